@@ -1,0 +1,141 @@
+"""The one protocol of everything that estimates, and :func:`run`.
+
+Filters, networks, adaptive filters and wrapped packages look the same: ``init`` makes the memory, ``step`` turns
+memory and measurement into new memory and an estimate. Estimators are immutable; all memory is the state, so saving,
+restoring, batching and looking ahead need nothing more.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Protocol, Self, TypeVar, runtime_checkable
+
+import numpy as np
+
+from .backend import Array, is_torch, namespace
+from .quantity import Channel, Estimate, Measurement, Quantity
+
+S = TypeVar("S")
+
+
+@runtime_checkable
+class Estimator(Protocol[S]):
+    """Anything that estimates a pose from a stream of measurements.
+
+    Attributes:
+        dt: sampling interval, s.
+        channels: what it reads; other channels of a measurement are ignored.
+        outputs: the quantities that its estimates hold.
+    """
+
+    @property
+    def dt(self) -> float: ...
+    @property
+    def channels(self) -> tuple[Channel, ...]: ...
+    @property
+    def outputs(self) -> tuple[Quantity, ...]: ...
+
+    def with_dt(self, dt: float) -> Self:
+        """The same estimator for samples ``dt`` seconds apart."""
+        ...
+
+    def init(self, measurement: Measurement) -> S:
+        """Memory before the first sample, with the batch shape and array kind of ``measurement``."""
+        ...
+
+    def step(self, state: S, measurement: Measurement) -> tuple[S, Estimate]:
+        """Take one sample (arrays ``(*batch, size)``); NaN where a channel brought none."""
+        ...
+
+
+def check_measurements(
+    channels: tuple[Channel, ...], measurements: Mapping[str, Any], *, time_axis: bool
+) -> dict[str, Array]:
+    """Return the needed channels as arrays of one common leading shape.
+
+    Args:
+        channels: what is needed.
+        measurements: channel name → ``([T,] *batch, size)``.
+        time_axis: whether the first axis is time, which then must not be empty.
+
+    Raises:
+        ValueError: a channel is missing, is no array of real numbers, has the wrong width, or another leading shape
+            than the first; or there is no sample at all.
+    """
+    if not isinstance(measurements, Mapping):
+        raise ValueError(
+            f"measurements must be a mapping from channel name to array, got {type(measurements).__name__}"
+        )
+    missing = [channel.name for channel in channels if channel.name not in measurements]
+    if missing:
+        raise ValueError(f"measurements lack the channels {missing}; given are {sorted(measurements)}")
+    arrays: dict[str, Array] = {}
+    leading: tuple[int, ...] | None = None
+    for channel in channels:
+        array = measurements[channel.name]
+        if not is_torch(array):
+            array = np.asarray(array)
+            if array.dtype.kind not in "fiub":
+                raise ValueError(f"channel {channel.name!r} must hold real numbers, got dtype {array.dtype}")
+            array = array.astype(float, copy=False)
+        least = 2 if time_axis else 1
+        shape = tuple(array.shape)
+        if len(shape) < least or shape[-1] != channel.size:
+            wanted = f"({'T, ' if time_axis else ''}..., {channel.size})"
+            raise ValueError(f"channel {channel.name!r} must have shape {wanted}, got {shape}")
+        if leading is None:
+            leading = shape[:-1]
+        elif shape[:-1] != leading:
+            raise ValueError(
+                f"channel {channel.name!r} has leading shape {shape[:-1]}, but {channels[0].name!r} has {leading}"
+            )
+        arrays[channel.name] = array
+    if time_axis and leading is not None and leading[0] == 0:
+        raise ValueError("measurements are empty: at least one sample is needed")
+    return arrays
+
+
+def stack_estimates(estimates: list[Estimate]) -> Estimate:
+    """Join estimates of single ticks along a new first axis, time."""
+
+    def join(parts: list[Any]) -> Any:
+        return None if parts[0] is None else namespace(parts[0]).stack(parts, axis=0)
+
+    pose = {name: join([estimate.pose[name] for estimate in estimates]) for name in estimates[0].pose}
+    return Estimate(pose, *(join([estimate[index] for estimate in estimates]) for index in (1, 2, 3)))
+
+
+def run_by_steps(estimator: Estimator[Any], measurements: Mapping[str, Any]) -> Estimate:
+    """Run an estimator sample by sample: the definition that every faster ``run`` must equal.
+
+    Args:
+        estimator: the estimator.
+        measurements: channel name → ``(T, *batch, size)``.
+    """
+    arrays = check_measurements(estimator.channels, measurements, time_axis=True)
+    length = next(iter(arrays.values())).shape[0]
+    state = estimator.init({name: array[0] for name, array in arrays.items()})
+    estimates = []
+    for t in range(length):
+        state, estimate = estimator.step(state, {name: array[t] for name, array in arrays.items()})
+        estimates.append(estimate)
+    return stack_estimates(estimates)
+
+
+def run(estimator: Estimator[Any], measurements: Mapping[str, Any]) -> Estimate:
+    """Run an estimator over a whole sequence.
+
+    Args:
+        estimator: from :func:`poise.make_estimator`, or anything that follows :class:`Estimator`.
+        measurements: channel name → ``(T, *batch, size)``, sampled every ``estimator.dt`` seconds; NaN where a
+            channel brought no sample (the filters predict through it).
+
+    Returns:
+        The estimate of every tick, time first.
+
+    Raises:
+        ValueError: see :func:`check_measurements`.
+    """
+    arrays = check_measurements(estimator.channels, measurements, time_axis=True)
+    own = getattr(estimator, "run", None)
+    return own(arrays) if own is not None else run_by_steps(estimator, arrays)
