@@ -1,0 +1,61 @@
+# One environment, .venv, made on demand by every target that needs it. PYTHON=python3.12 make install picks another Python.
+
+SHELL := /bin/bash
+.SHELLFLAGS := -eu -o pipefail -c
+.DEFAULT_GOAL := help
+.DELETE_ON_ERROR:
+.PHONY: help install benchmark speed test test-slow check format clean
+
+VENV := .venv
+BIN := $(abspath $(VENV))/bin
+STAMP := $(VENV)/.installed
+TYPECHECK := build/typecheck
+ARGS ?=
+WORKERS ?= 2
+
+# The first Python that runs and is new enough: a version manager may put a dead `python3.11` on the path.
+ifeq ($(origin PYTHON), undefined)
+PYTHON = $(shell for p in python3.11 python3 python; do \
+	"$$p" -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && echo "$$p" && break; done)
+endif
+
+help: ## list the targets
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-11s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
+
+install: $(STAMP) ## make .venv with the tested versions of everything (again only when the requirements change)
+
+$(STAMP): pyproject.toml constraints.txt
+	@test -n "$(PYTHON)" || { echo "make: no Python 3.11 or newer found; name one with PYTHON=…" >&2; exit 1; }
+	@rm -f $@
+	@test -x $(BIN)/pip || "$(PYTHON)" -m venv --clear $(VENV)
+	@echo "Installing into $(VENV) (minutes the first time) …"
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --progress-bar off -c constraints.txt -e '.[compare,dev]'
+	@touch $@
+
+benchmark: $(STAMP) ## compare all estimators on all environments, quick form; options in ARGS="…"
+	$(BIN)/poise benchmark $(ARGS)
+
+speed: $(STAMP) ## steps a second of environments and estimators; options in ARGS="…"
+	$(BIN)/poise speed $(ARGS)
+
+test: check ## lint, types and the tests of every day; ARGS="-k name" picks some
+	$(BIN)/python -m pytest -n $(WORKERS) --dist loadfile $(ARGS)
+
+test-slow: $(STAMP) ## the long tests: training, long rollouts
+	$(BIN)/python -m pytest -m slow $(ARGS)
+
+# Types are checked on a copy named poise, so that the folder of the clone may have any name.
+check: $(STAMP) ## lint, formatting, types
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	@rm -rf $(TYPECHECK) build/lib
+	@$(BIN)/python -c 'import setuptools; setuptools.setup()' --quiet build_py --build-lib $(TYPECHECK)
+	cd $(TYPECHECK) && $(BIN)/python -m mypy --config-file $(CURDIR)/pyproject.toml --cache-dir $(CURDIR)/.mypy_cache -p poise
+
+format: $(STAMP) ## put the code into the common form
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+clean: ## remove what was built, .venv and runs/ excepted
+	rm -rf build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis *.egg-info
+	find . -name __pycache__ -not -path './$(VENV)/*' -prune -exec rm -rf {} +
