@@ -1,0 +1,141 @@
+"""What a published filter contributes: its equations. The recursion around them is :mod:`poise.filters.kalman`.
+
+A model is a frozen dataclass whose fields are its parameters (floats with unit and source) and whose methods are its
+equations, written over ``xp = namespace(x)`` for arrays ``(*batch, …)``. The same lines run on NumPy, on torch and, traced
+once, as compiled code.
+"""
+
+from __future__ import annotations
+
+import copy
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, fields, replace
+from typing import Any, ClassVar, Self
+
+from .backend import Array
+from .quantity import Channel, Measurement, Quantity
+
+
+@dataclass(frozen=True)
+class Gain:
+    """A tuning constant that may be scaled at every tick, by a log factor: 0 is the published tuning.
+
+    Attributes:
+        parameter: the model's field that is scaled.
+        power: the field is multiplied by ``exp(power * log_factor)``. 0.5 for a standard deviation: the log factor then
+            scales the variance, that is Q or R.
+        maximum: the scaled field never exceeds this.
+        description: what the gain does, in one line.
+    """
+
+    parameter: str
+    power: float = 0.5
+    maximum: float = math.inf
+    description: str = ""
+
+
+@dataclass(frozen=True)
+class Model:
+    """Equations of a filter with state x (``n`` numbers) and error state (``e`` numbers).
+
+    Subclasses set the class attributes and write ``prior``, ``predict``, ``residual`` and ``pose``; ``retract`` and
+    ``finish`` have defaults. Attributes of the class:
+
+    * ``channels``: what is read. ``outputs``: quantities of ``pose``.
+    * ``state_size`` n, ``error_size`` e, ``residual_size`` m.
+    * ``gains``: name → :class:`Gain`.
+
+    Measurements arrive as channel → ``(*batch, size)``. ``predict`` and ``prior`` see each channel's last sample (zeros in
+    ``predict`` if there was none yet); ``residual`` and ``finish`` see NaN where this tick brought none.
+    A float parameter may be an array ``(*batch,)``: use :func:`poise.filters.backend.expand` where it scales a matrix.
+    """
+
+    dt: float = 0.01
+    """sampling interval, s"""
+
+    channels: ClassVar[tuple[Channel, ...]]
+    outputs: ClassVar[tuple[Quantity, ...]]
+    state_size: ClassVar[int]
+    error_size: ClassVar[int]
+    residual_size: ClassVar[int]
+    gains: ClassVar[Mapping[str, Gain]] = {}
+
+    def __post_init__(self) -> None:
+        """Refuse parameters that are not finite numbers and intervals that are not positive."""
+        for name, value in parameters_of(self).items():
+            if not math.isfinite(value):
+                raise ValueError(f"{type(self).__name__}: parameter {name} must be a finite number, got {value}")
+        if self.dt <= 0.0:
+            raise ValueError(f"{type(self).__name__}: dt must be positive seconds, got {self.dt}")
+
+    def prior(self, z: Measurement) -> tuple[Array, Array]:
+        """State ``(..., n)`` and covariance ``(..., e, e)`` from the first samples; NaN while they do not suffice."""
+        raise NotImplementedError
+
+    def predict(self, x: Array, z: Measurement, previous: Measurement) -> tuple[Array, Array, Array]:
+        """State after one interval, Jacobian F ``(..., e, e)`` of its error, and process covariance Q.
+
+        ``z`` holds the samples of the tick that is predicted to, ``previous`` those of the tick before.
+        """
+        raise NotImplementedError
+
+    def residual(self, x: Array, z: Measurement) -> tuple[Array, Array, Array]:
+        """Measured minus expected ``(..., m)``, Jacobian H ``(..., m, e)`` of the expectation, covariance R.
+
+        A row with anything not finite corrects nothing.
+        """
+        raise NotImplementedError
+
+    def retract(self, x: Array, dx: Array) -> Array:
+        """The state ``x`` corrected by the error ``dx``: a sum, unless the state holds rotations."""
+        return x + dx
+
+    def finish(self, x: Array, z: Measurement) -> Array:
+        """Last word of a tick, after the correction: normalise, remember what the next tick needs."""
+        return x
+
+    def pose(self, x: Array) -> dict[str, Array]:
+        """The quantities that the state tells."""
+        raise NotImplementedError
+
+    def with_dt(self, dt: float) -> Self:
+        """The same model for another sampling interval."""
+        return replace(self, dt=float(dt))
+
+
+def parameters_of(model: Model) -> dict[str, float]:
+    """The numbers a model is tuned by: every float of its fields, by a name such as ``lever_arm[0]``."""
+    return {path: value for path, value in _leaves(model) if isinstance(value, float)}
+
+
+def structure_of(model: Model) -> tuple[Any, ...]:
+    """What is not a float and so is fixed when a model is compiled: its class and its integers, booleans and texts."""
+    return (type(model), *((path, value) for path, value in _leaves(model) if not isinstance(value, float)))
+
+
+def with_parameters(model: Model, values: Mapping[str, Any]) -> Model:
+    """A copy whose floats are replaced (by arrays or traced scalars too), without the checks of construction."""
+    changed = copy.copy(model)
+    for field in fields(model):
+        object.__setattr__(changed, field.name, _rebuild(field.name, getattr(model, field.name), values))
+    return changed
+
+
+def _leaves(model: Model) -> Iterator[tuple[str, Any]]:
+    for field in fields(model):
+        yield from _walk(field.name, getattr(model, field.name))
+
+
+def _walk(path: str, value: Any) -> Iterator[tuple[str, Any]]:
+    if isinstance(value, tuple):
+        for index, item in enumerate(value):
+            yield from _walk(f"{path}[{index}]", item)
+    else:
+        yield path, value
+
+
+def _rebuild(path: str, value: Any, values: Mapping[str, Any]) -> Any:
+    if isinstance(value, tuple):
+        return tuple(_rebuild(f"{path}[{index}]", item, values) for index, item in enumerate(value))
+    return values.get(path, value)

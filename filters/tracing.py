@@ -1,0 +1,365 @@
+"""Record what model code computes, to print it as straight-line code.
+
+Model code runs once on object arrays of :class:`Expression`. Every operation makes a node; equal operations on equal
+operands make the same node (common subexpressions are found while recording), and zeros and ones are folded away, so
+the sparsity of Jacobians is known. Operations are kept in the order in which they were written: the printed code
+computes what NumPy computes, to rounding.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from typing import Any
+
+import numpy as np
+
+
+class Tape:
+    """The nodes of one recording, in order of creation."""
+
+    def __init__(self) -> None:
+        self.nodes: dict[tuple[Any, ...], Expression] = {}
+
+    def node(self, operation: str, *operands: Any) -> Expression:
+        """The node of an operation: a new one, or the one that was recorded before."""
+        key = (operation, *(operand.index if isinstance(operand, Expression) else operand for operand in operands))
+        found = self.nodes.get(key)
+        if found is None:
+            found = self.nodes[key] = Expression(self, len(self.nodes), operation, operands)
+        return found
+
+    def constant(self, value: float) -> Expression:
+        """The node of a number."""
+        return self.node("constant", repr(float(value)))
+
+    def inputs(self, name: str, size: int) -> np.ndarray:
+        """Object array ``(size,)`` of inputs that print as ``name[0]``, ``name[1]`` …"""
+        array = np.empty(size, dtype=object)
+        for index in range(size):
+            array[index] = self.node("input", f"{name}[{index}]")
+        return array
+
+
+class Expression:
+    """One recorded scalar; behaves like an array without axes in model code."""
+
+    __slots__ = ("index", "operands", "operation", "tape")
+
+    dtype = np.dtype(object)
+    ndim = 0
+    shape = ()
+
+    def __init__(self, tape: Tape, index: int, operation: str, operands: tuple[Any, ...]) -> None:
+        self.tape, self.index, self.operation, self.operands = tape, index, operation, operands
+
+    @property
+    def value(self) -> float | None:
+        """The number that this node is, or None."""
+        return float(self.operands[0]) if self.operation == "constant" else None
+
+    def _other(self, other: Any) -> Expression | None:
+        if isinstance(other, Expression):
+            return other
+        return self.tape.constant(other) if isinstance(other, (int, float, np.number)) else None
+
+    def _fold(self, function: Callable[..., float], *operands: Expression) -> Expression | None:
+        values = [operand.value for operand in operands]
+        return None if None in values else self.tape.constant(function(*values))
+
+    def __add__(self, other: Any) -> Any:
+        right = self._other(other)
+        if right is None:
+            return NotImplemented
+        if right.value == 0.0:
+            return self
+        if self.value == 0.0:
+            return right
+        return self._fold(lambda a, b: a + b, self, right) or self.tape.node("+", self, right)
+
+    def __radd__(self, other: Any) -> Any:
+        left = self._other(other)
+        return NotImplemented if left is None else left + self
+
+    def __neg__(self) -> Expression:
+        if self.operation == "neg":
+            return self.operands[0]
+        return self._fold(lambda a: -a, self) or self.tape.node("neg", self)
+
+    def __pos__(self) -> Expression:
+        return self
+
+    def __sub__(self, other: Any) -> Any:
+        right = self._other(other)
+        if right is None:
+            return NotImplemented
+        if right.value == 0.0:
+            return self
+        if self.value == 0.0:
+            return -right
+        return self._fold(lambda a, b: a - b, self, right) or self.tape.node("-", self, right)
+
+    def __rsub__(self, other: Any) -> Any:
+        left = self._other(other)
+        return NotImplemented if left is None else left - self
+
+    def __mul__(self, other: Any) -> Any:
+        right = self._other(other)
+        if right is None:
+            return NotImplemented
+        for one, two in ((self, right), (right, self)):
+            if one.value == 0.0:
+                return self.tape.constant(0.0)
+            if one.value == 1.0:
+                return two
+            if one.value == -1.0:
+                return -two
+        return self._fold(lambda a, b: a * b, self, right) or self.tape.node("*", self, right)
+
+    def __rmul__(self, other: Any) -> Any:
+        left = self._other(other)
+        return NotImplemented if left is None else left * self
+
+    def __truediv__(self, other: Any) -> Any:
+        right = self._other(other)
+        if right is None:
+            return NotImplemented
+        if self.value == 0.0:
+            return self
+        if right.value == 1.0:
+            return self
+        return self._fold(lambda a, b: a / b, self, right) or self.tape.node("/", self, right)
+
+    def __rtruediv__(self, other: Any) -> Any:
+        left = self._other(other)
+        return NotImplemented if left is None else left / self
+
+    def __pow__(self, exponent: Any) -> Any:
+        if isinstance(exponent, int) and exponent == 1:
+            return self
+        if isinstance(exponent, int) and exponent == 2:
+            return self * self
+        if isinstance(exponent, (int, float)):
+            return self._fold(lambda a: a**exponent, self) or self.tape.node("**", self, repr(exponent))
+        return NotImplemented
+
+    def __getitem__(self, key: Any) -> np.ndarray:
+        array = np.empty((), dtype=object)
+        array[()] = self
+        return array[key]
+
+    def __len__(self) -> int:
+        raise TypeError("a traced scalar has no length")
+
+    def __bool__(self) -> bool:
+        raise TypeError("model code must not branch on values: use xp.where, xp.greater, xp.less, xp.logical_and …")
+
+    def __float__(self) -> float:
+        raise TypeError("model code must not turn values into Python numbers")
+
+    def __repr__(self) -> str:
+        return f"<{self.operation} {self.index}>"
+
+
+def _call(name: str, function: Callable[..., float] | None, arity: int) -> Callable[..., Any]:
+    """An elementwise function that records ``name`` (and is computed at once on plain numbers)."""
+
+    def scalar(*operands: Any) -> Any:
+        tape = next((operand.tape for operand in operands if isinstance(operand, Expression)), None)
+        if tape is None:
+            if function is None:
+                raise TypeError(f"{name} on plain numbers cannot be traced")
+            return function(*operands)
+        nodes = [operand if isinstance(operand, Expression) else tape.constant(operand) for operand in operands]
+        values = [node.value for node in nodes]
+        if function is not None and None not in values:
+            return tape.constant(function(*values))
+        return tape.node(name, *nodes)
+
+    vectorised = np.frompyfunc(scalar, arity, 1)
+
+    def apply(*arrays: Any) -> Any:
+        return vectorised(*(_objects(array) for array in arrays))
+
+    return apply
+
+
+def _objects(array: Any) -> np.ndarray:
+    if isinstance(array, Expression):
+        return array[...]
+    return np.asarray(array, dtype=object)
+
+
+def _choose(condition: Any, first: Any, second: Any) -> Any:
+    if not isinstance(condition, Expression):
+        return first if condition else second
+    if first is second:
+        return first
+    if condition.value is not None:
+        return first if condition.value else second
+    tape = condition.tape
+    nodes = [part if isinstance(part, Expression) else tape.constant(part) for part in (first, second)]
+    return nodes[0] if nodes[0] is nodes[1] else tape.node("where", condition, *nodes)
+
+
+class TracedNamespace:
+    """The array functions that model code may use, on object arrays of expressions; names as in the array API."""
+
+    nan = math.nan
+    inf = math.inf
+    pi = math.pi
+
+    sin = staticmethod(_call("sin", math.sin, 1))
+    cos = staticmethod(_call("cos", math.cos, 1))
+    tan = staticmethod(_call("tan", math.tan, 1))
+    asin = staticmethod(_call("asin", math.asin, 1))
+    acos = staticmethod(_call("acos", math.acos, 1))
+    atan2 = staticmethod(_call("atan2", math.atan2, 2))
+    sqrt = staticmethod(_call("sqrt", math.sqrt, 1))
+    exp = staticmethod(_call("exp", math.exp, 1))
+    log = staticmethod(_call("log", math.log, 1))
+    abs = staticmethod(_call("fabs", math.fabs, 1))
+    floor = staticmethod(_call("floor", math.floor, 1))
+    isfinite = staticmethod(_call("isfinite", None, 1))
+    greater = staticmethod(_call(">", lambda a, b: float(a > b), 2))
+    greater_equal = staticmethod(_call(">=", lambda a, b: float(a >= b), 2))
+    less = staticmethod(_call("<", lambda a, b: float(a < b), 2))
+    less_equal = staticmethod(_call("<=", lambda a, b: float(a <= b), 2))
+    logical_and = staticmethod(_call("and", None, 2))
+    logical_or = staticmethod(_call("or", None, 2))
+    logical_not = staticmethod(_call("not", None, 1))
+
+    @staticmethod
+    def where(condition: Any, first: Any, second: Any) -> Any:
+        """Choose elementwise; both sides are computed."""
+        return np.frompyfunc(_choose, 3, 1)(_objects(condition), _objects(first), _objects(second))
+
+    @staticmethod
+    def minimum(a: Any, b: Any) -> Any:
+        """The smaller one, elementwise."""
+        return TracedNamespace.where(TracedNamespace.less(b, a), b, a)
+
+    @staticmethod
+    def maximum(a: Any, b: Any) -> Any:
+        """The larger one, elementwise."""
+        return TracedNamespace.where(TracedNamespace.greater(b, a), b, a)
+
+    @staticmethod
+    def stack(arrays: Iterable[Any], axis: int = 0) -> np.ndarray:
+        """Join along a new axis."""
+        return np.stack([_objects(array) for array in arrays], axis=axis)
+
+    @staticmethod
+    def concat(arrays: Iterable[Any], axis: int = 0) -> np.ndarray:
+        """Join along an axis that is there."""
+        return np.concatenate([_objects(array) for array in arrays], axis=axis)
+
+    @staticmethod
+    def sum(array: Any, axis: int | None = None, keepdims: bool = False) -> Any:
+        """Sum of elements."""
+        return np.sum(_objects(array), axis=axis, keepdims=keepdims)
+
+    @staticmethod
+    def all(array: Any, axis: int = -1) -> Any:
+        """Whether all elements along an axis are true."""
+        return TracedNamespace._reduce(TracedNamespace.logical_and, array, axis)
+
+    @staticmethod
+    def any(array: Any, axis: int = -1) -> Any:
+        """Whether any element along an axis is true."""
+        return TracedNamespace._reduce(TracedNamespace.logical_or, array, axis)
+
+    @staticmethod
+    def _reduce(function: Callable[..., Any], array: Any, axis: int) -> Any:
+        parts = np.moveaxis(_objects(array), axis, 0)
+        result = parts[0]
+        for part in parts[1:]:
+            result = function(result, part)
+        return result
+
+    @staticmethod
+    def matmul(a: Any, b: Any) -> np.ndarray:
+        """Matrix product."""
+        return _objects(a) @ _objects(b)
+
+    @staticmethod
+    def broadcast_to(array: Any, shape: tuple[int, ...]) -> np.ndarray:
+        """Repeat along leading axes."""
+        return np.broadcast_to(_objects(array), shape)
+
+    @staticmethod
+    def zeros_like(array: Any) -> np.ndarray:
+        """Zeros of the same shape."""
+        return 0.0 * _objects(array)
+
+    @staticmethod
+    def ones_like(array: Any) -> np.ndarray:
+        """Ones of the same shape."""
+        return 0.0 * _objects(array) + 1.0
+
+    @staticmethod
+    def eye(size: int) -> np.ndarray:
+        """Identity matrix of plain numbers."""
+        return np.eye(size).astype(object)
+
+
+INFIX = {"+", "-", "*", "/", ">", ">=", "<", "<=", "and", "or"}
+
+
+def print_code(outputs: dict[str, np.ndarray], *, indent: str = "    ") -> list[str]:
+    """Print straight-line Python that computes recorded outputs.
+
+    Args:
+        outputs: name of an array that exists in the printed scope → object array of what to write into it. Elements
+            that are exactly zero are not written: the caller clears the arrays once.
+        indent: put before every line.
+
+    Returns:
+        Lines of code that use ``sin``, ``sqrt`` … of :mod:`math` and ``isfinite`` by these names.
+    """
+    live: dict[int, Expression] = {}
+    pending = [item for array in outputs.values() for item in array.ravel() if isinstance(item, Expression)]
+    while pending:
+        node = pending.pop()
+        if node.index not in live:
+            live[node.index] = node
+            pending.extend(operand for operand in node.operands if isinstance(operand, Expression))
+    lines = []
+    for index in sorted(live):
+        node = live[index]
+        if node.operation not in ("input", "constant"):
+            lines.append(f"{indent}v{index} = {_formula(node)}")
+    for name, array in outputs.items():
+        for position in np.ndindex(array.shape):
+            item = array[position]
+            number = item.value if isinstance(item, Expression) else float(item)
+            if number != 0.0:
+                lines.append(f"{indent}{name}[{', '.join(map(str, position))}] = {_name(item)}")
+    return lines
+
+
+def _name(item: Any) -> str:
+    if not isinstance(item, Expression):
+        return _number(float(item))
+    if item.operation == "constant":
+        return _number(float(item.operands[0]))
+    return item.operands[0] if item.operation == "input" else f"v{item.index}"
+
+
+def _number(value: float) -> str:
+    return repr(value) if math.isfinite(value) else ("nan" if math.isnan(value) else "inf" if value > 0 else "-inf")
+
+
+def _formula(node: Expression) -> str:
+    operands = [_name(operand) if isinstance(operand, Expression) else operand for operand in node.operands]
+    if node.operation in INFIX:
+        return f"{operands[0]} {node.operation} ({operands[1]})"
+    if node.operation == "neg":
+        return f"-({operands[0]})"
+    if node.operation == "not":
+        return f"not {operands[0]}"
+    if node.operation == "**":
+        return f"({operands[0]})**{operands[1]}"
+    if node.operation == "where":
+        return f"{operands[1]} if {operands[0]} else {operands[2]}"
+    return f"{node.operation}({', '.join(operands)})"
