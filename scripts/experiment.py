@@ -1,0 +1,224 @@
+"""A run of a command and what it leaves behind: ``runs/<command>/<time>-<seed>/``.
+
+| file | holds |
+|---|---|
+| ``args.json`` | command, seed and every argument |
+| ``versions.json`` | Python, platform, poise (with commit), packages |
+| ``results.csv`` | one number a row: estimator, trajectory, quantity, metric, value, unit |
+| ``report.md`` | what a person reads |
+| ``figures/`` | plots, drawn from ``results.csv`` |
+"""
+
+from __future__ import annotations
+
+import csv
+import dataclasses
+import enum
+import io
+import json
+import os
+import platform
+import subprocess
+import tempfile
+from collections.abc import Iterable, Mapping, Sequence
+from datetime import datetime
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .tables import markdown_table, records
+
+COLUMNS = ("estimator", "trajectory", "quantity", "metric", "value", "unit")
+"""Columns of ``results.csv``."""
+
+PACKAGES = (
+    "numpy",
+    "scipy",
+    "numba",
+    "filterpy",
+    "gymnasium",
+    "pybullet",
+    "torch",
+    "stable-baselines3",
+    "vqf",
+    "imufusion",
+)
+"""Packages whose versions can change a result."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Run:
+    """One run of a command: its folder and the seed it started from."""
+
+    folder: Path
+    """``<root>/<command>/<time>-<seed>``."""
+    command: str
+    """Name of the command."""
+    seed: int
+    """Root seed; children come from :func:`seeds`."""
+
+    @property
+    def figures(self) -> Path:
+        """Folder of the plots."""
+        return self.folder / "figures"
+
+    @property
+    def results(self) -> Path:
+        """Path of the table of results."""
+        return self.folder / "results.csv"
+
+    def write_results(self, rows: Iterable[Any]) -> Path:
+        """Write all results so far; see :func:`write_results`."""
+        return write_results(self.results, rows)
+
+    def write_report(self, title: str, sections: Mapping[str, str]) -> Path:
+        """Write ``report.md``: a title, then a heading and Markdown text a section."""
+        parts = [f"# {title}", *(f"## {heading}\n\n{text.strip()}" for heading, text in sections.items())]
+        return write_text(self.folder / "report.md", "\n\n".join(parts) + "\n")
+
+
+def start_run(command: str, args: Any, seed: int, root: str | Path = "runs") -> Run:
+    """Make the folder of a new run and write down its arguments and versions.
+
+    Args:
+        command: name of the command, the folder above the run's.
+        args: its arguments, a dataclass instance or a mapping.
+        seed: root seed.
+        root: folder of all runs; made if missing.
+
+    Returns:
+        The run; its folder did not exist before, also when two runs start within a second.
+    """
+    now = datetime.now().astimezone()
+    folder = new_folder(Path(root) / command, f"{now:%Y%m%d-%H%M%S}-{seed}")
+    run = Run(folder, command, seed)
+    run.figures.mkdir()
+    write_json(folder / "args.json", {"command": command, "seed": seed, "args": args})
+    write_json(folder / "versions.json", {"started": now.isoformat(timespec="seconds"), **versions()})
+    return run
+
+
+def new_folder(parent: Path, name: str) -> Path:
+    """Make and return ``parent/name``, with ``-2``, ``-3`` … appended if that is taken."""
+    parent.mkdir(parents=True, exist_ok=True)
+    attempt = 1
+    while True:
+        folder = parent / (name if attempt == 1 else f"{name}-{attempt}")
+        try:
+            folder.mkdir()
+        except FileExistsError:
+            attempt += 1
+        else:
+            return folder
+
+
+def seeds(root: int, n: int) -> tuple[int, ...]:
+    """Return ``n`` independent child seeds of ``root``, each below 2³²; a larger ``n`` keeps the first ones."""
+    return tuple(int(child.generate_state(1)[0]) for child in np.random.SeedSequence(root).spawn(n))
+
+
+def write_results(path: Path, rows: Iterable[Any]) -> Path:
+    """Write rows of results as CSV, in one move, so that a reader never sees half a file.
+
+    Args:
+        path: file to (re)place.
+        rows: mappings, named tuples, dataclass instances or a data frame, with exactly the fields :data:`COLUMNS`.
+
+    Raises:
+        ValueError: a row has other fields.
+    """
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(COLUMNS)
+    for record in records(rows):
+        if set(record) != set(COLUMNS):
+            raise ValueError(f"a result has the fields {', '.join(COLUMNS)}, got {', '.join(map(str, record))}")
+        writer.writerow([repr(float(record[name])) if name == "value" else record[name] for name in COLUMNS])
+    return write_text(path, text.getvalue())
+
+
+def results_markdown(rows: Iterable[Any]) -> str:
+    """Return rows of results as a Markdown table for a report."""
+    return markdown_table(rows, COLUMNS)
+
+
+def versions(packages: Sequence[str] = PACKAGES) -> dict[str, Any]:
+    """Return what a result depends on besides its arguments; imports none of the packages."""
+    return {
+        "python": platform.python_version(),
+        "platform": platform.platform(),
+        "processors": os.cpu_count(),
+        "poise": {"version": package_version("poise"), **git_state(Path(__file__).resolve().parents[1])},
+        "packages": {name: package_version(name) for name in packages},
+    }
+
+
+def package_version(name: str) -> str | None:
+    """Return the installed version of a package, None if it is not installed."""
+    try:
+        return version(name)
+    except PackageNotFoundError:
+        return None
+
+
+def git_state(checkout: Path) -> dict[str, Any]:
+    """Return commit and whether files differ from it; empty when ``checkout`` is no git checkout."""
+    # Without this test git would answer for a repository further up, that of somebody's project.
+    if not (checkout / ".git").exists():
+        return {}
+    try:
+        commit = _git(checkout, "rev-parse", "HEAD")
+        changed = bool(_git(checkout, "status", "--porcelain", "--untracked-files=no"))
+    except (OSError, subprocess.SubprocessError):
+        return {}
+    return {"commit": commit, "changed": changed}
+
+
+def _git(checkout: Path, *words: str) -> str:
+    return subprocess.run(
+        ["git", "-C", str(checkout), *words], capture_output=True, text=True, check=True, timeout=10
+    ).stdout.strip()
+
+
+def jsonable(value: Any) -> Any:
+    """Return ``value`` in JSON's types: dataclasses by field, paths and non-finite numbers as text, arrays as lists."""
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        return {field.name: jsonable(getattr(value, field.name)) for field in dataclasses.fields(value)}
+    if isinstance(value, Mapping):
+        return {str(key): jsonable(item) for key, item in value.items()}
+    if isinstance(value, enum.Enum):
+        return value.name
+    if isinstance(value, np.ndarray | np.generic):
+        return jsonable(value.tolist())
+    if isinstance(value, set | frozenset):
+        return sorted((jsonable(item) for item in value), key=str)
+    if isinstance(value, list | tuple):
+        return [jsonable(item) for item in value]
+    if value is None or isinstance(value, bool | int | str):
+        return value
+    if isinstance(value, float):
+        return value if np.isfinite(value) else str(value)
+    if isinstance(value, type) or callable(value):
+        return f"{value.__module__}.{value.__qualname__}" if hasattr(value, "__qualname__") else repr(value)
+    return str(value)
+
+
+def write_json(path: Path, value: Any) -> Path:
+    """Write ``value`` as indented JSON."""
+    return write_text(path, json.dumps(jsonable(value), indent=2, ensure_ascii=False, allow_nan=False) + "\n")
+
+
+def write_text(path: Path, text: str) -> Path:
+    """Write a whole text file in one move and return its path."""
+    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+    try:
+        with os.fdopen(handle, "w", encoding="utf-8", newline="\n") as file:
+            file.write(text)
+        os.chmod(temporary, 0o644)
+        os.replace(temporary, path)
+    except BaseException:
+        Path(temporary).unlink(missing_ok=True)
+        raise
+    return path

@@ -1,0 +1,155 @@
+"""The command ``poise``: finds a subcommand by name, parses its arguments, runs it.
+
+A subcommand is a module with a dataclass ``Args`` (a sentence under each field becomes its help) and
+``run(args) -> int``, which returns the exit status. Only the module of the chosen subcommand is imported, so
+``poise --help`` stays light.
+
+Exit status: 0 done, 2 wrong input, 130 interrupted, 141 nobody reads the output; whatever ``run`` returns otherwise.
+"""
+
+from __future__ import annotations
+
+import difflib
+import importlib
+import os
+import sys
+from collections.abc import Sequence
+from importlib.metadata import PackageNotFoundError, version
+from typing import NamedTuple, NoReturn
+
+import tyro
+from gymnasium.error import UnregisteredEnv
+
+USAGE_ERROR = 2
+INTERRUPTED = 130
+"""128 + SIGINT, as shells report it."""
+BROKEN_PIPE = 141
+"""128 + SIGPIPE: the reader of our output left (`poise … | head`)."""
+
+USER_ERRORS = (ValueError, FileNotFoundError, UnregisteredEnv)
+"""What wrong input raises; shown as one line. Anything else is a defect and keeps its traceback."""
+
+
+class Command(NamedTuple):
+    """Where a subcommand lives and what it does."""
+
+    module: str
+    """Module name, relative to this package."""
+    help: str
+    """One line for the list of commands."""
+
+
+COMMANDS: dict[str, Command] = {
+    "record": Command(".record", "record trajectories of an environment into files"),
+    "train": Command(".train", "train a learned estimator or a gain policy"),
+    "tune": Command(".tune", "fit a filter's gains to trajectories"),
+    "evaluate": Command(".evaluate", "measure estimators on recorded trajectories"),
+    "benchmark": Command(".benchmark", "compare all estimators on all environments"),
+    "speed": Command(".speed", "measure steps a second of environments and estimators"),
+}
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run ``poise`` and return its exit status.
+
+    Args:
+        argv: the words after ``poise``; those of the process if None.
+    """
+    words = list(sys.argv[1:] if argv is None else argv)
+    debug = "--debug" in words or os.environ.get("POISE_DEBUG", "0") not in ("", "0")
+    try:
+        status = dispatch([word for word in words if word != "--debug"])
+        # Here rather than at exit, where a reader that left could not be handled.
+        sys.stdout.flush()
+        return status
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return BROKEN_PIPE
+    except KeyboardInterrupt:
+        if debug:
+            raise
+        print("\npoise: interrupted", file=sys.stderr)
+        return INTERRUPTED
+    except USER_ERRORS as error:
+        if debug:
+            raise
+        return fail(f"{one_line(error)} (--debug shows where)")
+
+
+def dispatch(words: Sequence[str]) -> int:
+    """Do what ``words`` ask for: help, version, or a subcommand with its options."""
+    if not words or words[0] in ("-h", "--help"):
+        print(usage())
+        return 0 if words else USAGE_ERROR
+    name, *rest = words
+    if name == "--version":
+        print(f"poise {installed_version()}")
+        return 0
+    if name not in COMMANDS:
+        return fail(unknown_command(name))
+    return run(name, rest)
+
+
+def run(name: str, words: Sequence[str]) -> int:
+    """Import the subcommand ``name``, parse ``words`` into its ``Args`` and run it."""
+    command = COMMANDS[name]
+    module = importlib.import_module(command.module, __package__)
+    args = tyro.cli(module.Args, args=list(words), prog=f"poise {name}", description=module.__doc__)
+    return int(module.run(args))
+
+
+def run_command(name: str) -> NoReturn:
+    """Leave the process through the subcommand ``name``; serves ``python -m poise.scripts.<name>``."""
+    sys.exit(main([name, *sys.argv[1:]]))
+
+
+def usage() -> str:
+    """Return the help of ``poise`` itself."""
+    width = max(len(name) for name in COMMANDS)
+    return "\n".join(
+        [
+            "usage: poise COMMAND [options]",
+            "",
+            "Pose from inertial sensors: environments, estimators, comparisons.",
+            "",
+            "commands:",
+            *(f"  {name:<{width}}  {command.help}" for name, command in COMMANDS.items()),
+            "",
+            "options:",
+            "  -h, --help  this text; `poise COMMAND --help` explains a command",
+            "  --version   the version",
+            "  --debug     show the traceback of an error (also POISE_DEBUG=1)",
+        ]
+    )
+
+
+def installed_version() -> str:
+    """Return the version of the installed package."""
+    try:
+        return version("poise")
+    except PackageNotFoundError:
+        return "unknown (not installed)"
+
+
+def unknown_command(name: str) -> str:
+    """Explain that ``name`` is no command, with the nearest one that is."""
+    near = difflib.get_close_matches(name, COMMANDS, n=1)
+    hint = f", did you mean {near[0]!r}?" if near else ""
+    return f"unknown command {name!r}{hint} (commands: {', '.join(COMMANDS)})"
+
+
+def one_line(error: BaseException) -> str:
+    """Return the message of ``error`` on one line."""
+    if isinstance(error, OSError) and error.filename is not None:
+        return f"{error.filename}: {error.strerror}"
+    return " ".join(str(error).split()) or type(error).__name__
+
+
+def fail(message: str) -> int:
+    """Print an error in the form of compilers and return the exit status of wrong input."""
+    print(f"poise: error: {message}", file=sys.stderr)
+    return USAGE_ERROR
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,206 @@
+"""What a run leaves behind: folder, arguments, versions, results, report; and the tables that show rows."""
+
+from __future__ import annotations
+
+import csv
+import dataclasses
+import enum
+import json
+import math
+import subprocess
+import sys
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+import pytest
+from rich.console import Console
+
+from poise.scripts import experiment, tables
+
+
+class Grade(enum.Enum):
+    GOOD = 1
+
+
+@dataclasses.dataclass(frozen=True)
+class Noise:
+    gyro: float = 0.01
+
+
+@dataclasses.dataclass
+class Args:
+    data: Path = Path("rides/a.h5")
+    noise: Noise = Noise()
+    names: tuple[str, ...] = ("a", "b")
+    limit: float = math.inf
+    grade: Grade = Grade.GOOD
+    missing: int | None = None
+
+
+class Result(NamedTuple):
+    estimator: str
+    trajectory: str
+    quantity: str
+    metric: str
+    value: float
+    unit: str
+
+
+ROW = Result("vqf", "hand-0", "orientation", "rmse", 1.0 / 3.0, "deg")
+
+
+@pytest.fixture
+def run(tmp_path: Path) -> experiment.Run:
+    return experiment.start_run("benchmark", Args(), seed=3, root=tmp_path / "runs")
+
+
+def test_run_folder(run: experiment.Run, tmp_path: Path) -> None:
+    assert run.folder.parent == tmp_path / "runs" / "benchmark"
+    assert run.folder.name.endswith("-3")
+    assert run.figures.is_dir()
+    assert {path.name for path in run.folder.iterdir()} == {"args.json", "versions.json", "figures"}
+
+
+def test_runs_within_a_second_are_apart(tmp_path: Path) -> None:
+    folders = {experiment.start_run("train", {}, seed=0, root=tmp_path).folder for _ in range(5)}
+    assert len(folders) == 5
+
+
+def test_arguments_are_written_as_json(run: experiment.Run) -> None:
+    assert json.loads((run.folder / "args.json").read_text()) == {
+        "command": "benchmark",
+        "seed": 3,
+        "args": {
+            "data": str(Path("rides/a.h5")),
+            "noise": {"gyro": 0.01},
+            "names": ["a", "b"],
+            "limit": "inf",
+            "grade": "GOOD",
+            "missing": None,
+        },
+    }
+
+
+@pytest.mark.parametrize(
+    ("value", "expected"),
+    [
+        (np.float64(0.5), 0.5),
+        (np.int32(4), 4),
+        (np.array([[1.0, np.nan]]), [[1.0, "nan"]]),
+        ({2: {"b", "a"}}, {"2": ["a", "b"]}),
+        (Noise, f"{__name__}.Noise"),
+        (True, True),
+        (1 + 2j, "(1+2j)"),
+    ],
+)
+def test_jsonable(value: Any, expected: Any) -> None:
+    assert experiment.jsonable(value) == expected
+
+
+def test_versions(run: experiment.Run) -> None:
+    found = json.loads((run.folder / "versions.json").read_text())
+    assert found["poise"]["version"] == version("poise")
+    assert found["packages"]["numpy"] == np.__version__
+    assert found["packages"]["stable-baselines3"] == version("stable-baselines3")
+    assert {"python", "platform", "processors", "started"} <= set(found)
+
+
+def test_versions_import_nothing_heavy() -> None:
+    code = (
+        "import sys; from poise.scripts.experiment import versions; versions();"
+        "sys.exit(', '.join({'torch', 'pybullet', 'stable_baselines3', 'numba'} & set(sys.modules)) or 0)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+
+
+def test_a_package_that_is_missing_has_no_version() -> None:
+    assert experiment.versions(["no-such-package-here"])["packages"] == {"no-such-package-here": None}
+
+
+def test_commit_of_a_checkout_only(tmp_path: Path) -> None:
+    def git(*words: str) -> None:
+        identity = ["-c", "user.name=t", "-c", "user.email=t@example.org"]
+        subprocess.run(["git", "-C", str(tmp_path), *identity, *words], check=True, capture_output=True)
+
+    git("init")
+    (tmp_path / "file").write_text("1")
+    (tmp_path / "inner").mkdir()
+    git("add", "file")
+    git("commit", "-m", "first")
+    state = experiment.git_state(tmp_path)
+    assert len(state["commit"]) == 40
+    assert state["changed"] is False
+    (tmp_path / "file").write_text("22")
+    assert experiment.git_state(tmp_path)["changed"] is True
+    assert experiment.git_state(tmp_path / "inner") == {}
+
+
+@pytest.mark.parametrize("rows", [[ROW], [ROW._asdict()], pd.DataFrame([ROW])], ids=["tuple", "mapping", "frame"])
+def test_results_come_back_exactly(run: experiment.Run, rows: Any) -> None:
+    path = run.write_results(rows)
+    with path.open(newline="") as file:
+        (row,) = csv.DictReader(file)
+    assert list(row) == ["estimator", "trajectory", "quantity", "metric", "value", "unit"]
+    assert float(row["value"]) == ROW.value
+    assert row["estimator"] == "vqf"
+
+
+def test_a_row_of_the_wrong_shape_leaves_the_old_results(run: experiment.Run) -> None:
+    before = run.write_results([ROW]).read_text()
+    with pytest.raises(ValueError, match="a result has the fields"):
+        run.write_results([ROW, {"estimator": "vqf", "value": 1.0}])
+    assert run.results.read_text() == before
+    assert not [path for path in run.folder.iterdir() if path.name.startswith(".")]
+
+
+def test_a_write_that_fails_leaves_nothing(tmp_path: Path) -> None:
+    with pytest.raises(UnicodeEncodeError):
+        experiment.write_text(tmp_path / "file", "\ud800")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_report(run: experiment.Run) -> None:
+    path = run.write_report("Benchmark", {"Errors": experiment.results_markdown([ROW])})
+    text = path.read_text(encoding="utf-8")
+    assert text.startswith("# Benchmark\n\n## Errors\n\n| estimator |")
+    assert "| vqf | hand-0 | orientation | rmse | 0.333 | deg |" in text
+
+
+def test_seeds() -> None:
+    assert experiment.seeds(5, 3) == experiment.seeds(5, 7)[:3]
+    assert len({*experiment.seeds(5, 100), *experiment.seeds(6, 100)}) == 200
+    children = np.random.SeedSequence(5).spawn(2)
+    assert experiment.seeds(5, 2) == tuple(int(child.generate_state(1)[0]) for child in children)
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [(1.23456, "1.23"), (12345.6, "12346"), (1e-7, "1e-07"), (math.nan, "–"), (None, "–"), (True, "yes"), (12, "12")],
+)
+def test_cell(value: Any, text: str) -> None:
+    assert tables.cell(value) == text
+
+
+def test_printed_table_holds_every_row_and_no_markup() -> None:
+    console = Console(record=True, width=80, file=open("/dev/null", "w"))  # noqa: SIM115
+    rows = [{"estimator": "[red]vqf", "error": 1.5}, {"estimator": "mekf", "note": "slow"}]
+    tables.print_table(rows, title="Errors", console=console)
+    text = console.export_text()
+    assert "Errors" in text
+    assert "[red]vqf" in text
+    assert "slow" in text
+    assert text.count("–") == 2
+
+
+def test_markdown_table_chooses_and_escapes() -> None:
+    text = tables.markdown_table([{"a": "x|y", "b": 2.0, "c": 3}], columns=["b", "a"])
+    assert text.splitlines() == ["| b | a |", "| ---: | --- |", "| 2 | x\\|y |"]
+
+
+def test_a_row_must_be_a_record() -> None:
+    with pytest.raises(TypeError, match="a row is"):
+        tables.records([(1, 2)])

@@ -1,0 +1,170 @@
+"""The command ``poise``: finding, parsing, failing; with subcommands made for the test, then over the real table."""
+
+from __future__ import annotations
+
+import ast
+import dataclasses
+import importlib
+import inspect
+import subprocess
+import sys
+import textwrap
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+from poise.scripts import main as cli
+
+
+@dataclasses.dataclass
+class Args:
+    """Arguments of the made-up subcommand."""
+
+    count: int = 1
+    """how many"""
+    error: str = ""
+    """what to raise"""
+
+
+ERRORS: dict[str, BaseException] = {
+    "value": ValueError("no estimator\nnamed 'x'"),
+    "missing": FileNotFoundError(2, "No such file or directory", "rides.h5"),
+    "interrupt": KeyboardInterrupt(),
+    "defect": RuntimeError("a defect"),
+}
+
+
+@pytest.fixture(autouse=True)
+def _fake(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Add the subcommand ``fake``, which returns ``count`` or raises ``error``."""
+
+    def run(args: Args) -> int:
+        if args.error:
+            raise ERRORS[args.error]
+        return args.count
+
+    module = ModuleType("poise.scripts.fake", "Does nothing, for a test.")
+    vars(module).update(Args=Args, run=run)
+    monkeypatch.setitem(sys.modules, "poise.scripts.fake", module)
+    monkeypatch.setitem(cli.COMMANDS, "fake", cli.Command(".fake", "do nothing"))
+    monkeypatch.delenv("POISE_DEBUG", raising=False)
+
+
+def test_arguments_arrive_and_the_status_returns() -> None:
+    assert cli.main(["fake", "--count", "7"]) == 7
+
+
+def test_help_lists_every_command(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["--help"]) == 0
+    out = capsys.readouterr().out
+    assert all(f"  {name}" in out and command.help in out for name, command in cli.COMMANDS.items())
+
+
+def test_without_a_command_the_help_is_an_error() -> None:
+    assert cli.main([]) == 2
+
+
+def test_help_of_a_command_shows_the_sentences(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as exit_:
+        cli.main(["fake", "--help"])
+    assert exit_.value.code == 0
+    out = capsys.readouterr().out
+    assert "poise fake" in out
+    assert "how many" in out
+    assert "Does nothing, for a test." in out
+
+
+def test_unknown_command_names_the_valid_ones(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["benchmrak"]) == 2
+    err = capsys.readouterr().err
+    assert err.startswith("poise: error: unknown command 'benchmrak', did you mean 'benchmark'?")
+    assert all(name in err for name in cli.COMMANDS)
+    assert len(err.splitlines()) == 1
+
+
+def test_unknown_option_is_wrong_input() -> None:
+    with pytest.raises(SystemExit) as exit_:
+        cli.main(["fake", "--cuont", "7"])
+    assert exit_.value.code == 2
+
+
+@pytest.mark.parametrize(
+    ("error", "line"),
+    [("value", "no estimator named 'x'"), ("missing", "rides.h5: No such file or directory")],
+)
+def test_wrong_input_is_one_line(error: str, line: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["fake", "--error", error]) == 2
+    assert capsys.readouterr().err == f"poise: error: {line} (--debug shows where)\n"
+
+
+def test_debug_shows_the_traceback(monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(ValueError, match="no estimator"):
+        cli.main(["fake", "--error", "value", "--debug"])
+    monkeypatch.setenv("POISE_DEBUG", "1")
+    with pytest.raises(ValueError, match="no estimator"):
+        cli.main(["fake", "--error", "value"])
+
+
+def test_a_defect_keeps_its_traceback() -> None:
+    with pytest.raises(RuntimeError, match="a defect"):
+        cli.main(["fake", "--error", "defect"])
+
+
+def test_interrupt(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["fake", "--error", "interrupt"]) == 130
+    assert capsys.readouterr().err == "\npoise: interrupted\n"
+
+
+def test_version(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["--version"]) == 0
+    assert capsys.readouterr().out == f"poise {cli.installed_version()}\n"
+
+
+def test_help_is_light() -> None:
+    code = textwrap.dedent("""
+        import sys
+        from poise.scripts.main import main
+        status = main(["--help"])
+        heavy = {"torch", "pybullet", "stable_baselines3", "numba", "matplotlib", "pandas"} & set(sys.modules)
+        sys.exit(status or ", ".join(heavy) or 0)
+    """)
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+
+
+def test_a_reader_that_leaves_is_no_error() -> None:
+    code = "import os; from poise.scripts.main import main; os.close(1); os.dup2(os.pipe()[1], 1); main(['--help'])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert "Traceback" not in done.stderr
+
+
+REAL = sorted(cli.COMMANDS)
+
+
+@pytest.mark.parametrize("name", REAL)
+def test_command_module(name: str) -> None:
+    """Every command of the table has a documented ``Args``, every field a sentence, and runs by ``python -m``."""
+    module = importlib.import_module(cli.COMMANDS[name].module, "poise.scripts")
+    assert dataclasses.is_dataclass(module.Args)
+    assert list(inspect.signature(module.run).parameters) == ["args"]
+    assert module.__doc__
+    tree = ast.parse(Path(str(module.__file__)).read_text(encoding="utf-8"))
+    (args,) = (node for node in tree.body if isinstance(node, ast.ClassDef) and node.name == "Args")
+    for field, after in zip(args.body, [*args.body[1:], None], strict=True):
+        if isinstance(field, ast.AnnAssign):
+            documented = isinstance(after, ast.Expr) and isinstance(after.value, ast.Constant)
+            assert documented, f"{name}: no sentence under {ast.unparse(field.target)}"
+    last = tree.body[-1]
+    assert isinstance(last, ast.If)
+    assert (
+        ast.unparse(last) == f"if __name__ == '__main__':\n    from .main import run_command\n    run_command('{name}')"
+    )
+
+
+def test_every_command_file_is_in_the_table() -> None:
+    folder = Path(str(cli.__file__)).parent
+    helpers = {"__init__", "main", "experiment", "tables"}
+    assert {path.stem for path in folder.glob("*.py")} - helpers <= {
+        command.module[1:] for command in cli.COMMANDS.values()
+    }

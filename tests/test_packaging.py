@@ -1,0 +1,136 @@
+"""The package as users get it, and the promises that the files around it make."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+import sys
+import tomllib
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+ROOT = Path(__file__).resolve().parents[1]
+PYPROJECT: dict[str, Any] = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+FLOORS = ("filters", "envs", "baselines", "scripts")
+LINES = 400
+HEAVY = {"pybullet", "torch", "stable_baselines3", "numba", "sympy", "pandas", "matplotlib", "tensorboard"}
+FIVE_WORKS = {
+    "10.1109/TMECH.2018.2811730": "Zhang",
+    "10.1109/TBME.2013.2260339": "Zhang",
+    "Whole-Body Pose Estimation in Human Bicycle Riding Using a Small Set of Wearable Sensors": "Zhang",
+    "Estimating the orientation of a game controller from inertial and magnetic measurements": "He",
+    "10.1109/TIM.2012.2187245": "Lee",
+}
+
+
+def project_files() -> list[Path]:
+    """Files that are, or could be, in the repository: tracked ones and new ones that are not ignored."""
+    listing = subprocess.run(
+        ["git", "-C", str(ROOT), "ls-files", "-z", "--cached", "--others", "--exclude-standard"],
+        capture_output=True,
+        text=True,
+    )
+    if listing.returncode:
+        pytest.skip("not a git checkout")
+    return [ROOT / name for name in listing.stdout.split("\0") if name and (ROOT / name).is_file()]
+
+
+def package_folders() -> set[str]:
+    inits = [ROOT / "__init__.py", *(path for floor in FLOORS for path in (ROOT / floor).rglob("__init__.py"))]
+    return {".".join(("poise", *path.relative_to(ROOT).parent.parts)) for path in inits}
+
+
+def test_every_package_is_listed() -> None:
+    assert set(PYPROJECT["tool"]["setuptools"]["packages"]) == package_folders()
+
+
+def test_every_module_lies_in_a_package() -> None:
+    for floor in FLOORS:
+        for path in (ROOT / floor).rglob("*.py"):
+            assert (path.parent / "__init__.py").is_file(), path
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
+    """Names of the files in a wheel built from a copy of the project."""
+    copy = tmp_path_factory.mktemp("copy")
+    for path in project_files():
+        target = copy / path.relative_to(ROOT)
+        target.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy2(path, target)
+    command = [sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--no-build-isolation", "--no-index"]
+    subprocess.run([*command, "--wheel-dir", str(copy / "wheels"), str(copy)], check=True, stdin=subprocess.DEVNULL)
+    (built,) = (copy / "wheels").glob("*.whl")
+    return zipfile.ZipFile(built).namelist()
+
+
+def test_the_wheel_holds_the_package_and_nothing_else(wheel: list[str]) -> None:
+    code = {name for name in wheel if not name.split("/")[0].endswith(".dist-info")}
+    assert {name.split("/")[0] for name in code} == {"poise"}
+    assert {name for name in code if name.endswith(".py")} == {
+        f"poise/{path.relative_to(ROOT).as_posix()}"
+        for path in [ROOT / "__init__.py", *(p for floor in FLOORS for p in (ROOT / floor).rglob("*.py"))]
+    }
+    assert {name.split("/")[1] for name in code} <= {*FLOORS, "__init__.py", "py.typed"}
+
+
+def test_the_wheel_holds_the_data_of_the_package(wheel: list[str]) -> None:
+    assert "poise/py.typed" in wheel
+    for folder in ("envs/assets", "baselines/weights"):
+        for path in project_files():
+            name = path.relative_to(ROOT).as_posix()
+            assert not name.startswith(folder) or f"poise/{name}" in wheel
+
+
+def test_files_are_short() -> None:
+    written = {".py", ".md", ".toml", ".cff"}
+    kept = [path for path in project_files() if path.suffix in written or path.name == "Makefile"]
+    lengths = {str(path.relative_to(ROOT)): len(path.read_text(encoding="utf-8").splitlines()) for path in kept}
+    assert {name: n for name, n in lengths.items() if n > LINES} == {}
+
+
+def test_no_file_names_a_place_on_somebodys_machine() -> None:
+    places = re.compile(rb"(?<![\w.)\]}])/(home|root|work|Users)/\w")
+    guilty = [path.name for path in project_files() if path.suffix != ".npz" and places.search(path.read_bytes())]
+    assert guilty == []
+
+
+def test_importing_poise_is_light() -> None:
+    code = "import sys, poise; print(*{name.split('.')[0] for name in sys.modules})"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert set(done.stdout.split()) & HEAVY == set()
+
+
+def test_the_readme_shows_the_two_commands() -> None:
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert "make benchmark" in readme
+    assert "make test" in readme
+
+
+def test_constraints_pin_every_requirement_exactly() -> None:
+    lines = [line for line in (ROOT / "constraints.txt").read_text().splitlines() if line and not line.startswith("#")]
+    pins = dict(line.split("==") for line in lines)
+    project = PYPROJECT["project"]
+    asked = project["dependencies"] + [r for group in project["optional-dependencies"].values() for r in group]
+    names = {re.split(r"[<>=!~\[; ]", requirement)[0].lower() for requirement in asked}
+    assert names <= set(pins)
+    # A local suffix (+cpu) would tie the set to one index.
+    assert not any("+" in pin for pin in pins.values())
+
+
+def test_the_citation_file_names_the_five_works() -> None:
+    citation = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
+    assert citation["cff-version"] == "1.2.0"
+    assert str(citation["version"]) == PYPROJECT["project"]["version"]
+    assert {"message", "title", "authors"} <= set(citation)
+    works = {
+        work["doi"] if "doi" in work else work["title"]: work["authors"][0]["family-names"]
+        for work in citation["references"]
+    }
+    assert works == FIVE_WORKS
+    assert all({"type", "title", "authors", "year"} <= set(work) for work in citation["references"])
