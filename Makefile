@@ -4,7 +4,7 @@ SHELL := /bin/bash
 .SHELLFLAGS := -eu -o pipefail -c
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help install benchmark speed test test-slow check format clean
+.PHONY: help install benchmark speed test test-slow check lint types format clean
 
 VENV := .venv
 BIN := $(abspath $(VENV))/bin
@@ -44,10 +44,14 @@ test: check ## lint, types and the tests of every day; ARGS="-k name" picks some
 test-slow: $(STAMP) ## the long tests: training, long rollouts
 	$(BIN)/python -m pytest -m slow $(ARGS)
 
-# Types are checked on a copy named poise, so that the folder of the clone may have any name.
-check: $(STAMP) ## lint, formatting, types
+check: lint types ## lint, formatting, types
+
+lint: $(STAMP) ## ruff: lint and formatting
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
+
+# Types are checked on a copy named poise, so that the folder of the clone may have any name.
+types: $(STAMP) ## mypy
 	@rm -rf $(TYPECHECK) build/lib
 	@$(BIN)/python -c 'import setuptools; setuptools.setup()' --quiet build_py --build-lib $(TYPECHECK)
 	cd $(TYPECHECK) && $(BIN)/python -m mypy --config-file $(CURDIR)/pyproject.toml --cache-dir $(CURDIR)/.mypy_cache -p poise
