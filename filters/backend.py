@@ -26,6 +26,11 @@ def is_torch(value: Any) -> bool:
     return torch is not None and isinstance(value, torch.Tensor)
 
 
+def is_traced(value: Any) -> bool:
+    """Whether ``value`` is a traced expression or an object array of them."""
+    return getattr(value, "dtype", None) == np.dtype(object)
+
+
 def namespace(*arrays: Any) -> Any:
     """Return the array namespace that serves all ``arrays``; Python and NumPy scalars follow the others.
 
@@ -40,7 +45,7 @@ def namespace(*arrays: Any) -> Any:
             import array_api_compat.torch as torch_namespace
 
             return torch_namespace
-    if any(getattr(array, "dtype", None) == object for array in arrays):
+    if any(is_traced(array) for array in arrays):
         from .tracing import TracedNamespace
 
         return TracedNamespace
@@ -68,8 +73,8 @@ def constant(values: Any, like: Array) -> Array:
         import torch
 
         return torch.as_tensor(np.asarray(values, dtype=float), dtype=like.dtype, device=like.device)
-    if getattr(like, "dtype", None) == object:
-        return np.asarray(values, dtype=float).astype(object)
+    if is_traced(like):
+        return np.asarray(values, dtype=object)
     return np.asarray(values, dtype=getattr(like, "dtype", float))
 
 

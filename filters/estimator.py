@@ -20,20 +20,22 @@ S = TypeVar("S")
 
 @runtime_checkable
 class Estimator(Protocol[S]):
-    """Anything that estimates a pose from a stream of measurements.
-
-    Attributes:
-        dt: sampling interval, s.
-        channels: what it reads; other channels of a measurement are ignored.
-        outputs: the quantities that its estimates hold.
-    """
+    """Anything that estimates a pose from a stream of measurements; channels it does not read are ignored."""
 
     @property
-    def dt(self) -> float: ...
+    def dt(self) -> float:
+        """Sampling interval, s."""
+        ...
+
     @property
-    def channels(self) -> tuple[Channel, ...]: ...
+    def channels(self) -> tuple[Channel, ...]:
+        """What it reads."""
+        ...
+
     @property
-    def outputs(self) -> tuple[Quantity, ...]: ...
+    def outputs(self) -> tuple[Quantity, ...]:
+        """What it gives."""
+        ...
 
     def with_dt(self, dt: float) -> Self:
         """The same estimator for samples ``dt`` seconds apart."""

@@ -145,7 +145,9 @@ class ExternalAcceleration(Model):
         xp = namespace(y)
         deviation = xp.abs(norm(y) - expand(self.gravity, 1))
         one = 1.0 + 0.0 * deviation
-        return xp.where(xp.less_equal(deviation, expand(self.threshold, 1)), one, xp.where(xp.isfinite(one), 0.0 * one, 0.0))
+        return xp.where(
+            xp.less_equal(deviation, expand(self.threshold, 1)), one, xp.where(xp.isfinite(one), 0.0 * one, 0.0)
+        )
 
     def _static_samples(self, x: Array, y: Array) -> Array:
         """Length of the run of static samples that ends now, ``(..., 1)``."""

@@ -16,13 +16,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .backend import Array, constant, is_torch, namespace, stack_channels, to_numpy
+from .backend import Array, constant, is_torch, namespace
 from .estimator import check_measurements, run_by_steps
-from .model import Gain, Model, parameters_of, with_parameters
+from .model import Gain, Model
 from .quantity import Channel, Estimate, Measurement, Quantity
-
-Gains = Mapping[str, Any]
-"""Gain name → log factor: a number or ``(*batch,)``; over a sequence also ``(T,)`` or ``(T, *batch)``."""
+from .sampling import Gains, check_gains, empty_memory, filled, hold, join, per_tick_gains, scaled, split
 
 
 class FilterState(NamedTuple):
@@ -82,15 +80,8 @@ class KalmanFilter:
     def init(self, measurement: Measurement) -> FilterState:
         """Empty memory with the batch shape and array kind of ``measurement`` (no sample is used up)."""
         arrays = check_measurements(self.channels, measurement, time_axis=False)
-        like = stack_channels(arrays, tuple(arrays))
-        xp, batch, model = namespace(like), tuple(like.shape[:-1]), self.model
-        zero = 0.0 * xp.where(xp.isfinite(like), like, xp.zeros_like(like))[..., :1]
-        x = xp.broadcast_to(zero, (*batch, model.state_size))
-        P = xp.broadcast_to(zero[..., None], (*batch, model.error_size, model.error_size))
-        held = xp.broadcast_to(zero + xp.nan, tuple(like.shape))
-        started = xp.zeros_like(zero[..., 0]) > 0.5
-        copy = (lambda a: a.clone()) if is_torch(like) else np.array
-        return FilterState(copy(x), copy(P), copy(held), copy(started))
+        n, e = self.model.state_size, self.model.error_size
+        return FilterState(*empty_memory(join(arrays, self.channels), (n,), (e, e)))
 
     def step(
         self, state: FilterState, measurement: Measurement, gains: Gains | None = None
@@ -106,11 +97,11 @@ class KalmanFilter:
             ValueError: a channel is missing or has a wrong shape, or a gain is unknown.
         """
         arrays = check_measurements(self.channels, measurement, time_axis=False)
-        self._check_gains(gains)
+        check_gains(self.gains, gains, type(self.model).__name__)
         if self.compiled and not is_torch(state.x):
-            from .compiled import compiled_form
+            from .compiled import compiled_model
 
-            form = compiled_form(self.model)
+            form = compiled_model(self.model)
             if form is not None:
                 return form.step(self.model, state, arrays, gains)
         return self._step_arrays(state, arrays, gains)
@@ -130,13 +121,13 @@ class KalmanFilter:
     ) -> tuple[Estimate, FilterState]:
         """As :meth:`run`, but going on from ``state`` (None: from the start) and giving the last state too."""
         arrays = check_measurements(self.channels, measurements, time_axis=True)
-        self._check_gains(gains)
+        check_gains(self.gains, gains, type(self.model).__name__)
         if state is None:
             state = self.init({name: array[0] for name, array in arrays.items()})
         if self.compiled and not is_torch(state.x):
-            from .compiled import compiled_form
+            from .compiled import compiled_model
 
-            form = compiled_form(self.model)
+            form = compiled_model(self.model)
             if form is not None:
                 return form.run(self.model, state, arrays, gains, self.keep_covariance)
         return self._run_arrays(state, arrays, gains)
@@ -157,19 +148,18 @@ class KalmanFilter:
         self, state: FilterState, arrays: Measurement, gains: Gains | None
     ) -> tuple[FilterState, Estimate]:
         model = scaled(self.model, gains, state.x)
-        sample = stack_channels(arrays, tuple(channel.name for channel in self.channels))
+        sample = join(arrays, self.channels)
         xp = namespace(sample, state.x)
-        current = xp.where(xp.isfinite(sample), sample, state.held)
-        started = state.started
+        current, started, samples = hold(sample, state.held), state.started, split(sample, self.channels)
         whitened = xp.zeros_like(state.x[..., :1]) + constant([0.0] * model.residual_size, state.x)
         x, P = state.x, state.covariance
         if bool(xp.any(started)):
-            filled = [xp.where(xp.isfinite(part), part, xp.zeros_like(part)) for part in (current, state.held)]
-            x1, F, Q = model.predict(x, self._split(filled[0]), self._split(filled[1]))
+            now, before = (split(filled(part), self.channels) for part in (current, state.held))
+            x1, F, Q = model.predict(x, now, before)
             P1 = F @ P @ F.mT + 0.5 * (Q + Q.mT)
-            r, H, R = model.residual(x1, self._split(sample))
+            r, H, R = model.residual(x1, samples)
             dx, P1, whitened = correct(P1, r, H, R)
-            x1 = model.finish(model.retract(x1, dx), self._split(sample))
+            x1 = model.finish(model.retract(x1, dx), samples)
             if bool(xp.all(started)):
                 x, P = x1, P1
             else:
@@ -177,7 +167,7 @@ class KalmanFilter:
                 P = xp.where(started[..., None, None], P1, P)
                 whitened = xp.where(started[..., None], whitened, xp.zeros_like(whitened))
         if not bool(xp.all(started)):
-            x0, P0 = model.prior(self._split(current))
+            x0, P0 = model.prior(split(current, self.channels))
             P0 = P0 + xp.zeros_like(P)
             ready = xp.all(xp.isfinite(x0), axis=-1) & xp.all(xp.all(xp.isfinite(P0), axis=-1), axis=-1)
             new = ready & ~started
@@ -191,18 +181,6 @@ class KalmanFilter:
             covariance = xp.where(started[..., None, None], P, P + xp.nan)
         estimate = Estimate(pose, covariance, whitened, xp.sum(whitened * whitened, axis=-1))
         return FilterState(x, P, current, started), estimate
-
-    def _split(self, sample: Array) -> dict[str, Array]:
-        parts, start = {}, 0
-        for channel in self.channels:
-            parts[channel.name] = sample[..., start : start + channel.size]
-            start += channel.size
-        return parts
-
-    def _check_gains(self, gains: Gains | None) -> None:
-        unknown = sorted(set(gains or {}) - set(self.gains))
-        if unknown:
-            raise ValueError(f"unknown gains {unknown}; {type(self.model).__name__} has {sorted(self.gains)}")
 
 
 class _Sequence:
@@ -223,44 +201,6 @@ class _Sequence:
         self.last, estimate = self.kalman._step_arrays(state, measurement, gains)
         self.tick += 1
         return self.last, estimate
-
-
-def per_tick_gains(gains: Gains | None, length: int) -> dict[str, Any]:
-    """Gains as arrays with a time axis of ``length``.
-
-    Raises:
-        ValueError: a gain's first axis is neither absent nor ``length`` long.
-    """
-    table = {}
-    for name, factor in (gains or {}).items():
-        array = factor if is_torch(factor) else np.asarray(factor, dtype=float)
-        if array.ndim == 0:
-            array = namespace(array).broadcast_to(array, (length,))
-        elif array.shape[0] != length:
-            raise ValueError(f"gain {name!r} must be a number or have {length} ticks first, got shape {array.shape}")
-        table[name] = array
-    return table
-
-
-def scaled(model: Model, gains: Gains | None, like: Array) -> Model:
-    """The model with its named constants multiplied by ``exp(power * log factor)``.
-
-    Args:
-        model: the published tuning.
-        gains: name → log factor, number or ``(*batch,)``.
-        like: an array of the kind in which the factors are wanted.
-    """
-    if not gains:
-        return model
-    values = {}
-    base = parameters_of(model)
-    for name, factor in gains.items():
-        gain = model.gains[name]
-        xp = namespace(like)
-        log_factor = factor if is_torch(factor) else constant(to_numpy(factor), like)
-        value = base[gain.parameter] * xp.exp(gain.power * log_factor)
-        values[gain.parameter] = xp.where(value > gain.maximum, gain.maximum + 0.0 * value, value)
-    return with_parameters(model, values)
 
 
 def correct(P: Array, r: Array, H: Array, R: Array) -> tuple[Array, Array, Array]:

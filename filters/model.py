@@ -1,8 +1,9 @@
-"""What a published filter contributes: its equations. The recursion around them is :mod:`poise.filters.kalman`.
+"""What a published filter contributes: its equations. The recursion around them is elsewhere.
 
-A model is a frozen dataclass whose fields are its parameters (floats with unit and source) and whose methods are its
-equations, written over ``xp = namespace(x)`` for arrays ``(*batch, …)``. The same lines run on NumPy, on torch and, traced
-once, as compiled code.
+A :class:`Model` goes into :class:`poise.filters.kalman.KalmanFilter`, a :class:`Recurrence` (no covariance) into
+:class:`poise.filters.observer.Observer`. Either is a frozen dataclass: its fields are its parameters (floats with unit and
+source), its methods its equations, written over ``xp = namespace(x)`` for arrays ``(*batch, …)``. The same lines run on
+NumPy, on torch and, traced once, as compiled code.
 """
 
 from __future__ import annotations
@@ -11,10 +12,12 @@ import copy
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields, replace
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar, Self, TypeVar
 
 from .backend import Array
 from .quantity import Channel, Measurement, Quantity
+
+E = TypeVar("E", bound="Equations")
 
 
 @dataclass(frozen=True)
@@ -36,19 +39,15 @@ class Gain:
 
 
 @dataclass(frozen=True)
-class Model:
-    """Equations of a filter with state x (``n`` numbers) and error state (``e`` numbers).
+class Equations:
+    """What models and recurrences share: channels, outputs, parameters, the sampling interval.
 
-    Subclasses set the class attributes and write ``prior``, ``predict``, ``residual`` and ``pose``; ``retract`` and
-    ``finish`` have defaults. Attributes of the class:
-
-    * ``channels``: what is read. ``outputs``: quantities of ``pose``.
-    * ``state_size`` n, ``error_size`` e, ``residual_size`` m.
-    * ``gains``: name → :class:`Gain`.
-
-    Measurements arrive as channel → ``(*batch, size)``. ``predict`` and ``prior`` see each channel's last sample (zeros in
-    ``predict`` if there was none yet); ``residual`` and ``finish`` see NaN where this tick brought none.
+    Measurements arrive as channel → ``(*batch, size)``. ``predict`` sees each channel's last sample (zeros if there
+    was none yet), ``prior`` too (NaN if there was none); ``residual`` and ``finish`` see NaN where this tick brought none.
     A float parameter may be an array ``(*batch,)``: use :func:`poise.filters.backend.expand` where it scales a matrix.
+
+    Attributes of the class: ``channels``, what is read; ``outputs``, the quantities of ``pose``; ``state_size`` n, the
+    numbers in the state; ``gains``, name → :class:`Gain`.
     """
 
     dt: float = 0.01
@@ -57,17 +56,43 @@ class Model:
     channels: ClassVar[tuple[Channel, ...]]
     outputs: ClassVar[tuple[Quantity, ...]]
     state_size: ClassVar[int]
-    error_size: ClassVar[int]
-    residual_size: ClassVar[int]
     gains: ClassVar[Mapping[str, Gain]] = {}
 
     def __post_init__(self) -> None:
         """Refuse parameters that are not finite numbers and intervals that are not positive."""
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if isinstance(value, int) and isinstance(field.default, float):
+                object.__setattr__(self, field.name, float(value))
         for name, value in parameters_of(self).items():
             if not math.isfinite(value):
                 raise ValueError(f"{type(self).__name__}: parameter {name} must be a finite number, got {value}")
         if self.dt <= 0.0:
             raise ValueError(f"{type(self).__name__}: dt must be positive seconds, got {self.dt}")
+
+    def finish(self, x: Array, z: Measurement) -> Array:
+        """Last word of a tick, after the correction: normalise, remember what the next tick needs."""
+        return x
+
+    def pose(self, x: Array) -> dict[str, Array]:
+        """The quantities that the state tells."""
+        raise NotImplementedError
+
+    def with_dt(self, dt: float) -> Self:
+        """The same equations for another sampling interval."""
+        return replace(self, dt=float(dt))
+
+
+@dataclass(frozen=True)
+class Model(Equations):
+    """Equations of a Kalman filter with state x (``n`` numbers) and error state (``e`` numbers).
+
+    Subclasses write ``prior``, ``predict``, ``residual`` and ``pose``; ``retract`` and ``finish`` have defaults.
+    Further attributes of the class: ``error_size`` e, ``residual_size`` m.
+    """
+
+    error_size: ClassVar[int]
+    residual_size: ClassVar[int]
 
     def prior(self, z: Measurement) -> tuple[Array, Array]:
         """State ``(..., n)`` and covariance ``(..., e, e)`` from the first samples; NaN while they do not suffice."""
@@ -91,30 +116,34 @@ class Model:
         """The state ``x`` corrected by the error ``dx``: a sum, unless the state holds rotations."""
         return x + dx
 
-    def finish(self, x: Array, z: Measurement) -> Array:
-        """Last word of a tick, after the correction: normalise, remember what the next tick needs."""
-        return x
 
-    def pose(self, x: Array) -> dict[str, Array]:
-        """The quantities that the state tells."""
+@dataclass(frozen=True)
+class Recurrence(Equations):
+    """Equations of a method without covariance: an observer with fixed gains, or plain integration.
+
+    Subclasses write ``prior``, ``predict`` and ``pose``; what corrects is written in ``finish``.
+    """
+
+    def prior(self, z: Measurement) -> Array:
+        """State ``(..., n)`` from the first samples; NaN while they do not suffice."""
         raise NotImplementedError
 
-    def with_dt(self, dt: float) -> Self:
-        """The same model for another sampling interval."""
-        return replace(self, dt=float(dt))
+    def predict(self, x: Array, z: Measurement, previous: Measurement) -> Array:
+        """State after one interval; ``z`` belongs to the tick that is predicted to, ``previous`` to the one before."""
+        raise NotImplementedError
 
 
-def parameters_of(model: Model) -> dict[str, float]:
+def parameters_of(model: Equations) -> dict[str, float]:
     """The numbers a model is tuned by: every float of its fields, by a name such as ``lever_arm[0]``."""
     return {path: value for path, value in _leaves(model) if isinstance(value, float)}
 
 
-def structure_of(model: Model) -> tuple[Any, ...]:
+def structure_of(model: Equations) -> tuple[Any, ...]:
     """What is not a float and so is fixed when a model is compiled: its class and its integers, booleans and texts."""
     return (type(model), *((path, value) for path, value in _leaves(model) if not isinstance(value, float)))
 
 
-def with_parameters(model: Model, values: Mapping[str, Any]) -> Model:
+def with_parameters(model: E, values: Mapping[str, Any]) -> E:
     """A copy whose floats are replaced (by arrays or traced scalars too), without the checks of construction."""
     changed = copy.copy(model)
     for field in fields(model):
@@ -122,7 +151,7 @@ def with_parameters(model: Model, values: Mapping[str, Any]) -> Model:
     return changed
 
 
-def _leaves(model: Model) -> Iterator[tuple[str, Any]]:
+def _leaves(model: Equations) -> Iterator[tuple[str, Any]]:
     for field in fields(model):
         yield from _walk(field.name, getattr(model, field.name))
 

@@ -293,6 +293,11 @@ class TracedNamespace:
         return 0.0 * _objects(array)
 
     @staticmethod
+    def reshape(array: Any, shape: tuple[int, ...]) -> np.ndarray:
+        """The same elements in another shape."""
+        return np.reshape(_objects(array), shape)
+
+    @staticmethod
     def ones_like(array: Any) -> np.ndarray:
         """Ones of the same shape."""
         return 0.0 * _objects(array) + 1.0

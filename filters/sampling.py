@@ -1,0 +1,111 @@
+"""What every recursion does with samples: split channels, hold the last one, wait for the first.
+
+Shared by the Kalman filter and the observers, so that a drop-out means the same everywhere.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from .backend import Array, constant, is_torch, namespace, stack_channels, to_numpy
+from .model import E, Gain, parameters_of, with_parameters
+from .quantity import Channel, Measurement
+
+Gains = Mapping[str, Any]
+"""Gain name → log factor: a number or ``(*batch,)``; over a sequence also ``(T,)`` or ``(T, *batch)``."""
+
+
+def split(sample: Array, channels: tuple[Channel, ...]) -> dict[str, Array]:
+    """The channels of a concatenated sample ``(..., d)``."""
+    parts, start = {}, 0
+    for channel in channels:
+        parts[channel.name] = sample[..., start : start + channel.size]
+        start += channel.size
+    return parts
+
+
+def join(measurement: Measurement, channels: tuple[Channel, ...]) -> Array:
+    """The samples of all channels, concatenated to ``(..., d)``."""
+    return stack_channels(measurement, tuple(channel.name for channel in channels))
+
+
+def hold(sample: Array, held: Array) -> Array:
+    """The sample, with the last one where it is missing (NaN where there was none yet)."""
+    xp = namespace(sample, held)
+    return xp.where(xp.isfinite(sample), sample, held)
+
+
+def filled(sample: Array) -> Array:
+    """The sample, with zeros where nothing is known."""
+    xp = namespace(sample)
+    return xp.where(xp.isfinite(sample), sample, xp.zeros_like(sample))
+
+
+def empty_memory(like: Array, *shapes: tuple[int, ...]) -> tuple[Array, ...]:
+    """Fresh arrays for a recursion over samples ``like`` ``(*batch, d)``.
+
+    Returns:
+        One array of zeros ``(*batch, *shape)`` for each of ``shapes``, then the held sample (NaN) and the flags
+        ``started`` (False).
+    """
+    xp, batch = namespace(like), tuple(like.shape[:-1])
+    zero = xp.zeros_like(like[..., :1])
+    copy = (lambda array: array.clone()) if is_torch(like) else np.array
+    arrays = []
+    for shape in shapes:
+        zeros = xp.reshape(zero, (*batch, *(1,) * len(shape)))
+        arrays.append(copy(xp.broadcast_to(zeros, (*batch, *shape))))
+    started = xp.greater(zero[..., 0], 0.5)
+    return (*arrays, copy(xp.zeros_like(like) + xp.nan), copy(started))
+
+
+def check_gains(known: Mapping[str, Gain], gains: Gains | None, owner: str) -> None:
+    """Refuse gains that a model does not have.
+
+    Raises:
+        ValueError: names the unknown gains and those that exist.
+    """
+    unknown = sorted(set(gains or {}) - set(known))
+    if unknown:
+        raise ValueError(f"unknown gains {unknown}; {owner} has {sorted(known)}")
+
+
+def per_tick_gains(gains: Gains | None, length: int) -> dict[str, Any]:
+    """Gains as arrays with a time axis of ``length``.
+
+    Raises:
+        ValueError: a gain's first axis is neither absent nor ``length`` long.
+    """
+    table = {}
+    for name, factor in (gains or {}).items():
+        array = factor if is_torch(factor) else np.asarray(factor, dtype=float)
+        if array.ndim == 0:
+            array = namespace(array).broadcast_to(array, (length,))
+        elif array.shape[0] != length:
+            raise ValueError(f"gain {name!r} must be a number or have {length} ticks first, got shape {array.shape}")
+        table[name] = array
+    return table
+
+
+def scaled(model: E, gains: Gains | None, like: Array) -> E:
+    """The model with its named constants multiplied by ``exp(power * log factor)``.
+
+    Args:
+        model: the published tuning.
+        gains: name → log factor, number or ``(*batch,)``.
+        like: an array of the kind in which the factors are wanted.
+    """
+    if not gains:
+        return model
+    values = {}
+    base = parameters_of(model)
+    xp = namespace(like)
+    for name, factor in gains.items():
+        gain = model.gains[name]
+        log_factor = factor if is_torch(factor) else constant(to_numpy(factor), like)
+        value = base[gain.parameter] * xp.exp(gain.power * log_factor)
+        values[gain.parameter] = xp.where(value > gain.maximum, gain.maximum + 0.0 * value, value)
+    return with_parameters(model, values)
