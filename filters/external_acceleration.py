@@ -4,7 +4,8 @@ J. K. Lee, E. J. Park, S. N. Robinovitch, "Estimation of Attitude and External A
 Measurement During Various Dynamic Conditions", IEEE Transactions on Instrumentation and Measurement 61(8), 2012,
 doi 10.1109/TIM.2012.2187245. Equation numbers are the paper's.
 
-The state is Z, the upward vertical in sensor coordinates. The accelerometer sees gravity and the external acceleration a,
+The state is Z, the upward vertical in sensor coordinates. The accelerometer sees gravity and the external
+acceleration a,
 
     y_A = g Z + a + n_A                                                   (6b)
     a_t = c_a a_{t−1} + ε_t                                               (7)
@@ -14,11 +15,11 @@ and the filter subtracts what it expects of a, and trusts the rest the less the 
     a⁻ = c_a a⁺_{t−1},   z = y_A − a⁻,   H = g I                          (16–19)
     M = (c_a² ‖a⁺_{t−1}‖² / 3) I + σ_A² I                                 (20–23)
 
-Differs from print: (31) has a transposed ω̃ that would turn the wrong way, (14) an index k for t, and (4) a single-argument
-arctangent that is 0/0 at zero roll (:func:`poise.filters.rotation.roll_pitch` is its well-defined form). c_a acts as a covariance gain
-more than as the correlation that (7) calls it: under (7) the variance of (23) would be that of ε, which falls as c_a grows. The
-printed first-order rotation (12) loses 1.9 °/s at 10 rad/s and 100 Hz; ``exact_rotation`` replaces it by the exponential.
-The text never says how to start: here Z₀ = y_A/‖y_A‖, P₀ = 10⁻² I, sensor at rest.
+Differs from print: (31) has a transposed ω̃ that would turn the wrong way, (14) an index k for t, and (4) a
+single-argument arctangent that is 0/0 at zero roll (:func:`poise.filters.rotation.roll_pitch` is its well-defined
+form). c_a acts as a covariance gain more than as the correlation that (7) calls it: under (7) the variance of (23) would
+be that of ε, which falls as c_a grows. The printed first-order rotation (12) loses 1.9 °/s at 10 rad/s and 100 Hz;
+``exact_rotation`` replaces it by the exponential. The text never says how to start: here Z₀ = y_A/‖y_A‖, P₀ = 10⁻² I, sensor at rest.
 
 Not estimated: heading, gyroscope bias. Sustained acceleration cannot be told from tilt.
 """
@@ -50,8 +51,8 @@ class ExternalAcceleration(Model):
     exact_rotation: bool = True
     """propagate by the exponential instead of the printed first order (12)"""
     gyroscope_sample: Literal["current", "previous"] = "current"
-    """which sample turns t−1 into t: ``previous`` is printed (12), right for samples that hold until the next one; ``current``
-    is right for samples that describe the interval that they end"""
+    """which sample turns t−1 into t: ``previous`` is printed (12), right for samples that hold until the next one;
+    ``current`` is right for samples that describe the interval that they end"""
     gyroscope_noise: float = 1e-2
     """σ_G, rad/s per sample (section IV: σ_G² = 10⁻⁴)"""
     accelerometer_noise: float = 1e-2
@@ -145,9 +146,8 @@ class ExternalAcceleration(Model):
         xp = namespace(y)
         deviation = xp.abs(norm(y) - expand(self.gravity, 1))
         one = 1.0 + 0.0 * deviation
-        return xp.where(
-            xp.less_equal(deviation, expand(self.threshold, 1)), one, xp.where(xp.isfinite(one), 0.0 * one, 0.0)
-        )
+        missing = xp.where(xp.isfinite(one), 0.0 * one, xp.zeros_like(one))
+        return xp.where(xp.less_equal(deviation, expand(self.threshold, 1)), one, missing)
 
     def _static_samples(self, x: Array, y: Array) -> Array:
         """Length of the run of static samples that ends now, ``(..., 1)``."""

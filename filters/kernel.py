@@ -32,14 +32,9 @@ def correct(r, H, R, P, dx, white, rows, S, HP, K):  # type: ignore[no-untyped-d
 
     S = H P Hᵀ + R = L Lᵀ,  K = P Hᵀ S⁻¹,  P ← (I − K H) P (I − K H)ᵀ + K R Kᵀ,  dx = K r,  white = L⁻¹ r
 
-    Args:
-        r, H, R: residual ``(m,)``, Jacobian ``(m, e)`` and covariance ``(m, m)`` of the measurement.
-        P: covariance ``(e, e)``, changed in place.
-        dx, white: outputs, ``(e,)`` and ``(m,)``.
-        rows, S, HP, K: scratch, ``(m,)`` integers, ``(m, m)``, ``(m, e)``, ``(m, e)``.
-
-    Returns:
-        The normalised innovation squared, 0 if every row was left out.
+    In: residual r ``(m,)``, Jacobian H ``(m, e)``, covariance R ``(m, m)``. Changed in place: P ``(e, e)``. Out: dx
+    ``(e,)``, white ``(m,)``. Scratch: rows ``(m,)`` integers, S ``(m, m)``, HP and K ``(m, e)``. Returns the normalised
+    innovation squared, 0 if every row was left out.
     """
     m, e = H.shape
     count = 0

@@ -1,8 +1,8 @@
 """What a published filter contributes: its equations. The recursion around them is elsewhere.
 
 A :class:`Model` goes into :class:`poise.filters.kalman.KalmanFilter`, a :class:`Recurrence` (no covariance) into
-:class:`poise.filters.observer.Observer`. Either is a frozen dataclass: its fields are its parameters (floats with unit and
-source), its methods its equations, written over ``xp = namespace(x)`` for arrays ``(*batch, …)``. The same lines run on
+:class:`poise.filters.observer.Observer`. Either is a frozen dataclass: its fields are its parameters (floats with unit
+and source), its methods its equations, written over ``xp = namespace(x)`` for arrays ``(*batch, …)``. The same lines run on
 NumPy, on torch and, traced once, as compiled code.
 """
 
@@ -42,8 +42,9 @@ class Gain:
 class Equations:
     """What models and recurrences share: channels, outputs, parameters, the sampling interval.
 
-    Measurements arrive as channel → ``(*batch, size)``. ``predict`` sees each channel's last sample (zeros if there
-    was none yet), ``prior`` too (NaN if there was none); ``residual`` and ``finish`` see NaN where this tick brought none.
+    Measurements arrive as channel → ``(*batch, size)``. ``predict`` sees each channel's last sample (zeros if
+    there was none yet), ``prior`` too (NaN if there was none); ``residual`` and ``finish`` see NaN where this tick
+    brought none.
     A float parameter may be an array ``(*batch,)``: use :func:`poise.filters.backend.expand` where it scales a matrix.
 
     Attributes of the class: ``channels``, what is read; ``outputs``, the quantities of ``pose``; ``state_size`` n, the

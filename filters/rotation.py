@@ -14,7 +14,7 @@ SMALL_ANGLE_SQUARED = 1e-8
 
 
 def identity(like: Array) -> Array:
-    """The quaternion of no rotation, with the batch shape and kind of the quaternion or vector ``like`` ``(..., n)``."""
+    """The quaternion of no rotation, with the batch shape and kind of the array ``like`` ``(..., n)``."""
     xp = namespace(like)
     zero = 0.0 * like[..., 0]
     return xp.stack([zero + 1.0, zero, zero, zero], axis=-1)

@@ -34,7 +34,7 @@ class Tape:
         return self.node("constant", repr(float(value)))
 
     def inputs(self, name: str, size: int) -> np.ndarray:
-        """Object array ``(size,)`` of inputs that print as ``name[0]``, ``name[1]`` …"""
+        """Object array ``(size,)`` of inputs that print as ``name[0]``, ``name[1]`` and so on."""
         array = np.empty(size, dtype=object)
         for index in range(size):
             array[index] = self.node("input", f"{name}[{index}]")
