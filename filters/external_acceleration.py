@@ -17,9 +17,10 @@ and the filter subtracts what it expects of a, and trusts the rest the less the 
 
 Differs from print: (31) has a transposed ω̃ that would turn the wrong way, (14) an index k for t, and (4) a
 single-argument arctangent that is 0/0 at zero roll (:func:`poise.filters.rotation.roll_pitch` is its well-defined
-form). c_a acts as a covariance gain more than as the correlation that (7) calls it: under (7) the variance of (23) would
-be that of ε, which falls as c_a grows. The printed first-order rotation (12) loses 1.9 °/s at 10 rad/s and 100 Hz;
-``exact_rotation`` replaces it by the exponential. The text never says how to start: here Z₀ = y_A/‖y_A‖, P₀ = 10⁻² I, sensor at rest.
+form). c_a acts as a covariance gain more than as the correlation that (7) calls it: under (7) the variance of (23)
+would be that of ε, which falls as c_a grows. The printed first-order rotation (12) loses 1.9 °/s at 10 rad/s and
+100 Hz; ``exact_rotation`` replaces it by the exponential. The text never says how to start: here Z₀ = y_A/‖y_A‖,
+P₀ = 10⁻² I, sensor at rest.
 
 Not estimated: heading, gyroscope bias. Sustained acceleration cannot be told from tilt.
 """

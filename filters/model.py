@@ -2,8 +2,8 @@
 
 A :class:`Model` goes into :class:`poise.filters.kalman.KalmanFilter`, a :class:`Recurrence` (no covariance) into
 :class:`poise.filters.observer.Observer`. Either is a frozen dataclass: its fields are its parameters (floats with unit
-and source), its methods its equations, written over ``xp = namespace(x)`` for arrays ``(*batch, …)``. The same lines run on
-NumPy, on torch and, traced once, as compiled code.
+and source), its methods its equations, written over ``xp = namespace(x)`` for arrays ``(*batch, …)``. The same lines
+run on NumPy, on torch and, traced once, as compiled code.
 """
 
 from __future__ import annotations

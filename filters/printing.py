@@ -2,7 +2,8 @@
 
 A model runs once on recorded scalars (:mod:`poise.filters.tracing`); its floats stay parameters, so one printed file
 serves every tuning, sampling interval and gain. The file is headed by the text of :mod:`poise.filters.kernel` and lies
-under the hash of its content; numba keeps the machine code beside it, so only the first run on a machine pays for compiling.
+under the hash of its content; numba keeps the machine code beside it, so only the first run on a machine pays for
+compiling.
 """
 
 from __future__ import annotations
