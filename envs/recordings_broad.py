@@ -58,7 +58,7 @@ def load_broad(path: Path) -> Trajectory:
         ValueError: the file is damaged, lacks a field, or has fields of other shapes.
     """
     with path.open("rb") as file:
-        if not file.read(len(MATLAB_5)) == MATLAB_5:
+        if file.read(len(MATLAB_5)) != MATLAB_5:
             return read_hdf5(path, lambda file, path: to_trajectory(hdf5_fields(file), path))
     import scipy.io
 

@@ -1,8 +1,8 @@
 """CSV exports of Movella DOT (formerly Xsens DOT) sensors.
 
 Xsens DOT User Manual, document XD0502P, sections 4.2.1–4.2.5: ``SampleTimeFine`` counts microseconds and
-wraps at 2³²; ``Acc_*`` m/s², ``Gyr_*`` deg/s, ``Mag_*`` in units of the field at calibration (about 40 µT), ``dq_*`` and
-``dv[*]`` are increments of one sampling interval, all in sensor axes.
+wraps at 2³²; ``Acc_*`` m/s², ``Gyr_*`` deg/s, ``Mag_*`` in units of the field at calibration (about 40 µT), ``dq_*``
+and ``dv[*]`` are increments of one sampling interval, all in sensor axes.
 """
 
 from __future__ import annotations

@@ -6,7 +6,7 @@ A sample stands for the interval that ends at its tick. Its kind decides how sam
 * an accelerometer beside a gyroscope is integrated to a velocity in the frame of that attitude, and given in the
   attitude of the middle of the new interval, so that sculling is kept (P. G. Savage, "Strapdown Inertial Navigation
   Integration Algorithm Design", J. Guidance, Control, and Dynamics 21(1–2), 1998);
-* every other channel is averaged.
+* an orientation is interpolated, every other channel averaged.
 """
 
 from __future__ import annotations
@@ -20,8 +20,9 @@ from .trajectory import Trajectory
 def resample(trajectory: Trajectory, rate: float) -> Trajectory:
     """Resample to ``rate`` on the uniform grid that starts at the first tick.
 
-    Strapdown integration of the result passes through the attitudes and velocities that the original gives. Nothing is
-    filtered beyond the mean over an interval. At a higher rate samples are repeated: no information is added.
+    Strapdown integration of the result passes through the attitudes of the original, and through its velocities,
+    interpolated between old ticks. Nothing is filtered beyond the mean over an interval. At a higher rate samples are
+    repeated: no information is added.
 
     Args:
         trajectory: with uniform or other ticks; its samples are taken as means over the interval that ends at them.
@@ -44,23 +45,30 @@ def resample(trajectory: Trajectory, rate: float) -> Trajectory:
     edges = np.concatenate([[new[0] - 1.0 / rate], new])
     # Before the first sample nothing is known; the first is held over the first interval.
     knots = np.concatenate([[min(old[0] - dt, edges[0])], old])
-    measurements = {}
-    for name, values in trajectory.measurements.items():
-        place, _, kind = name.rpartition("/")
-        gyroscope = trajectory.measurements.get(f"{place}/gyr")
-        turning = kind in ("gyr", "acc") and gyroscope is not None and gyroscope.shape[1] == values.shape[1] == 3
-        samples = held(gyroscope, values, knots, edges) if turning and kind == "acc" else None
-        if turning and kind == "gyr":
-            samples = turned(values, knots, edges)
-        measurements[name] = mean(values, knots, edges) if samples is None else samples
     left, right, weight = neighbours(old, new)
     return trajectory.replace(
         time=new,
-        measurements=measurements,
+        measurements={
+            name: between(name, values[left], values[right], weight)
+            if name.endswith("orientation")
+            else joined(name, trajectory.measurements, knots, edges)
+            for name, values in trajectory.measurements.items()
+        },
         truth={name: between(name, values[left], values[right], weight) for name, values in trajectory.truth.items()},
         mask=trajectory.mask[left] & trajectory.mask[right],
         metadata=trajectory.metadata | {"rate": float(rate), "resampled_from": 1.0 / dt},
     )
+
+
+def joined(name: str, channels: dict[str, np.ndarray], knots: np.ndarray, edges: np.ndarray) -> np.ndarray:
+    """Samples of one channel for the new intervals."""
+    place, _, kind = name.rpartition("/")
+    values, rates = channels[name], channels.get(f"{place}/gyr")
+    if kind not in ("gyr", "acc") or rates is None or not rates.shape[1] == values.shape[1] == 3:
+        return mean(values, knots, edges)
+    if kind == "gyr":
+        return angular_rate(values, knots, edges)
+    return specific_force(rates, values, knots, edges)
 
 
 def neighbours(old: np.ndarray, new: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -101,31 +109,42 @@ def mean(values: np.ndarray, knots: np.ndarray, edges: np.ndarray) -> np.ndarray
     return mark_missing(result, values, knots, edges)
 
 
+def running_product(q: np.ndarray) -> np.ndarray:
+    """Products ``q[0] ⊗ … ⊗ q[k]`` ``(T, 4)`` of quaternions ``(T, 4)``, by doubling."""
+    reach = 1
+    while reach < len(q):
+        q = np.concatenate([q[:reach], rotation.multiply(q[:-reach], q[reach:])])
+        reach *= 2
+    return rotation.normalize(q)
+
+
 def attitude_at(rates: np.ndarray, knots: np.ndarray, at: np.ndarray) -> np.ndarray:
     """Attitude ``(N, 4)`` relative to the start, after piecewise constant angular rates (missing ones are zero)."""
-    rates = np.nan_to_num(rates)
+    rates = np.where(np.isfinite(rates).all(axis=1, keepdims=True), rates, 0.0)
     steps = rotation.exp(rates * np.diff(knots)[:, None])
-    attitude = np.empty((len(knots), 4))
-    attitude[0] = (1.0, 0.0, 0.0, 0.0)
-    for tick, step in enumerate(steps):
-        attitude[tick + 1] = rotation.multiply(attitude[tick], step)
-    attitude = rotation.normalize(attitude)
+    attitude = running_product(np.concatenate([[[1.0, 0.0, 0.0, 0.0]], steps]))
     interval = np.clip(np.searchsorted(knots, at, side="right") - 1, 0, len(steps) - 1)
-    elapsed = (at - knots[interval])[:, None]
-    return rotation.multiply(attitude[interval], rotation.exp(rates[interval] * elapsed))
+    return rotation.multiply(attitude[interval], rotation.exp(rates[interval] * (at - knots[interval])[:, None]))
 
 
-def turned(rates: np.ndarray, knots: np.ndarray, edges: np.ndarray) -> np.ndarray:
-    """Angular rates whose rotation over each new interval is that of the old rates."""
+def turns(rates: np.ndarray, knots: np.ndarray, edges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Attitudes ``(N, 4)`` at the start of every new interval, and its rotation vector ``(N, 3)``."""
     attitude = attitude_at(rates, knots, edges)
-    steps = rotation.log(rotation.multiply(rotation.conjugate(attitude[:-1]), attitude[1:]))
-    return mark_missing(steps / np.diff(edges)[:, None], rates, knots, edges)
+    return attitude[:-1], rotation.log(rotation.multiply(rotation.conjugate(attitude[:-1]), attitude[1:]))
 
 
-def held(rates: np.ndarray, forces: np.ndarray, knots: np.ndarray, edges: np.ndarray) -> np.ndarray:
-    """Specific force whose velocity over each new interval is that of the old samples, in the attitude of its middle."""
-    middles = attitude_at(rates, knots, 0.5 * (knots[1:] + knots[:-1]))
-    increments = rotation.rotate(middles, np.nan_to_num(forces)) * np.diff(knots)[:, None]
-    velocity = np.diff(integral_at(increments, knots, edges), axis=0) / np.diff(edges)[:, None]
-    result = rotation.rotate_back(attitude_at(rates, knots, 0.5 * (edges[1:] + edges[:-1])), velocity)
+def angular_rate(rates: np.ndarray, knots: np.ndarray, edges: np.ndarray) -> np.ndarray:
+    """Angular rates whose rotation over each new interval is that of the old rates."""
+    _, turn = turns(rates, knots, edges)
+    return mark_missing(turn / np.diff(edges)[:, None], rates, knots, edges)
+
+
+def specific_force(rates: np.ndarray, forces: np.ndarray, knots: np.ndarray, edges: np.ndarray) -> np.ndarray:
+    """Specific force with the velocity increments of the old samples, in the attitude half-way through each turn."""
+    old_middle = attitude_at(rates, knots, 0.5 * (knots[1:] + knots[:-1]))
+    increments = rotation.rotate(old_middle, np.nan_to_num(forces)) * np.diff(knots)[:, None]
+    velocity = np.diff(integral_at(increments, knots, edges), axis=0)
+    start, turn = turns(rates, knots, edges)
+    new_middle = rotation.multiply(start, rotation.exp(0.5 * turn))
+    result = rotation.rotate_back(new_middle, velocity) / np.diff(edges)[:, None]
     return mark_missing(mark_missing(result, forces, knots, edges), rates, knots, edges)

@@ -54,14 +54,15 @@ class Trajectory:
         if backwards.any():
             tick = first(backwards) + 1
             raise ValueError(f"time must increase strictly, got {time[tick]} s at tick {tick} after {time[tick - 1]} s")
-        if not self.measurements:
+        measurements = columns("measurements", self.measurements, len(time))
+        if not measurements:
             raise ValueError("measurements must hold at least one channel, got none")
         mask = np.ones(len(time), bool) if self.mask is None else np.asarray(self.mask)
         if mask.dtype != bool or mask.shape != time.shape:
             raise ValueError(f"mask must be bool of shape ({len(time)},), got {mask.dtype} of shape {mask.shape}")
         values = {
             "time": time,
-            "measurements": columns("measurements", self.measurements, len(time)),
+            "measurements": measurements,
             "truth": columns("truth", self.truth, len(time)),
             "mask": mask,
             "metadata": check_metadata(self.metadata),
