@@ -1,0 +1,144 @@
+"""Weights in a file, and beside them a card that says what they are.
+
+``name.safetensors`` holds arrays only: reading it runs no code. ``name.json``, the card, holds whatever describes them
+and the SHA-256 of the weights, so that these cannot be changed without it. Shipped weights lie in :data:`WEIGHTS`.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from safetensors import SafetensorError
+from safetensors.numpy import load, save
+
+WEIGHTS = Path(__file__).resolve().parent / "weights"
+"""Folder of the weights that come with the package."""
+
+SUFFIX = ".safetensors"
+DIGEST = "sha256"
+"""Field of the card that :func:`save_weights` adds."""
+
+
+def save_weights(path: str | Path, arrays: Mapping[str, np.ndarray], card: Mapping[str, Any]) -> Path:
+    """Write ``path`` (weights) and, with the suffix ``.json``, the card; each in one move.
+
+    Args:
+        path: file of the weights; ``.safetensors`` is appended where it is missing. Folders are made.
+        arrays: name → array of numbers.
+        card: JSON-able description; the SHA-256 of the weights is added to it.
+
+    Returns:
+        The path of the weights.
+
+    Raises:
+        ValueError: there are no arrays, one is not finite or of a type that the format lacks, or the card is not
+            JSON-able or has a field ``sha256`` already.
+    """
+    path = weights_path(path)
+    if not arrays:
+        raise ValueError("weights must hold at least one array, got none")
+    contiguous = {name: np.array(array, order="C") for name, array in arrays.items()}
+    for name, array in contiguous.items():
+        if array.dtype.kind not in "fiub":
+            raise ValueError(f"weights {name!r} must be numbers, got dtype {array.dtype}")
+        if not np.isfinite(array).all():
+            raise ValueError(f"weights {name!r} must be finite")
+    if DIGEST in card:
+        raise ValueError(f"the card must not hold {DIGEST!r}: it is computed here")
+    try:
+        data = save(contiguous)
+        digest = {DIGEST: hashlib.sha256(data).hexdigest()}
+        text = json.dumps({**card, **digest}, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+    except (SafetensorError, KeyError, TypeError, ValueError) as reason:
+        raise ValueError(f"cannot write {path.name}: {reason}") from None
+    path.parent.mkdir(parents=True, exist_ok=True)
+    _replace(path, data)
+    _replace(card_path(path), text.encode("utf-8"))
+    return path
+
+
+def load_weights(path_or_name: str | Path) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
+    """Read weights and card.
+
+    Args:
+        path_or_name: path of a ``.safetensors`` file (its card lies beside it), or the name of shipped weights.
+
+    Returns:
+        Name → array, and the card.
+
+    Raises:
+        FileNotFoundError: there are no such weights, or their card is missing; the message lists what is shipped.
+        ValueError: the weights are not those that the card describes, or one of the files is damaged.
+    """
+    path = find_weights(path_or_name)
+    beside = card_path(path)
+    if not beside.is_file():
+        raise FileNotFoundError(f"{path} has no card {beside.name} beside it")
+    try:
+        card = json.loads(beside.read_text(encoding="utf-8"))
+    except ValueError as reason:
+        raise ValueError(f"{beside} is not JSON: {reason}") from None
+    if not isinstance(card, dict) or not isinstance(card.get(DIGEST), str):
+        raise ValueError(f"{beside} must hold the {DIGEST} of {path.name}")
+    data = path.read_bytes()
+    found = hashlib.sha256(data).hexdigest()
+    if found != card[DIGEST]:
+        raise ValueError(
+            f"{path} is not the file that its card describes: it is damaged or was exchanged "
+            f"({DIGEST} {found[:12]}…, the card says {card[DIGEST][:12]}…)"
+        )
+    try:
+        return load(data), card
+    except SafetensorError as reason:
+        raise ValueError(f"{path} is no safetensors file: {reason}") from None
+
+
+def list_weights() -> list[str]:
+    """Names of the shipped weights."""
+    return sorted(path.stem for path in WEIGHTS.glob(f"*{SUFFIX}"))
+
+
+def find_weights(path_or_name: str | Path) -> Path:
+    """Path of the weights of a shipped name or of a file.
+
+    Raises:
+        FileNotFoundError: there are none.
+    """
+    given = Path(path_or_name)
+    # A bare name means what is shipped, whatever lies in the working directory.
+    bare = given.name == str(path_or_name) and given.suffix != SUFFIX
+    path = weights_path(WEIGHTS / given if bare else given)
+    if not path.is_file():
+        raise FileNotFoundError(f"no weights {str(path_or_name)!r}; shipped are {', '.join(list_weights()) or 'none'}")
+    return path
+
+
+def weights_path(path: str | Path) -> Path:
+    """The path with the suffix of weights."""
+    path = Path(path)
+    return path if path.suffix == SUFFIX else path.with_name(path.name + SUFFIX)
+
+
+def card_path(path: Path) -> Path:
+    """Path of the card of weights."""
+    return path.with_suffix(".json")
+
+
+def _replace(path: Path, data: bytes) -> None:
+    """Write a whole file in one move, so that a reader never sees half of it."""
+    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(data)
+        os.chmod(temporary, 0o644)
+        os.replace(temporary, path)
+    except BaseException:
+        Path(temporary).unlink(missing_ok=True)
+        raise
