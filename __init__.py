@@ -1,1 +1,79 @@
-"""poise."""
+"""poise: pose from inertial sensors.
+
+Gymnasium environments that move people and things in PyBullet and say the true pose, published Kalman filters, learned
+estimators and policies that adapt filter gains, compared on the same data, simulated and recorded.
+
+>>> import poise
+>>> trajectory = poise.record("poise/HandMotion-v0", seed=0)
+>>> estimate = poise.run(poise.make_estimator("bounded-motion", dt=trajectory.dt), trajectory.measurements)
+>>> table = poise.evaluate(["bounded-motion", "tilt"], [trajectory])
+
+Four floors, imports only downwards: :mod:`poise.filters` (rotations, the Kalman core, published filters, metrics),
+:mod:`poise.envs` (physics, sensors, environments, recordings), :mod:`poise.baselines` (learned estimators, gain policies, the
+list of all estimators, evaluation), :mod:`poise.scripts` (the command ``poise``). Importing poise registers its environments
+with Gymnasium and loads neither PyBullet nor torch.
+"""
+
+from __future__ import annotations
+
+import importlib
+from importlib.metadata import PackageNotFoundError, version
+from typing import TYPE_CHECKING, Any
+
+from . import envs
+
+if TYPE_CHECKING:
+    from .baselines.evaluation import evaluate
+    from .baselines.zoo import EstimatorInfo, list_estimators, make_estimator
+    from .envs.recorder import record
+    from .envs.recordings import load_recording
+    from .envs.trajectory import Trajectory
+    from .filters.estimator import Estimator, run
+    from .filters.quantity import Estimate
+
+__all__ = [
+    "Estimate",
+    "Estimator",
+    "EstimatorInfo",
+    "Trajectory",
+    "__version__",
+    "evaluate",
+    "list_estimators",
+    "load_recording",
+    "make_estimator",
+    "record",
+    "run",
+]
+
+_HOMES = {
+    "Estimate": ".filters.quantity",
+    "Estimator": ".filters.estimator",
+    "EstimatorInfo": ".baselines.zoo",
+    "Trajectory": ".envs.trajectory",
+    "evaluate": ".baselines.evaluation",
+    "list_estimators": ".baselines.zoo",
+    "load_recording": ".envs.recordings",
+    "make_estimator": ".baselines.zoo",
+    "record": ".envs.recorder",
+    "run": ".filters.estimator",
+}
+
+try:
+    __version__ = version("poise")
+except PackageNotFoundError:  # a checkout that is not installed
+    __version__ = "0+unknown"
+
+getattr(envs, 'register_environments', lambda: None)()
+
+
+def __getattr__(name: str) -> Any:
+    """Load a name of the public face on first use."""
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = getattr(importlib.import_module(_HOMES[name], __name__), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -24,6 +24,7 @@ T = TypeVar("T", bound=tuple[Any, ...])
 
 _FORMS: dict[tuple[Any, ...], Any] = {}
 _HINTED: list[bool] = []
+PROCESSORS = os.cpu_count() or 1
 PARALLEL_WORK = 200_000
 """ticks × batch above which a batch is shared among threads"""
 
@@ -68,7 +69,7 @@ class _Form:
 
     def _parameters(self, model: Equations, gains: Gains | None, length: int, batch: tuple[int, ...]) -> np.ndarray:
         """Parameters ``(T or 1, B or 1, count)`` with the gains applied."""
-        base = np.array(list(parameters_of(model).values()))
+        base = np.array([*parameters_of(model).values()])
         if not gains:
             return base[None, None]
         factors = {name: np.asarray(array) for name, array in per_tick_gains(gains, length).items()}
@@ -90,7 +91,7 @@ class _Form:
 
     def _execute(self, states: list[np.ndarray], Z: np.ndarray, parameters: np.ndarray, outs: list[np.ndarray]) -> None:
         """Call the kernel, in threads where the work is worth it; sequences do not meet, so the numbers stay."""
-        threads = min(os.cpu_count() or 1, Z.shape[1])
+        threads = min(PROCESSORS, Z.shape[1])
         if threads < 2 or Z.shape[0] * Z.shape[1] < PARALLEL_WORK:
             self.kernel(*states, Z, parameters, *outs)
             return
@@ -114,22 +115,35 @@ def _flatten(state: T, batch: tuple[int, ...]) -> list[np.ndarray]:
     return [np.array(array).reshape((math.prod(batch), *array.shape[len(batch) :])) for array in state]
 
 
-def _first_tick(estimate: Estimate) -> Estimate:
-    pose = {name: value[0] for name, value in estimate.pose.items()}
-    return Estimate(pose, *(None if part is None else part[0] for part in estimate[1:]))
-
-
 class CompiledModel(_Form):
     """The compiled Kalman recursion of one model class; parameters are passed at every call."""
 
     def step(
         self, model: Model, state: FilterState, arrays: Measurement, gains: Gains | None
     ) -> tuple[FilterState, Estimate]:
-        """One tick; see :meth:`poise.filters.kalman.KalmanFilter.step`."""
+        """One tick; see :meth:`poise.filters.kalman.KalmanFilter.step`. Written for speed, not through :meth:`run`."""
         if gains:
             gains = {name: np.asarray(factor, dtype=float)[None] for name, factor in gains.items()}
-        estimate, state = self.run(model, state, {name: array[None] for name, array in arrays.items()}, gains, True)
-        return state, _first_tick(estimate)
+        z = np.concatenate([arrays[channel.name] for channel in model.channels], axis=-1)
+        batch = z.shape[:-1]
+        count, e, m = math.prod(batch), model.error_size, model.residual_size
+        x, P, held, started = (array.copy() for array in state)
+        poses, covariances = np.empty((*batch, self.pose_size)), np.empty((*batch, e, e))
+        whites, nis = np.empty((*batch, m)), np.empty(batch)
+        self.kernel(
+            x.reshape(count, -1),
+            P.reshape(count, e, e),
+            held.reshape(count, -1),
+            started.reshape(count),
+            z.reshape(1, count, -1),
+            self._parameters(model, gains, 1, batch),
+            poses.reshape(1, count, -1),
+            covariances.reshape(1, count, e, e),
+            whites.reshape(1, count, m),
+            nis.reshape(1, count),
+        )
+        pose = {name: poses[..., part] for name, part in self.columns.items()}
+        return state._make((x, P, held, started)), Estimate(pose, covariances, whites, nis)
 
     def run(
         self, model: Model, state: FilterState, arrays: Measurement, gains: Gains | None, keep_covariance: bool
@@ -157,7 +171,7 @@ class CompiledRecurrence(_Form):
     def step(self, model: Recurrence, state: ObserverState, arrays: Measurement) -> tuple[ObserverState, Estimate]:
         """One tick; see :meth:`poise.filters.observer.Observer.step`."""
         estimate, state = self.run(model, state, {name: array[None] for name, array in arrays.items()})
-        return state, _first_tick(estimate)
+        return state, Estimate({name: value[0] for name, value in estimate.pose.items()})
 
     def run(self, model: Recurrence, state: ObserverState, arrays: Measurement) -> tuple[Estimate, ObserverState]:
         """A whole sequence, from a given state."""

@@ -134,19 +134,31 @@ class Recurrence(Equations):
         raise NotImplementedError
 
 
-def parameters_of(model: Equations) -> dict[str, float]:
+def parameters_of(model: Equations) -> Mapping[str, float]:
     """The numbers a model is tuned by: every float of its fields, by a name such as ``lever_arm[0]``."""
-    return {path: value for path, value in _leaves(model) if isinstance(value, float)}
+    return _remembered(model)[0]
 
 
 def structure_of(model: Equations) -> tuple[Any, ...]:
     """What is not a float and so is fixed when a model is compiled: its class and its integers, booleans and texts."""
-    return (type(model), *((path, value) for path, value in _leaves(model) if not isinstance(value, float)))
+    return _remembered(model)[1]
+
+
+def _remembered(model: Equations) -> tuple[Mapping[str, float], tuple[Any, ...]]:
+    """Parameters and structure, found once a model: stepping asks for them at every tick."""
+    found = model.__dict__.get("_leaves")
+    if found is None:
+        leaves = list(_leaves(model))
+        parameters = {path: value for path, value in leaves if isinstance(value, float)}
+        structure = (type(model), *((path, value) for path, value in leaves if not isinstance(value, float)))
+        found = model.__dict__["_leaves"] = (parameters, structure)
+    return found
 
 
 def with_parameters(model: E, values: Mapping[str, Any]) -> E:
     """A copy whose floats are replaced (by arrays or traced scalars too), without the checks of construction."""
     changed = copy.copy(model)
+    changed.__dict__.pop("_leaves", None)
     for field in fields(model):
         object.__setattr__(changed, field.name, _rebuild(field.name, getattr(model, field.name), values))
     return changed
