@@ -7,6 +7,8 @@ leading dimensions and works on NumPy arrays, torch tensors and traced expressio
 
 from __future__ import annotations
 
+import math
+
 from .backend import Array, namespace, rows
 
 SMALL_ANGLE_SQUARED = 1e-8
@@ -181,13 +183,16 @@ def from_euler_zyx(yaw: Array, pitch: Array, roll: Array) -> Array:
 
 
 def to_euler_zyx(q: Array) -> tuple[Array, Array, Array]:
-    """Yaw, pitch and roll ``(...)`` of a unit quaternion; pitch in [-pi/2, pi/2]."""
+    """Yaw, pitch and roll ``(...)`` of a unit quaternion; pitch in [-pi/2, pi/2].
+
+    The three give the rotation back also at pitch ±pi/2, where only the sum or the difference of the others is defined
+    (E. Bernardes, S. Viollet, "Quaternion to Euler angles conversion", PLOS ONE 17(11), 2022).
+    """
     xp = namespace(q)
     w, x, y, z = q[..., 0], q[..., 1], q[..., 2], q[..., 3]
-    yaw = xp.atan2(2.0 * (x * y + w * z), 1.0 - 2.0 * (y * y + z * z))
-    up = up_in_body(q)
-    roll, pitch = roll_pitch(up)
-    return yaw, pitch, roll
+    half_sum, half_difference = xp.atan2(z + x, w - y), xp.atan2(z - x, w + y)
+    ratio = xp.atan2(xp.sqrt((z - x) ** 2 + (w + y) ** 2), xp.sqrt((z + x) ** 2 + (w - y) ** 2))
+    return wrap(half_sum + half_difference), 2.0 * ratio - 0.5 * math.pi, wrap(half_sum - half_difference)
 
 
 def up_in_body(q: Array) -> Array:
