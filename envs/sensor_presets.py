@@ -15,7 +15,7 @@ import math
 from dataclasses import dataclass, replace
 from typing import Any, Self
 
-from .sensor_noise import NoiseModel
+from .noise_model import NoiseModel
 from .sensors import STANDARD_GRAVITY
 
 DEG = math.pi / 180.0
@@ -128,7 +128,8 @@ PRESETS = (
     SensorPreset(
         "bosch-bmi160",
         "Bosch Sensortec BMI160 data sheet BST-BMI160-DS000, typical, ± 2000 °/s and ± 16 g: 0.007 °/s/√Hz, "
-        "180 µg/√Hz, offsets ± 3 °/s and ± 40 mg, 16.4 LSB/(°/s), 2048 LSB/g; in-run stability not published; no magnetometer",
+        "180 µg/√Hz, offsets ± 3 °/s and ± 40 mg, 16.4 LSB/(°/s), 2048 LSB/g; in-run stability not published; "
+        "no magnetometer",
         NoiseModel(
             white_noise=0.007 * DEG, turn_on_bias=3.0 * DEG, resolution=DEG / 16.4, full_scale=32767.0 / 16.4 * DEG
         ),

@@ -56,7 +56,8 @@ class BodyState(NamedTuple):
 
     def at(self, index: int | slice | np.ndarray) -> BodyState:
         """The state (or states) at ``index`` of the time axis."""
-        return BodyState(*(None if field is None else np.asarray(field)[index] for field in self))
+        known = {name: np.asarray(field)[index] for name, field in self._asdict().items() if field is not None}
+        return BodyState(**known)
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,88 @@
+"""One sensor of a suite: :class:`Sensor` says what it senses, where, how often and how badly."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from ..filters.quantity import Channel
+from .noise_model import NoiseModel
+from .sensors import SAMPLINGS, BodyState, Mounting, Sampling
+
+Kind = Literal["gyroscope", "accelerometer", "magnetometer", "given"]
+"""What an ideal sensor reads; ``given``: the caller says (wheel encoder, force sensor …)."""
+
+FIXED = Mounting()
+"""A sensor in the body frame's origin, along its axes."""
+WIDTHS = {"gyroscope": 3, "accelerometer": 3, "magnetometer": 3}
+
+
+@dataclass(frozen=True)
+class Sensor:
+    """One sensor: a channel, what it senses, where, how often and how badly.
+
+    Raises:
+        ValueError: a field out of its range, or a channel of another width than the kind has.
+    """
+
+    channel: Channel
+    kind: Kind
+    rate: float
+    """Hz"""
+    noise: NoiseModel
+    """its full scale must be finite: it bounds the observation"""
+    body: str = "body"
+    """name of the body on which it is mounted"""
+    mounting: Mounting = FIXED
+    sampling: Sampling = "interval"
+    device: str = ""
+    """preset or product, for the record"""
+
+    def __post_init__(self) -> None:
+        if self.kind not in (*WIDTHS, "given"):
+            raise ValueError(f"kind must be one of {[*WIDTHS, 'given']}, got {self.kind!r}")
+        if self.sampling not in SAMPLINGS:
+            raise ValueError(f"sampling must be one of {list(SAMPLINGS)}, got {self.sampling!r}")
+        if not 0.0 < self.rate < math.inf:
+            raise ValueError(f"rate of {self.channel.name!r} must be positive and finite (Hz), got {self.rate}")
+        if self.channel.size != WIDTHS.get(self.kind, self.channel.size):
+            raise ValueError(f"a {self.kind} has 3 axes, but channel {self.channel.name!r} has {self.channel.size}")
+
+    @property
+    def truth_name(self) -> str:
+        """Name of its bias in the truth: ``gyroscope_bias`` at the place ``imu``, else ``<place>/gyroscope_bias``."""
+        place, _, rest = self.channel.name.partition("/")
+        if self.kind == "given":
+            return f"{self.channel.name}_bias"
+        return f"{self.kind}_bias" if place == "imu" and rest else f"{place}/{self.kind}_bias"
+
+    def describe(self) -> dict[str, Any]:
+        """Everything about it, for JSON."""
+        return {
+            "channel": self.channel.name,
+            "size": self.channel.size,
+            "unit": self.channel.unit,
+            "kind": self.kind,
+            "device": self.device,
+            "rate": float(self.rate),
+            "body": self.body,
+            "lever_arm": list(self.mounting.lever_arm),
+            "rotation": list(self.mounting.rotation),
+            "sampling": self.sampling,
+            "noise": self.noise.describe(),
+        }
+
+
+def pick(bodies: BodyState | Mapping[str, BodyState], name: str) -> BodyState:
+    """The state of the body ``name``.
+
+    Raises:
+        ValueError: there is none.
+    """
+    if isinstance(bodies, BodyState):
+        return bodies
+    if name not in bodies:
+        raise ValueError(f"bodies must hold {name!r}, got {sorted(bodies)}")
+    return bodies[name]
