@@ -1,15 +1,21 @@
 """Trajectories at another rate, without losing what integrates to the pose.
 
-A sample stands for the interval that ends at its tick. Its kind decides how samples are joined:
+With ``sampling="interval"`` a sample stands for the interval that ends at its tick, and its kind decides how samples are
+joined:
 
 * a gyroscope is integrated to an attitude, which is read at the new ticks, so that coning is kept;
 * an accelerometer beside a gyroscope is integrated to a velocity in the frame of that attitude, and given in the
   attitude of the middle of the new interval, so that sculling is kept (P. G. Savage, "Strapdown Inertial Navigation
   Integration Algorithm Design", J. Guidance, Control, and Dynamics 21(1–2), 1998);
 * an orientation is interpolated, every other channel averaged.
+
+With ``sampling="instant"`` a sample is the value at its tick, and all are interpolated; motion faster than half the new
+rate is aliased. This suits estimators that use the accelerometer in the attitude of the tick.
 """
 
 from __future__ import annotations
+
+from typing import Literal
 
 import numpy as np
 
@@ -17,25 +23,28 @@ from ..filters import rotation
 from .trajectory import Trajectory
 
 
-def resample(trajectory: Trajectory, rate: float) -> Trajectory:
+def resample(trajectory: Trajectory, rate: float, sampling: Literal["interval", "instant"] = "interval") -> Trajectory:
     """Resample to ``rate`` on the uniform grid that starts at the first tick.
 
-    Strapdown integration of the result passes through the attitudes of the original, and through its velocities,
+    By intervals, strapdown integration of the result passes through the attitudes of the original, and through its velocities,
     interpolated between old ticks. Nothing is filtered beyond the mean over an interval. At a higher rate samples are
     repeated: no information is added.
 
     Args:
-        trajectory: with uniform or other ticks; its samples are taken as means over the interval that ends at them.
+        trajectory: with uniform or other ticks.
         rate: Hz.
+        sampling: what a sample is, the mean over the interval that ends at its tick or the value at its tick.
 
     Returns:
-        The new trajectory. A sample is NaN if its interval overlaps a missing one; orientations are interpolated on
+        The new trajectory. A sample is NaN if its interval overlaps a missing one, or an old neighbour is missing; orientations are interpolated on
         the great circle, other truth linearly, both NaN beside unknown truth; a tick is scored if both its old
         neighbours are.
 
     Raises:
-        ValueError: ``rate`` is not positive and finite.
+        ValueError: ``rate`` is not positive and finite, or ``sampling`` unknown.
     """
+    if sampling not in ("interval", "instant"):
+        raise ValueError(f"sampling must be 'interval' or 'instant', got {sampling!r}")
     if not 0.0 < rate < np.inf:
         raise ValueError(f"rate must be a positive number of Hz, got {rate}")
     old, dt = trajectory.time, trajectory.dt
@@ -50,7 +59,7 @@ def resample(trajectory: Trajectory, rate: float) -> Trajectory:
         time=new,
         measurements={
             name: between(name, values[left], values[right], weight)
-            if name.endswith("orientation")
+            if sampling == "instant" or name.endswith("orientation")
             else joined(name, trajectory.measurements, knots, edges)
             for name, values in trajectory.measurements.items()
         },

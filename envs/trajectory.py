@@ -10,7 +10,7 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -131,11 +131,11 @@ class Trajectory:
         """A copy with some attributes changed."""
         return dataclasses.replace(self, **changes)
 
-    def resampled(self, rate: float) -> Trajectory:
+    def resampled(self, rate: float, sampling: Literal["interval", "instant"] = "interval") -> Trajectory:
         """The same motion at another rate in Hz, see :func:`~poise.envs.resampling.resample`."""
         from .resampling import resample
 
-        return resample(self, rate)
+        return resample(self, rate, sampling)
 
     def save(self, path: str | Path) -> Path:
         """Write the trajectory to an HDF5 file, see :func:`~poise.envs.storage.save_trajectory`."""

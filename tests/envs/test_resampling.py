@@ -86,6 +86,20 @@ def test_missing_samples_and_unknown_truth_stay_missing(wobble):
     np.testing.assert_allclose(thin.truth["orientation"], orientation[::3], atol=1e-12)
 
 
+def test_instants_are_interpolated(wobble):
+    thin = wobble.resampled(100.0, sampling="instant")
+    for name, values in wobble.measurements.items():
+        np.testing.assert_allclose(thin.measurements[name], values[::3], atol=1e-12)
+    dense = wobble.resampled(600.0, sampling="instant")
+    gyr = wobble.measurements["imu/gyr"]
+    np.testing.assert_allclose(dense.measurements["imu/gyr"][1::2], 0.5 * (gyr[1:] + gyr[:-1]), atol=1e-12)
+    gyr[100] = np.nan
+    assert np.isnan(wobble.resampled(100.0, sampling="instant").measurements["imu/gyr"]).sum() == 0
+    assert np.isnan(wobble.resampled(600.0, sampling="instant").measurements["imu/gyr"][199:202]).all()
+    with pytest.raises(ValueError, match="sampling must be"):
+        wobble.resampled(100.0, sampling="mean")
+
+
 def test_a_rate_must_be_positive(wobble):
     for rate in (0.0, -1.0, np.nan, np.inf):
         with pytest.raises(ValueError, match="rate must be a positive"):
