@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -66,16 +66,26 @@ class MotionSensing:
         body: name of the body, for messages.
         mounting: place and axes on the body.
         sampling: ``interval`` or ``instant``.
+        rate: samples a second, Hz.
         gravity: m/s².
         field: ``(3,)`` magnetic field in the world, any unit.
+        kinds: which of ``gyroscope``, ``accelerometer`` and ``magnetometer`` are there.
     """
 
     def __init__(
-        self, body: str, mounting: Mounting, sampling: Sampling, gravity: float, field: tuple[float, ...]
+        self,
+        body: str,
+        mounting: Mounting,
+        sampling: Sampling,
+        rate: float,
+        gravity: float,
+        field: tuple[float, ...],
+        kinds: Collection[str],
     ) -> None:
-        self.body, self.mounting, self.sampling = body, mounting, sampling
+        self.body, self.mounting, self.sampling, self.rate = body, mounting, sampling, rate
         self.gravity, self.field = gravity, field
-        self.kinds: set[str] = {"gyroscope", "accelerometer", "magnetometer"}
+        self.magnetic = "magnetometer" in kinds
+        self.inertial = "gyroscope" in kinds or "accelerometer" in kinds
         self._lines = straight_lines(mounting, gravity, field)
         self.reset()
 
@@ -101,9 +111,9 @@ class MotionSensing:
         """
         now, rate = self._place(state)
         ideal: dict[str, list[float]] = {}
-        if "magnetometer" in self.kinds:
+        if self.magnetic:
             ideal["magnetometer"] = self._lines.field(now[1])[0]
-        if self.kinds & {"gyroscope", "accelerometer"}:
+        if self.inertial:
             if self.sampling == "instant":
                 ideal["gyroscope"] = rate
                 ideal["accelerometer"] = self._force(state, now, before)
@@ -153,9 +163,11 @@ class MotionSensing:
         """
         none = (0, np.zeros((0, 3)))
         if len(np.atleast_1d(states.time)) == 0:
-            return dict.fromkeys(self.kinds, none)
+            return dict.fromkeys(("gyroscope", "accelerometer", "magnetometer"), none)
         placed = sensors.mounted(states, self.mounting)
-        ideal = {"magnetometer": (0, sensors.magnetometer_reading(placed, self.field))}
+        ideal = {"magnetometer": (0, sensors.magnetometer_reading(placed, self.field))} if self.magnetic else {}
+        if not self.inertial:
+            return ideal
         if self.sampling == "instant":
             earlier = None if before is None else sensors.mounted(before, self.mounting)
             rate, force = sensors.instant_readings(placed, earlier, self.gravity)

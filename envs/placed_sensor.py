@@ -7,6 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
+import numpy as np
+
 from ..filters.quantity import Channel
 from .noise_model import NoiseModel
 from .sensors import SAMPLINGS, BodyState, Mounting, Sampling
@@ -49,6 +51,22 @@ class Sensor:
             raise ValueError(f"rate of {self.channel.name!r} must be positive and finite (Hz), got {self.rate}")
         if self.channel.size != WIDTHS.get(self.kind, self.channel.size):
             raise ValueError(f"a {self.kind} has 3 axes, but channel {self.channel.name!r} has {self.channel.size}")
+
+    @property
+    def placement(self) -> tuple[str, Mounting, Sampling, float] | None:
+        """What sensors have in common whose readings are computed together; None for a given reading."""
+        return None if self.kind == "given" else (self.body, self.mounting, self.sampling, float(self.rate))
+
+    def due(self, tick: int | np.ndarray, tick_rate: float) -> Any:
+        """Whether it is sampled at ``tick`` (a number or ``(T,)``): whether its own clock struck since the tick before.
+
+        Args:
+            tick: counted from 0, when every sensor is due.
+            tick_rate: ticks a second, Hz, at least ``rate``.
+        """
+        ratio = self.rate / tick_rate
+        # the small number keeps exact ratios exact
+        return np.floor(tick * ratio + 1e-9) > np.floor((tick - 1) * ratio + 1e-9)
 
     @property
     def truth_name(self) -> str:

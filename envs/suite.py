@@ -70,19 +70,14 @@ class SensorSuite:
         self.channels = tuple(sensor.channel for sensor in sensors)
         limits = {sensor.channel.name: sensor.noise.full_scale for sensor in sensors}
         self._layout = ObservationLayout(self.channels, limits)
-        placements: dict[tuple[Any, ...], MotionSensing] = {}
-        self._places: list[MotionSensing | None] = []
-        for sensor in sensors:
-            if sensor.kind == "given":
-                self._places.append(None)
-                continue
-            key = (sensor.body, sensor.mounting, sensor.rate, sensor.sampling)
-            if key not in placements:
-                placements[key] = MotionSensing(sensor.body, sensor.mounting, sensor.sampling, self.gravity, self.field)
-            self._places.append(placements[key])
-        self._motion = list(placements.values())
-        for place in self._motion:
-            place.kinds = {sensor.kind for sensor, at in zip(sensors, self._places, strict=True) if at is place}
+        keys = [sensor.placement for sensor in sensors]
+        places = {
+            key: MotionSensing(*key, self.gravity, self.field, {s.kind for s in sensors if s.placement == key})
+            for key in keys
+            if key is not None
+        }
+        self._motion = list(places.values())
+        self._places = [None if key is None else places[key] for key in keys]
         self._missing = {channel.name: np.full(channel.size, np.nan) for channel in self.channels}
         self._noise: list[NoiseProcess] = []
         self._tick = 0
@@ -107,12 +102,6 @@ class SensorSuite:
             place.reset()
         self._layout.reset()
         self._tick = 0
-
-    def due(self, sensor: Sensor, tick: int | np.ndarray) -> bool | np.ndarray:
-        """Whether a sensor is sampled at ``tick``, by the phase that its own clock has reached."""
-        ratio = sensor.rate / self.rate
-        # the small number keeps exact ratios exact
-        return np.floor(tick * ratio + 1e-9) > np.floor((tick - 1) * ratio + 1e-9)
 
     def sample(
         self,
@@ -142,7 +131,7 @@ class SensorSuite:
         for sensor, place, noise in zip(self.sensors, self._places, self._noise, strict=True):
             name = sensor.channel.name
             measurement[name] = self._missing[name].copy()
-            if sensor.rate < self.rate and not self.due(sensor, tick):
+            if sensor.rate < self.rate and not sensor.due(tick, self.rate):
                 continue
             force = None
             if place is None:
@@ -186,7 +175,7 @@ class SensorSuite:
         measurements, truth = {}, {}
         for sensor, place, noise in zip(self.sensors, self._places, self._noise, strict=True):
             name, size = sensor.channel.name, sensor.channel.size
-            rows, force = np.flatnonzero(self.due(sensor, ticks)), None
+            rows, force = np.flatnonzero(sensor.due(ticks, self.rate)), None
             if place is None:
                 values = self._reading(name, readings, (len(ticks), size))[rows]
             else:
