@@ -94,10 +94,28 @@ def test_instants_are_interpolated(wobble):
     gyr = wobble.measurements["imu/gyr"]
     np.testing.assert_allclose(dense.measurements["imu/gyr"][1::2], 0.5 * (gyr[1:] + gyr[:-1]), atol=1e-12)
     gyr[100] = np.nan
-    assert np.isnan(wobble.resampled(100.0, sampling="instant").measurements["imu/gyr"]).sum() == 0
+    assert not np.isnan(wobble.resampled(75.0, sampling="instant").measurements["imu/mag"]).any()
     assert np.isnan(wobble.resampled(600.0, sampling="instant").measurements["imu/gyr"][199:202]).all()
     with pytest.raises(ValueError, match="sampling must be"):
         wobble.resampled(100.0, sampling="mean")
+
+
+@pytest.mark.parametrize("first", [0, 3])
+def test_sensors_slower_than_the_ticks_keep_their_own_intervals(wobble, first):
+    """Every third tick has a sample, as in an episode with a slow sensor; its interval reaches back to the last one."""
+    slow = wobble.resampled(100.0)
+    spread = {name: np.full((601, 3), np.nan) for name in slow.measurements}
+    for name, values in slow.measurements.items():
+        spread[name][first::3] = values[first // 3 :]
+    mixed = wobble.replace(measurements=spread)
+    for sampling in ("interval", "instant"):
+        back = mixed.resampled(100.0, sampling=sampling)
+        for name, values in slow.measurements.items():
+            np.testing.assert_allclose(back.measurements[name][first // 3 :], values[first // 3 :], atol=1e-9)
+            assert np.isnan(back.measurements[name][: first // 3]).all()
+    spread["imu/acc"][300] = np.nan
+    holed = mixed.replace(measurements=spread).resampled(100.0)
+    assert np.flatnonzero(np.isnan(holed.measurements["imu/acc"][1:]).any(1)).tolist() == [99]
 
 
 def test_a_rate_must_be_positive(wobble):
