@@ -1,0 +1,52 @@
+"""Measure estimators on recordings: BROAD trials, Movella/Xsens DOT exports, or trajectories of this package."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import tyro
+
+from .main import run_command
+
+
+@dataclass
+class Args:
+    """Arguments of ``poise evaluate``."""
+
+    recordings: tyro.conf.Positional[tuple[Path, ...]]
+    """files, or folders that are searched for recordings"""
+    estimators: tuple[str, ...] = ("bounded-motion", "external-acceleration", "mekf", "mahony", "gru")
+    """names of estimators; `poise evaluate --estimators all .` takes every one that is installed"""
+    reference: str = "mekf-9"
+    """estimator that stands in for the truth of recordings without one (agreement, not error)"""
+    seed: int = 0
+    """names the run folder; evaluation draws no random numbers"""
+    runs: Path = Path("runs")
+    """where the run folder goes"""
+    json: bool = False
+    """print machine-readable rows instead of tables"""
+
+
+def run(args: Args) -> int:
+    """Evaluate, print the table, and leave a run folder."""
+    from ..baselines.evaluation import evaluate
+    from ..baselines.zoo import list_estimators
+    from ..envs.recordings import find_recordings, load_recording
+    from .experiment import start_run
+    from .report import print_comparison
+
+    paths = [path for item in args.recordings for path in (find_recordings(item) if item.is_dir() else [item])]
+    if not paths:
+        raise ValueError(f"no recording in {', '.join(map(str, args.recordings))}")
+    trajectories = [load_recording(path) for path in paths]
+    names = tuple(list_estimators()) if args.estimators == ("all",) else args.estimators
+    table = evaluate(list(names), trajectories, reference=args.reference, progress=not args.json)
+    folder = start_run("evaluate", args, args.seed, args.runs)
+    folder.write_results(table)
+    print_comparison(table, folder, as_json=args.json)
+    return 0
+
+
+if __name__ == "__main__":
+    run_command("evaluate")

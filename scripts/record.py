@@ -1,0 +1,86 @@
+"""Record episodes of an environment into files, several at a time; call it again to go on after an interruption."""
+
+from __future__ import annotations
+
+import ast
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+import tyro
+
+from .main import run_command
+
+
+@dataclass
+class Args:
+    """Arguments of ``poise record``."""
+
+    environment: tyro.conf.Positional[str] = "hand-motion"
+    """environment: an id such as poise/HandMotion-v0, or its short form hand-motion"""
+    folder: Annotated[Path, tyro.conf.arg(aliases=["-o"])] = Path("recordings")
+    """where the files go; finished episodes of the same kind in it are kept"""
+    episodes: int = 10
+    """how many episodes there shall be"""
+    seed: int = 0
+    """root seed; every episode has a child of its own"""
+    processes: int = 2
+    """episodes played at a time"""
+    options: tuple[str, ...] = ()
+    """arguments of the environment, as name=value (gesture=fast rate=200)"""
+
+
+def environment_id(name: str) -> str:
+    """The registered id of ``hand-motion`` or ``poise/HandMotion-v0``.
+
+    Raises:
+        ValueError: there is none; the message lists those that can be recorded.
+    """
+    import gymnasium
+
+    known = sorted(name for name in gymnasium.registry if name.startswith("poise/"))
+    words = "".join(word.capitalize() for word in name.split("-"))
+    for candidate in (name, *(id_ for id_ in known if id_.rsplit("-v", 1)[0] == f"poise/{words}")):
+        if candidate in known:
+            return candidate
+    raise ValueError(f"unknown environment {name!r}; there are {', '.join(known)}")
+
+
+def option(text: str) -> tuple[str, Any]:
+    """``rate=200`` → ("rate", 200); values that are no Python literals stay text.
+
+    Raises:
+        ValueError: there is no ``=``.
+    """
+    name, sign, value = text.partition("=")
+    if not sign or not name:
+        raise ValueError(f"an option must be name=value, got {text!r}")
+    try:
+        return name, ast.literal_eval(value)
+    except (ValueError, SyntaxError):
+        return name, value
+
+
+def run(args: Args) -> int:
+    """Record and say where the files are."""
+    from tqdm import tqdm
+
+    from ..envs.batch_recorder import record_episodes
+
+    env_id = environment_id(args.environment)
+    with tqdm(total=args.episodes, desc=f"record {env_id}", unit="episode") as bar:
+        paths = record_episodes(
+            env_id,
+            args.folder,
+            episodes=args.episodes,
+            seed=args.seed,
+            options=dict(option(text) for text in args.options),
+            processes=args.processes,
+            report=lambda path: bar.update(),
+        )
+    print(f"{len(paths)} episodes in {args.folder}")
+    return 0
+
+
+if __name__ == "__main__":
+    run_command("record")

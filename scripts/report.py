@@ -1,0 +1,93 @@
+"""A table of errors → terminal, Markdown report, figures, or JSON."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from .experiment import Run
+from .tables import markdown_table, print_table, records
+
+if TYPE_CHECKING:
+    import pandas
+
+TITLES = {
+    "inclination": "Inclination error, RMS over the scored ticks, deg",
+    "heading": "Heading error, RMS, deg",
+    "total": "Total orientation error, RMS, deg",
+}
+"""Metric → title; other metrics get their name."""
+
+
+def kinds_of(labels: Any) -> dict[str, str]:
+    """Label → kind, for labels that are names of estimators or begin with one (``name (variant)``)."""
+    from ..baselines.zoo import list_estimators
+
+    known = list_estimators()
+    return {label: known[name].kind for label in map(str, labels) if (name := label.split(" (")[0]) in known}
+
+
+def wide_tables(table: pandas.DataFrame, groups: Mapping[str, str] | None = None) -> dict[str, list[dict[str, Any]]]:
+    """Title → rows (an estimator each, a column a group, then the mean over trajectories), for every metric in deg."""
+    from ..baselines.evaluation import summary
+
+    kinds = kinds_of(table["estimator"].unique())
+    tables = {}
+    for metric in table.loc[table["unit"] == "deg", "metric"].unique():
+        wide = summary(table, metric, groups)
+        title = TITLES.get(metric, f"RMS {metric}, deg (agreement, not error: these recordings have no truth)")
+        tables[title] = [
+            {"estimator": name, "kind": kinds.get(str(name), "–"), **{str(key): value for key, value in row.items()}}
+            for name, row in wide.iterrows()
+        ]
+    return tables
+
+
+def skipped_text(table: pandas.DataFrame) -> str:
+    """What could not be run and why, a line an estimator."""
+    reasons: dict[str, set[str]] = {}
+    for estimator, _, reason in table.attrs.get("skipped", []):
+        reasons.setdefault(estimator, set()).add(reason)
+    return "\n".join(f"- {name}: {'; '.join(sorted(why))}" for name, why in reasons.items())
+
+
+def print_comparison(
+    table: pandas.DataFrame, run: Run, *, as_json: bool = False, groups: Mapping[str, str] | None = None, name: str = ""
+) -> dict[str, str]:
+    """Print a comparison and draw its bars.
+
+    Args:
+        table: from :func:`poise.evaluate`.
+        run: where the figures go.
+        as_json: print rows as JSON, one a line, and no tables.
+        groups: trajectory → column of the wide tables.
+        name: of the data (simulation, recordings), in titles and file names.
+
+    Returns:
+        Heading → Markdown, for the report.
+    """
+    from ..baselines.plots import rms_bars, save
+
+    sections = {}
+    if as_json:
+        for row in records(table):
+            print(
+                json.dumps(row, allow_nan=False) if row["value"] == row["value"] else json.dumps({**row, "value": None})
+            )
+    for title, rows in wide_tables(table, groups).items():
+        heading = f"{name}: {title}" if name else title
+        if not as_json:
+            print_table(rows, heading)
+        sections[heading] = markdown_table(rows)
+    for metric in table.loc[table["unit"] == "deg", "metric"].unique():
+        figure = rms_bars(table, kinds_of(table["estimator"].unique()), metric, name)
+        words = f"{name} {metric}".strip().replace(" ", "-")
+        path = save(figure, run.figures / f"{words}.png")
+        sections[f"Figure: {words}"] = f"![{words}]({path.relative_to(run.folder)})"
+    skipped = skipped_text(table)
+    if skipped:
+        sections[f"{name}: not run".lstrip(": ")] = skipped
+        if not as_json:
+            print(f"not run:\n{skipped}")
+    return sections
