@@ -30,7 +30,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from .backend import Array, constant, expand, namespace
-from .magnetic_heading import align, follow, heading_error, is_disturbed, norm_and_dip
+from .magnetic_heading import MagneticHeading
 from .model import Gain, Model
 from .quantity import (
     ACCELEROMETER,
@@ -99,15 +99,12 @@ class BoundedMotion(Model):
 
     def prior(self, z: Measurement) -> tuple[Array, Array]:
         """Sensor at rest: inclination from the first accelerometer sample, heading, bias and velocity zero."""
-        return self._prior(level(z["imu/acc"]), z["imu/acc"], self.tilt_prior)
-
-    def _prior(self, q: Array, f: Array, heading_prior: float) -> tuple[Array, Array]:
-        xp = namespace(f)
-        zero = 0.0 * f
+        xp, f = namespace(z["imu/acc"]), z["imu/acc"]
+        q, zero = level(f), 0.0 * f
         x = xp.concat([q, zero, zero, self._external(q, f), zero[..., :2]], axis=-1)
         one = 1.0 + zero[..., :1]
-        deviations = [self.tilt_prior, self.tilt_prior, heading_prior, *[self.bias_prior] * 3, *[self.velocity_prior] * 3]
-        diagonal = xp.concat([one * expand(value, 1) for value in deviations], axis=-1) ** 2
+        deviations = [*[self.tilt_prior] * 3, *[self.bias_prior] * 3, *[self.velocity_prior] * 3]
+        diagonal = xp.concat([one * expand(value**2, 1) for value in deviations], axis=-1)
         return x, diagonal[..., :, None] * constant([[float(i == j) for j in range(9)] for i in range(9)], f)
 
     def predict(self, x: Array, z: Measurement, previous: Measurement) -> tuple[Array, Array, Array]:
@@ -204,3 +201,19 @@ class BoundedMotion(Model):
         clipped = xp.any(xp.greater(xp.abs(f), expand(self.accelerometer_range, 1)), axis=-1)[..., None]
         one = 1.0 + 0.0 * f[..., :1]
         return xp.where(clipped, one * expand(self.clipped_inflation**2, 1), one)
+
+
+@dataclass(frozen=True)
+class BoundedMotion9(MagneticHeading, BoundedMotion):
+    """Nine axes: orientation in the world (x east, y north, z up), gyroscope bias and external acceleration.
+
+    State: as for six axes (15), expected norm and dip of the magnetic field (2).
+    """
+
+    channels: ClassVar[tuple[Channel, ...]] = (GYROSCOPE, ACCELEROMETER, MAGNETOMETER)
+    outputs: ClassVar[tuple[Quantity, ...]] = (ORIENTATION, UP, GYROSCOPE_BIAS, EXTERNAL_ACCELERATION)
+    state_size: ClassVar[int] = 17
+    residual_size: ClassVar[int] = 4
+    gains: ClassVar[dict[str, Gain]] = BoundedMotion.gains | {
+        "heading": Gain("magnetometer_noise", description="variance σ_m² of the magnetic heading"),
+    }

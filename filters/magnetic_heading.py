@@ -1,4 +1,4 @@
-"""Heading from a magnetometer: what the magnetic filters share.
+"""Heading from a magnetometer: what the nine-axis filters share.
 
 Only the horizontal part of the field is used, and only its direction: the unit of the magnetometer does not matter, and
 an error of the field never reaches the inclination directly. Magnetic north lies ``declination`` radians east of
@@ -11,7 +11,11 @@ doi 10.1016/j.inffus.2022.10.014, section 3.4 (here with one slowly following re
 
 from __future__ import annotations
 
-from .backend import Array, expand, namespace
+from dataclasses import dataclass
+
+from .backend import Array, constant, expand, namespace
+from .model import Model
+from .quantity import Measurement
 from .rotation import from_axis_angle, level, multiply, norm, rotate, wrap
 
 
@@ -72,3 +76,68 @@ def follow(reference: Array, measured: Array, dt: Array, time: Array) -> Array:
     share = expand(dt / (dt + time), 1)
     moved = reference + share * (measured - reference)
     return xp.where(xp.isfinite(moved), moved, reference)
+
+
+@dataclass(frozen=True)
+class MagneticHeading(Model):
+    """Adds the heading to a model of six axes: put it first among the bases.
+
+    The other base keeps the orientation in the first four numbers of its state and the turn about world axes in the first three
+    of its error, and passes what follows its own numbers on. The state gains two numbers at its end: norm and dip of the field that are
+    expected. The residual gains one row at its end: the error of the heading. The filter starts at the first tick at which
+    the magnetometer, too, has brought a sample.
+
+    A sample whose norm or dip is off what is expected is left out. The expectation follows all samples slowly, so a new
+    place is accepted after some time constants.
+    """
+
+    magnetometer_noise: float = 0.1
+    """σ_m, rad/√Hz: density of the error of the magnetic heading"""
+    heading_prior: float = 0.1
+    """rad"""
+    declination: float = 0.0
+    """of the magnetic field, rad, positive east; 0 takes magnetic for geographic north"""
+    norm_tolerance: float = 0.1
+    """relative deviation from the expected norm beyond which a sample is left out; 1e3: never"""
+    dip_tolerance: float = 0.175
+    """rad: the same for the dip (10°)"""
+    field_time: float = 20.0
+    """s: time constant with which the expected norm and dip follow"""
+
+    def prior(self, z: Measurement) -> tuple[Array, Array]:
+        """The prior of six axes, turned to magnetic north."""
+        x, P = super().prior(z)
+        q, field = x[..., :4], z["imu/mag"]
+        q = turn_heading(q, heading_error(q, field, self.declination))
+        size = self.error_size
+        heading = constant([[float(i == j == 2) for j in range(size)] for i in range(size)], P)
+        P = P * (1.0 - heading) + expand(self.heading_prior**2, 2) * heading
+        return namespace(x).concat([q, x[..., 4:], norm_and_dip(q, field)], axis=-1), P
+
+    def residual(self, x: Array, z: Measurement) -> tuple[Array, Array, Array]:
+        """The rows of six axes, and the error of the heading unless the field is disturbed."""
+        xp = namespace(x)
+        r, H, R = super().residual(x, z)
+        q, field = x[..., :4], z["imu/mag"]
+        angle = heading_error(q, field, self.declination)
+        disturbed = is_disturbed(norm_and_dip(q, field), x[..., -2:], self.norm_tolerance, self.dip_tolerance)
+        angle = xp.where(disturbed, xp.nan + 0.0 * angle, angle)
+        zero = 0.0 * x[..., :1, None]
+        row = zero + constant([[float(j == 2) for j in range(self.error_size)]], x)
+        column = zero + constant([[0.0] for _ in range(self.residual_size - 1)], x)
+        variance = zero + expand(self.magnetometer_noise**2 / self.dt, 2)
+        lower = xp.concat([column.mT, variance], axis=-1)
+        R = xp.concat([xp.concat([R, column], axis=-1), lower], axis=-2)
+        return xp.concat([r, angle], axis=-1), xp.concat([H, row], axis=-2), R
+
+    def finish(self, x: Array, z: Measurement) -> Array:
+        """Let the expected field follow the measured one."""
+        x = super().finish(x, z)
+        expected = follow(x[..., -2:], norm_and_dip(x[..., :4], z["imu/mag"]), self.dt, self.field_time)
+        return namespace(x).concat([x[..., :-2], expected], axis=-1)
+
+    def pose(self, x: Array) -> dict[str, Array]:
+        """The quantities of six axes; the orientation is that in the world."""
+        pose = super().pose(x)
+        pose["orientation"] = pose.pop("relative_orientation")
+        return pose
