@@ -13,12 +13,9 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from .external_packages import ExternalPackage
+from .external_packages import QUARTER_TURN, ExternalPackage
 from .magnetic_heading import align, norm_and_dip
-from .rotation import conjugate, from_euler_zyx, level, multiply, normalize
-
-QUARTER_TURN = np.asarray(from_euler_zyx(np.array(0.5 * np.pi), np.array(0.0), np.array(0.0)))
-"""North-west-up to east-north-up."""
+from .rotation import conjugate, level, multiply, normalize
 
 
 @dataclass(frozen=True)

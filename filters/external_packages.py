@@ -31,7 +31,10 @@ from .quantity import (
     Measurement,
     Quantity,
 )
-from .rotation import normalize, up_in_body
+from .rotation import from_euler_zyx, multiply, normalize, up_in_body
+
+QUARTER_TURN = np.asarray(from_euler_zyx(np.array(0.5 * np.pi), np.array(0.0), np.array(0.0)))
+"""From north-west-up, the world of several packages, to east-north-up."""
 
 
 class WrapperState(NamedTuple):
@@ -75,7 +78,9 @@ class ExternalPackage:
         try:
             return importlib.import_module(self.package)
         except ImportError as error:
-            raise ImportError(f"{type(self).__name__} needs the package {self.package}: pip install {self.package}") from error
+            raise ImportError(
+                f"{type(self).__name__} needs the package {self.package}: pip install {self.package}"
+            ) from error
 
     @property
     def channels(self) -> tuple[Channel, ...]:
@@ -247,13 +252,14 @@ class IMUFusion(ExternalPackage):
         samples.append(sample)
         self._update(engine[0], sample)
         engine[1] = count + 1
-        return Log(samples, count + 1, engine), normalize(np.asarray(engine[0].get_quaternion(), dtype=float))
+        q = normalize(np.asarray(engine[0].get_quaternion(), dtype=float))
+        return Log(samples, count + 1, engine), np.asarray(multiply(QUARTER_TURN, q))
 
     def _engine(self) -> Any:
         package = self._import()
         settings = package.AhrsSettings(
             sample_rate=1.0 / self.dt,
-            convention=package.CONVENTION_ENU,
+            convention=package.CONVENTION_NWU,
             gain=self.gain,
             gyroscope_range=math.degrees(self.gyroscope_range),
             acceleration_rejection=math.degrees(self.acceleration_rejection),

@@ -1,0 +1,151 @@
+"""Every estimator of this floor by name: what it is called, what it reads and gives, how it is made.
+
+The table holds texts only, so listing it imports nothing; modules (and packages that are wrapped) are loaded when an
+estimator is made.
+"""
+
+from __future__ import annotations
+
+import difflib
+import importlib
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from typing import Any, Literal
+
+from .estimator import Estimator
+
+SIX = ("imu/gyr", "imu/acc")
+NINE = (*SIX, "imu/mag")
+RELATIVE = ("up", "relative_orientation")
+WORLD = ("orientation", "up")
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One estimator.
+
+    Attributes:
+        factory: ``module:class`` in this package; a model, a recurrence or an estimator.
+        kind: ``filter`` (published or ours), ``reference`` (what everybody knows), ``external`` (another package's).
+        description: one line.
+        channels: names of what it reads.
+        outputs: names of what it gives.
+        recursion: what runs the equations: ``KalmanFilter``, ``Observer``, or None for what is an estimator itself.
+        fixed: parameters that the name stands for; they cannot be given.
+    """
+
+    factory: str
+    kind: Literal["filter", "reference", "external"]
+    description: str
+    channels: tuple[str, ...]
+    outputs: tuple[str, ...]
+    recursion: Literal["KalmanFilter", "Observer"] | None = None
+    fixed: Mapping[str, Any] = field(default_factory=dict)
+
+    def load(self) -> type:
+        """The class of the equations or of the estimator."""
+        module, name = self.factory.split(":")
+        return getattr(importlib.import_module(f".{module}", __package__), name)
+
+
+def _filter(factory: str, description: str, channels: tuple[str, ...], outputs: tuple[str, ...]) -> Entry:
+    return Entry(factory, "filter", description, channels, outputs, "KalmanFilter")
+
+
+def _reference(factory: str, description: str, channels: tuple[str, ...], outputs: tuple[str, ...]) -> Entry:
+    return Entry(factory, "reference", description, channels, outputs, "Observer")
+
+
+def _external(factory: str, axes: int, description: str, bias: bool) -> Entry:
+    outputs = (WORLD if axes == 9 else RELATIVE) + (("gyroscope_bias",) if bias else ())
+    return Entry(factory, "external", description, NINE[: axes // 3], outputs, None, {"axes": axes})
+
+
+CATALOGUE: dict[str, Entry] = {
+    "external-acceleration": _filter(
+        "external_acceleration:ExternalAcceleration",
+        "Lee, Park, Robinovitch 2012: vertical and external acceleration; mode=1, 2 or 3",
+        SIX,
+        ("up", "external_acceleration"),
+    ),
+    "mekf": _filter(
+        "mekf:MEKF", "multiplicative extended Kalman filter with gyroscope bias", SIX, (*RELATIVE, "gyroscope_bias")
+    ),
+    "mekf-9": _filter("mekf:MEKF9", "the same with the heading of a magnetometer", NINE, (*WORLD, "gyroscope_bias")),
+    "bounded-motion": _filter(
+        "bounded_motion:BoundedMotion",
+        "accelerates, but does not go anywhere: velocity near zero as pseudo-measurement",
+        SIX,
+        (*RELATIVE, "gyroscope_bias", "external_acceleration"),
+    ),
+    "bounded-motion-9": _filter(
+        "bounded_motion:BoundedMotion9",
+        "the same with the heading of a magnetometer",
+        NINE,
+        (*WORLD, "gyroscope_bias", "external_acceleration"),
+    ),
+    "gyroscope-integration": _reference(
+        "references:GyroscopeIntegration", "gyroscope alone, from the first inclination", SIX, RELATIVE
+    ),
+    "tilt": _reference("references:Tilt", "accelerometer alone, sample by sample", ("imu/acc",), ("up",)),
+    "mahony": _reference(
+        "references:Mahony", "Mahony, Hamel, Pflimlin 2008, published gains", SIX, (*RELATIVE, "gyroscope_bias")
+    ),
+    "mahony-9": _reference("references:Mahony9", "the same with a magnetometer", NINE, (*WORLD, "gyroscope_bias")),
+    "vqf": _external("external_packages:VQF", 6, "VQF, Laidig and Seel 2023, causal form (package vqf)", True),
+    "vqf-9": _external("external_packages:VQF", 9, "the same with a magnetometer (package vqf)", True),
+    "imufusion": _external("external_packages:IMUFusion", 6, "Fusion of x-io Technologies (package imufusion)", False),
+    "imufusion-9": _external(
+        "external_packages:IMUFusion", 9, "the same with a magnetometer (package imufusion)", False
+    ),
+    "ahrs-madgwick": _external("external_ahrs:AHRSMadgwick", 6, "Madgwick 2010 (package ahrs)", False),
+    "ahrs-madgwick-9": _external("external_ahrs:AHRSMadgwick", 9, "the same with a magnetometer (package ahrs)", False),
+    "ahrs-mahony": _external("external_ahrs:AHRSMahony", 6, "Mahony et al. 2008 (package ahrs)", True),
+    "ahrs-mahony-9": _external("external_ahrs:AHRSMahony", 9, "the same with a magnetometer (package ahrs)", True),
+    "ahrs-ekf": _external("external_ahrs:AHRSEKF", 6, "extended Kalman filter on the quaternion (package ahrs)", False),
+    "ahrs-ekf-9": _external("external_ahrs:AHRSEKF", 9, "the same with a magnetometer (package ahrs)", False),
+}
+
+
+def make(name: str, **parameters: Any) -> Estimator[Any]:
+    """Make an estimator of this floor.
+
+    Args:
+        name: a key of :data:`CATALOGUE`.
+        parameters: fields of the equations (``dt``, noises …) and of what runs them (``compiled``, ``keep_covariance``).
+
+    Returns:
+        The estimator.
+
+    Raises:
+        ValueError: an unknown name, an unknown parameter (the message lists those that there are), or a value that is refused.
+        ImportError: the package that is wrapped, or the extra that the name needs, is not installed.
+    """
+    if name not in CATALOGUE:
+        close = difflib.get_close_matches(name, CATALOGUE, n=3)
+        hint = f"; did you mean {' or '.join(map(repr, close))}?" if close else f"; there are {sorted(CATALOGUE)}"
+        raise ValueError(f"unknown estimator {name!r}{hint}")
+    entry = CATALOGUE[name]
+    equations = entry.load()
+    recursion = _recursion(entry)
+    own = {item.name for item in fields(equations)} - set(entry.fixed)
+    outer = {item.name for item in fields(recursion)} - {"model"} if recursion else set()
+    unknown = sorted(set(parameters) - own - outer)
+    if unknown:
+        raise ValueError(f"unknown parameters {unknown} of {name!r}; there are {sorted(own | outer)}")
+    made = equations(**{key: value for key, value in parameters.items() if key in own}, **entry.fixed)
+    if recursion is None:
+        return made
+    return recursion(made, **{key: value for key, value in parameters.items() if key in outer})
+
+
+def _recursion(entry: Entry) -> type | None:
+    if entry.recursion == "KalmanFilter":
+        from .kalman import KalmanFilter
+
+        return KalmanFilter
+    if entry.recursion == "Observer":
+        from .observer import Observer
+
+        return Observer
+    return None
