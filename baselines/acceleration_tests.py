@@ -110,7 +110,7 @@ def sweep_c_a(seeds: Sequence[int], values: Sequence[float]) -> list[dict[str, f
 
 
 def estimate_up(trial: Trial, model: ExternalAcceleration) -> np.ndarray:
-    """The filter's upward vertical ``(T, trials, 3)``; samples are instants: each of the gyroscope holds to the next."""
+    """The filter's upward vertical ``(T, trials, 3)``; each gyroscope sample holds until the next."""
     model = replace(model, dt=1.0 / RATE, gyroscope_sample="previous")
     return np.asarray(run(KalmanFilter(model, keep_covariance=False), trial.measurements).pose["up"])
 
