@@ -112,14 +112,16 @@ def make(name: str, **parameters: Any) -> Estimator[Any]:
 
     Args:
         name: a key of :data:`CATALOGUE`.
-        parameters: fields of the equations (``dt``, noises …) and of what runs them (``compiled``, ``keep_covariance``).
+        parameters: fields of the equations (``dt``, noises …) and of what runs them (``compiled``,
+        ``keep_covariance``).
 
     Returns:
         The estimator.
 
     Raises:
-        ValueError: an unknown name, an unknown parameter (the message lists those that there are), or a value that is refused.
-        ImportError: the package that is wrapped, or the extra that the name needs, is not installed.
+        ValueError: an unknown name, an unknown parameter (the message lists those that there are), or a value that is
+            refused.
+        ImportError: the package that is wrapped is not installed.
     """
     if name not in CATALOGUE:
         close = difflib.get_close_matches(name, CATALOGUE, n=3)

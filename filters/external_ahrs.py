@@ -1,8 +1,9 @@
 """The classical filters of the package ``ahrs`` behind the protocol of this one: Madgwick, Mahony, extended Kalman.
 
-See :mod:`poise.filters.external_packages` for what all wrappers do alike. The package's filters start from an attitude in frames that
-differ from filter to filter; here all start from the first complete sample: inclination from the accelerometer, heading from the
-magnetometer (zero without). Their memory is explicit. They are written in plain Python: expect 0.1 ms a sample.
+See :mod:`poise.filters.external_packages` for what all wrappers do alike. The package's filters start from an attitude
+in frames that differ from filter to filter; here all start from the first complete sample: inclination from the
+accelerometer, heading from the magnetometer (zero without). Their memory is explicit. They are written in plain Python:
+expect 0.1 ms a sample.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ class AHRSFilter(ExternalPackage):
         return np.asarray(level(f) if self.axes == 6 else align(f, sample[6:], 0.0))
 
     def _parts(self, sample: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
-        """Rates, specific force (zeros, which these filters skip, if missing) and field (None if missing or not read)."""
+        """Rates, specific force (zeros, which these filters skip, if missing), field (None if missing or not read)."""
         gyroscope, f = sample[:3], sample[3:6]
         if not gyroscope.any():
             gyroscope = np.full(3, 1e-12)  # the package skips the correction too at a rate of exactly zero
@@ -49,8 +50,8 @@ class AHRSFilter(ExternalPackage):
 class AHRSMadgwick(AHRSFilter):
     """Madgwick's gradient descent.
 
-    S. O. H. Madgwick, "An efficient orientation filter for inertial and inertial/magnetic sensor arrays", report, University of
-    Bristol, 2010. The world of its nine-axis form is x north, y west, z up.
+    S. O. H. Madgwick, "An efficient orientation filter for inertial and inertial/magnetic sensor arrays", report,
+    University of Bristol, 2010. The world of its nine-axis form is x north, y west, z up.
     """
 
     gain_imu: float = 0.033
@@ -68,10 +69,8 @@ class AHRSMadgwick(AHRSFilter):
         gyroscope, f, field = self._parts(sample)
         gain = self.gain_imu if self.axes == 6 else self.gain_marg
         engine = self._filters().Madgwick(Dt=self.dt, gain=gain)
-        if field is None:
-            q = engine.updateIMU(memory, gyroscope, f)
-        else:
-            q = engine.updateMARG(memory, gyroscope, f, field)
+        without = field is None
+        q = engine.updateIMU(memory, gyroscope, f) if without else engine.updateMARG(memory, gyroscope, f, field)
         q = np.asarray(q, dtype=float)
         return q, np.asarray(multiply(QUARTER_TURN, q))
 
@@ -80,8 +79,8 @@ class AHRSMadgwick(AHRSFilter):
 class AHRSMahony(AHRSFilter):
     """Mahony's explicit complementary filter with bias; compare :class:`poise.filters.references.Mahony`.
 
-    R. Mahony, T. Hamel, J.-M. Pflimlin, "Nonlinear Complementary Filters on the Special Orthogonal Group", IEEE Transactions
-    on Automatic Control 53(5), 2008, doi 10.1109/TAC.2008.923738.
+    R. Mahony, T. Hamel, J.-M. Pflimlin, "Nonlinear Complementary Filters on the Special Orthogonal Group", IEEE
+    Transactions on Automatic Control 53(5), 2008, doi 10.1109/TAC.2008.923738.
     """
 
     k_p: float = 1.0
@@ -115,8 +114,8 @@ class AHRSMahony(AHRSFilter):
 class AHRSEKF(AHRSFilter):
     """Extended Kalman filter on the quaternion.
 
-    Of the package (see its documentation of ``ahrs.filters.ekf``). Its default reference field is that of Munich; here the dip is
-    that of the first sample. Noises are per sample, so the filter changes with the rate.
+    Of the package (see its documentation of ``ahrs.filters.ekf``). Its default reference field is that of Munich; here
+    the dip is that of the first sample. Noises are per sample, so the filter changes with the rate.
     """
 
     gyroscope_variance: float = 0.09

@@ -1,9 +1,10 @@
 """Filters of other packages behind the protocol of this one, so that they can stand in the same table.
 
-Each wrapper hands over units, frames and axes as the package wants them and gives back sensor-to-world quaternions, world
-x east, y north, z up. What holds for all: a gyroscope sample that is missing is replaced by the last one; missing samples of accelerometer
-and magnetometer correct nothing; nothing is estimated before every channel has brought a sample; batches are looped over; computation is
-NumPy's, whatever the arrays are. Constants are the packages' own defaults. ``pip install poise[compare]`` brings them all.
+Each wrapper hands over units, frames and axes as the package wants them and gives back sensor-to-world quaternions,
+world x east, y north, z up. What holds for all: a gyroscope sample that is missing is replaced by the last one; missing
+samples of accelerometer and magnetometer correct nothing; nothing is estimated before every channel has brought a
+sample; batches are looped over; computation is NumPy's, whatever the arrays are. Constants are the packages' own
+defaults. ``pip install poise[compare]`` brings them all.
 """
 
 from __future__ import annotations
@@ -102,7 +103,7 @@ class ExternalPackage:
         raise NotImplementedError
 
     def advance(self, memory: Any, sample: np.ndarray) -> tuple[Any, np.ndarray]:
-        """Memory and output after one more sample ``(d,)``; NaN in it is a sample that is missing (never the gyroscope's)."""
+        """Memory and output after one more sample ``(d,)``; NaN is a sample that is missing (never the gyroscope's)."""
         raise NotImplementedError
 
     def init(self, measurement: Measurement) -> WrapperState:
@@ -199,19 +200,19 @@ class VQF(ExternalPackage):
 
 
 class Log(NamedTuple):
-    """Memory of a package that hides its own: the samples since the start, of which the first ``count`` are this memory's.
+    """Memory of a package that hides its own: the samples since the start, of which the first ``length`` are its own.
 
-    ``engine`` is the package's object, with the number of samples that it has taken; it is shared by the memories of one
-    sequence and rebuilt from the samples for whoever goes on from an earlier one.
+    ``engine`` is the package's object, with the number of samples that it has taken; it is shared by the memories of
+    one sequence and rebuilt from the samples for whoever goes on from an earlier one.
     """
 
     samples: list[np.ndarray]
-    count: int
+    length: int
     engine: list[Any]
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Save the samples only."""
-        return Log, (self.samples[: self.count], self.count, [])
+        return Log, (self.samples[: self.length], self.length, [])
 
 
 @dataclass(frozen=True)
@@ -219,10 +220,11 @@ class IMUFusion(ExternalPackage):
     """The filter of x-io Technologies' Fusion (``imufusion``), a revised Madgwick filter in single precision.
 
     S. O. H. Madgwick, "AHRS algorithms and calibration solutions to facilitate new applications using low-cost MEMS",
-    PhD thesis, University of Bristol, 2014, chapter 7. During its first three seconds the gain falls from 10 to ``gain``.
+    PhD thesis, University of Bristol, 2014, chapter 7. During its first three seconds the gain falls from 10 to
+    ``gain``.
 
-    The package neither shows nor copies its memory. A state is therefore the list of the samples so far; going on from the latest one is
-    immediate, going back to an earlier one (or to a saved one) computes the sequence anew.
+    The package neither shows nor copies its memory. A state is therefore the list of the samples so far; going on from
+    the latest one is immediate, going back to an earlier one (or to a saved one) computes the sequence anew.
     """
 
     gain: float = 0.5
@@ -244,16 +246,16 @@ class IMUFusion(ExternalPackage):
 
     def advance(self, memory: Any, sample: np.ndarray) -> tuple[Any, np.ndarray]:
         """Update the engine if it stands where the memory ends, else a new one from the start."""
-        samples, count, engine = memory
-        if len(samples) != count or not engine or engine[1] != count:
-            samples, engine = samples[:count], [self._engine(), 0]
+        samples, length, engine = memory
+        if len(samples) != length or not engine or engine[1] != length:
+            samples, engine = samples[:length], [self._engine(), 0]
             for old in samples:
                 self._update(engine[0], old)
         samples.append(sample)
         self._update(engine[0], sample)
-        engine[1] = count + 1
+        engine[1] = length + 1
         q = normalize(np.asarray(engine[0].get_quaternion(), dtype=float))
-        return Log(samples, count + 1, engine), np.asarray(multiply(QUARTER_TURN, q))
+        return Log(samples, length + 1, engine), np.asarray(multiply(QUARTER_TURN, q))
 
     def _engine(self) -> Any:
         package = self._import()

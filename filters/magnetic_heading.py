@@ -82,10 +82,10 @@ def follow(reference: Array, measured: Array, dt: Array, time: Array) -> Array:
 class MagneticHeading(Model):
     """Adds the heading to a model of six axes: put it first among the bases.
 
-    The other base keeps the orientation in the first four numbers of its state and the turn about world axes in the first three
-    of its error, and passes what follows its own numbers on. The state gains two numbers at its end: norm and dip of the field that are
-    expected. The residual gains one row at its end: the error of the heading. The filter starts at the first tick at which
-    the magnetometer, too, has brought a sample.
+    The other base keeps the orientation in the first four numbers of its state and the turn about world axes in the
+    first three of its error, and passes what follows its own numbers on. The state gains two numbers at its end: norm
+    and dip of the field that are expected. The residual gains one row at its end: the error of the heading. The filter
+    starts at the first tick at which the magnetometer, too, has brought a sample.
 
     A sample whose norm or dip is off what is expected is left out. The expectation follows all samples slowly, so a new
     place is accepted after some time constants.

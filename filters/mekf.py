@@ -1,26 +1,26 @@
 r"""Multiplicative extended Kalman filter: attitude and gyroscope bias.
 
-F. L. Markley, J. L. Crassidis, "Fundamentals of Spacecraft Attitude Determination and Control", Springer 2014, section 6.2
-(after E. J. Lefferts, F. L. Markley, M. D. Shuster, "Kalman Filtering for Spacecraft Attitude Estimation", Journal of Guidance,
-Control, and Dynamics 5(5), 1982, doi 10.2514/3.56190); error in world axes as in J. Solà, "Quaternion kinematics for the
-error-state Kalman filter", arXiv:1711.02508, section 7.
+F. L. Markley, J. L. Crassidis, "Fundamentals of Spacecraft Attitude Determination and Control", Springer 2014, section
+6.2 (after E. J. Lefferts, F. L. Markley, M. D. Shuster, "Kalman Filtering for Spacecraft Attitude Estimation", Journal
+of Guidance, Control, and Dynamics 5(5), 1982, doi 10.2514/3.56190); error in world axes as in J. Solà, "Quaternion
+kinematics for the error-state Kalman filter", arXiv:1711.02508, section 7.
 
-The state is q (sensor to world) and the gyroscope bias b. With the error [δθ (world), δb], R the matrix of q, and samples that describe
-the interval that they end,
+The state is q (sensor to world) and the gyroscope bias b. With the error [δθ (world), δb], R the matrix of q, and
+samples that describe the interval that they end,
 
     q ← q ⊗ exp((ω − b) Δt),   F = [[1, −R Δt], [0, 1]],   Q = Δt blkdiag(σ_g² 1, σ_b² 1)
     f = Rᵀ g e₃ + n,   H = [g Rᵀ [e₃]×, 0],   var n = σ_a² / Δt + (κ (‖f‖ − g))²
 
-All noises are densities, so the filter means the same at any rate. The accelerometer is no inclinometer: σ_a stands for the
-acceleration of the motion, not for the noise of the sensor, which is a hundred times smaller. It is set for recorded hand
-motion (BROAD); the published idea of σ_a as sensor noise fails there.
+All noises are densities, so the filter means the same at any rate. The accelerometer is no inclinometer: σ_a stands for
+the acceleration of the motion, not for the noise of the sensor, which is a hundred times smaller. It is set for
+recorded hand motion (BROAD); the published idea of σ_a as sensor noise fails there.
 
-κ > 0 (``norm_adaptation``) trusts samples less that cannot be gravity alone. It is an option and off: in vigorous motion
-the samples that it picks are those where acceleration and gravity happen to add up to g, which are biased, and the mean
-inclination error on ten BROAD trials grows from 1.2° to 2.2° at κ = 1.
+κ > 0 (``norm_adaptation``) trusts samples less that cannot be gravity alone. It is an option and off: in vigorous
+motion the samples that it picks are those where acceleration and gravity happen to add up to g, which are biased, and
+the mean inclination error on ten BROAD trials grows from 1.2° to 2.2° at κ = 1.
 
-The magnetometer corrects the heading and, through the covariance, the bias about the vertical: its residual is one angle about
-the vertical, and its Jacobian has no entry for the inclination (:mod:`poise.filters.magnetic_heading`).
+The magnetometer corrects the heading and, through the covariance, the bias about the vertical: its residual is one
+angle about the vertical, and its Jacobian has no entry for the inclination (:mod:`poise.filters.magnetic_heading`).
 
 Not estimated: external acceleration, magnetic field. Sustained acceleration cannot be told from tilt.
 """

@@ -1,6 +1,7 @@
-r"""Methods without covariance that every comparison should hold: what gyroscope and accelerometer give alone, and Mahony's.
+r"""Methods without covariance for every comparison: gyroscope alone, accelerometer alone, and Mahony's.
 
-None of them is tuned to the data at hand: integration and tilt have no constant, Mahony's filters keep the published gains.
+None of them is tuned to the data at hand: integration and tilt have no constant, Mahony's filters keep the published
+gains.
 """
 
 from __future__ import annotations
@@ -30,8 +31,8 @@ from .rotation import cross, exp, level, multiply, normalize, rotate, rotate_bac
 class GyroscopeIntegration(Recurrence):
     """The gyroscope alone, from an inclination that the first accelerometer sample gives; heading zero at the start.
 
-    Each sample is taken as the mean rate of the interval that it ends, which one rotation vector integrates exactly if the axis stays.
-    The error is that of the first sample, plus what bias and noise of the gyroscope add up to.
+    Each sample is taken as the mean rate of the interval that it ends, which one rotation vector integrates exactly if
+    the axis stays. The error is that of the first sample, plus what bias and noise of the gyroscope add up to.
 
     State: q (4).
     """
@@ -89,9 +90,9 @@ class Tilt(Recurrence):
 class Mahony(Recurrence):
     """Explicit complementary filter with bias, six axes.
 
-    R. Mahony, T. Hamel, J.-M. Pflimlin, "Nonlinear Complementary Filters on the Special Orthogonal Group", IEEE Transactions
-    on Automatic Control 53(5), 2008, doi 10.1109/TAC.2008.923738, equation (32): with the measured and the expected
-    direction v, v̂ in sensor axes,
+    R. Mahony, T. Hamel, J.-M. Pflimlin, "Nonlinear Complementary Filters on the Special Orthogonal Group", IEEE
+    Transactions on Automatic Control 53(5), 2008, doi 10.1109/TAC.2008.923738, equation (32): with the measured and the
+    expected direction v, v̂ in sensor axes,
 
         e = v × v̂,   q̇ = ½ q ⊗ (ω − b + k_P e),   ḃ = −k_I e
 
@@ -142,8 +143,8 @@ class Mahony9(Mahony):
     """The same with a magnetometer; orientation in the world.
 
     The expected field is the measured one, turned in the world to magnetic north (S. O. H. Madgwick, "An efficient
-    orientation filter for inertial and inertial/magnetic sensor arrays", report, 2010, section 3.4, as in most programs that bear Mahony's name). It enters
-    like the vertical, so a magnetic disturbance also tilts the estimate.
+    orientation filter for inertial and inertial/magnetic sensor arrays", report, 2010, section 3.4, as in most programs
+    that bear Mahony's name). It enters like the vertical, so a magnetic disturbance also tilts the estimate.
 
     State: q (4), b (3).
     """
