@@ -116,6 +116,12 @@ class Physics:
         self.clear_defaults(body)
         return int(body)
 
+    def set_mass(self, body: int, mass: float, moments: Vector) -> None:
+        """Change the base's mass (kg) and its moments ``(3,)`` about the principal axes it has (kg·m²)."""
+        pybullet.changeDynamics(
+            body, BASE, mass=float(mass), localInertiaDiagonal=floats(moments), physicsClientId=self.client
+        )
+
     def load_urdf(
         self,
         source: str | Path,
@@ -209,6 +215,14 @@ class Physics:
         position, (x, y, z, w) = pybullet.getBasePositionAndOrientation(body, physicsClientId=self.client)
         velocity, angular_velocity = pybullet.getBaseVelocity(body, physicsClientId=self.client)
         return position, (w, x, y, z), velocity, angular_velocity
+
+    def set_base_tuples(
+        self, body: int, position: Vector, orientation: Vector, velocity: Vector, turning: Vector
+    ) -> None:
+        """Undo :meth:`base_tuples`; ``turning`` is the angular velocity."""
+        w, x, y, z = orientation
+        pybullet.resetBasePositionAndOrientation(body, position, (x, y, z, w), physicsClientId=self.client)
+        pybullet.resetBaseVelocity(body, velocity, turning, physicsClientId=self.client)
 
     def state(self, body: int, link: int = BASE) -> BodyState:
         """State of the body frame of one link (or the base); accelerations are None."""
