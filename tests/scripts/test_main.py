@@ -164,12 +164,13 @@ def test_command_module(name: str) -> None:
             assert documented, f"{name}: no sentence under {ast.unparse(field.target)}"
     last = tree.body[-1]
     assert isinstance(last, ast.If)
-    lines = ["if __name__ == '__main__':", "    from .main import run_command", f"    run_command('{name}')"]
-    assert ast.unparse(last).splitlines() == lines
+    assert ast.unparse(last.test) == "__name__ == '__main__'"
+    assert ast.unparse(last.body[-1]) == f"run_command('{name}')"
 
 
 def test_every_command_file_is_in_the_table() -> None:
+    """A file with ``run_command("…")`` at its end is a command, the others help."""
     folder = Path(str(cli.__file__)).parent
-    helpers = {"__init__", "main", "experiment", "tables"}
     listed = {command.module[1:] for command in cli.COMMANDS.values()}
-    assert {path.stem for path in folder.glob("*.py")} - helpers <= listed
+    commands = {path.stem for path in folder.glob("*.py") if '    run_command("' in path.read_text(encoding="utf-8")}
+    assert commands <= listed
