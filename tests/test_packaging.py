@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import re
 import shutil
 import subprocess
@@ -110,13 +111,27 @@ def test_the_readme_shows_the_two_commands() -> None:
     assert "make test" in readme
 
 
+def requirements() -> set[str]:
+    project = PYPROJECT["project"]
+    asked = project["dependencies"] + [r for group in project["optional-dependencies"].values() for r in group]
+    return {re.split(r"[<>=!~\[; ]", requirement)[0].lower() for requirement in asked}
+
+
+def test_every_import_is_a_declared_requirement() -> None:
+    names = {name.replace("-", "_") for name in requirements()}
+    for path in (p for floor in FLOORS for p in (ROOT / floor).rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            modules = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
+            if isinstance(node, ast.ImportFrom) and not node.level and node.module:
+                modules = [node.module]
+            for top in {module.split(".")[0] for module in modules} - sys.stdlib_module_names - {"pybullet_data"}:
+                assert top in names, f"{path.relative_to(ROOT)} imports {top}"
+
+
 def test_constraints_pin_every_requirement_exactly() -> None:
     lines = [line for line in (ROOT / "constraints.txt").read_text().splitlines() if line and not line.startswith("#")]
     pins = dict(line.split("==") for line in lines)
-    project = PYPROJECT["project"]
-    asked = project["dependencies"] + [r for group in project["optional-dependencies"].values() for r in group]
-    names = {re.split(r"[<>=!~\[; ]", requirement)[0].lower() for requirement in asked}
-    assert names <= set(pins)
+    assert requirements() <= set(pins)
     # A local suffix (+cpu) would tie the set to one index.
     assert not any("+" in pin for pin in pins.values())
 
