@@ -14,7 +14,6 @@ import numpy as np
 
 from ..filters import rotation
 from .gestures import Gesture
-from .physics import Physics
 from .sensors import STANDARD_GRAVITY, BodyState
 
 
@@ -138,6 +137,9 @@ class DynamicDrive:
         longest_step: float = 1e-3,
         gravity: float = STANDARD_GRAVITY,
     ) -> None:
+        # imported here, because whoever only plays gestures back needs no PyBullet
+        from .physics import Physics
+
         self.rate, self.device, self.bandwidth = rate, device or Device(), bandwidth
         self.substeps = max(1, math.ceil(1.0 / (rate * longest_step) - 1e-9))
         self.physics = Physics(time_step=1.0 / (rate * self.substeps), gravity=gravity)

@@ -1,0 +1,353 @@
+"""What every environment of this package shares: spaces, reward, info, seeds, snapshots, rendering.
+
+An environment is a source of ticks. Estimates do not act on what is estimated, so a subclass hands over ticks in
+:class:`Block` objects, many at once, and :class:`PoseEnv` deals them out one a step.
+"""
+
+from __future__ import annotations
+
+import copy
+import math
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar, NamedTuple, Protocol
+
+import gymnasium
+import numpy as np
+from gymnasium import spaces
+
+from ..filters import metrics
+from ..filters.quantity import ORIENTATION, RELATIVE_ORIENTATION, Channel, Quantity
+
+Observation = dict[str, np.ndarray]
+
+
+class Block(NamedTuple):
+    """Consecutive ticks of an episode.
+
+    Attributes:
+        time: ``(n,)`` s.
+        measurements: channel → ``(n, size)``; NaN where not sampled.
+        pose: quantity → ``(n, size)``: the true pose.
+        truth: name → ``(n, size)``: what else is known.
+        scored: ``(n,)`` bool, whether the reward counts.
+    """
+
+    time: np.ndarray
+    measurements: Mapping[str, np.ndarray]
+    pose: Mapping[str, np.ndarray]
+    truth: Mapping[str, np.ndarray]
+    scored: np.ndarray
+
+
+class Sensing(Protocol):
+    """What an environment needs of its sensors, see :class:`poise.envs.suite.SensorSuite`."""
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        """What is measured."""
+        ...
+
+    @property
+    def observation_space(self) -> spaces.Dict:
+        """Every channel, and ``fresh``."""
+        ...
+
+    def reset(self, rng: np.random.Generator) -> None:
+        """Begin an episode."""
+        ...
+
+    def to_observation(self, measurement: Mapping[str, np.ndarray]) -> Observation:
+        """Observation of the measurement of one tick."""
+        ...
+
+    def to_measurement(self, observation: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+        """Measurement of an observation."""
+        ...
+
+    def describe(self) -> dict[str, Any]:
+        """Everything about the sensors, for JSON."""
+        ...
+
+    def save(self) -> Any:
+        """All memory."""
+        ...
+
+    def restore(self, state: Any) -> None:
+        """Go on from saved memory."""
+        ...
+
+
+class Scene(Protocol):
+    """What an environment is drawn with, see :mod:`poise.envs.rendering`."""
+
+    def draw(self, pose: Mapping[str, np.ndarray], truth: Mapping[str, np.ndarray], estimate: np.ndarray) -> None:
+        """Put everything in its place; ``estimate`` is the last action."""
+        ...
+
+    def image(self) -> np.ndarray:
+        """What is seen, ``(height, width, 3)`` uint8."""
+        ...
+
+    def close(self) -> None:
+        """Free the window."""
+        ...
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """The whole state of an environment between two steps; plain data that can be pickled."""
+
+    generator: np.random.Generator
+    tick: int
+    last_tick: int
+    block: Block
+    row: int
+    sensors: Any
+    source: Any
+    estimate: np.ndarray
+
+
+class PoseEnv(gymnasium.Env[Observation, np.ndarray]):
+    """An agent reads sensors and says a pose; the reward is minus the error of what it says.
+
+    The action of a step is the estimate for the observation *before* the step. Rotations and directions may have any
+    length that is not zero; an action of zeros counts as no rotation (or as straight up).
+
+    Attributes:
+        suite: the sensors: channels, observation space, observation ↔ measurement.
+        quantity: the pose that the action states.
+        neutral_action: the estimate of an agent that knows nothing: no rotation, or straight up.
+        rate: ticks a second, Hz.
+    """
+
+    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["human", "rgb_array"], "render_fps": 100}
+    reset_options: ClassVar[tuple[str, ...]] = ()
+    """Names that ``reset(options=...)`` understands."""
+
+    def __init__(self, suite: Sensing, quantity: Quantity, rate: float, render_mode: str | None = None) -> None:
+        if render_mode is not None and render_mode not in self.metadata["render_modes"]:
+            raise ValueError(f"render_mode must be None or one of {self.metadata['render_modes']}, got {render_mode!r}")
+        self.suite, self.quantity, self.rate, self.render_mode = suite, quantity, float(rate), render_mode
+        self.metadata = {**type(self).metadata, "render_fps": max(1, round(rate))}  # type: ignore[misc]
+        self.observation_space = suite.observation_space
+        self.action_space = spaces.Box(-1.0, 1.0, (quantity.size,), np.float32)
+        self._scene: Scene | None = None
+        self._block: Block | None = None
+        self._estimate = self.neutral_action
+        self._row = self._tick = self._last_tick = 0
+        self._drawn = -math.inf
+
+    @property
+    def neutral_action(self) -> np.ndarray:
+        """``(size,)`` float32."""
+        neutral = np.zeros(self.quantity.size, np.float32)
+        neutral[0 if self.quantity.kind == "rotation" else -1] = 1.0
+        return neutral
+
+    def begin(self, motion: np.random.Generator, sensors: np.random.Generator, options: Mapping[str, Any]) -> int:
+        """Begin an episode.
+
+        Args:
+            motion: source of randomness of the motion.
+            sensors: source of randomness of the sensors, so that other sensors see the same motion.
+            options: what ``reset`` was given; only names of :attr:`reset_options`.
+
+        Returns:
+            How many steps the episode has.
+        """
+        raise NotImplementedError
+
+    def next_block(self, most: int) -> Block:
+        """The next ticks of the episode: at least one, at most ``most``; the first block begins with tick 0."""
+        raise NotImplementedError
+
+    def save_source(self) -> Any:
+        """What :meth:`next_block` remembers, as plain data that later calls do not change."""
+        return None
+
+    def restore_source(self, saved: Any) -> None:
+        """Undo :meth:`save_source`."""
+
+    def make_scene(self, gui: bool) -> Scene:
+        """Make what the environment is drawn with."""
+        raise NotImplementedError
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observation, dict[str, Any]]:
+        """Begin an episode.
+
+        Args:
+            seed: makes this episode and those after it reproducible.
+            options: see the environment's Arguments.
+
+        Raises:
+            ValueError: an unknown option, or an unusable value of one.
+        """
+        super().reset(seed=seed)
+        options = dict(options or {})
+        unknown = sorted(set(options) - set(self.reset_options))
+        if unknown:
+            raise ValueError(f"unknown reset options {unknown}; known are {list(self.reset_options)}")
+        motion, sensors = self.np_random.spawn(2)
+        self._last_tick = self.begin(motion, sensors, options)
+        self._block = self.next_block(self._last_tick + 1)
+        self._row = self._tick = 0
+        self._estimate = self.neutral_action
+        self._drawn = -math.inf
+        if self.render_mode == "human":
+            self._show()
+        return self._observe(), self._info()
+
+    def step(self, action: np.ndarray) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
+        """Judge the estimate ``action`` of the last observation, then advance by one tick.
+
+        Raises:
+            ValueError: the action has another shape than the action space, or is not finite.
+            RuntimeError: :meth:`reset` was not called, or the episode is over.
+        """
+        if self._block is None or self._tick >= self._last_tick:
+            raise RuntimeError("call reset first: there is no episode, or it is over")
+        self._estimate = self._checked(action)
+        reward = self._reward(self._block)
+        self._tick += 1
+        self._row += 1
+        if self._row == len(self._block.time):
+            self._block, self._row = self.next_block(self._last_tick + 1 - self._tick), 0
+        if self.render_mode == "human":
+            self._show()
+        return self._observe(), reward, False, self._tick >= self._last_tick, self._info()
+
+    def _checked(self, action: np.ndarray) -> np.ndarray:
+        estimate = np.asarray(action, dtype=float)
+        if estimate.shape != self.action_space.shape or not all(map(math.isfinite, estimate.tolist())):
+            raise ValueError(f"action must hold {self.quantity.size} finite numbers, got {action!r}")
+        return estimate if estimate.any() else self.neutral_action.astype(float)
+
+    def _reward(self, block: Block) -> float:
+        """Minus the error of the estimate at the present tick; 0 where it is not scored or the truth is unknown."""
+        if not block.scored[self._row]:
+            return 0.0
+        name = "orientation" if self.quantity.name == RELATIVE_ORIENTATION.name else self.quantity.name
+        error = pose_error(self.quantity, self._estimate, block.pose[name][self._row])
+        return -error if error == error else 0.0
+
+    def _observe(self) -> Observation:
+        assert self._block is not None
+        row = self._row
+        return self.suite.to_observation({name: values[row] for name, values in self._block.measurements.items()})
+
+    def _info(self) -> dict[str, Any]:
+        block, row = self._block, self._row
+        assert block is not None
+        return {
+            "time": float(block.time[row]),
+            "pose": {name: values[row].copy() for name, values in block.pose.items()},
+            "truth": {name: values[row].copy() for name, values in block.truth.items()},
+            "scored": bool(block.scored[row]),
+        }
+
+    def snapshot(self) -> Snapshot:
+        """The whole state, to which :meth:`restore` returns here or in an environment made with equal arguments.
+
+        Raises:
+            RuntimeError: there is no episode.
+        """
+        if self._block is None:
+            raise RuntimeError("call reset first: there is no episode")
+        return Snapshot(
+            copy.deepcopy(self.np_random),
+            self._tick,
+            self._last_tick,
+            self._block,
+            self._row,
+            self.suite.save(),
+            self.save_source(),
+            self._estimate.copy(),
+        )
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Return to a snapshot: what follows is bitwise what followed it then, under equal actions."""
+        self.np_random = copy.deepcopy(snapshot.generator)
+        self._tick, self._last_tick, self._block = snapshot.tick, snapshot.last_tick, snapshot.block
+        self._row, self._estimate = snapshot.row, snapshot.estimate.copy()
+        self.suite.restore(snapshot.sensors)
+        self.restore_source(snapshot.source)
+
+    def render(self) -> np.ndarray | None:
+        """An image ``(height, width, 3)`` uint8 with ``render_mode="rgb_array"``; a window is drawn by itself.
+
+        Raises:
+            RuntimeError: :meth:`reset` was not called.
+        """
+        if self._block is None:
+            raise RuntimeError("call reset first: there is nothing to draw")
+        if self.render_mode is None:
+            gymnasium.logger.warn("render() does nothing without a render_mode, such as rgb_array")
+            return None
+        return self._draw().image() if self.render_mode == "rgb_array" else None
+
+    def _draw(self) -> Scene:
+        if self._scene is None:
+            self._scene = self.make_scene(self.render_mode == "human")
+        block, row = self._block, self._row
+        assert block is not None
+        pose, truth = ({name: values[row] for name, values in part.items()} for part in (block.pose, block.truth))
+        self._scene.draw(pose, truth, self._estimate)
+        return self._scene
+
+    def _show(self) -> None:
+        """Keep the window up to date, at most fifty times a second and not faster than time passes."""
+        stride = max(1, round(self.rate / 50.0))
+        if self._tick % stride:
+            return
+        wait = self._drawn + stride / self.rate - time.monotonic()
+        if 0.0 < wait < 1.0:
+            time.sleep(wait)
+        self._drawn = time.monotonic()
+        self._draw()
+
+    def close(self) -> None:
+        """Close window and worlds; may be called twice."""
+        scene, self._scene = self._scene, None
+        if scene is not None:
+            scene.close()
+
+
+def pose_error(quantity: Quantity, estimate: np.ndarray, truth: np.ndarray) -> float:
+    """:func:`poise.filters.metrics.error` of one tick, in plain floats for orientations, where it is 20 times faster.
+
+    Args:
+        quantity: what is compared.
+        estimate: ``(size,)``, of any positive length.
+        truth: ``(size,)``.
+
+    Returns:
+        The error in rad or the quantity's unit; NaN where the truth is.
+    """
+    if quantity.name not in (ORIENTATION.name, RELATIVE_ORIENTATION.name):
+        return float(metrics.error(quantity, estimate, truth))
+    (a, b, c, d), (w, x, y, z) = estimate.tolist(), truth.tolist()
+    # estimate ⊗ conjugate(truth)
+    real = a * w + b * x + c * y + d * z
+    east = b * w - a * x + d * y - c * z
+    north = c * w - a * y + b * z - d * x
+    vertical = d * w - a * z + c * x - b * y
+    level = math.hypot(east, north)
+    if quantity.name == RELATIVE_ORIENTATION.name:
+        return 2.0 * math.atan2(level, math.hypot(real, vertical))
+    return 2.0 * math.atan2(math.hypot(level, vertical), abs(real))
+
+
+def choose_quantity(score: str, choices: Sequence[Quantity]) -> Quantity:
+    """The quantity named ``score``.
+
+    Raises:
+        ValueError: it is none of the choices.
+    """
+    for quantity in choices:
+        if quantity.name == score:
+            return quantity
+    raise ValueError(f"score must be one of {[quantity.name for quantity in choices]}, got {score!r}")

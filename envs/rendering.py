@@ -1,0 +1,128 @@
+"""Pictures of a device and of what an estimator thinks of it, drawn by PyBullet in a world of their own.
+
+The world of the pictures is not the world of the physics: drawing cannot change an episode, and kinematic or recorded
+motion is drawn like any other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import pybullet
+
+from ..filters import rotation
+from .physics import Physics
+from .sensors import BodyState
+
+IMAGE_SIZE = (480, 360)
+"""Width and height of an image, pixels."""
+BODY_COLOUR = (0.25, 0.28, 0.33, 1.0)
+AXIS_COLOURS = ((0.85, 0.15, 0.15), (0.15, 0.65, 0.2), (0.2, 0.35, 0.95))
+"""x red, y green, z blue."""
+TILE_COLOURS = ((0.80, 0.82, 0.84, 1.0), (0.62, 0.66, 0.70, 1.0))
+
+Box = tuple[Sequence[float], Sequence[float], Sequence[float]]
+"""Half extents (m), centre in the body frame (m), colour (red, green, blue, alpha)."""
+
+
+def axes_boxes(length: float, thickness: float, alpha: float, pale: float = 0.0) -> list[Box]:
+    """Three bars along the axes of a frame; ``pale`` mixes white into their colours."""
+    boxes: list[Box] = []
+    for axis, colour in enumerate(AXIS_COLOURS):
+        half, centre = [thickness] * 3, [0.0] * 3
+        half[axis], centre[axis] = 0.5 * length, 0.5 * length
+        boxes.append((half, centre, (*(c + pale * (1.0 - c) for c in colour), alpha)))
+    return boxes
+
+
+class DeviceScene:
+    """A controller over a tiled ground with its axes, and pale thin axes for the estimate.
+
+    Args:
+        size: ``(3,)`` extent of the device, m.
+        gui: open a window.
+    """
+
+    def __init__(self, size: Sequence[float] = (0.16, 0.10, 0.05), *, gui: bool = False) -> None:
+        self._physics = Physics(gui=gui)
+        if gui:
+            pybullet.configureDebugVisualizer(pybullet.COV_ENABLE_GUI, 0, physicsClientId=self._physics.client)
+        x, y, z = (0.5 * side for side in size)
+        # a body with two grips and a stick: its orientation can be told from any side
+        device: list[Box] = [
+            ((x, 0.6 * y, z), (0.0, 0.2 * y, 0.0), BODY_COLOUR),
+            ((0.25 * x, 0.5 * y, 0.8 * z), (-0.75 * x, -0.8 * y, 0.0), BODY_COLOUR),
+            ((0.25 * x, 0.5 * y, 0.8 * z), (0.75 * x, -0.8 * y, 0.0), BODY_COLOUR),
+            ((0.12 * x, 0.12 * x, 0.4 * z), (-0.5 * x, 0.3 * y, 1.3 * z), (0.95, 0.75, 0.1, 1.0)),
+        ]
+        self._draw_ground()
+        self._device = self._body([*device, *axes_boxes(2.2 * x, 0.004, 1.0)])
+        self._ghost = self._body(axes_boxes(3.2 * x, 0.0025, 1.0, pale=0.55))
+        self._target = np.zeros(3)
+
+    def _body(self, boxes: Sequence[Box]) -> int:
+        half, centres, colours = zip(*boxes, strict=True)
+        visual = pybullet.createVisualShapeArray(
+            shapeTypes=[pybullet.GEOM_BOX] * len(boxes),
+            halfExtents=[list(extent) for extent in half],
+            visualFramePositions=[list(centre) for centre in centres],
+            rgbaColors=[list(colour) for colour in colours],
+            physicsClientId=self._physics.client,
+        )
+        return self._physics.create_body(0.0, (0.0, 0.0, 0.0), visual=visual)
+
+    def _draw_ground(self, tiles: int = 3, side: float = 0.5) -> None:
+        places = [(i, j) for i in range(-tiles, tiles) for j in range(-tiles, tiles)]
+        for parity, colour in enumerate(TILE_COLOURS):
+            chosen = [place for place in places if sum(place) % 2 == parity]
+            for begin in range(0, len(chosen), 16):
+                # PyBullet takes at most 16 shapes a body
+                self._body(
+                    [
+                        ((0.5 * side, 0.5 * side, 0.005), ((i + 0.5) * side, (j + 0.5) * side, -0.005), colour)
+                        for i, j in chosen[begin : begin + 16]
+                    ]
+                )
+
+    def draw(self, pose: Mapping[str, np.ndarray], truth: Mapping[str, np.ndarray], estimate: np.ndarray) -> None:
+        """Put the device and the estimate in place.
+
+        Args:
+            pose: ``orientation`` ``(4,)``, or ``up`` ``(3,)``.
+            truth: ``position`` ``(3,)`` where known, m.
+            estimate: ``(4,)`` orientation or ``(3,)`` upward vertical in sensor axes, of any length.
+        """
+        position = np.asarray(truth.get("position", np.full(3, np.nan)))
+        self._target = position if np.isfinite(position).all() else np.array([0.0, 0.0, 0.5])
+        known = pose["orientation"] if "orientation" in pose else pose["up"]
+        for body, shown in ((self._device, known), (self._ghost, estimate)):
+            if np.isfinite(shown).all() and np.any(shown):
+                self._place(body, rotation.normalize(shown) if len(shown) == 4 else rotation.level(shown))
+
+    def _place(self, body: int, orientation: np.ndarray) -> None:
+        zero = np.zeros(3)
+        self._physics.set_state(body, BodyState(0.0, self._target, orientation, zero, zero))
+
+    def image(self) -> np.ndarray:
+        """The view of a camera beside and above the device, ``(height, width, 3)`` uint8."""
+        width, height = IMAGE_SIZE
+        client = self._physics.client
+        eye = self._target + np.array([0.25, -0.5, 0.25])
+        view = pybullet.computeViewMatrix(eye.tolist(), self._target.tolist(), [0.0, 0.0, 1.0], physicsClientId=client)
+        lens = pybullet.computeProjectionMatrixFOV(45.0, width / height, 0.05, 10.0, physicsClientId=client)
+        pixels = pybullet.getCameraImage(
+            width,
+            height,
+            view,
+            lens,
+            lightDirection=[1.0, -1.5, 3.0],
+            shadow=1,
+            renderer=pybullet.ER_TINY_RENDERER,
+            physicsClientId=client,
+        )[2]
+        return np.reshape(np.asarray(pixels, dtype=np.uint8), (height, width, 4))[..., :3].copy()
+
+    def close(self) -> None:
+        """Close the world or the window."""
+        self._physics.close()

@@ -1,0 +1,231 @@
+"""``poise/Replay-v0``: a recorded or simulated trajectory as an environment."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+from gymnasium import spaces
+
+from ..filters.quantity import ORIENTATION, RELATIVE_ORIENTATION, UP, Channel, Quantity
+from .base import Block, Observation, PoseEnv, Scene, choose_quantity
+from .hand_sensing import check_duration, simulate_hand
+from .observation import ObservationLayout
+from .recordings import load_recording
+from .trajectory import Trajectory
+
+UNITS = {"gyr": "rad/s", "acc": "m/s²", "mag": "µT"}
+"""Units by the last part of a channel's name."""
+POSE = ("orientation", "up")
+
+
+class RecordedSensors:
+    """The channels of a trajectory, with the face of a :class:`poise.envs.suite.SensorSuite`.
+
+    Args:
+        trajectory: what was recorded; the largest magnitude of each channel bounds its observation.
+    """
+
+    def __init__(self, trajectory: Trajectory) -> None:
+        self.channels = tuple(
+            Channel(name, values.shape[1], UNITS.get(name.rsplit("/", 1)[-1], "?"))
+            for name, values in trajectory.measurements.items()
+        )
+        largest = {
+            name: float(np.max(np.abs(values), where=np.isfinite(values), initial=0.0))
+            for name, values in trajectory.measurements.items()
+        }
+        # rounding to single precision must not put the largest value outside the bounds
+        self._layout = ObservationLayout(self.channels, {name: value or 1.0 for name, value in largest.items()})
+        self._described = {
+            "rate": 1.0 / trajectory.dt,
+            "recording": trajectory.name,
+            "sensors": trajectory.metadata.get("sensors"),
+        }
+
+    @property
+    def observation_space(self) -> spaces.Dict:
+        """Every channel as a float32 Box, and ``fresh``."""
+        return self._layout.space
+
+    def reset(self, rng: np.random.Generator) -> None:
+        """Forget the last values; nothing is random here."""
+        self._layout.reset()
+
+    def to_observation(self, measurement: Mapping[str, np.ndarray]) -> Observation:
+        """Observation of the measurement of one tick."""
+        return self._layout.observe(measurement)
+
+    def to_measurement(self, observation: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+        """Measurement of an observation, NaN where not fresh."""
+        return self._layout.to_measurement(observation)
+
+    def describe(self) -> dict[str, Any]:
+        """What the trajectory tells about its sensors."""
+        return dict(self._described)
+
+    def save(self) -> dict[str, np.ndarray]:
+        """The last values."""
+        return {name: values.copy() for name, values in self._layout.held.items()}
+
+    def restore(self, state: dict[str, np.ndarray]) -> None:
+        """Go on from saved values."""
+        self._layout.held = {name: values.copy() for name, values in state.items()}
+
+
+class ReplayEnv(PoseEnv):
+    """The sensors say what they said in a recording; the agent says the pose, and is judged by the recorded truth.
+
+    ## Description
+
+    Any :class:`poise.Trajectory` as an environment with the interface of ``poise/HandMotion-v0``. Nothing is random but
+    where an episode starts.
+
+    ## Action Space
+
+    The agent's estimate for the last observation. If the trajectory knows an orientation, ``Box(-1, 1, (4,), float32)``:
+    a quaternion w, x, y, z, sensor axes to world axes, of any length (zeros count as no rotation). If it knows only the
+    vertical (``up``), ``Box(-1, 1, (3,), float32)``: the upward vertical in sensor axes, of any length (zeros count as
+    the z axis).
+
+    ## Observation Space
+
+    ``Dict``: each channel of the trajectory, for instance
+
+    | key | shape | unit | rate |
+    |---|---|---|---|
+    | ``imu/gyr`` | (3,) float32 | rad/s | of the trajectory |
+    | ``imu/acc`` | (3,) float32 | m/s² | of the trajectory |
+    | ``fresh`` | (channels,) int8 | 1 for a new sample, 0 where the last value is repeated | of the trajectory |
+
+    Bounds are the largest recorded magnitudes.
+
+    ## Rewards
+
+    Minus the error of the action in rad, at the pose of the observation it answers: total angle (``score="orientation"``),
+    inclination alone (``"relative_orientation"``), angle between verticals (``"up"``). 0 at ticks that the trajectory does
+    not score, and where its truth is unknown.
+
+    ## Starting State
+
+    The first tick of the trajectory or, with ``random_start``, any tick that leaves room for the duration.
+
+    ## Episode End
+
+    Truncated at the end of the duration or of the trajectory. Never terminated.
+
+    ## Info
+
+    One structure at ``reset`` and ``step``: ``time`` (s, that of the trajectory), ``pose`` (``orientation`` (4,) and
+    ``up`` (3,) as far as known), ``truth`` (everything else that the trajectory knows), ``scored`` (bool). The keys are
+    those that the trajectory knows at all; where it does not know a value at a tick, the entry is NaN of the same shape.
+
+    ## Arguments
+
+    Args:
+        trajectory: a trajectory, or the path of one (see :func:`poise.load_recording`); None for a simulated motion of a
+            hand of 30 s, always the same.
+        duration: length of an episode, s; None for the rest of the trajectory.
+        random_start: whether an episode starts anywhere instead of at the beginning.
+            ``reset(options={"start": tick})`` says where, for one episode.
+        score: ``orientation``, ``relative_orientation`` or ``up``; None for the first of them that is known.
+        render_mode: ``human`` (a window), ``rgb_array`` or None.
+
+    Raises:
+        ValueError: the trajectory has a single tick or no pose to judge by, or an argument is out of its range.
+
+    ## Version History
+
+    * v0: first release.
+    """
+
+    reset_options: ClassVar[tuple[str, ...]] = ("start",)
+
+    def __init__(
+        self,
+        trajectory: Trajectory | str | Path | None = None,
+        duration: float | None = None,
+        random_start: bool = False,
+        *,
+        score: str | None = None,
+        render_mode: str | None = None,
+    ) -> None:
+        if trajectory is None:
+            trajectory = simulate_hand("mixed", seed=0, duration=30.0)
+        elif not isinstance(trajectory, Trajectory):
+            trajectory = load_recording(trajectory)
+        check_duration(duration)
+        if len(trajectory) < 2:
+            raise ValueError(f"trajectory must have two ticks at least, {trajectory.name!r} has {len(trajectory)}")
+        self.trajectory, self.random_start = trajectory, random_start
+        self._length = len(trajectory)
+        if duration is not None:
+            self._length = max(1, math.floor(duration / trajectory.dt + 1e-6)) + 1
+            if self._length > len(trajectory):
+                raise ValueError(
+                    f"duration must be at most {(len(trajectory) - 1) * trajectory.dt:g} s, the length of "
+                    f"{trajectory.name!r}, got {duration}"
+                )
+        quantity = scored_quantity(trajectory, score)
+        super().__init__(RecordedSensors(trajectory), quantity, 1.0 / trajectory.dt, render_mode)
+        self._pose = {name: trajectory.truth_of(name) for name in POSE if name in trajectory.quantities}
+        self._truth = {name: values for name, values in trajectory.truth.items() if name not in POSE}
+
+    def begin(self, motion: np.random.Generator, sensors: np.random.Generator, options: Mapping[str, Any]) -> int:
+        """Choose where to start."""
+        last_start = len(self.trajectory) - self._length
+        if "start" in options:
+            start = options["start"]
+            if isinstance(start, bool) or not isinstance(start, int | np.integer):
+                raise ValueError(f"start must be a tick, got {start!r}")
+            if not 0 <= start < len(self.trajectory) - 1:
+                raise ValueError(f"start must lie in [0, {len(self.trajectory) - 2}], got {start}")
+        else:
+            start = motion.integers(last_start + 1) if self.random_start else 0
+        self._start = int(start)
+        self.suite.reset(sensors)
+        return min(self._length, len(self.trajectory) - self._start) - 1
+
+    def next_block(self, most: int) -> Block:
+        """The whole episode."""
+        ticks = slice(self._start, self._start + most)
+        recorded = self.trajectory
+
+        def cut(arrays: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+            return {name: values[ticks] for name, values in arrays.items()}
+
+        return Block(
+            recorded.time[ticks],
+            cut(recorded.measurements),
+            cut(self._pose),
+            cut(self._truth),
+            recorded.mask[ticks],
+        )
+
+    def make_scene(self, gui: bool) -> Scene:
+        """A device above the ground, and the axes of the estimate."""
+        from .rendering import DeviceScene
+
+        return DeviceScene(gui=gui)
+
+
+def scored_quantity(trajectory: Trajectory, score: str | None) -> Quantity:
+    """What the agent is asked for.
+
+    Raises:
+        ValueError: the trajectory knows no pose, or not the one that is wanted.
+    """
+    choices = [
+        quantity for quantity in (ORIENTATION, RELATIVE_ORIENTATION, UP) if quantity.name in trajectory.quantities
+    ]
+    if ORIENTATION not in choices:
+        choices = [quantity for quantity in choices if quantity == UP]
+    if not choices:
+        raise ValueError(
+            f"trajectory {trajectory.name!r} knows neither orientation nor up, so that nothing can be scored; it knows "
+            f"{list(trajectory.quantities)}"
+        )
+    return choices[0] if score is None else choose_quantity(score, choices)
