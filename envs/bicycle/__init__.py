@@ -1,0 +1,1 @@
+"""A rider on a bicycle: multibody, tyres, balance, contact forces, sensors and the environment."""

@@ -1,0 +1,294 @@
+"""A bicycle as one multibody in PyBullet: rear frame, front assembly, two wheels, crank; tyres and chain around it.
+
+The base is the rear frame and its body frame is the bicycle frame: origin on the ground under the rear hub when
+upright, x forward, y left, z up. A rider hangs further links on the same tree.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from ...filters import rotation
+from ..physics import BASE, Physics
+from ..sensors import BodyState
+from .drivetrain import Drivetrain
+from .multibody import CentreMotion, Multibody, newton_euler
+from .parameters import BicycleParameters, RigidPart
+from .shapes import bicycle_shapes
+from .terrain import FlatGround, Ground
+from .tyre import AIRBORNE, Tyre, TyreForce, TyreParameters
+from .urdf import Tree
+
+AIR_DENSITY = 1.2
+"""kg/m³"""
+WHEELS = ("rear_wheel", "front_wheel")
+BICYCLE_LINKS = ("rear_frame", "rear_wheel", "front_assembly", "front_wheel", "crank")
+
+
+class BicycleState(NamedTuple):
+    """The bicycle in numbers; angles in rad, Z-Y-X order, roll to the right and steering to the left positive."""
+
+    time: float
+    x: float
+    """m: origin of the bicycle frame (near the rear contact), world"""
+    y: float
+    z: float
+    roll: float
+    pitch: float
+    """nose down positive"""
+    yaw: float
+    """heading, counter-clockwise from east"""
+    roll_rate: float
+    pitch_rate: float
+    yaw_rate: float
+    speed: float
+    """m/s of the frame's origin along the heading"""
+    steer: float
+    steer_rate: float
+    crank: float
+    """0 with the left pedal in front, growing when pedalling forward (0 without a crank)"""
+    crank_rate: float
+    wheel_rate: float
+    """rad/s of the rear wheel"""
+
+
+@dataclass(frozen=True)
+class BicycleMemory:
+    """What the bicycle remembers besides PyBullet's state."""
+
+    bristles: tuple[tuple[float, float], ...]
+    slipped: float
+    tyre_forces: tuple[TyreForce, ...]
+
+
+def bicycle_tree(bicycle: BicycleParameters) -> Tree:
+    """Links and joints of a bicycle; the joints are called steer = ``front_assembly``, and as the wheels and crank."""
+    tree, shapes = Tree(bicycle.name), bicycle_shapes(bicycle)
+    frame, front = bicycle.rear_frame, bicycle.front_assembly
+    steer = bicycle.steer_origin
+    tree.link("rear_frame", frame.mass, frame.tensor, frame.centre, shapes["rear_frame"])
+    tree.link("front_assembly", front.mass, front.tensor, np.array(front.centre) - steer, shapes["front_assembly"])
+    tree.joint("rear_frame", "front_assembly", steer, bicycle.steer_axis)
+    for name, wheel, x, parent, origin in (
+        ("rear_wheel", bicycle.rear_wheel, 0.0, "rear_frame", np.zeros(3)),
+        ("front_wheel", bicycle.front_wheel, bicycle.wheelbase, "front_assembly", steer),
+    ):
+        across = wheel.inertia_diameter
+        tree.link(name, wheel.mass, (across, wheel.inertia_axle, across), (0.0, 0.0, 0.0), shapes[name])
+        tree.joint(parent, name, np.array([x, 0.0, wheel.radius]) - origin, (0.0, 1.0, 0.0))
+    if bicycle.drive is not None:
+        drive = bicycle.drive
+        tree.link("crank", drive.mass, drive.inertia, (0.0, 0.0, 0.0), shapes["crank"])
+        tree.joint("rear_frame", "crank", drive.axle, (0.0, 1.0, 0.0))
+    return tree
+
+
+class Bicycle:
+    """A bicycle in a world.
+
+    Args:
+        physics: the world.
+        parameters: the bicycle.
+        ground: what it rolls on; None for a level plane at height 0.
+        tyre: its tyres.
+        load: what sits on it when starting, for the tyres' static deflection: mass and centre of the rider.
+        extend: hangs further links (a rider) on the tree before it is loaded.
+    """
+
+    def __init__(
+        self,
+        physics: Physics,
+        parameters: BicycleParameters,
+        ground: Ground | None = None,
+        tyre: TyreParameters | None = None,
+        *,
+        load: RigidPart | None = None,
+        extend: Callable[[Tree], None] | None = None,
+    ) -> None:
+        self.physics, self.parameters = physics, parameters
+        self.ground: Ground = FlatGround() if ground is None else ground
+        tree = bicycle_tree(parameters)
+        if extend is not None:
+            extend(tree)
+        self.body = Multibody(physics, physics.load_urdf(tree.text()))
+        wheels = (parameters.rear_wheel, parameters.front_wheel)
+        self.tyres = [
+            Tyre(
+                wheel.radius,
+                wheel.crown_radius,
+                TyreParameters() if tyre is None else tyre,
+                self.ground,
+                physics.time_step,
+                parameters.rolling_resistance,
+            )
+            for wheel in wheels
+        ]
+        self.tyre_forces: list[TyreForce] = [AIRBORNE, AIRBORNE]
+        self.drivetrain = None if parameters.drive is None else Drivetrain(parameters.drive)
+        self.links = self.body.links
+        self._wheels = self.body.index(WHEELS)
+        self._driven = [self.links[name] for name in ("rear_wheel", "crank") if name in self.links]
+        self._joints = [self.links["front_assembly"], *self._driven]
+        self.own_links = [self.links[name] for name in BICYCLE_LINKS if name in self.links]
+        own = [name for name in BICYCLE_LINKS if name in self.links]
+        self.own_masses = np.array([self.body.masses[name] for name in own])
+        self.own_moments = np.array([self.body.moments[name] for name in own])
+        whole = parameters.with_load(*(() if load is None else (load,)))
+        centres = np.array([part.centre for part in whole.parts])
+        masses = np.array([part.mass for part in whole.parts])
+        self._total_mass = float(masses.sum())
+        self._centre = masses @ centres / self._total_mass
+
+    def static_loads(self) -> tuple[float, float]:
+        """Weight (N) on the rear and the front tyre, at rest on level ground with the tyres' deflection."""
+        weight, wheelbase = self._total_mass * self.physics.gravity, self.parameters.wheelbase
+        front, pitch = 0.0, 0.0
+        for _ in range(5):
+            # a softer end sinks deeper and takes more of the load
+            front = weight * (self._centre[0] + pitch * self._centre[2]) / wheelbase
+            sinking = [
+                load / tyre.parameters.stiffness for load, tyre in zip((weight - front, front), self.tyres, strict=True)
+            ]
+            pitch = (sinking[1] - sinking[0]) / wheelbase
+        return float(weight - front), float(front)
+
+    def start(
+        self,
+        speed: float = 0.0,
+        position: tuple[float, float] = (0.0, 0.0),
+        heading: float = 0.0,
+        roll: float = 0.0,
+        roll_rate: float = 0.0,
+        steer: float = 0.0,
+        steer_rate: float = 0.0,
+        crank: float = 0.0,
+    ) -> None:
+        """Place the bicycle at static tyre deflection, rolling without slip, the chain just taut.
+
+        Args:
+            speed: m/s.
+            position: of the rear contact, m, world.
+            heading: rad, counter-clockwise from east.
+            roll: rad, right positive; the bicycle rolls about the line through its contacts.
+            roll_rate: rad/s.
+            steer: rad, left positive. A large steering angle would also pitch the bicycle; that is left to settle.
+            steer_rate: rad/s.
+            crank: rad.
+        """
+        bike = self.parameters
+        c, s = math.cos(heading), math.sin(heading)
+        ground, heights, rates = [], [], []
+        wheels = (bike.rear_wheel, bike.front_wheel)
+        for x, load, tyre, wheel in zip((0.0, bike.wheelbase), self.static_loads(), self.tyres, wheels, strict=True):
+            sinking = load / tyre.parameters.stiffness
+            ground.append(self.ground.height_and_slope(position[0] + c * x, position[1] + s * x)[0])
+            heights.append(ground[-1] - sinking)
+            rates.append(speed / wheel.radius)
+            tyre.bristles = (0.0, 0.0)
+        climb = math.atan2(ground[1] - ground[0], bike.wheelbase)
+        pitch = -math.atan2(heights[1] - heights[0], bike.wheelbase)
+        orientation = rotation.from_euler_zyx(np.array(heading), np.array(pitch), np.array(roll))
+        # the frame sits pitched on its tyres, but moves along the ground
+        forward = np.array([c * math.cos(climb), s * math.cos(climb), math.sin(climb)])
+        origin = np.array([*position, heights[0]])
+        self.physics.set_state(
+            self.body.body, BodyState(self.physics.time, origin, orientation, speed * forward, roll_rate * forward)
+        )
+        for link in range(self.physics.link_count(self.body.body)):
+            self.body.set_joint(link, 0.0)
+        self.body.set_joint(self.links["front_assembly"], steer, steer_rate)
+        for name, rate in zip(WHEELS, rates, strict=True):
+            self.body.set_joint(self.links[name], 0.0, rate)
+        if self.drivetrain is not None:
+            self.body.set_joint(self.links["crank"], crank, rates[0] / self.drivetrain.parameters.ratio)
+            self.drivetrain.engage(crank, 0.0)
+        self.tyre_forces = [AIRBORNE, AIRBORNE]
+
+    def act(self, steer_torque: float = 0.0, wheel_torque: float = 0.0) -> None:
+        """Apply tyre forces, chain and air drag for the next step.
+
+        Args:
+            steer_torque: N·m between rear frame and front assembly, left positive.
+            wheel_torque: N·m between rear frame and rear wheel, forward positive, besides the chain's.
+        """
+        body = self.body
+        for number, (link, state) in enumerate(zip(self._wheels, body.link_tuples(self._wheels), strict=True)):
+            centre, (w, x, y, z), velocity, turning = state
+            # second column of the rotation matrix: the axle
+            axle = (2.0 * (x * y - w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z + w * x))
+            result = self.tyres[number].force(centre, axle, velocity, turning)
+            self.tyre_forces[number] = result
+            if result.load > 0.0:
+                body.push(link, result.force, result.point)
+        if self.parameters.drag_area:
+            position, _, velocity, _ = self.physics.base_tuples(body.body)
+            speed = math.sqrt(velocity[0] ** 2 + velocity[1] ** 2 + velocity[2] ** 2)
+            factor = -0.5 * AIR_DENSITY * self.parameters.drag_area * speed
+            body.push(BASE, [factor * part for part in velocity], position)
+        if self.drivetrain is None:
+            body.drive_joints(self._joints, [steer_torque, wheel_torque])
+            return
+        (wheel, wheel_rate), (crank, crank_rate) = body.joint_tuples(self._driven)
+        pull = self.drivetrain.torque(crank, crank_rate, wheel, wheel_rate)
+        torques = [steer_torque, wheel_torque + pull, -self.drivetrain.parameters.ratio * pull]
+        body.drive_joints(self._joints, torques)
+
+    def state(self) -> BicycleState:
+        """Where the bicycle is and how it moves, now."""
+        frame = self.physics.state(self.body.body)
+        yaw, pitch, roll = (float(angle) for angle in rotation.to_euler_zyx(frame.orientation))
+        p, q, r = rotation.rotate_back(frame.orientation, frame.angular_velocity).tolist()
+        turn = q * math.sin(roll) + r * math.cos(roll)
+        joints = self.body.joint_tuples(self._joints)
+        (steer, steer_rate), (_, wheel_rate) = joints[0], joints[1]
+        crank, crank_rate = joints[2] if len(joints) > 2 else (0.0, 0.0)
+        vx, vy, _ = frame.velocity.tolist()
+        return BicycleState(
+            self.physics.time,
+            *frame.position.tolist(),
+            roll,
+            pitch,
+            yaw,
+            p + math.tan(pitch) * turn,
+            q * math.cos(roll) - r * math.sin(roll),
+            turn / math.cos(pitch),
+            vx * math.cos(yaw) + vy * math.sin(yaw),
+            steer,
+            steer_rate,
+            crank,
+            crank_rate,
+            wheel_rate,
+        )
+
+    def ground_wrench(self, point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Force (N) of the ground on both tyres in the last step and its moment (N·m) about ``point``, world axes."""
+        forces = np.array([tyre.force for tyre in self.tyre_forces])
+        arms = np.array([tyre.point for tyre in self.tyre_forces]) - point
+        return forces.sum(axis=0), rotation.cross(arms, forces).sum(axis=0)
+
+    def own_motion(self) -> CentreMotion:
+        """Motion of the bicycle's own links (not the rider's)."""
+        return self.body.centre_motion(self.own_links)
+
+    def own_wrench(self, before: CentreMotion, after: CentreMotion, point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Wrench of everything outside on the bicycle in the last step; see :func:`newton_euler`."""
+        dt, gravity = self.physics.time_step, self.physics.gravity
+        return newton_euler(before, after, self.own_masses, self.own_moments, point, dt, gravity)
+
+    def save(self) -> BicycleMemory:
+        """Tyre and chain memory; the rest is in :meth:`Physics.save`."""
+        slipped = 0.0 if self.drivetrain is None else self.drivetrain.slipped
+        return BicycleMemory(tuple(tyre.bristles for tyre in self.tyres), slipped, tuple(self.tyre_forces))
+
+    def restore(self, memory: BicycleMemory) -> None:
+        """Undo :meth:`save`."""
+        for tyre, bristles in zip(self.tyres, memory.bristles, strict=True):
+            tyre.bristles = bristles
+        if self.drivetrain is not None:
+            self.drivetrain.slipped = memory.slipped
+        self.tyre_forces = list(memory.tyre_forces)
