@@ -122,7 +122,7 @@ class PoseEnv(gymnasium.Env[Observation, np.ndarray]):
         rate: ticks a second, Hz.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["human", "rgb_array"], "render_fps": 100}
+    metadata: dict[str, Any] = {"render_modes": ["human", "rgb_array"], "render_fps": 100}  # noqa: RUF012
     reset_options: ClassVar[tuple[str, ...]] = ()
     """Names that ``reset(options=...)`` understands."""
 
@@ -130,8 +130,8 @@ class PoseEnv(gymnasium.Env[Observation, np.ndarray]):
         if render_mode is not None and render_mode not in self.metadata["render_modes"]:
             raise ValueError(f"render_mode must be None or one of {self.metadata['render_modes']}, got {render_mode!r}")
         self.suite, self.quantity, self.rate, self.render_mode = suite, quantity, float(rate), render_mode
-        self.metadata = {**type(self).metadata, "render_fps": max(1, round(rate))}  # type: ignore[misc]
-        self.observation_space = suite.observation_space
+        self.metadata = {**type(self).metadata, "render_fps": max(1, round(rate))}
+        self.observation_space: spaces.Space[Any] = suite.observation_space
         self.action_space = spaces.Box(-1.0, 1.0, (quantity.size,), np.float32)
         self._scene: Scene | None = None
         self._block: Block | None = None
@@ -230,8 +230,8 @@ class PoseEnv(gymnasium.Env[Observation, np.ndarray]):
         """Minus the error of the estimate at the present tick; 0 where it is not scored or the truth is unknown."""
         if not block.scored[self._row]:
             return 0.0
-        name = "orientation" if self.quantity.name == RELATIVE_ORIENTATION.name else self.quantity.name
-        error = pose_error(self.quantity, self._estimate, block.pose[name][self._row])
+        truth = block.pose[self.quantity.name if self.quantity.name in block.pose else ORIENTATION.name][self._row]
+        error = pose_error(self.quantity, self._estimate, truth)
         return -error if error == error else 0.0
 
     def _observe(self) -> Observation:

@@ -80,7 +80,7 @@ class HandMotionEnv(PoseEnv):
     | ``truth/position``, ``truth/velocity`` | (3,) | of the sensor, world, m and m/s |
     | ``truth/angular_rate`` | (3,) | rad/s, sensor axes: what an ideal gyroscope reports |
     | ``truth/external_acceleration`` | (3,) | m/s², sensor axes: what an ideal accelerometer reports without gravity |
-    | ``truth/gyroscope_bias``, ``truth/accelerometer_bias`` | (3,) | biases of the last samples (and ``truth/magnetometer_bias``) |
+    | ``truth/gyroscope_bias``, ``truth/accelerometer_bias``, … | (3,) | bias of the last sample of each sensor |
     | ``scored`` | bool | always True |
 
     ## Arguments

@@ -131,7 +131,7 @@ class Segment:
         swing = product(column(window(times, self.start, self.end, self.ramp)), self.angles.sample(since))
         position = tuple(a + b * self.shift for a, b in zip(wave, step, strict=True))
         angles = tuple(a + b * self.turn for a, b in zip(swing, step, strict=True))
-        return position, angles  # type: ignore[return-value]
+        return position, angles
 
 
 @dataclass(frozen=True)

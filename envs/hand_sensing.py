@@ -101,7 +101,7 @@ def sense(
     else:
         first = earlier.at(slice(0, 1)) if before is None else before
         fields = zip(first[:5], now[:5], strict=True)
-        path = BodyState(*(np.concatenate([a, b]) for a, b in fields))  # type: ignore[arg-type]
+        path = BodyState(*(np.concatenate([a, b]) for a, b in fields))
         rate, acceleration = interval_readings(path.at(slice(None, -1)), path.at(slice(1, None)), 0.0)
     truth = {
         "position": now.position,

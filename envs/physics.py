@@ -26,7 +26,8 @@ BASE = -1
 """Index of the base of a body where a link is asked for."""
 
 Vector = Sequence[float] | np.ndarray
-TupleState = tuple[tuple[float, ...], tuple[float, float, float, float], tuple[float, ...], tuple[float, ...]]
+Triple = tuple[float, float, float]
+TupleState = tuple[Triple, tuple[float, float, float, float], Triple, Triple]
 """Position, quaternion (w, x, y, z), velocity and angular velocity as plain tuples, for loops over physics steps."""
 
 

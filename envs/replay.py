@@ -19,7 +19,8 @@ from .trajectory import Trajectory
 
 UNITS = {"gyr": "rad/s", "acc": "m/s²", "mag": "µT"}
 """Units by the last part of a channel's name."""
-POSE = ("orientation", "up")
+POSE = ("orientation", "relative_orientation", "up")
+"""Truth that belongs to the pose."""
 
 
 class RecordedSensors:
@@ -38,7 +39,6 @@ class RecordedSensors:
             name: float(np.max(np.abs(values), where=np.isfinite(values), initial=0.0))
             for name, values in trajectory.measurements.items()
         }
-        # rounding to single precision must not put the largest value outside the bounds
         self._layout = ObservationLayout(self.channels, {name: value or 1.0 for name, value in largest.items()})
         self._described = {
             "rate": 1.0 / trajectory.dt,
@@ -86,10 +86,10 @@ class ReplayEnv(PoseEnv):
 
     ## Action Space
 
-    The agent's estimate for the last observation. If the trajectory knows an orientation, ``Box(-1, 1, (4,), float32)``:
-    a quaternion w, x, y, z, sensor axes to world axes, of any length (zeros count as no rotation). If it knows only the
-    vertical (``up``), ``Box(-1, 1, (3,), float32)``: the upward vertical in sensor axes, of any length (zeros count as
-    the z axis).
+    The agent's estimate for the last observation. If the trajectory knows an orientation, it is
+    ``Box(-1, 1, (4,), float32)``: a quaternion w, x, y, z, sensor axes to world axes, of any length (zeros count as no
+    rotation). If it knows only the vertical (``up``), ``Box(-1, 1, (3,), float32)``: the upward vertical in sensor
+    axes, of any length (zeros count as the z axis).
 
     ## Observation Space
 
@@ -105,9 +105,9 @@ class ReplayEnv(PoseEnv):
 
     ## Rewards
 
-    Minus the error of the action in rad, at the pose of the observation it answers: total angle (``score="orientation"``),
-    inclination alone (``"relative_orientation"``), angle between verticals (``"up"``). 0 at ticks that the trajectory does
-    not score, and where its truth is unknown.
+    Minus the error of the action in rad, at the pose of the observation it answers: total angle
+    (``score="orientation"``), inclination alone (``"relative_orientation"``), angle between verticals (``"up"``). 0 at
+    ticks that the trajectory does not score, and where its truth is unknown.
 
     ## Starting State
 
@@ -121,13 +121,13 @@ class ReplayEnv(PoseEnv):
 
     One structure at ``reset`` and ``step``: ``time`` (s, that of the trajectory), ``pose`` (``orientation`` (4,) and
     ``up`` (3,) as far as known), ``truth`` (everything else that the trajectory knows), ``scored`` (bool). The keys are
-    those that the trajectory knows at all; where it does not know a value at a tick, the entry is NaN of the same shape.
+    those that the trajectory knows at all; a value that it does not know at a tick is NaN of the same shape.
 
     ## Arguments
 
     Args:
-        trajectory: a trajectory, or the path of one (see :func:`poise.load_recording`); None for a simulated motion of a
-            hand of 30 s, always the same.
+        trajectory: a trajectory, or the path of one (see :func:`poise.load_recording`); None for a simulated motion of
+            a hand of 30 s, always the same.
         duration: length of an episode, s; None for the rest of the trajectory.
         random_start: whether an episode starts anywhere instead of at the beginning.
             ``reset(options={"start": tick})`` says where, for one episode.
@@ -171,7 +171,9 @@ class ReplayEnv(PoseEnv):
                 )
         quantity = scored_quantity(trajectory, score)
         super().__init__(RecordedSensors(trajectory), quantity, 1.0 / trajectory.dt, render_mode)
-        self._pose = {name: trajectory.truth_of(name) for name in POSE if name in trajectory.quantities}
+        # an orientation says its relative orientation itself
+        wanted = [name for name in POSE if name in trajectory.truth or name == "up"]
+        self._pose = {name: trajectory.truth_of(name) for name in wanted if name in trajectory.quantities}
         self._truth = {name: values for name, values in trajectory.truth.items() if name not in POSE}
 
     def begin(self, motion: np.random.Generator, sensors: np.random.Generator, options: Mapping[str, Any]) -> int:
@@ -218,11 +220,8 @@ def scored_quantity(trajectory: Trajectory, score: str | None) -> Quantity:
     Raises:
         ValueError: the trajectory knows no pose, or not the one that is wanted.
     """
-    choices = [
-        quantity for quantity in (ORIENTATION, RELATIVE_ORIENTATION, UP) if quantity.name in trajectory.quantities
-    ]
-    if ORIENTATION not in choices:
-        choices = [quantity for quantity in choices if quantity == UP]
+    candidates = (ORIENTATION, RELATIVE_ORIENTATION, UP)
+    choices = [quantity for quantity in candidates if quantity.name in trajectory.quantities]
     if not choices:
         raise ValueError(
             f"trajectory {trajectory.name!r} knows neither orientation nor up, so that nothing can be scored; it knows "
