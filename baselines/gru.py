@@ -78,7 +78,6 @@ class GruNetwork:
             array = np.array(getattr(self, name), dtype=float)
             if array.shape != shape:
                 raise ValueError(f"{name} must have shape {shape}, got {array.shape}")
-            array.flags.writeable = False
             object.__setattr__(self, name, array)
 
     @classmethod

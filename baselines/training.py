@@ -34,11 +34,11 @@ class TrainingConfig:
         ValueError: a number is out of its range.
     """
 
-    episodes: int = 640
+    episodes: int = 800
     """simulated training episodes"""
     validation_episodes: int = 64
     """simulated episodes on which the best epoch is chosen"""
-    epochs: int = 16
+    epochs: int = 14
     """passes over the episodes"""
     batch: int = 32
     """sequences in a batch"""
@@ -76,6 +76,10 @@ class TrainingConfig:
         children = np.random.SeedSequence(self.seed).spawn(4)
         train, validation, weights, order = (int(child.generate_state(1)[0]) for child in children)
         return train, validation, weights, order
+
+    def test_seed(self) -> int:
+        """Child of the root seed for episodes that neither training nor the choice of the epoch sees."""
+        return int(np.random.SeedSequence(self.seed).spawn(5)[4].generate_state(1)[0])
 
 
 class TrainingResult(NamedTuple):

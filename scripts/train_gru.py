@@ -1,0 +1,208 @@
+"""Training of the recurrent estimator: arguments, test on episodes that were never seen, card, weights."""
+
+from __future__ import annotations
+
+import shlex
+from dataclasses import asdict, dataclass, replace
+from datetime import date
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from .experiment import Run, start_run, versions
+
+if TYPE_CHECKING:
+    import pandas
+
+    from ..baselines.learned import LearnedEstimator
+    from ..baselines.training import TrainingConfig, TrainingResult
+    from ..envs.trajectory import Trajectory
+
+CONTENDERS = ("bounded-motion", "vqf", "mahony", "tilt", "gyroscope-integration")
+"""What the network is compared with on the test episodes."""
+GESTURES = ("slow", "fast", "severe", "mixed")
+"""Gestures of the hand-motion environment on which it is tested besides the episodes of its curriculum."""
+
+
+@dataclass
+class Gru:
+    """Train the recurrent estimator of the vertical."""
+
+    preset: Literal["quick", "shipped"] = "quick"
+    """quick: some minutes, to see that it works; shipped: the training of the weights in the package"""
+    seed: int = 0
+    """root seed of episodes, weights and order"""
+    episodes: int | None = None
+    """simulated training episodes, instead of the preset's"""
+    epochs: int | None = None
+    """passes over the episodes, instead of the preset's"""
+    units: int | None = None
+    """units of the network, instead of the preset's"""
+    recordings: tuple[Path, ...] = ()
+    """files or folders of recordings with known orientation, to train on instead of simulated episodes"""
+    test_episodes: int = 48
+    """simulated episodes that the finished network is tested on"""
+    resume: Path | None = None
+    """run folder of an interrupted training; give the other arguments as then"""
+    export: Path | None = None
+    """file to which the weights are written too"""
+    runs: Path = Path("runs")
+    """where the run folder goes"""
+
+
+def run_gru(args: Gru) -> int:
+    """Train, test, and write weights with their card."""
+    from ..baselines.dataset import LearnedDataset
+    from ..baselines.training import train
+    from ..baselines.weights_io import save_weights
+
+    config = training_config(args)
+    dataset = validation = None
+    if args.recordings:
+        own = load_all(args.recordings)
+        dataset = LearnedDataset.from_trajectories(own, config.frame)
+    folder = start_run("train", args, args.seed, args.runs) if args.resume is None else resumed(args)
+    result = train(
+        config, folder.folder, dataset=dataset, validation=validation, resume=args.resume is not None, progress=True
+    )
+    estimator = estimator_of(result, config)
+    table = test(estimator, config, args.test_episodes)
+    folder.write_results(table)
+    card = card_of(args, config, result, table)
+    path = save_weights(folder.folder / "gru", result.arrays, card)
+    print(f"weights: {path}")
+    if args.export is not None:
+        print(f"weights: {save_weights(args.export, result.arrays, card)}")
+    report = means(table)
+    print_means(report)
+    return 0
+
+
+def training_config(args: Gru) -> TrainingConfig:
+    """The configuration that the arguments ask for."""
+    from ..baselines.curriculum import Curriculum
+    from ..baselines.training import TrainingConfig
+
+    config = TrainingConfig()
+    if args.preset == "quick":
+        quick = Curriculum(duration=60.0)
+        config = replace(config, episodes=96, validation_episodes=16, epochs=4, units=32, batch=16, curriculum=quick)
+    given = {name: getattr(args, name) for name in ("episodes", "epochs", "units")}
+    return replace(config, seed=args.seed, **{name: value for name, value in given.items() if value is not None})
+
+
+def resumed(args: Gru) -> Run:
+    """The run that is gone on with.
+
+    Raises:
+        FileNotFoundError: there is no such folder.
+    """
+    assert args.resume is not None
+    if not args.resume.is_dir():
+        raise FileNotFoundError(f"there is no run folder {args.resume}")
+    return Run(args.resume, "train", args.seed)
+
+
+def load_all(paths: tuple[Path, ...]) -> list[Trajectory]:
+    """Recordings of files and folders.
+
+    Raises:
+        ValueError: there are none.
+    """
+    from ..envs.recordings import find_recordings, load_recording
+
+    files = [path for item in paths for path in (find_recordings(item) if item.is_dir() else [item])]
+    if not files:
+        raise ValueError(f"no recording in {', '.join(map(str, paths))}")
+    return [load_recording(path) for path in files]
+
+
+def estimator_of(result: TrainingResult, config: TrainingConfig) -> LearnedEstimator:
+    """The trained estimator."""
+    from ..baselines.gru import GruNetwork
+    from ..baselines.learned import LearnedEstimator
+
+    return LearnedEstimator(GruNetwork.from_arrays(result.arrays), config.frame)
+
+
+def test(estimator: LearnedEstimator, config: TrainingConfig, episodes: int) -> pandas.DataFrame:
+    """Errors on episodes that training never saw, beside those of others and of the front end alone."""
+    from ..baselines.evaluation import evaluate
+
+    still = replace(
+        estimator.network,
+        output_weight=0.0 * estimator.network.output_weight,
+        output_bias=0.0 * estimator.network.output_bias,
+    )
+    contenders: dict[str, Any] = {"gru": estimator, "gru (front end alone)": replace(estimator, network=still)}
+    contenders |= {name: name for name in CONTENDERS}
+    table = evaluate(contenders, test_trajectories(config, episodes), progress=True)
+    return table[table["metric"] == "inclination"]
+
+
+def test_trajectories(config: TrainingConfig, episodes: int) -> list[Trajectory]:
+    """Held-out episodes of the curriculum, and hand motions of the environment with a sensor that is not in it."""
+    from ..baselines.dataset import simulate
+    from ..envs.hand_trajectories import HandTrajectories
+
+    trajectories = list(simulate(config.curriculum, config.test_seed(), episodes))
+    for index, gesture in enumerate(GESTURES):
+        hand = HandTrajectories((gesture,), rates=(60.0, 100.0, 200.0), sensors=("paper-hand",), duration=60.0)
+        for number, trajectory in enumerate(hand.draw_many(config.test_seed() + 1 + index, max(1, episodes // 6))):
+            metadata = {**trajectory.metadata, "name": f"{gesture}-{number}"}
+            trajectories.append(trajectory.replace(metadata=metadata))
+    return trajectories
+
+
+def means(table: pandas.DataFrame) -> dict[str, dict[str, dict[str, float]]]:
+    """Group of trajectories → estimator → mean and median over its trajectories, deg."""
+    groups: dict[str, dict[str, dict[str, float]]] = {}
+    kinds = table["trajectory"].str.split("-").str[0]
+    for (kind, estimator), values in table.groupby([kinds, "estimator"], sort=False)["value"]:
+        row = {"mean_deg": round(float(values.mean()), 4), "median_deg": round(float(values.median()), 4)}
+        groups.setdefault(str(kind), {})[str(estimator)] = row
+    return groups
+
+
+def print_means(groups: dict[str, dict[str, dict[str, float]]]) -> None:
+    """A table on the terminal: an estimator a row, a group a column."""
+    from .tables import print_table
+
+    estimators = list(next(iter(groups.values())))
+    rows = [
+        {"estimator": name, **{group: values[name]["mean_deg"] for group, values in groups.items() if name in values}}
+        for name in estimators
+    ]
+    print_table(rows, "Inclination error on unseen simulated episodes, mean of RMS, deg")
+
+
+def card_of(args: Gru, config: TrainingConfig, result: TrainingResult, table: pandas.DataFrame) -> dict[str, Any]:
+    """What the weights are and how they came about."""
+    best = result.history[result.best_epoch - 1]
+    return {
+        "name": "gru",
+        "description": "upward vertical from gyroscope and accelerometer: level-frame front end and recurrent network",
+        "estimator": "poise.baselines.learned.LearnedEstimator",
+        "units": config.units,
+        "front_end": {name: value for name, value in asdict(config.frame).items() if name != "dt"},
+        "command": command_of(args),
+        "data": "simulated episodes" if not args.recordings else [path.name for path in args.recordings],
+        "training": asdict(config),
+        "best_epoch": result.best_epoch,
+        "validation_deg": round(best["validation_deg"], 4),
+        "history": [{name: round(value, 4) for name, value in entry.items()} for entry in result.history],
+        "test_inclination": means(table),
+        "versions": versions(("numpy", "numba", "torch", "scipy")),
+        "date": date.today().isoformat(),
+        "licence": "MIT",
+    }
+
+
+def command_of(args: Gru) -> str:
+    """The command line that trains these weights again."""
+    words = ["poise", "train", "gru", "--preset", args.preset, "--seed", str(args.seed)]
+    for name in ("episodes", "epochs", "units"):
+        if getattr(args, name) is not None:
+            words += [f"--{name}", str(getattr(args, name))]
+    if args.recordings:
+        words += ["--recordings", *map(str, args.recordings)]
+    return shlex.join([*words, "--test-episodes", str(args.test_episodes)])
