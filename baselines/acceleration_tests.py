@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
@@ -25,6 +26,8 @@ TESTS = {"A": "slow", "B": "fast", "C": "severe"}
 
 MISALIGNMENT = np.radians(1.6)
 """Standard deviation of the reference's misalignment about each axis, rad."""
+
+MODES: tuple[Literal[1, 2, 3], ...] = (1, 2, 3)
 
 RATE = 100.0
 """Samples a second, as in the paper."""
@@ -71,26 +74,23 @@ def simulate(test: str, seeds: Sequence[int]) -> Trial:
 
 
 def compare_modes(seeds: Sequence[int]) -> list[dict[str, float | str | int]]:
-    """Mean over trials of the root mean square errors of all modes in all tests, deg.
+    """Mean over trials of the root mean square errors of all modes in all tests, with both forms of the rotation.
 
     Returns:
-        Rows with test, mode, roll, pitch and inclination for the printed first-order rotation and for the exact one.
+        Rows with test, mean and peak of |a| (m/s²), mode, rotation, and roll, pitch and inclination (deg).
     """
     rows: list[dict[str, float | str | int]] = []
     for test in TESTS:
         trial = simulate(test, seeds)
         level, peak = float(trial.acceleration.mean()), float(trial.acceleration.max(axis=0).mean())
-        for mode in (1, 2, 3):
-            row: dict[str, float | str | int] = {"test": test, "mean |a|": level, "peak |a|": peak, "mode": mode}
-            for label, exact in (("first order", False), ("exact", True)):
-                up = estimate_up(trial, ExternalAcceleration(mode=mode, exact_rotation=exact))  # type: ignore[arg-type]
-                roll, pitch = (
-                    rms(rotation.wrap(a - b)).mean() * DEGREES
-                    for a, b in zip(rotation.roll_pitch(up), rotation.roll_pitch(trial.up), strict=True)
-                )
-                inclination = inclination_rms(up, trial.up)
-                row |= {f"roll, {label}": roll, f"pitch, {label}": pitch, f"inclination, {label}": inclination}
-            rows.append(row)
+        for rotated, exact in (("printed", False), ("exact", True)):
+            for mode in MODES:
+                up = estimate_up(trial, ExternalAcceleration(mode=mode, exact_rotation=exact))
+                angles = zip(rotation.roll_pitch(up), rotation.roll_pitch(trial.up), strict=True)
+                roll, pitch = (float(rms(rotation.wrap(a - b)).mean()) * DEGREES for a, b in angles)
+                errors = {"roll": roll, "pitch": pitch, "inclination": inclination_rms(up, trial.up)}
+                setting = {"test": test, "mean |a|": level, "peak |a|": peak, "rotation": rotated, "mode": mode}
+                rows.append({**setting, **errors})
     return rows
 
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+import sys
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from .experiment import Run
@@ -11,6 +12,8 @@ from .tables import markdown_table, print_table, records
 
 if TYPE_CHECKING:
     import pandas
+
+    from ..envs.trajectory import Trajectory
 
 TITLES = {
     "inclination": "Inclination error, RMS over the scored ticks, deg",
@@ -91,3 +94,54 @@ def print_comparison(
         if not as_json:
             print(f"not run:\n{skipped}")
     return sections
+
+
+def draw_example(
+    table: pandas.DataFrame,
+    trajectories: Sequence[Trajectory],
+    contenders: Mapping[str, Any],
+    run: Run,
+    name: str,
+    most: int = 5,
+) -> dict[str, str]:
+    """Draw the errors of the best estimator of each kind over time, on the last trajectory that has a truth.
+
+    Returns:
+        Heading → Markdown; empty if no trajectory has a truth.
+    """
+    from ..baselines.evaluation import at_interval, has_truth, summary
+    from ..baselines.plots import error_curves, save
+    from ..filters.estimator import run as run_estimator
+
+    known = [trajectory for trajectory in trajectories if has_truth(trajectory)]
+    if not known:
+        return {}
+    trajectory = known[-1]
+    kinds = kinds_of(contenders)
+    best: dict[str, str] = {}
+    for label in summary(table).index:
+        best.setdefault(kinds.get(str(label), ""), str(label))
+    estimates = {
+        label: run_estimator(at_interval(contenders[label], trajectory.dt), trajectory.measurements)
+        for label in list(best.values())[:most]
+    }
+    figure = error_curves(trajectory, estimates, kinds, f"{name}: {trajectory.name}, best estimator of each kind")
+    path = save(figure, run.figures / f"{name}-over-time.png")
+    return {f"Figure: {name} over time": f"![{name} over time]({path.relative_to(run.folder)})"}
+
+
+def print_progress(as_json: bool, text: str) -> None:
+    """Say what is going on, away from machine-readable output."""
+    print(text, file=sys.stderr if as_json else sys.stdout, flush=True)
+
+
+def provenance(run: Run) -> str:
+    """What a report depends on: command, seed, versions."""
+    state = json.loads((run.folder / "versions.json").read_text(encoding="utf-8"))
+    packages = ", ".join(f"{name} {version}" for name, version in state["packages"].items() if version)
+    lines = [
+        f"- command: `poise {run.command}`, arguments in `args.json`, root seed {run.seed}",
+        f"- poise {state['poise']['version']}, Python {state['python']}, {state['platform']}",
+        f"- {packages}",
+    ]
+    return "\n".join(lines)

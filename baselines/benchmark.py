@@ -1,0 +1,84 @@
+"""The data and the contenders of the standard comparison; the command ``poise benchmark`` runs it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from ..envs.trajectory import Trajectory
+from ..filters.estimator import Estimator
+from .zoo import list_estimators, make_estimator
+
+GESTURES = ("slow", "fast", "severe", "mixed")
+"""Gestures of the simulated part: tests A, B, C of the external-acceleration paper, and changing intensity."""
+
+PLAIN_PYTHON = ("ahrs-mahony", "ahrs-mahony-9", "ahrs-ekf", "ahrs-ekf-9")
+"""Wrapped loops in plain Python that take minutes on recordings and add little: left out unless asked for."""
+
+
+def simulated(seed: int, episodes: int, gestures: Sequence[str] = GESTURES, **options: Any) -> list[Trajectory]:
+    """Record episodes of ``poise/HandMotion-v0``, moved by forces in PyBullet.
+
+    Args:
+        seed: root seed; each episode has a child.
+        episodes: of each gesture.
+        gestures: names.
+        options: further arguments of the environment.
+
+    Returns:
+        Trajectories named ``slow-1``, ``slow-2`` …; the gesture is ``metadata["group"]``.
+    """
+    import gymnasium
+
+    from ..envs.recorder import record
+
+    trajectories = []
+    children = iter(np.random.SeedSequence(seed).spawn(episodes * len(gestures)))
+    for gesture in gestures:
+        env = gymnasium.make("poise/HandMotion-v0", gesture=gesture, **options)
+        try:
+            for number in range(1, episodes + 1):
+                trajectory = record(env, seed=int(next(children).generate_state(1)[0]))
+                metadata = {**trajectory.metadata, "name": f"{gesture}-{number}", "group": gesture}
+                trajectories.append(trajectory.replace(metadata=metadata))
+        finally:
+            env.close()
+    return trajectories
+
+
+def groups_of(trajectories: Sequence[Trajectory]) -> dict[str, str]:
+    """Trajectory → ``metadata["group"]``, or its own name."""
+    return {trajectory.name: str(trajectory.metadata.get("group") or trajectory.name) for trajectory in trajectories}
+
+
+def contenders(names: Sequence[str] = ()) -> dict[str, str | Estimator[Any]]:
+    """Label → estimator: those that are named, or all that are installed, with the other modes of the paper.
+
+    Raises:
+        ValueError: an unknown name.
+    """
+    if names:
+        for name in names:
+            if name not in list_estimators():
+                make_estimator(name)  # raises, with the names that there are
+        return {name: name for name in names}
+    known = [
+        name
+        for name in list_estimators()
+        if name not in PLAIN_PYTHON and is_available(lambda n=name: make_estimator(n))
+    ]
+    chosen: dict[str, str | Estimator[Any]] = {name: name for name in known}
+    for mode in (2, 3):
+        chosen[f"external-acceleration (mode {mode})"] = make_estimator("external-acceleration", mode=mode)
+    return chosen
+
+
+def is_available(make: Callable[[], Any]) -> bool:
+    """Whether an estimator can be made: the package that it wraps may be missing."""
+    try:
+        make()
+    except ImportError:
+        return False
+    return True
