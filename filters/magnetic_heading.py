@@ -71,11 +71,18 @@ def is_disturbed(measured: Array, reference: Array, norm_tolerance: Array, dip_t
 
 
 def follow(reference: Array, measured: Array, dt: Array, time: Array) -> Array:
-    """The reference ``(..., 2)`` after one sample: a first-order lag of ``time`` seconds; unchanged by NaN."""
-    xp = namespace(reference)
-    share = expand(dt / (dt + time), 1)
-    moved = reference + share * (measured - reference)
-    return xp.where(xp.isfinite(moved), moved, reference)
+    """The reference ``(..., 2)`` after one sample: a first-order lag of ``time`` seconds."""
+    return reference + expand(dt / (dt + time), 1) * (measured - reference)
+
+
+def known(sample: Array) -> tuple[Array, Array]:
+    """A sample ``(..., 3)`` with ones where it is missing, and whether it is there ``(..., 1)``.
+
+    What is computed of a missing sample is thrown away afterwards; a NaN in it would still make gradients NaN.
+    """
+    xp = namespace(sample)
+    there = xp.all(xp.isfinite(sample), axis=-1)[..., None]
+    return xp.where(there, sample, xp.ones_like(sample)), there
 
 
 @dataclass(frozen=True)
@@ -87,8 +94,8 @@ class MagneticHeading(Model):
     and dip of the field that are expected. The residual gains one row at its end: the error of the heading. The filter
     starts at the first tick at which the magnetometer, too, has brought a sample.
 
-    A sample whose norm or dip is off what is expected is left out. The expectation follows all samples slowly, so a new
-    place is accepted after some time constants.
+    A sample whose norm or dip is off what is expected is left out. The expectation follows all samples, those left out
+    more slowly.
     """
 
     magnetometer_noise: float = 0.1
@@ -102,7 +109,9 @@ class MagneticHeading(Model):
     dip_tolerance: float = 0.175
     """rad: the same for the dip (10°)"""
     field_time: float = 20.0
-    """s: time constant with which the expected norm and dip follow"""
+    """s: time constant with which the expected norm and dip follow accepted samples"""
+    new_field_time: float = 100.0
+    """s: the same for samples that are left out, so that a new place is accepted in the end"""
 
     def prior(self, z: Measurement) -> tuple[Array, Array]:
         """The prior of six axes, turned to magnetic north."""
@@ -118,10 +127,10 @@ class MagneticHeading(Model):
         """The rows of six axes, and the error of the heading unless the field is disturbed."""
         xp = namespace(x)
         r, H, R = super().residual(x, z)
-        q, field = x[..., :4], z["imu/mag"]
+        q, (field, there) = x[..., :4], known(z["imu/mag"])
         angle = heading_error(q, field, self.declination)
         disturbed = is_disturbed(norm_and_dip(q, field), x[..., -2:], self.norm_tolerance, self.dip_tolerance)
-        angle = xp.where(disturbed, xp.nan + 0.0 * angle, angle)
+        angle = xp.where(xp.logical_and(there, xp.logical_not(disturbed)), angle, xp.nan + 0.0 * angle)
         zero = 0.0 * x[..., :1, None]
         row = zero + constant([[float(j == 2) for j in range(self.error_size)]], x)
         column = zero + constant([[0.0] for _ in range(self.residual_size - 1)], x)
@@ -133,8 +142,13 @@ class MagneticHeading(Model):
     def finish(self, x: Array, z: Measurement) -> Array:
         """Let the expected field follow the measured one."""
         x = super().finish(x, z)
-        expected = follow(x[..., -2:], norm_and_dip(x[..., :4], z["imu/mag"]), self.dt, self.field_time)
-        return namespace(x).concat([x[..., :-2], expected], axis=-1)
+        xp, expected = namespace(x), x[..., -2:]
+        field, there = known(z["imu/mag"])
+        measured = norm_and_dip(x[..., :4], field)
+        disturbed = is_disturbed(measured, expected, self.norm_tolerance, self.dip_tolerance)
+        near = follow(expected, measured, self.dt, self.field_time)
+        followed = xp.where(disturbed, follow(expected, measured, self.dt, self.new_field_time), near)
+        return xp.concat([x[..., :-2], xp.where(there, followed, expected)], axis=-1)
 
     def pose(self, x: Array) -> dict[str, Array]:
         """The quantities of six axes; the orientation is that in the world."""

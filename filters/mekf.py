@@ -122,6 +122,7 @@ class MEKF(Model):
         f, q = z["imu/acc"], x[..., :4]
         g = expand(self.gravity, 1)
         deviation = expand(self.norm_adaptation, 1) * (norm(f) - g)
+        deviation = xp.where(xp.isfinite(deviation), deviation, xp.zeros_like(deviation))
         variance = expand(self.accelerometer_noise**2 / self.dt, 1) + deviation * deviation
         unit = constant(UNIT, x) + 0.0 * x[..., :3, None]
         turn = expand(self.gravity, 2) * (to_matrix(q).mT @ constant(UP_CROSS, x))

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from .backend import Array, expand, namespace
-from .magnetic_heading import align
+from .magnetic_heading import align, known
 from .model import Recurrence
 from .quantity import (
     ACCELEROMETER,
@@ -135,7 +135,9 @@ class Mahony(Recurrence):
         return {"up": up_in_body(q), "relative_orientation": q, "gyroscope_bias": x[..., 4:]}
 
     def _error(self, q: Array, z: Measurement) -> Array:
-        return _known(cross(normalize(z["imu/acc"]), up_in_body(q)))
+        f, there = known(z["imu/acc"])
+        e = cross(normalize(f), up_in_body(q))
+        return namespace(q).where(there, e, 0.0 * e)
 
 
 @dataclass(frozen=True)
@@ -167,16 +169,11 @@ class Mahony9(Mahony):
 
     def _error(self, q: Array, z: Measurement) -> Array:
         xp = namespace(q)
-        field = normalize(z["imu/mag"])
+        field, there = known(z["imu/mag"])
+        field = normalize(field)
         world = rotate(q, field)
         horizontal = xp.sqrt(world[..., :1] * world[..., :1] + world[..., 1:2] * world[..., 1:2])
         declination = expand(self.declination, 1) + 0.0 * horizontal
         north = xp.concat([horizontal * xp.sin(declination), horizontal * xp.cos(declination), world[..., 2:]], axis=-1)
-        return super()._error(q, z) + _known(cross(field, rotate_back(q, north)))
-
-
-def _known(e: Array) -> Array:
-    """The error, or zero where a sample that it needs is missing."""
-    xp = namespace(e)
-    known = xp.all(xp.isfinite(e), axis=-1)[..., None]
-    return xp.where(known, e, xp.zeros_like(e))
+        e = cross(field, rotate_back(q, north))
+        return super()._error(q, z) + xp.where(there, e, 0.0 * e)
