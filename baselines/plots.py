@@ -19,10 +19,10 @@ if TYPE_CHECKING:
 
 COLOURS = {
     "filter": "#1f5fa8",
-    "reference": "#8a8f98",
+    "reference": "#6d737c",
     "learned": "#c2571a",
     "adaptive": "#2c8c5a",
-    "external": "#b9bec7",
+    "external": "#b08d1a",
 }
 """Kind of estimator → colour."""
 
@@ -58,7 +58,7 @@ def rms_bars(
         kinds: estimator → kind, for the colours.
         metric: which metric.
         title: above the axes.
-        limit: bars and dots beyond it are cut (their value stands beside the bar).
+        limit: bars and dots beyond it are cut (the number at the right is not).
     """
     means = summary(table, metric)["mean"]
     chosen = table[table["metric"] == metric]
@@ -67,18 +67,20 @@ def rms_bars(
     positions = np.arange(len(means))[::-1]
     limit = min(limit, 1.15 * float(means.max()))
     for position, (name, mean) in zip(positions, means.items(), strict=True):
-        colour = COLOURS.get(kinds.get(str(name), ""), "#8a8f98")
+        colour = COLOURS.get(kinds.get(str(name), ""), COLOURS["reference"])
         ax.barh(position, min(mean, limit), height=0.62, color=colour, alpha=0.85)
         values = chosen.loc[chosen["estimator"] == name, "value"]
         inside = values[values <= limit]
         ax.plot(inside, np.full(len(inside), position), "o", color="black", markersize=2.6, alpha=0.55)
-        ax.text(min(mean, limit) + 0.012 * limit, position, f"{mean:.2f}", va="center", fontsize=8.5)
+        # Values stand in a column of their own, where no dot can lie.
+        ax.text(1.02 * limit, position, f"{mean:.2f}", va="center", fontsize=8.5)
     ax.set_yticks(positions, [str(name) for name in means.index])
-    ax.set_xlim(0.0, 1.08 * limit)
-    ax.set_xlabel(f"{metric} error, RMS, {unit} (bar: mean of trajectories, dot: one trajectory)")
+    ax.set_xlim(0.0, 1.12 * limit)
+    ax.set_xlabel(f"{metric} error, RMS, {unit} (bar and number: mean of trajectories, dot: one trajectory)")
     ax.grid(axis="y", visible=False)
     present = [kind for kind in COLOURS if kind in {kinds.get(str(name)) for name in means.index}]
-    ax.legend([_patch(COLOURS[kind]) for kind in present], present, loc="lower right", frameon=False, fontsize=8.5)
+    patches = [_patch(COLOURS[kind]) for kind in present]
+    figure.legend(patches, present, loc="outside upper right", ncols=len(present), frameon=False, fontsize=8.5)
     if title:
         ax.set_title(title, loc="left", fontsize=10.5)
     return figure
@@ -116,7 +118,7 @@ def error_curves(
         style = styles[used.get(kind, 0) % len(styles)]
         used[kind] = used.get(kind, 0) + 1
         per_tick = error(UP, with_up(estimate.pose)[UP.name], truth) * DEGREES
-        colour = COLOURS.get(kind, "#8a8f98")
+        colour = COLOURS.get(kind, COLOURS["reference"])
         errors.plot(time, per_tick, color=colour, linestyle=style, linewidth=0.9, label=label)
     errors.set_ylabel("inclination error, deg")
     errors.set_xlabel("time, s")
