@@ -1,7 +1,7 @@
 """Heading from a magnetometer: what the nine-axis filters share.
 
 Only the horizontal part of the field is used, and only its direction: the unit of the magnetometer does not matter, and
-an error of the field never reaches the inclination directly. Magnetic north lies ``declination`` radians east of
+an error of the field does not reach the inclination directly. Magnetic north lies ``declination`` radians east of
 geographic north (+y of the world).
 
 Reference for the test of disturbances by norm and dip: D. Laidig, T. Seel, "VQF: Highly accurate IMU orientation
@@ -93,6 +93,10 @@ class MagneticHeading(Model):
     first three of its error, and passes what follows its own numbers on. The state gains two numbers at its end: norm
     and dip of the field that are expected. The residual gains one row at its end: the error of the heading. The filter
     starts at the first tick at which the magnetometer, too, has brought a sample.
+
+    The row has no entry for the inclination. Heading and gyroscope bias are correlated, so that the bias about the
+    vertical is found; a false field that is taken for true therefore harms the bias, and through it, slowly, the
+    inclination.
 
     A sample whose norm or dip is off what is expected is left out. The expectation follows all samples, those left out
     more slowly.
