@@ -157,24 +157,25 @@ class SegmentedGesture:
     origin: tuple[float, float, float] = (0.0, 0.0, 1.2)
 
     def position_and_angles(self, times: np.ndarray) -> tuple[Jet, Jet]:
-        """Position and Z-Y-X angles at ``times`` ``(T,)``: two jets ``(T, 3)``."""
+        """Position and Z-Y-X angles at ``times`` ``(T,)``, which must not decrease: two jets ``(T, 3)``."""
         position = (np.tile(np.asarray(self.origin), (len(times), 1)), *np.zeros((2, len(times), 3)))
         angles = (np.tile(self.start_angles, (len(times), 1)), *np.zeros((2, len(times), 3)))
         for segment in self.segments:
-            inside = np.flatnonzero((times > segment.start) & (times < segment.end))
-            after = times >= segment.end
-            position[0][after] += segment.shift
-            angles[0][after] += segment.turn
-            if inside.size:
-                moved, turned = segment.sample(times[inside])
-                for order in range(3):
-                    position[order][inside] += moved[order]
-                    angles[order][inside] += turned[order]
+            first, last = np.searchsorted(times, segment.start, "right"), np.searchsorted(times, segment.end, "left")
+            position[0][last:] += segment.shift
+            angles[0][last:] += segment.turn
+            if first < last:
+                for whole, part in zip((position, angles), segment.sample(times[first:last]), strict=True):
+                    for order in range(3):
+                        whole[order][first:last] += part[order]
         return position, angles
 
     def sample(self, times: np.ndarray) -> BodyState:
         """The motion at ``times`` ``(T,)``, s."""
         times = np.asarray(times, dtype=float)
+        if (np.diff(times) < 0.0).any():
+            ascending, ranks = np.unique(times, return_inverse=True)
+            return self.sample(ascending).at(ranks)
         position, angles = self.position_and_angles(times)
         orientation, *rates = euler_motion(angles)
         orientation = rotation.multiply(self.heading, orientation)

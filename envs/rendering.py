@@ -58,7 +58,7 @@ class DeviceScene:
         ]
         self._draw_ground()
         self._device = self._body([*device, *axes_boxes(2.2 * x, 0.004, 1.0)])
-        self._ghost = self._body(axes_boxes(3.2 * x, 0.0025, 1.0, pale=0.55))
+        self._ghost = self._body(axes_boxes(2.8 * x, 0.0025, 1.0, pale=0.55))
         self._target = np.zeros(3)
 
     def _body(self, boxes: Sequence[Box]) -> int:
@@ -110,7 +110,7 @@ class DeviceScene:
         client = self._physics.client
         eye = self._target + np.array([0.25, -0.5, 0.25])
         view = pybullet.computeViewMatrix(eye.tolist(), self._target.tolist(), [0.0, 0.0, 1.0], physicsClientId=client)
-        lens = pybullet.computeProjectionMatrixFOV(45.0, width / height, 0.05, 10.0, physicsClientId=client)
+        lens = pybullet.computeProjectionMatrixFOV(50.0, width / height, 0.05, 10.0, physicsClientId=client)
         pixels = pybullet.getCameraImage(
             width,
             height,

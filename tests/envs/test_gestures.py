@@ -92,6 +92,8 @@ def test_equal_seeds_give_equal_motion_and_any_selection_of_times(name):
     one, two = draw(name, 5, 8.0).sample(times), draw(name, 5, 8.0).sample(times)
     for left, right in zip(one, two, strict=True):
         np.testing.assert_array_equal(left, right)
+    backwards = draw(name, 5, 8.0).sample(times[::-1])
+    np.testing.assert_allclose(backwards.acceleration[::-1], one.acceleration, atol=1e-9)
     part = draw(name, 5, 8.0).sample(times[100:200])
     np.testing.assert_allclose(part.acceleration, one.acceleration[100:200], atol=1e-9)
 
