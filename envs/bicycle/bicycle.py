@@ -241,6 +241,7 @@ class Bicycle:
     def state(self) -> BicycleState:
         """Where the bicycle is and how it moves, now."""
         frame = self.physics.state(self.body.body)
+        x, y, z = frame.position.tolist()
         yaw, pitch, roll = (float(angle) for angle in rotation.to_euler_zyx(frame.orientation))
         p, q, r = rotation.rotate_back(frame.orientation, frame.angular_velocity).tolist()
         turn = q * math.sin(roll) + r * math.cos(roll)
@@ -250,7 +251,9 @@ class Bicycle:
         vx, vy, _ = frame.velocity.tolist()
         return BicycleState(
             self.physics.time,
-            *frame.position.tolist(),
+            x,
+            y,
+            z,
             roll,
             pitch,
             yaw,

@@ -13,7 +13,11 @@ import numpy as np
 import pybullet
 
 from ...filters import rotation
-from ..physics import BASE, Physics, TupleState, Vector
+from ..physics import BASE, Physics, Vector
+
+Tuple3 = tuple[float, float, float]
+LinkState = tuple[Tuple3, tuple[float, float, float, float], Tuple3, Tuple3]
+"""Position, quaternion (w, x, y, z), velocity and angular velocity of a centre-of-mass frame, world axes."""
 
 
 class CentreMotion(NamedTuple):
@@ -56,7 +60,7 @@ class Multibody:
         """Numbers of links, for the fast calls below."""
         return [self.links[name] for name in names]
 
-    def link_tuples(self, links: Sequence[int]) -> list[TupleState]:
+    def link_tuples(self, links: Sequence[int]) -> list[LinkState]:
         """Position, quaternion (w, x, y, z), velocity and angular velocity of links (not the base) as plain tuples."""
         rows = pybullet.getLinkStates(
             self.body, links, computeLinkVelocity=1, computeForwardKinematics=1, physicsClientId=self.physics.client
@@ -67,9 +71,9 @@ class Multibody:
         """Motion of the centre-of-mass frames of links; the base may be among them."""
         moving = [link for link in links if link != BASE]
         rows = iter(self.link_tuples(moving) if moving else ())
-        states = [self.physics.base_tuples(self.body) if link == BASE else next(rows) for link in links]
-        position, orientation, velocity, turning = (np.array(field) for field in zip(*states, strict=True))
-        return CentreMotion(position, orientation, velocity, turning)
+        base = self.physics.base_tuples(self.body)
+        states = [base if link == BASE else next(rows) for link in links]
+        return CentreMotion(*(np.array(field) for field in zip(*states, strict=True)))
 
     def joint_tuples(self, links: Sequence[int]) -> list[tuple[float, float]]:
         """Angle (rad) and rate (rad/s) of the joints above ``links``."""

@@ -12,9 +12,9 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from .multibody import Tuple3
 from .terrain import Ground
 
-Tuple3 = tuple[float, float, float]
 ROLLING_SPEED = 0.05
 """m/s: rolling drag is full well above this speed"""
 

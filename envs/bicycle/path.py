@@ -1,0 +1,149 @@
+"""Paths on the horizontal plane, told by their curvature over arc length."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+SPACING = 0.02
+"""m between the points that a path keeps"""
+
+
+class PathPoint(NamedTuple):
+    """One point of a path."""
+
+    x: float
+    """m, world"""
+    y: float
+    heading: float
+    """rad, counter-clockwise from east, not wrapped"""
+    curvature: float
+    """1/m, left positive"""
+
+
+class Path:
+    """A path with continuous curvature, straight beyond its end.
+
+    Args:
+        curvature: ``(n,)`` 1/m at points ``SPACING`` apart along the path, left positive.
+        start: x, y (m) and heading (rad) of the first point.
+
+    Raises:
+        ValueError: fewer than two points, or a curvature that is not finite.
+    """
+
+    def __init__(self, curvature: np.ndarray, start: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> None:
+        curvature = np.asarray(curvature, dtype=float)
+        if curvature.ndim != 1 or len(curvature) < 2 or not np.all(np.isfinite(curvature)):
+            raise ValueError(f"curvature must be (n ≥ 2,) finite numbers, got shape {curvature.shape}")
+        turn = 0.5 * SPACING * (curvature[1:] + curvature[:-1])
+        heading = start[2] + np.concatenate([[0.0], np.cumsum(turn)])
+        # the middle heading of each piece: exact to third order in its turn
+        middle = 0.5 * (heading[1:] + heading[:-1])
+        x = start[0] + np.concatenate([[0.0], np.cumsum(SPACING * np.cos(middle))])
+        y = start[1] + np.concatenate([[0.0], np.cumsum(SPACING * np.sin(middle))])
+        self.points = np.stack([x, y, heading, curvature], axis=1)
+        self._rows = self.points.tolist()
+
+    @property
+    def length(self) -> float:
+        """Arc length, m."""
+        return SPACING * (len(self._rows) - 1)
+
+    def at(self, distance: float) -> PathPoint:
+        """The point at an arc length (m); beyond the ends the path goes straight on."""
+        last = len(self._rows) - 1
+        place = distance / SPACING
+        if place <= 0.0 or place >= last:
+            x, y, heading, _ = self._rows[0 if place <= 0.0 else last]
+            over = distance if place <= 0.0 else distance - last * SPACING
+            return PathPoint(x + over * math.cos(heading), y + over * math.sin(heading), heading, 0.0)
+        index = int(place)
+        part = place - index
+        first, second = self._rows[index], self._rows[index + 1]
+        return PathPoint(*(a + part * (b - a) for a, b in zip(first, second, strict=True)))
+
+    def curvatures(self, distances: np.ndarray) -> np.ndarray:
+        """Curvature ``(n,)`` at several arc lengths (m), 1/m."""
+        places = np.asarray(distances) / SPACING
+        return np.interp(places, np.arange(len(self.points)), self.points[:, 3], left=0.0, right=0.0)
+
+    def progress(self, distance: float, x: float, y: float) -> tuple[float, float]:
+        """Arc length of the nearest point and how far (m) the point (x, y) lies to the left of the path there.
+
+        Args:
+            distance: a guess near the answer, for instance the last one.
+            x: m, world.
+            y: m, world.
+        """
+        left = 0.0
+        for _ in range(2):
+            point = self.at(distance)
+            c, s = math.cos(point.heading), math.sin(point.heading)
+            dx, dy = x - point.x, y - point.y
+            left = c * dy - s * dx
+            distance += (c * dx + s * dy) / max(0.2, 1.0 - point.curvature * left)
+        return distance, left
+
+
+def smooth_curvature(curvature: Callable[[np.ndarray], np.ndarray], length: float, blend: float = 1.0) -> np.ndarray:
+    """Curvature at the points of a path of some length, blended over ``blend`` metres so that it has no jumps.
+
+    Args:
+        curvature: arc length ``(n,)`` m → curvature ``(n,)`` 1/m.
+        length: m.
+        blend: m; the width of the averaging window.
+
+    Raises:
+        ValueError: a length that is not positive.
+    """
+    if not (length > 0.0 and blend > 0.0):
+        raise ValueError(f"length and blend must be positive (m), got {length} and {blend}")
+    half = max(1, round(0.5 * blend / SPACING))
+    distances = SPACING * np.arange(-2 * half, math.ceil(length / SPACING) + 2 * half + 1)
+    values = curvature(distances)
+    window = np.hanning(2 * half + 1 + 2)[1:-1]
+    return np.convolve(values, window / window.sum(), "same")[2 * half : -2 * half]
+
+
+def wandering_path(
+    rng: np.random.Generator,
+    length: float,
+    size: tuple[float, float] = (50.0, 40.0),
+    smallest_radius: float = 4.0,
+    start: tuple[float, float, float] = (0.0, 0.0, 0.0),
+) -> Path:
+    """A random ride inside a rectangle around the origin, from one random goal to the next.
+
+    Args:
+        rng: source of randomness.
+        length: m.
+        size: of the rectangle, m.
+        smallest_radius: of the turns, m.
+        start: x, y (m) and heading (rad) of the first point.
+
+    Raises:
+        ValueError: a rectangle narrower than four turns.
+    """
+    if not 4.0 * smallest_radius <= min(size) and smallest_radius > 0.0:
+        raise ValueError(f"a rectangle of {size} m has no room for turns of {smallest_radius} m")
+    x, y, heading = start
+    inner = 0.5 * np.array(size) - 1.2 * smallest_radius
+    goal = rng.uniform(-inner, inner)
+    largest, curvature = 1.0 / smallest_radius, 0.0
+    values = np.empty(max(2, math.ceil(length / SPACING) + 1))
+    for index in range(len(values)):
+        values[index] = curvature
+        dx, dy = float(goal[0]) - x, float(goal[1]) - y
+        if dx * dx + dy * dy < (1.2 * smallest_radius) ** 2:
+            goal = rng.uniform(-inner, inner)
+        bearing = math.remainder(math.atan2(dy, dx) - heading, 2.0 * math.pi)
+        wanted = max(-largest, min(largest, 0.5 * bearing))
+        # a rider turns the bar over a metre or two
+        curvature += (wanted - curvature) * SPACING / 1.2
+        heading += curvature * SPACING
+        x, y = x + math.cos(heading) * SPACING, y + math.sin(heading) * SPACING
+    return Path(values, start)
