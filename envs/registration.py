@@ -7,7 +7,8 @@ import gymnasium
 ENTRY_POINTS: dict[str, str] = {
     "poise/HandMotion-v0": "poise.envs.hand:HandMotionEnv",
     "poise/Replay-v0": "poise.envs.replay:ReplayEnv",
-    # environments in which filter gains are the actions: add poise/HandMotionGain-v0 and poise/ReplayGain-v0 here
+    "poise/HandMotionGain-v0": "poise.envs.gain_tuning:HandMotionGainEnv",
+    "poise/ReplayGain-v0": "poise.envs.gain_tuning:ReplayGainEnv",
 }
 """Id → ``module:class``. Episodes end by themselves (gesture or recording), so no time limit is registered."""
 

@@ -1,0 +1,221 @@
+"""Many gain-tuning episodes in one process: the environments of :mod:`poise.envs.gain_tuning`, batched for training.
+
+One call of the filter serves all episodes of a sampling rate, which is an order of magnitude faster than one environment after the other.
+Observations, actions and rewards are the same numbers (up to rounding).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+from stable_baselines3.common.vec_env import VecEnv
+
+from ..envs.gain_tuning import scored_quantity
+from ..envs.trajectory import Trajectory
+from ..filters.metrics import error
+from ..filters.quantity import Quantity
+from ..filters.tuned import TunedFilter, TunedState
+
+
+class RateGroup:
+    """Episodes that advance together: same rate, one row each.
+
+    Args:
+        tuned: the filter.
+        trajectories: to draw from, all of one rate; the shortest decides about the length of all.
+        rows: number of episodes.
+        generator: of the choice of trajectories.
+        quantity: what is scored.
+        reference: action whose error the reward is relative to.
+    """
+
+    def __init__(
+        self,
+        tuned: TunedFilter,
+        trajectories: Sequence[Trajectory],
+        rows: int,
+        generator: np.random.Generator,
+        quantity: Quantity,
+        reference: np.ndarray,
+    ) -> None:
+        self.tuned, self.rows, self.generator, self.quantity = tuned.with_dt(trajectories[0].dt), rows, generator, quantity
+        self.episode = min(len(trajectory) for trajectory in trajectories) // self.tuned.ticks
+        length = self.episode * self.tuned.ticks
+        self.channels = {
+            channel.name: np.stack([trajectory.measurements[channel.name][:length] for trajectory in trajectories])
+            for channel in tuned.kalman.channels
+        }
+        self.truth = np.stack([trajectory.truth_of(quantity.name)[:length] for trajectory in trajectories])
+        self.scored = np.stack([trajectory.mask[:length] for trajectory in trajectories])
+        gains = self.tuned.gains(reference)
+        self.reference = np.stack(
+            [
+                error(quantity, self.tuned.kalman.run(self._sequence(index), gains).pose[quantity.name], self.truth[index])
+                for index in range(len(trajectories))
+            ]
+        )
+        self.start()
+
+    def _sequence(self, index: int) -> dict[str, np.ndarray]:
+        return {name: values[index] for name, values in self.channels.items()}
+
+    def start(self) -> None:
+        """Begin all episodes; the first ones end at random times, so that later ones do not end together."""
+        self.trajectory = self.generator.integers(len(self.truth), size=self.rows)
+        self.decision = np.zeros(self.rows, int)
+        self.end = self.generator.integers(1, self.episode + 1, size=self.rows)
+        self.fresh = self.tuned.init({name: values[self.trajectory, 0] for name, values in self.channels.items()})
+        self.state = self.fresh
+
+    def observe(self) -> np.ndarray:
+        """Observations ``(rows, n)``."""
+        return self.tuned.observe(self.state)
+
+    def step(self, actions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Advance by one interval.
+
+        Returns:
+            Observations at the end of the interval ``(rows, n)``, rewards ``(rows,)`` in rad, and which episodes are over
+            ``(rows,)``; :meth:`restart` begins these anew.
+        """
+        ticks = self.decision * self.tuned.ticks + np.arange(self.tuned.ticks)[:, None]
+        chunk = {name: values[self.trajectory, ticks] for name, values in self.channels.items()}
+        estimate, self.state = self.tuned.advance(self.tuned.decide(self.state, actions), chunk)
+        errors = error(self.quantity, estimate.pose[self.quantity.name], self.truth[self.trajectory, ticks])
+        gained = self.reference[self.trajectory, ticks] - errors
+        counted = self.scored[self.trajectory, ticks] & np.isfinite(gained)
+        rewards = np.where(counted, gained, 0.0).sum(axis=0) / np.maximum(counted.sum(axis=0), 1)
+        self.decision = self.decision + 1
+        return self.observe(), rewards, self.decision >= self.end
+
+    def restart(self, over: np.ndarray) -> None:
+        """Begin new episodes in the rows ``over`` ``(rows,)`` bool."""
+        count = int(over.sum())
+        self.trajectory = self.trajectory.copy()
+        self.trajectory[over] = self.generator.integers(len(self.truth), size=count)
+        self.decision[over], self.end[over] = 0, self.episode
+
+        def mixed(new: np.ndarray, old: np.ndarray) -> np.ndarray:
+            if new.ndim == 0:
+                return old
+            return np.where(over.reshape(-1, *(1,) * (new.ndim - 1)), new, old)
+
+        self.state = TunedState(
+            type(self.fresh.filter)(*map(mixed, self.fresh.filter, self.state.filter)),
+            type(self.fresh.memory)(*map(mixed, self.fresh.memory, self.state.memory)),
+            mixed(self.fresh.action, self.state.action),
+        )
+
+
+class TuningBatch(VecEnv):
+    """A Stable-Baselines3 vector environment over a fixed set of trajectories.
+
+    The reward is the mean error of a constant ``reference`` action over the interval minus that of the agent, in degrees.
+
+    Args:
+        tuned: the filter, what may be chosen of it and what is seen.
+        trajectories: drawn from with replacement; every rate among them gets its share of the episodes.
+        envs: episodes that run at a time, at least one for each rate.
+        seed: of the choice of trajectories.
+        quantity: output that is scored; None for ``up``.
+        reference: action ``(k,)``; None for the published tuning.
+
+    Raises:
+        ValueError: fewer ``envs`` than rates.
+    """
+
+    def __init__(
+        self,
+        tuned: TunedFilter,
+        trajectories: Sequence[Trajectory],
+        envs: int,
+        *,
+        seed: int = 0,
+        quantity: str | None = None,
+        reference: np.ndarray | None = None,
+    ) -> None:
+        groups: dict[int, list[Trajectory]] = {}
+        for trajectory in trajectories:
+            groups.setdefault(round(1e6 * trajectory.dt), []).append(trajectory)
+        if not groups or envs < len(groups):
+            raise ValueError(f"envs must be at least the number of rates ({len(groups)}, not 0), got {envs}")
+        rows = [len(part) for part in np.array_split(np.arange(envs), len(groups))]
+        generators = np.random.default_rng(seed).spawn(len(groups))
+        output = scored_quantity(tuned.kalman, quantity)
+        action = np.zeros(tuned.actions) if reference is None else np.asarray(reference, float)
+        self.groups = [
+            RateGroup(tuned, part, count, generator, output, action)
+            for part, count, generator in zip(groups.values(), rows, generators, strict=True)
+        ]
+        self.bounds = np.cumsum([0, *rows])
+        self.tuned, self.actions = tuned, np.zeros((envs, tuned.actions))
+        self.returns = np.zeros(envs)
+        super().__init__(
+            envs,
+            spaces.Box(-1.0, 1.0, (tuned.observation_size,), np.float32),
+            spaces.Box(-1.0, 1.0, (tuned.actions,), np.float32),
+        )
+
+    def reset(self) -> np.ndarray:
+        """Begin all episodes."""
+        for group in self.groups:
+            group.start()
+        self.returns[:] = 0.0
+        return np.concatenate([group.observe() for group in self.groups])
+
+    def step_async(self, actions: np.ndarray) -> None:
+        """Remember the actions ``(envs, k)``."""
+        self.actions = np.asarray(actions, float)
+
+    def step_wait(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[dict[str, Any]]]:
+        """Advance all episodes by one interval; those that are over begin anew."""
+        observations, rewards, overs = [], [], []
+        infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
+        for group, first, last in zip(self.groups, self.bounds[:-1], self.bounds[1:], strict=True):
+            observation, reward, over = group.step(self.actions[first:last])
+            lengths = group.decision.copy()
+            self.returns[first:last] += np.degrees(reward)
+            if over.any():
+                terminal = observation
+                group.restart(over)
+                observation = np.where(over[:, None], group.observe(), observation)
+                for row in np.flatnonzero(over):
+                    index = first + row
+                    mean = float(self.returns[index] / lengths[row])
+                    infos[index] = {
+                        "TimeLimit.truncated": True,
+                        "terminal_observation": terminal[row],
+                        "episode": {"r": mean, "l": int(lengths[row]), "t": 0.0},
+                    }
+                    self.returns[index] = 0.0
+            observations.append(observation)
+            rewards.append(np.degrees(reward))
+            overs.append(over)
+        return (
+            np.concatenate(observations),
+            np.concatenate(rewards).astype(np.float32),
+            np.concatenate(overs),
+            infos,
+        )
+
+    def close(self) -> None:
+        """Nothing to free."""
+
+    def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
+        """An attribute of the batch, once for each episode."""
+        return [getattr(self, attr_name, None) for _ in self._get_indices(indices)]
+
+    def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
+        """Refused: episodes have no attributes of their own."""
+        raise NotImplementedError("the episodes of a batch have no attributes of their own")
+
+    def env_method(self, method_name: str, *args: Any, indices: Any = None, **kwargs: Any) -> list[Any]:
+        """Refused: episodes have no methods of their own."""
+        raise NotImplementedError("the episodes of a batch have no methods of their own")
+
+    def env_is_wrapped(self, wrapper_class: Any, indices: Any = None) -> list[bool]:
+        """Never wrapped."""
+        return [False for _ in self._get_indices(indices)]

@@ -1,0 +1,309 @@
+"""Environments in which an agent tunes a Kalman filter while it runs: ``poise/HandMotionGain-v0``, ``poise/ReplayGain-v0``."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, ClassVar, Literal
+
+import gymnasium
+import numpy as np
+from gymnasium import spaces
+
+from ..filters.adaptation import gain_sizes, tunable_filter
+from ..filters.innovation_features import InnovationFeatures
+from ..filters.kalman import KalmanFilter
+from ..filters.metrics import error
+from ..filters.quantity import Estimate, Quantity
+from ..filters.tuned import TunedFilter, TunedState
+from .hand_trajectories import HandTrajectories
+from .recordings import load_recording
+from .trajectory import Trajectory
+
+RewardKind = Literal["error", "improvement"]
+NIS_FLOOR = 1e-6
+"""Smallest mean NIS that the consistency term tells from zero."""
+
+
+class GainTuningEnv(gymnasium.Env[np.ndarray, np.ndarray]):
+    """What the gain-tuning environments share; subclasses say where trajectories come from.
+
+    Args:
+        filter: name (``external-acceleration``, ``bounded-motion``) or a Kalman filter with gains that reads a
+            gyroscope and an accelerometer.
+        gains: names of the gains to be tuned, in the order of the action; None for all.
+        quantity: output of the filter whose error counts; None for ``up``, or the filter's first output.
+        interval: time from decision to decision, s, rounded to ticks.
+        reward: ``error`` or ``improvement``, see the subclasses.
+        consistency: weight of the consistency term of the reward, rad.
+
+    Raises:
+        ValueError: an unknown filter, gain, quantity or kind of reward, or a number out of its range.
+    """
+
+    metadata: ClassVar[dict[str, Any]] = {"render_modes": []}
+
+    def __init__(
+        self,
+        filter: str | KalmanFilter = "external-acceleration",
+        *,
+        gains: Sequence[str] | None = None,
+        quantity: str | None = None,
+        interval: float = 0.1,
+        reward: RewardKind = "error",
+        consistency: float = 0.0,
+        render_mode: None = None,
+    ) -> None:
+        if reward not in ("error", "improvement"):
+            raise ValueError(f"reward must be 'error' or 'improvement', got {reward!r}")
+        if not 0.0 <= consistency < math.inf:
+            raise ValueError(f"consistency must be a weight of 0 or more, got {consistency}")
+        if render_mode is not None:
+            raise ValueError(f"render_mode must be None: there is nothing to see, got {render_mode!r}")
+        names = None if gains is None else tuple(gains)
+        self.tuned = TunedFilter.of(tunable_filter(filter), names, InnovationFeatures(interval))
+        self.quantity = scored_quantity(self.tuned.kalman, quantity)
+        self.reward_kind, self.consistency, self.render_mode = reward, float(consistency), render_mode
+        size, actions = self.tuned.observation_size, self.tuned.actions
+        self.observation_space = spaces.Box(-1.0, 1.0, (size,), np.float32)
+        self.action_space = spaces.Box(-1.0, 1.0, (actions,), np.float32)
+        self.neutral_action = np.zeros(actions, np.float32)
+        self.trajectory: Trajectory | None = None
+
+    def next_trajectory(self) -> Trajectory:
+        """The trajectory of the next episode; all randomness from ``self.np_random``."""
+        raise NotImplementedError
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[np.ndarray, dict[str, Any]]:
+        """Begin a new trajectory; the filter has seen nothing yet."""
+        super().reset(seed=seed)
+        self.trajectory = trajectory = self.next_trajectory()
+        channels = [channel.name for channel in self.tuned.kalman.channels]
+        missing = [name for name in channels if name not in trajectory.measurements]
+        if missing:
+            raise ValueError(f"trajectory {trajectory.name!r} lacks the channels {missing} that the filter reads")
+        self.tuned = self.tuned.with_dt(trajectory.dt)
+        self._measurements = {name: trajectory.measurements[name] for name in channels}
+        self._truth = trajectory.truth_of(self.quantity.name)
+        self._reference = None
+        if self.reward_kind == "improvement":
+            estimate = self.tuned.kalman.run(self._measurements)
+            self._reference = error(self.quantity, estimate.pose[self.quantity.name], self._truth)
+        self._tick = 0
+        self._state = self.tuned.init({name: values[0] for name, values in self._measurements.items()})
+        return self.tuned.observe(self._state), self._info(None, math.nan)
+
+    def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
+        """Run the filter over one interval with the gains of ``action``.
+
+        Raises:
+            ValueError: the action has a wrong shape or is not finite.
+            RuntimeError: :meth:`reset` was not called, or the episode is over.
+        """
+        if self.trajectory is None or self._tick + self.tuned.ticks > len(self.trajectory):
+            raise RuntimeError("call reset first: there is no episode, or it is over")
+        chosen = np.asarray(action, dtype=float)
+        if chosen.shape != self.action_space.shape or not np.isfinite(chosen).all():
+            raise ValueError(f"action must hold {self.tuned.actions} finite numbers, got {action!r}")
+        ticks = slice(self._tick, self._tick + self.tuned.ticks)
+        chunk = {name: values[ticks] for name, values in self._measurements.items()}
+        estimate, self._state = self.tuned.advance(self.tuned.decide(self._state, chosen), chunk)
+        self._tick = ticks.stop
+        errors = error(self.quantity, estimate.pose[self.quantity.name], self._truth[ticks])
+        scored = self.trajectory.mask[ticks]
+        mean_error = interval_mean(errors, scored)
+        reward = -mean_error if math.isfinite(mean_error) else 0.0
+        if self._reference is not None:
+            reference = interval_mean(self._reference[ticks], scored)
+            reward += reference if math.isfinite(reference) else 0.0
+        if self.consistency:
+            reward -= self.consistency * inconsistency(estimate, self.tuned.kalman.model.residual_size)
+        truncated = self._tick + self.tuned.ticks > len(self.trajectory)
+        return self.tuned.observe(self._state), reward, False, truncated, self._info(estimate, mean_error)
+
+    def _info(self, estimate: Estimate | None, mean_error: float) -> dict[str, Any]:
+        assert self.trajectory is not None
+        row = max(self._tick - 1, 0)
+        pose = self._truth[row]
+        outputs = self.tuned.kalman.outputs
+        if estimate is None:
+            estimates = {output.name: np.full(output.size, np.nan) for output in outputs}
+        else:
+            estimates = {output.name: np.array(estimate.pose[output.name][-1]) for output in outputs}
+        sizes = gain_sizes(self.tuned.kalman.model, self.tuned.gains(self._state.action))
+        return {
+            "time": float(self.trajectory.time[row]),
+            "pose": {self.quantity.name: np.array(pose)},
+            "truth": {name: np.array(values[row]) for name, values in self.trajectory.truth.items()},
+            "estimate": estimates,
+            "error_deg": math.degrees(mean_error),
+            "gains": {name: float(size) for name, size in sizes.items()},
+        }
+
+
+class HandMotionGainEnv(GainTuningEnv):
+    r"""An agent tunes the gains of an attitude filter while a hand moves an inertial sensor.
+
+    Every episode draws a motion, a sensor with its errors, and its mounting. A step runs the filter over ``interval``
+    seconds (several samples) with the gains of the action. Nothing that the agent sees contains the truth.
+
+    ## Action space
+
+    ``Box(-1, 1, (k,), float32)``, one number for each gain; 0 is the published tuning exactly, and between 0 and ±1
+    the logarithm of the constant is changed linearly, variances by up to 10^±3.
+
+    | filter | gains (constant that is scaled) |
+    |---|---|
+    | ``external-acceleration`` | ``process`` (σ_G), ``measurement`` (σ_A), ``c_a``: 10⁻³ to 0.5, and never so large that a gyroscope error of 1 °/s would lock the filter out (:mod:`poise.filters.adaptation`) |
+    | ``bounded-motion`` | ``process`` (σ_g), ``bias`` (σ_b), ``velocity`` (σ_V) |
+
+    ## Observation space
+
+    ``Box(-1, 1, (n,), float32)``: statistics of the whitened innovations, the sensors and the estimated external
+    acceleration over five time scales up to 16 s, the time since the start, and the last action
+    (:class:`poise.filters.innovation_features.InnovationFeatures`; ``env.unwrapped.tuned.features.names``).
+
+    ## Reward
+
+    ``error``: minus the mean error of ``quantity`` over the interval, rad (:func:`poise.filters.metrics.error`).
+    ``improvement``: that of the published tuning, run beside it, minus the agent's: the same optimal policy with far
+    less variance. Ticks without truth or that are not scored do not count. With ``consistency`` w, minus
+    w·|ln(mean NIS / m)| of the m innovations of the interval.
+
+    ## Start and end
+
+    The filter starts from nothing, so the first observation tells nothing. Truncated when the motion is over; never terminated.
+
+    ## info
+
+    The same at reset and at every step, as of the last tick taken: ``time`` (s), ``pose`` (true ``quantity``), ``truth`` (all that
+    is known), ``estimate`` (outputs of the filter; NaN before it started), ``error_deg`` (mean over the interval; NaN at reset), ``gains``
+    (name → scaled constant).
+
+    ## Arguments
+
+    Those of :class:`GainTuningEnv`, and ``gesture``, ``rate`` (Hz), ``sensors`` (preset), each a single one or several to draw
+    from, ``grade`` (factor on the sensor's errors, or lowest and highest), ``duration`` (s), ``mounting``, ``drive``; see
+    :class:`poise.envs.hand_trajectories.HandTrajectories`. The dynamic drive costs seconds a reset.
+
+    ## Version history
+
+    v0: first release.
+    """
+
+    def __init__(
+        self,
+        filter: str | KalmanFilter = "external-acceleration",
+        *,
+        gesture: str | Sequence[str] = "mixed",
+        rate: float | Sequence[float] = 100.0,
+        sensors: str | Sequence[str] = "xsens-mtw-awinda",
+        grade: float | tuple[float, float] = 1.0,
+        duration: float = 60.0,
+        mounting: Literal["random", "aligned"] = "random",
+        drive: Literal["kinematic", "dynamic"] = "kinematic",
+        **common: Any,
+    ) -> None:
+        super().__init__(filter, **common)
+        self.motions = HandTrajectories(
+            gestures=gesture,  # type: ignore[arg-type]
+            rates=rate,  # type: ignore[arg-type]
+            sensors=sensors,  # type: ignore[arg-type]
+            grade=grade,  # type: ignore[arg-type]
+            duration=duration,
+            mounting=mounting,
+            drive=drive,
+        )
+        longest = max(1.0 / rate * self.tuned.features.ticks(1.0 / rate) for rate in self.motions.rates)
+        if duration < longest:
+            raise ValueError(f"duration must be one interval at least ({longest:g} s), got {duration}")
+
+    def next_trajectory(self) -> Trajectory:
+        """A new motion and new errors."""
+        return self.motions.draw(self.np_random.spawn(1)[0])
+
+
+class ReplayGainEnv(GainTuningEnv):
+    """An agent tunes the gains of an attitude filter over recordings, or any trajectories with a known truth.
+
+    Actions, observations, rewards and info are those of :class:`HandMotionGainEnv`; an episode runs through one trajectory, or a part of one.
+
+    ## Start and end
+
+    Each reset draws one of the trajectories and, with a ``duration``, where the episode starts in it. Truncated when the
+    part is over (ticks that fill no interval are left out); never terminated.
+
+    ## Arguments
+
+    Those of :class:`GainTuningEnv`, and ``trajectory``: a :class:`poise.Trajectory`, the path of a recording, or a sequence of
+    such; ``duration``: length of an episode, s (None: the whole trajectory). Without a ``trajectory`` a simulated hand motion
+    of a minute stands in, always the same.
+
+    ## Version history
+
+    v0: first release.
+    """
+
+    def __init__(
+        self,
+        trajectory: Trajectory | str | Path | Sequence[Trajectory | str | Path] | None = None,
+        filter: str | KalmanFilter = "external-acceleration",
+        *,
+        duration: float | None = None,
+        **common: Any,
+    ) -> None:
+        super().__init__(filter, **common)
+        given = HandTrajectories().draw_many(0, 1) if trajectory is None else trajectory
+        items = [given] if isinstance(given, Trajectory | str | Path) else list(given)
+        if not items:
+            raise ValueError("trajectory must name at least one trajectory, got none")
+        self.trajectories = tuple(item if isinstance(item, Trajectory) else load_recording(item) for item in items)
+        for item in self.trajectories:
+            item.truth_of(self.quantity.name)
+            shortest = self.tuned.features.ticks(item.dt)
+            length = len(item) if duration is None else math.floor(duration / item.dt + 1e-6)
+            if min(length, len(item)) < shortest:
+                raise ValueError(f"an episode of {item.name!r} must last one interval at least ({shortest} ticks)")
+        self.duration = duration
+
+    def next_trajectory(self) -> Trajectory:
+        """One of the trajectories, or a part of it."""
+        trajectory = self.trajectories[int(self.np_random.integers(len(self.trajectories)))]
+        if self.duration is None:
+            return trajectory
+        length = min(math.floor(self.duration / trajectory.dt + 1e-6), len(trajectory))
+        start = int(self.np_random.integers(len(trajectory) - length + 1))
+        return trajectory[start : start + length]
+
+
+def scored_quantity(kalman: KalmanFilter, name: str | None) -> Quantity:
+    """The output of a filter whose error counts.
+
+    Raises:
+        ValueError: the filter has no such output.
+    """
+    outputs = {output.name: output for output in kalman.outputs}
+    if name is None:
+        return outputs.get("up", kalman.outputs[0])
+    if name not in outputs:
+        raise ValueError(f"quantity must be one of {sorted(outputs)}, got {name!r}")
+    return outputs[name]
+
+
+def interval_mean(errors: np.ndarray, scored: np.ndarray) -> float:
+    """Mean of the finite errors ``(T,)`` among the scored ticks; NaN where there is none."""
+    counted = errors[scored & np.isfinite(errors)]
+    return float(counted.mean()) if counted.size else math.nan
+
+
+def inconsistency(estimate: Estimate, size: int) -> float:
+    """|ln(mean NIS / m)| over the ticks ``(T,)`` that brought an innovation; 0 where none did."""
+    nis = np.asarray(estimate.nis)
+    nis = nis[nis > 0.0]
+    return abs(math.log(max(float(nis.mean()) / size, NIS_FLOOR))) if nis.size else 0.0
+
+
+__all__ = ["GainTuningEnv", "HandMotionGainEnv", "ReplayGainEnv", "TunedState"]
