@@ -11,6 +11,8 @@ the origin would drown an accelerometer in noise.
 from __future__ import annotations
 
 import contextlib
+import os
+import sys
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
@@ -63,6 +65,9 @@ class Physics:
         self.gravity = float(gravity)
         self.steps = 0
         self._inertial: dict[tuple[int, int], tuple[np.ndarray, np.ndarray]] = {}
+        if gui and sys.platform.startswith("linux") and not os.environ.get("DISPLAY"):
+            # PyBullet would end the whole process
+            raise PhysicsError("a window needs a display, but DISPLAY is not set; use render_mode='rgb_array'")
         self.client = pybullet.connect(pybullet.GUI if gui else pybullet.DIRECT)
         if self.client < 0:
             raise PhysicsError(f"PyBullet could not {'open a window' if gui else 'start'}")

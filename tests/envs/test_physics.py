@@ -177,3 +177,10 @@ def test_bad_arguments_are_refused():
             physics.create_body(1.0, (1.0, 0.0, 1.0))
         with pytest.raises(PhysicsError, match="cannot load"):
             physics.load_urdf("<robot></robot>")
+
+
+def test_a_window_without_a_display_is_an_error_not_the_end(monkeypatch):
+    monkeypatch.setattr("sys.platform", "linux")
+    monkeypatch.delenv("DISPLAY", raising=False)
+    with pytest.raises(PhysicsError, match="DISPLAY is not set"):
+        Physics(gui=True)
