@@ -1,0 +1,80 @@
+"""How fast the environments step, beside the bare physics step that they rest on."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from functools import partial
+from typing import Any
+
+from .speed_filters import REPEATS, Speed, measure
+
+STEPS = 500
+PHYSICS_PER_TICK = 10
+"""1 kHz of physics under 100 Hz of observations."""
+
+
+def environment_speeds() -> Iterator[Speed]:
+    """Steps a CPU second of hand motion in both drives, of replay, of gain tuning; then simulation without steps."""
+    group = "environments at 100 Hz"
+    bare = measure(bare_steps(STEPS * PHYSICS_PER_TICK), STEPS * PHYSICS_PER_TICK)
+    yield Speed(group, "bare stepSimulation of one free body, 10 a tick", bare / PHYSICS_PER_TICK, "ticks/s", 1.0)
+    for what, identity, options in (
+        ("HandMotion, dynamic", "poise/HandMotion-v0", {"gesture": "fast"}),
+        ("HandMotion, kinematic", "poise/HandMotion-v0", {"gesture": "fast", "drive": "kinematic"}),
+        ("Replay", "poise/Replay-v0", {}),
+        ("HandMotionGain, 100 ms a step", "poise/HandMotionGain-v0", {}),
+    ):
+        rate = environment_rate(identity, options)
+        yield Speed(group, what, rate, "steps/s", rate / (bare / PHYSICS_PER_TICK))
+    rate = bulk_rate()
+    yield Speed(group, "simulate_hand, whole episode at once", rate, "ticks/s", rate / (bare / PHYSICS_PER_TICK))
+
+
+def bare_steps(count: int) -> Callable[[], None]:
+    """A function that steps a physics client with one free body ``count`` times and does nothing else."""
+    import pybullet
+
+    client = pybullet.connect(pybullet.DIRECT)
+    pybullet.setPhysicsEngineParameter(fixedTimeStep=1e-3, numSolverIterations=30, physicsClientId=client)
+    pybullet.createMultiBody(0.25, -1, -1, [0.0, 0.0, 1.0], physicsClientId=client)
+    step = partial(pybullet.stepSimulation, physicsClientId=client)
+
+    def run() -> None:
+        for _ in range(count):
+            step()
+
+    return run
+
+
+def environment_rate(identity: str, options: dict[str, Any]) -> float:
+    """Median steps a CPU second; episodes are reset where they end, outside the clock."""
+    import gymnasium
+
+    env = gymnasium.make(identity, disable_env_checker=True, **options).unwrapped
+    action = env.neutral_action  # type: ignore[attr-defined]
+    rates = []
+    try:
+        for repeat in range(REPEATS + 1):
+            env.reset(seed=repeat)
+            spent, steps, over = 0.0, 0, False
+            while steps < STEPS:
+                if over:
+                    env.reset()
+                start = time.process_time()
+                over = False
+                while steps < STEPS and not over:
+                    _, _, terminated, truncated, _ = env.step(action)
+                    steps, over = steps + 1, terminated or truncated
+                spent += time.process_time() - start
+            rates.append(steps / spent)
+    finally:
+        env.close()
+    return sorted(rates[1:])[REPEATS // 2]
+
+
+def bulk_rate() -> float:
+    """Ticks a CPU second of recording a kinematic episode without an environment."""
+    from ..envs.hand_sensing import simulate_hand
+
+    return measure(lambda: simulate_hand("mixed", seed=0, duration=60.0), 6001)

@@ -1,0 +1,42 @@
+"""Measure filters and environments beside packages and bare physics; one run, ratios, no history."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass
+from typing import Literal
+
+from .main import run_command
+
+
+@dataclass
+class Args:
+    """Arguments of ``poise speed``."""
+
+    what: tuple[Literal["filters", "latency", "environments"], ...] = ("filters", "latency", "environments")
+    """parts to measure"""
+    json: bool = False
+    """print machine-readable rows instead of tables"""
+
+
+def run(args: Args) -> int:
+    """Measure and print every group as soon as it is complete."""
+    from itertools import groupby
+
+    from ..baselines.speed_environments import environment_speeds
+    from ..baselines.speed_filters import filter_speeds, latencies
+    from .tables import print_table
+
+    parts = {"filters": filter_speeds, "latency": latencies, "environments": environment_speeds}
+    for name in args.what:
+        for group, rows in groupby(parts[name](), key=lambda speed: speed.group):
+            table = [asdict(row) for row in rows]
+            if args.json:
+                print("\n".join(json.dumps(row) for row in table), flush=True)
+            else:
+                print_table(table, group, columns=("what", "rate", "unit", "ratio"))
+    return 0
+
+
+if __name__ == "__main__":
+    run_command("speed")
