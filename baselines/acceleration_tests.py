@@ -88,9 +88,10 @@ def compare_modes(seeds: Sequence[int]) -> list[dict[str, float | str | int]]:
                 up = estimate_up(trial, ExternalAcceleration(mode=mode, exact_rotation=exact))
                 angles = zip(rotation.roll_pitch(up), rotation.roll_pitch(trial.up), strict=True)
                 roll, pitch = (float(rms(rotation.wrap(a - b)).mean()) * DEGREES for a, b in angles)
-                errors = {"roll": roll, "pitch": pitch, "inclination": inclination_rms(up, trial.up)}
-                setting = {"test": test, "mean |a|": level, "peak |a|": peak, "rotation": rotated, "mode": mode}
-                rows.append({**setting, **errors})
+                row: dict[str, float | str | int] = {"test": test, "mean |a|": level, "peak |a|": peak}
+                row |= {"rotation": rotated, "mode": mode}
+                row |= {"roll": roll, "pitch": pitch, "inclination": inclination_rms(up, trial.up)}
+                rows.append(row)
     return rows
 
 
@@ -99,13 +100,11 @@ def sweep_c_a(seeds: Sequence[int], values: Sequence[float]) -> list[dict[str, f
     rows = []
     for test in TESTS:
         trial = simulate(test, seeds)
-        errors = {
-            f"c_a = {c_a:g}": inclination_rms(
-                estimate_up(trial, ExternalAcceleration(c_a=c_a, exact_rotation=False)), trial.up
-            )
-            for c_a in values
-        }
-        rows.append({"test": test, **errors})
+        row: dict[str, float | str] = {"test": test}
+        for c_a in values:
+            up = estimate_up(trial, ExternalAcceleration(c_a=c_a, exact_rotation=False))
+            row[f"c_a = {c_a:g}"] = inclination_rms(up, trial.up)
+        rows.append(row)
     return rows
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -64,21 +64,17 @@ def contenders(names: Sequence[str] = ()) -> dict[str, str | Estimator[Any]]:
             if name not in list_estimators():
                 make_estimator(name)  # raises, with the names that there are
         return {name: name for name in names}
-    known = [
-        name
-        for name in list_estimators()
-        if name not in PLAIN_PYTHON and is_available(lambda n=name: make_estimator(n))
-    ]
+    known = [name for name in list_estimators() if name not in PLAIN_PYTHON and is_available(name)]
     chosen: dict[str, str | Estimator[Any]] = {name: name for name in known}
     for mode in (2, 3):
         chosen[f"external-acceleration (mode {mode})"] = make_estimator("external-acceleration", mode=mode)
     return chosen
 
 
-def is_available(make: Callable[[], Any]) -> bool:
+def is_available(name: str) -> bool:
     """Whether an estimator can be made: the package that it wraps may be missing."""
     try:
-        make()
+        make_estimator(name)
     except ImportError:
         return False
     return True

@@ -7,7 +7,7 @@ import os
 import warnings
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -19,8 +19,6 @@ from .sampling import Gains, join, per_tick_gains
 if TYPE_CHECKING:
     from .kalman import FilterState
     from .observer import ObserverState
-
-T = TypeVar("T", bound=tuple[Any, ...])
 
 _FORMS: dict[tuple[Any, ...], Any] = {}
 _HINTED: list[bool] = []
@@ -110,9 +108,15 @@ class _Form:
         return {name: flat[..., part] for name, part in self.columns.items()}
 
 
-def _flatten(state: T, batch: tuple[int, ...]) -> list[np.ndarray]:
+def _flatten(state: tuple[Any, ...], batch: tuple[int, ...]) -> list[np.ndarray]:
     """Fresh arrays ``(B, …)`` of a state, so that the caller's stay as they are."""
     return [np.array(array).reshape((math.prod(batch), *array.shape[len(batch) :])) for array in state]
+
+
+def _unflatten(state: Any, arrays: list[np.ndarray], batch: tuple[int, ...]) -> dict[str, np.ndarray]:
+    """Fields of the state after the run, in the caller's batch shape."""
+    shaped = (array.reshape((*batch, *array.shape[1:])) for array in arrays)
+    return dict(zip(state._fields, shaped, strict=True))
 
 
 class CompiledModel(_Form):
@@ -143,7 +147,8 @@ class CompiledModel(_Form):
             nis.reshape(1, count),
         )
         pose = {name: poses[..., part] for name, part in self.columns.items()}
-        return state._make((x, P, held, started)), Estimate(pose, covariances, whites, nis)
+        state = state._replace(x=x, covariance=P, held=held, started=started)
+        return state, Estimate(pose, covariances, whites, nis)
 
     def run(
         self, model: Model, state: FilterState, arrays: Measurement, gains: Gains | None, keep_covariance: bool
@@ -161,8 +166,7 @@ class CompiledModel(_Form):
         covariance = covariances.reshape(length, *batch, e, e) if keep_covariance else None
         pose = self._pose(poses, batch)
         estimate = Estimate(pose, covariance, whites.reshape(length, *batch, m), nis.reshape(length, *batch))
-        final = (array.reshape((*batch, *array.shape[1:])) for array in states)
-        return estimate, state._make(final)
+        return estimate, state._replace(**_unflatten(state, states, batch))
 
 
 class CompiledRecurrence(_Form):
@@ -179,8 +183,7 @@ class CompiledRecurrence(_Form):
         states = _flatten(state, batch)
         poses = np.empty((*Z.shape[:2], self.pose_size))
         self._execute(states, Z, self._parameters(model, None, Z.shape[0], batch), [poses])
-        final = (array.reshape((*batch, *array.shape[1:])) for array in states)
-        return Estimate(self._pose(poses, batch)), state._make(final)
+        return Estimate(self._pose(poses, batch)), state._replace(**_unflatten(state, states, batch))
 
 
 def clear_compiled(remove_files: bool = False) -> None:

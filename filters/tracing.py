@@ -61,7 +61,7 @@ class Expression:
     def _other(self, other: Any) -> Expression | None:
         if isinstance(other, Expression):
             return other
-        return self.tape.constant(other) if isinstance(other, (int, float, np.number)) else None
+        return self.tape.constant(float(other)) if isinstance(other, int | float | np.number) else None
 
     def _fold(self, function: Callable[..., float], *operands: Expression) -> Expression | None:
         values = [operand.value for operand in operands]
