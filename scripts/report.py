@@ -39,6 +39,8 @@ def wide_tables(table: pandas.DataFrame, groups: Mapping[str, str] | None = None
     tables = {}
     for metric in table.loc[table["unit"] == "deg", "metric"].unique():
         wide = summary(table, metric, groups)
+        if len(wide.columns) == 2:  # of a single group the mean says it all again
+            wide = wide.drop(columns="mean")
         title = TITLES.get(metric, f"RMS {metric}, deg (agreement, not error: these recordings have no truth)")
         tables[title] = [
             {"estimator": name, "kind": kinds.get(str(name), "–"), **{str(key): value for key, value in row.items()}}
