@@ -124,8 +124,8 @@ class LearnedDataset:
         path.parent.mkdir(parents=True, exist_ok=True)
         temporary = path.with_name(f".{path.stem}.{os.getpid()}.npz")
         try:
-            arrays = {"features": self.features, "vertical": self.vertical, "scored": self.scored}
-            np.savez(temporary, names=np.array(self.names), **arrays)
+            names = np.array(self.names)
+            np.savez(temporary, features=self.features, vertical=self.vertical, scored=self.scored, names=names)
             os.replace(temporary, path)
         finally:
             temporary.unlink(missing_ok=True)
@@ -192,7 +192,7 @@ def sequence_of(trajectory: Trajectory, frame: LevelFrame) -> tuple[np.ndarray, 
 
 def turned(features: np.ndarray, vertical: np.ndarray, angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The same sequences ``(B, N, …)`` in level frames turned by ``angles`` ``(B,)`` about the vertical."""
-    cosine, sine = np.float32(np.cos(angles))[:, None], np.float32(np.sin(angles))[:, None]
+    cosine, sine = (part.astype(np.float32)[:, None] for part in (np.cos(angles), np.sin(angles)))
     copies = []
     for array, vectors in ((features, VECTORS), (vertical, 1)):
         copy = array.copy()
