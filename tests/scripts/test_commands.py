@@ -1,0 +1,94 @@
+"""The commands end to end, on little data: files, tables, figures, JSON, going on after an interruption."""
+
+import json
+import re
+
+import pandas
+import pytest
+
+from poise.baselines.evaluation import COLUMNS
+from poise.envs.batch_recorder import episode_seeds
+from poise.envs.storage import load_trajectory
+from poise.scripts.main import main
+from poise.scripts.record import environment_id, option
+
+SHORT = ["--options", "gesture=fast", "duration=2.0", "drive=kinematic"]
+
+
+def record(folder, *words):
+    return main(["record", "hand-motion", "--folder", str(folder), "--processes", "1", *words, *SHORT])
+
+
+@pytest.fixture(scope="module")
+def episodes(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("episodes")
+    assert record(folder, "--episodes", "2", "--seed", "7") == 0
+    return folder
+
+
+def test_record_writes_episodes_and_goes_on_where_it_stopped(episodes, capsys):
+    paths = sorted(episodes.glob("*.h5"))
+    assert [path.name for path in paths] == ["hand_motion_0000.h5", "hand_motion_0001.h5"]
+    stamps = [path.stat().st_mtime_ns for path in paths]
+    assert record(episodes, "--episodes", "3", "--seed", "7") == 0
+    assert [path.stat().st_mtime_ns for path in paths] == stamps
+    third = load_trajectory(episodes / "hand_motion_0002.h5")
+    assert third.metadata["seed"] == episode_seeds(7, 3)[2]
+    assert third.metadata["environment"]["kwargs"]["gesture"] == "fast"
+    assert "3 episodes" in capsys.readouterr().out
+
+
+def test_record_in_processes_gives_the_same_episodes(episodes, tmp_path):
+    assert record(tmp_path, "--episodes", "2", "--seed", "7", "--processes", "2") == 0
+    for path in sorted(tmp_path.glob("*.h5")):
+        one, other = load_trajectory(path), load_trajectory(episodes / path.name)
+        for channel, values in one.measurements.items():
+            assert values.tobytes() == other.measurements[channel].tobytes()
+
+
+def test_record_does_not_mix_origins(episodes, capsys):
+    assert record(episodes, "--episodes", "2", "--seed", "8") == 2
+    assert "holds another episode" in capsys.readouterr().err
+
+
+def test_record_explains_bad_words(tmp_path, capsys):
+    assert main(["record", "foot-motion", "--folder", str(tmp_path)]) == 2
+    assert "unknown environment 'foot-motion'; there are poise/HandMotion-v0" in capsys.readouterr().err
+    assert main(["record", "--folder", str(tmp_path), "--options", "fast"]) == 2
+    assert "name=value" in capsys.readouterr().err
+    assert main(["record", "--folder", str(tmp_path), "--episodes", "0"]) == 2
+    assert environment_id("poise/Replay-v0") == environment_id("replay")
+    assert option("rate=200") == ("rate", 200)
+    assert option("gesture=fast") == ("gesture", "fast")
+
+
+def test_evaluate_prints_tables_and_leaves_a_run(episodes, tmp_path, capsys):
+    words = ["evaluate", str(episodes), "--estimators", "mekf", "tilt", "--runs", str(tmp_path)]
+    assert main(words) == 0
+    output = capsys.readouterr().out
+    assert "Inclination error" in output
+    assert output.index("mekf") < output.index("tilt")
+    (folder,) = (tmp_path / "evaluate").iterdir()
+    table = pandas.read_csv(folder / "results.csv")
+    assert tuple(table.columns) == COLUMNS
+    assert (folder / "figures" / "inclination.png").stat().st_size > 5_000
+    assert main(["evaluate", str(tmp_path / "nothing"), "--runs", str(tmp_path)]) == 2
+    assert "nothing" in capsys.readouterr().err
+
+
+def test_benchmark_compares_and_reports(episodes, tmp_path, capsys):
+    estimators = ["--estimators", "external-acceleration", "mekf-9", "tilt"]
+    words = ["benchmark", "--episodes", "1", "--trials", "1", "--runs", str(tmp_path), *estimators]
+    assert main([*words, "--recordings", str(episodes / "hand_motion_0000.h5"), "--json"]) == 0
+    captured = capsys.readouterr()
+    rows = [json.loads(line) for line in captured.out.splitlines()]
+    assert all(tuple(row) == COLUMNS for row in rows)
+    assert {row["trajectory"] for row in rows} == {"slow-1", "fast-1", "severe-1", "mixed-1", "hand_motion_0000"}
+    (folder,) = (tmp_path / "benchmark").iterdir()
+    report = (folder / "report.md").read_text()
+    pictures = re.findall(r"!\[[^]]*\]\(([^)]*)\)", report)
+    assert len(pictures) >= 6
+    assert all((folder / picture).stat().st_size > 5_000 for picture in pictures)
+    assert "| C |" in report
+    assert "root seed 0" in report
+    assert len(pandas.read_csv(folder / "results.csv")) == len(rows)
