@@ -23,7 +23,7 @@ constant and no sensor noise. Pseudo-measurements of this kind are known from pe
 only while the foot stands.
 
 Mean inclination error of ten BROAD trials, constants below, none fitted to a trial: 0.76° at 286 Hz and 0.83° at 48 Hz
-(VQF 0.84° at 286 Hz); with the lag of 3 ms that these recordings show at both rates 0.71° and 0.77°.
+(VQF 0.84° at 286 Hz); a lag of 3 ms, chosen on these trials, gives 0.71° and 0.77°.
 
 Not estimated: position; velocity is a means, not an output. Sustained motion in one direction (a car, a lift) violates
 the assumption and shows as growing innovations.
