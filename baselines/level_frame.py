@@ -98,7 +98,7 @@ class LevelFrame(Recurrence):
         g = expand(self.gravity, 1)
         a = xp.where(brought, x[..., 10:13] - g * constant(VERTICAL, x), 0.0 * x[..., 10:13])
         length = xp.sqrt(xp.sum(f * f, axis=-1, keepdims=True))
-        deviation = xp.where(brought, xp.abs(length - g), 0.0 * length)
+        deviation = xp.where(brought, xp.abs(length - g), 0.0 * x[..., :1])
         q, b, v = x[..., :4], x[..., 4:7], x[..., 7:10]
         v = v + dt * (a - expand(self.velocity_gain, 1) * v)
         blame = dt * cross(v, constant(VERTICAL, x) + 0.0 * v)
