@@ -7,7 +7,7 @@ upright, x forward, y left, z up. A rider hangs further links on the same tree.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -144,6 +144,11 @@ class Bicycle:
         self._total_mass = float(masses.sum())
         self._centre = masses @ centres / self._total_mass
 
+    @property
+    def ratio(self) -> float:
+        """Turns of the rear wheel a turn of the crank (0 without a crank)."""
+        return 0.0 if self.drivetrain is None else self.drivetrain.parameters.ratio
+
     def static_loads(self) -> tuple[float, float]:
         """Weight (N) on the rear and the front tyre, at rest on level ground with the tyres' deflection."""
         weight, wheelbase = self._total_mass * self.physics.gravity, self.parameters.wheelbase
@@ -209,12 +214,22 @@ class Bicycle:
             self.drivetrain.engage(crank, 0.0)
         self.tyre_forces = [AIRBORNE, AIRBORNE]
 
-    def act(self, steer_torque: float = 0.0, wheel_torque: float = 0.0) -> None:
-        """Apply tyre forces, chain and air drag for the next step.
+    def act(
+        self,
+        steer_torque: float = 0.0,
+        wheel_torque: float = 0.0,
+        crank_torque: float = 0.0,
+        joints: Sequence[int] = (),
+        torques: Sequence[float] = (),
+    ) -> None:
+        """Apply tyre forces, chain, air drag and joint torques for the next step.
 
         Args:
             steer_torque: N·m between rear frame and front assembly, left positive.
             wheel_torque: N·m between rear frame and rear wheel, forward positive, besides the chain's.
+            crank_torque: N·m between rear frame and crank, forward positive, besides the chain's.
+            joints: further joints to drive (a rider's), by the links below them.
+            torques: N·m on these.
         """
         body = self.body
         for number, (link, state) in enumerate(zip(self._wheels, body.link_tuples(self._wheels), strict=True)):
@@ -231,12 +246,12 @@ class Bicycle:
             factor = -0.5 * AIR_DENSITY * self.parameters.drag_area * speed
             body.push(BASE, [factor * part for part in velocity], position)
         if self.drivetrain is None:
-            body.drive_joints(self._joints, [steer_torque, wheel_torque])
+            body.drive_joints([*self._joints, *joints], [steer_torque, wheel_torque, *torques])
             return
         (wheel, wheel_rate), (crank, crank_rate) = body.joint_tuples(self._driven)
         pull = self.drivetrain.torque(crank, crank_rate, wheel, wheel_rate)
-        torques = [steer_torque, wheel_torque + pull, -self.drivetrain.parameters.ratio * pull]
-        body.drive_joints(self._joints, torques)
+        own = (steer_torque, wheel_torque + pull, crank_torque - self.ratio * pull)
+        body.drive_joints([*self._joints, *joints], [*own, *torques])
 
     def state(self) -> BicycleState:
         """Where the bicycle is and how it moves, now."""

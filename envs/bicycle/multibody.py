@@ -89,10 +89,14 @@ class Multibody:
         pybullet.changeDynamics(self.body, link, jointDamping=damping, physicsClientId=self.physics.client)
 
     def drive_joints(self, links: Sequence[int], torques: Sequence[float]) -> None:
-        """Act on the joints above ``links`` with torques (N·m) during the next step; a torque holds until renewed."""
+        """Act on the joints above ``links`` with torques (N·m) during the next step."""
         pybullet.setJointMotorControlArray(
             self.body, links, pybullet.TORQUE_CONTROL, forces=torques, physicsClientId=self.physics.client
         )
+
+    def release(self, constraint: int) -> None:
+        """Remove a constraint between points."""
+        pybullet.removeConstraint(constraint, physicsClientId=self.physics.client)
 
     def push(self, link: int, force: Vector, point: Vector) -> None:
         """Act on a link with a force (N) at a point (m), world axes, during the next step."""

@@ -1,0 +1,193 @@
+"""Sizes, masses and inertias of riders, scaled from published tables by stature and mass.
+
+Source: P. de Leva, Adjustments to Zatsiorsky-Seluyanov's segment inertia parameters, J. Biomech. 29 (1996), table 4
+(young adults; mean stature 1.741 m, men, and 1.735 m, women). Radii of gyration are about the segment's sagittal
+(forward), transverse (sideways) and longitudinal axis, in parts of its length.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+
+class SegmentTable(NamedTuple):
+    """One row of the table for one sex."""
+
+    mass: float
+    """part of the body's mass"""
+    length: float
+    """m, of the mean person"""
+    centre: float
+    """part of the length, from the upper (proximal) end"""
+    radii: tuple[float, float, float]
+    """parts of the length: sagittal, transverse, longitudinal"""
+
+
+MEN = {
+    "head": SegmentTable(0.0694, 0.2033, 0.5976, (0.362, 0.376, 0.312)),
+    "upper_trunk": SegmentTable(0.1596, 0.1707, 0.2999, (0.716, 0.454, 0.659)),
+    "middle_trunk": SegmentTable(0.1633, 0.2155, 0.4502, (0.482, 0.383, 0.468)),
+    "lower_trunk": SegmentTable(0.1117, 0.1457, 0.6115, (0.615, 0.551, 0.587)),
+    "upper_arm": SegmentTable(0.0271, 0.2817, 0.5772, (0.285, 0.269, 0.158)),
+    "forearm": SegmentTable(0.0162, 0.2689, 0.4574, (0.276, 0.265, 0.121)),
+    "hand": SegmentTable(0.0061, 0.0862, 0.7900, (0.628, 0.513, 0.401)),
+    "thigh": SegmentTable(0.1416, 0.4222, 0.4095, (0.329, 0.329, 0.149)),
+    "shank": SegmentTable(0.0433, 0.4340, 0.4459, (0.255, 0.249, 0.103)),
+    "foot": SegmentTable(0.0137, 0.2581, 0.4415, (0.257, 0.245, 0.124)),
+}
+WOMEN = {
+    "head": SegmentTable(0.0668, 0.2002, 0.5894, (0.330, 0.359, 0.318)),
+    "upper_trunk": SegmentTable(0.1545, 0.1425, 0.2077, (0.746, 0.502, 0.718)),
+    "middle_trunk": SegmentTable(0.1465, 0.2053, 0.4512, (0.433, 0.354, 0.415)),
+    "lower_trunk": SegmentTable(0.1247, 0.1815, 0.4920, (0.433, 0.402, 0.444)),
+    "upper_arm": SegmentTable(0.0255, 0.2751, 0.5754, (0.278, 0.260, 0.148)),
+    "forearm": SegmentTable(0.0138, 0.2643, 0.4559, (0.261, 0.257, 0.094)),
+    "hand": SegmentTable(0.0056, 0.0780, 0.7474, (0.531, 0.454, 0.335)),
+    "thigh": SegmentTable(0.1478, 0.3685, 0.3612, (0.369, 0.364, 0.162)),
+    "shank": SegmentTable(0.0481, 0.4323, 0.4416, (0.271, 0.267, 0.093)),
+    "foot": SegmentTable(0.0129, 0.2283, 0.4014, (0.299, 0.279, 0.139)),
+}
+MEAN_STATURE = {False: 1.741, True: 1.735}
+"""m; True for women"""
+VERTEX_ABOVE_SUPRASTERNALE = {False: 0.3143, True: 0.3292}
+"""m: table 4, vertex to cervicale plus cervicale above suprasternale"""
+SHALLOWEST, HEAVIEST = (1.2, 2.3), (30.0, 200.0)
+"""m and kg: outside these bounds the tables say nothing"""
+
+
+class Segment(NamedTuple):
+    """A body segment of one person, z along it upwards (towards the head or the proximal joint)."""
+
+    mass: float
+    """kg"""
+    length: float
+    """m"""
+    centre: float
+    """m from the upper (proximal) end"""
+    moments: tuple[float, float, float]
+    """kg·m² about the centre of mass: forward, sideways and long axis"""
+
+
+@dataclass(frozen=True)
+class RiderBody:
+    """A person.
+
+    Raises:
+        ValueError: a stature or mass that no rider has, or both together.
+    """
+
+    stature: float = 1.76
+    """m"""
+    mass: float = 68.0
+    """kg"""
+    female: bool = False
+    name: str = "rider"
+
+    def __post_init__(self) -> None:
+        if not SHALLOWEST[0] <= self.stature <= SHALLOWEST[1]:
+            raise ValueError(f"stature must lie in {list(SHALLOWEST)} m, got {self.stature}")
+        if not HEAVIEST[0] <= self.mass <= HEAVIEST[1]:
+            raise ValueError(f"mass must lie in {list(HEAVIEST)} kg, got {self.mass}")
+        if not 12.0 <= self.mass / self.stature**2 <= 50.0:
+            raise ValueError(
+                f"mass / stature² must lie in [12, 50] kg/m², got {self.mass} kg and {self.stature} m: impossible rider"
+            )
+
+    @property
+    def scale(self) -> float:
+        """Stature relative to that of the tables."""
+        return self.stature / MEAN_STATURE[self.female]
+
+    def segment(self, name: str) -> Segment:
+        """A segment by its name in the tables.
+
+        Raises:
+            KeyError: there is none of that name.
+        """
+        row = (WOMEN if self.female else MEN)[name]
+        mass, length = row.mass * self.mass, row.length * self.scale
+        forward, sideways, along = (mass * (radius * length) ** 2 for radius in row.radii)
+        return Segment(mass, length, row.centre * length, (forward, sideways, along))
+
+    @property
+    def vertex_height(self) -> float:
+        """Top of the head above the suprasternal notch, m."""
+        return VERTEX_ABOVE_SUPRASTERNALE[self.female] * self.scale
+
+    @property
+    def shoulder_half_width(self) -> float:
+        """From the middle to a shoulder joint, m: 0.129 of stature (Drillis and Contini) less 0.037 of acromion."""
+        return 0.129 * self.stature - 0.037 * self.scale
+
+    @property
+    def hip_half_width(self) -> float:
+        """From the middle to a hip joint, m; choice of this project after 0.17 m between hip joints."""
+        return 0.085 * self.scale
+
+
+SUBJECTS = (
+    RiderBody(1.82, 80.0, name="subject 0"),
+    RiderBody(1.79, 72.0, name="subject 1"),
+    RiderBody(1.75, 66.0, name="subject 2"),
+    RiderBody(1.76, 68.0, name="subject 3"),
+    RiderBody(1.68, 54.0, female=True, name="subject 4"),
+)
+"""Five riders with the means and deviations of the papers' subjects: 176 ± 5 cm, 68 ± 10 kg, one female."""
+
+
+def random_body(rng: np.random.Generator) -> RiderBody:
+    """A random adult: stature 176 ± 5 cm, body mass index 22 ± 2.2 kg/m², one in five female and then 8 cm smaller."""
+    female = bool(rng.random() < 0.2)
+    stature = (1.69 if female else 1.775) + 0.045 * float(np.clip(rng.standard_normal(), -2.5, 2.5))
+    index = 22.0 + 2.2 * float(np.clip(rng.standard_normal(), -2.0, 2.5))
+    return RiderBody(round(stature, 3), round(index * stature**2, 1), female, "random rider")
+
+
+def rider_body(subject: int | str | RiderBody, rng: np.random.Generator | None = None) -> RiderBody:
+    """A person by number (0…4), as ``"random"`` (drawn from ``rng``), or as given.
+
+    Raises:
+        ValueError: there is no such subject, or a random one without ``rng``.
+    """
+    if isinstance(subject, RiderBody):
+        return subject
+    if subject == "random":
+        if rng is None:
+            raise ValueError("a random subject needs a generator")
+        return random_body(rng)
+    if isinstance(subject, (int, np.integer)) and not isinstance(subject, bool) and 0 <= subject < len(SUBJECTS):
+        return SUBJECTS[int(subject)]
+    raise ValueError(f"subject must be 0…{len(SUBJECTS) - 1}, 'random' or a RiderBody, got {subject!r}")
+
+
+class Mass(NamedTuple):
+    """A rigid body in some frame."""
+
+    mass: float
+    """kg"""
+    centre: np.ndarray
+    """(3,) m"""
+    tensor: np.ndarray
+    """(3, 3) kg·m² about the centre of mass"""
+
+
+def join(parts: list[Mass]) -> Mass:
+    """Several bodies as one."""
+    mass = sum(part.mass for part in parts)
+    centre = sum((part.mass * part.centre for part in parts), np.zeros(3)) / mass
+    tensor = np.zeros((3, 3))
+    for part in parts:
+        d = part.centre - centre
+        tensor += part.tensor + part.mass * (d @ d * np.eye(3) - np.outer(d, d))
+    return Mass(mass, centre, tensor)
+
+
+def hanging(segment: Segment, top: np.ndarray, turn: float = 0.0) -> Mass:
+    """A segment that hangs from the point ``top`` along −z, turned by ``turn`` (rad) about y, in that frame."""
+    c, s = math.cos(turn), math.sin(turn)
+    R = np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
+    return Mass(segment.mass, top + R @ np.array([0.0, 0.0, -segment.centre]), R @ np.diag(segment.moments) @ R.T)

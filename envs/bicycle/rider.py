@@ -1,0 +1,328 @@
+"""A rider who sits, holds, pedals, steers and sways: joint torques on the links of :mod:`.rider_links`.
+
+``full``: hands and feet are held to handlebar and pedals by point-to-point constraints. The arms steer and the legs
+pedal by joint torques that let the tips push with the wanted force (virtual work); whatever else the constraints carry
+follows from the motion. ``lumped``: legs and arms are rigid parts of pelvis and trunk; the hands' forces act on the
+handlebar and, oppositely, on the trunk, and the pedalling torque acts between frame and crank.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from ...filters import rotation
+from ..joints import connect_points, constraint_force
+from ..physics import BASE
+from ..sensors import straight_line
+from .bicycle import Bicycle, BicycleState
+from .limbs import reach_to, three_turns, tip_torques
+from .posture import KNEE_OUT, LIMBS, SIDES, SIGNS, Posture
+from .rider_links import LUMPED_MASSES, TRUNK_JOINTS, add_full_rider, add_lumped_rider, limb_joints, segment_links
+from .style import RiderMotion
+from .urdf import Tree
+
+Fidelity = Literal["full", "lumped"]
+TRUNK_STIFFNESS, TRUNK_DAMPING = 900.0, 90.0
+"""N·m/rad and N·m·s/rad of the lumbar joint's muscles"""
+LIMB_DAMPING = 0.3
+"""N·m·s/rad of every joint of a limb"""
+SWIVEL_STIFFNESS, SWIVEL_DAMPING = 20.0, 1.0
+"""N·m/rad, N·m·s/rad: hold elbows and knees in their plane"""
+DOWNSTROKE = 0.15
+"""the pedal force is this plus the cosine of the crank angle where that is positive"""
+MEAN_STROKE = 2.0 * (1.0 / math.pi + DOWNSTROKE)
+"""mean of both legs' strength over a turn"""
+LARGEST_PEDAL_FORCE = 450.0
+"""N"""
+
+
+@dataclass(frozen=True)
+class RiderMemory:
+    """What a rider remembers between physics steps."""
+
+    torques: tuple[float, ...]
+    trunk: tuple[float, ...]
+    swivel: tuple[float, ...]
+    crank_torque: float
+    hands: tuple[tuple[float, float, float], ...]
+
+
+def _into_trunk(angles, force):  # type: ignore[no-untyped-def]
+    """Force in bicycle axes to trunk axes; angles about y, x, z."""
+    xp = rotation.namespace(angles)
+    c, s, zero = xp.cos(0.5 * angles), xp.sin(0.5 * angles), 0.0 * angles[..., 0]
+    turn = rotation.multiply(
+        xp.stack([c[..., 0], zero, s[..., 0], zero], axis=-1), xp.stack([c[..., 1], s[..., 1], zero, zero], axis=-1)
+    )
+    turn = rotation.multiply(turn, xp.stack([c[..., 2], zero, zero, s[..., 2]], axis=-1))
+    return (rotation.rotate_back(turn, force),)
+
+
+class Rider:
+    """A rider on one bicycle.
+
+    Args:
+        posture: the person fitted to the bicycle, see :func:`poise.envs.bicycle.posture.sit`.
+        fidelity: ``full`` or ``lumped``.
+    """
+
+    def __init__(self, posture: Posture, fidelity: Fidelity = "full") -> None:
+        if fidelity not in ("full", "lumped"):
+            raise ValueError(f"fidelity must be 'full' or 'lumped', got {fidelity!r}")
+        self.posture, self.fidelity = posture, fidelity
+        self.full = fidelity == "full"
+        self._steer_in_trunk = straight_line(_into_trunk, angles=3, force=3)
+        self._limb_torques = [tip_torques(posture.limb(name)) for name in LIMBS]
+        axis, origin = posture.bicycle.steer_axis, posture.bicycle.steer_origin
+        self._steer_axis = axis
+        arm = np.array(posture.bicycle.grip) - origin
+        self._grip_arm = float(np.linalg.norm(np.cross(axis, arm)))
+        # direction in which each hand moves when the bar turns to the left, at straight steering
+        self._pull = {side: np.cross(axis, arm * (1.0, SIGNS[side], 1.0)) / self._grip_arm for side in SIDES}
+        trunk = posture.trunk()
+        self._trunk_moment = trunk.mass * float(trunk.centre[2])
+        self.constraints: list[int] = []
+
+    def extend(self, tree: Tree) -> None:
+        """Hang the rider's links on a bicycle's tree."""
+        (add_full_rider if self.full else add_lumped_rider)(tree, self.posture)
+
+    def mount(self, bicycle: Bicycle) -> None:
+        """Get to know the links after the bicycle with this rider was loaded."""
+        self.bicycle, body = bicycle, bicycle.body
+        self.trunk_links = body.index(TRUNK_JOINTS)
+        self.limb_links = [body.index(limb_joints(name)) for name in LIMBS] if self.full else []
+        self.joints = [*self.trunk_links, *(link for links in self.limb_links for link in links)]
+        names = segment_links() if self.full else LUMPED_MASSES
+        self.mass_links = body.index(names)
+        self.masses = np.array([body.masses[name] for name in names])
+        self.moments = np.array([body.moments[name] for name in names])
+        self._pressing = self._pressing_lines()
+        # abduction holds the swivel
+        self._felt = [*self.trunk_links, *(links[1] for links in self.limb_links)]
+        for links in self.limb_links:
+            for link in links:
+                body.set_joint_damping(link, LIMB_DAMPING)
+
+    def start(self, motion: RiderMotion, crank: float, crank_rate: float) -> None:
+        """Take the posture at rest, hands and feet in place with consistent velocities.
+
+        Args:
+            motion: what the rider intends.
+            crank: rad.
+            crank_rate: rad/s.
+        """
+        self.motion, self._began = motion, self.bicycle.physics.time
+        body, physics = self.bicycle.body, self.bicycle.physics
+        trunk, _, _ = motion.at(0.0, 0.0, 0.0)
+        self._trunk_target = [self.posture.flexion + float(trunk[0]), float(trunk[1]), float(trunk[2])]
+        for link, angle in zip(self.trunk_links, self._trunk_target, strict=True):
+            body.set_joint(link, angle)
+        for constraint in self.constraints:
+            body.release(constraint)
+        self.constraints = []
+        angles, bit = self.limb_angles(crank), 0.01
+        turned = self.limb_angles(crank, extra=bit)
+        self._abduction = [float(limb[1]) for limb in angles]
+        self._per_swivel = [float(b[1] - a[1]) / bit for a, b in zip(angles, turned, strict=True)]
+        self._first_swivel = motion.at(0.0, 0.0, 0.0)[1]
+        self._swivel = list(self._abduction)
+        self._torques = [0.0] * len(self.joints)
+        self._crank_torque = 0.0
+        self._hands = [(0.0, 0.0, 0.0), (0.0, 0.0, 0.0)]
+        if not self.full:
+            return
+        step = 1e-5
+        later = self.limb_angles(crank + step * crank_rate)
+        for links, now, then in zip(self.limb_links, angles, later, strict=True):
+            for link, angle, rate in zip(links, now, (then - now) / step, strict=True):
+                body.set_joint(link, float(angle), float(rate))
+        for name, links in zip(LIMBS, self.limb_links, strict=True):
+            side, limb = name.split("_")[1], self.posture.limb(name)
+            if name.startswith("arm"):
+                mate = self.bicycle.links["front_assembly"]
+                point = self.posture.grip(side, 0.0) - self.posture.bicycle.steer_origin
+            else:
+                drive = self.posture.bicycle.drive
+                assert drive is not None
+                mate, point = self.bicycle.links["crank"], self.posture.pedal(side, 0.0) - np.array(drive.axle)
+            tip = (limb.tip[0], 0.0, limb.tip[1])
+            self.constraints.append(connect_points(physics, (body.body, links[3]), tip, (body.body, mate), point))
+
+    @property
+    def intended_lean(self) -> float:
+        """Wanted lean of the trunk relative to the bicycle, rad, right positive."""
+        return self._trunk_target[1]
+
+    def limb_angles(self, crank: float, extra: float = 0.0) -> list[np.ndarray]:
+        """Joint angles ``(4,)`` of each limb at the start by inverse kinematics, swivelled by ``extra`` rad more."""
+        posture, motion = self.posture, self.motion
+        swivel = motion.at(0.0, 0.0, 0.0)[1] + extra
+        flexion, lean, twist = (np.array(angle) for angle in self._trunk_target)
+        trunk, angles = three_turns(flexion, lean, twist), []
+        for name, turn in zip(LIMBS, swivel.tolist(), strict=True):
+            side = name.split("_")[1]
+            if name.startswith("arm"):
+                target, out = posture.arm_target(side, 0.0, trunk), posture.elbow_out(side, trunk)
+            else:
+                target, out = posture.leg_target(side, crank), KNEE_OUT
+            angles.append(reach_to(posture.limb(name), target, out, turn).angles)
+        return angles
+
+    def plan(self, state: BicycleState, curvature: float, steer_torque: float, drive: float) -> None:
+        """Decide on muscle torques for the next control period.
+
+        Args:
+            state: of the bicycle.
+            curvature: of the path a little ahead, 1/m, left positive.
+            steer_torque: N·m on the handlebar, left positive.
+            drive: wanted force at the wheel, N; braking is not the rider's legs' business.
+        """
+        change, swivel, unsteady = self.motion.at(state.time - self._began, curvature, state.roll)
+        self._trunk_target = [self.posture.flexion + float(change[0]), float(change[1]), float(change[2])]
+        steer_torque += unsteady
+        c, s = math.cos(state.steer), math.sin(state.steer)
+        load = np.array([0.0, 0.0, -self.motion.style.hand_load])
+        hands = []
+        for side in SIDES:
+            pull = self._pull[side]
+            turned = c * pull + s * np.cross(self._steer_axis, pull)
+            hands.append((0.5 * steer_torque / self._grip_arm * turned + load).tolist())
+        self._hands = [tuple(hand) for hand in hands]
+        ratio = self.bicycle.ratio
+        bicycle = self.posture.bicycle
+        assert bicycle.drive is not None
+        length = bicycle.drive.crank_length
+        wanted = max(0.0, drive) * bicycle.rear_wheel.radius * ratio
+        phases = [state.crank, state.crank + math.pi]
+        if not self.full:
+            self._crank_torque = wanted * sum(max(0.0, math.cos(a)) + DOWNSTROKE for a in phases) / MEAN_STROKE
+            return
+        moved = swivel - self._first_swivel
+        self._swivel = [
+            angle + slope * float(turn)
+            for angle, slope, turn in zip(self._abduction, self._per_swivel, moved, strict=True)
+        ]
+        angles = [pair[0] for pair in self.bicycle.body.joint_tuples(self.joints)]
+        trunk = angles[:3]
+        torques = [0.0, 0.0, 0.0]
+        push = min(LARGEST_PEDAL_FORCE, wanted / (length * MEAN_STROKE))
+        for index, compute in enumerate(self._limb_torques):
+            if index < 2:
+                force = self._steer_in_trunk(trunk, hands[index])[0]
+            else:
+                phase = phases[index - 2]
+                strength = push * (max(0.0, math.cos(phase)) + DOWNSTROKE)
+                force = [-strength * math.sin(phase), 0.0, -strength * math.cos(phase)]
+            torques += compute(angles[3 + 4 * index : 7 + 4 * index], force)[0]
+        self._torques = torques
+
+    def act(self) -> tuple[list[float], float]:
+        """Torques of all joints of the rider and of the crank for the next step, after :meth:`plan`."""
+        felt = self.bicycle.body.joint_tuples(self._felt)
+        torques = list(self._torques) if self.full else [0.0, 0.0, 0.0]
+        gravity = self.bicycle.physics.gravity
+        for index in range(3):
+            angle, rate = felt[index]
+            torques[index] += TRUNK_STIFFNESS * (self._trunk_target[index] - angle) - TRUNK_DAMPING * rate
+        # a rider knows the weight of the own trunk
+        torques[0] -= gravity * self._trunk_moment * math.sin(felt[0][0])
+        for index, target in enumerate(self._swivel):
+            if self.full:
+                angle, rate = felt[3 + index]
+                torques[4 + 4 * index] += SWIVEL_STIFFNESS * (target - angle) - SWIVEL_DAMPING * rate
+        if not self.full:
+            self._press()
+        return torques, self._crank_torque
+
+    def _press(self) -> None:
+        """Hands of the lumped rider: the same force on the handlebar and, oppositely, on the trunk."""
+        body = self.bicycle.body
+        front = self.bicycle.links["front_assembly"]
+        position, orientation, _, _ = body.link_tuples([front])[0]
+        frame = self.bicycle.physics.base_tuples(body.body)[1]
+        points, forces = self._pressing(position, orientation, frame, *self._hands)
+        for point, force in ((points[:3], forces[:3]), (points[3:], forces[3:])):
+            body.push(front, force, point)
+            body.push(self.trunk_links[2], [-part for part in force], point)
+
+    def _pressing_lines(self) -> Callable[..., list[list[float]]]:
+        """Function of the front assembly's and the frame's principal axes: hands' places and forces in the world."""
+        physics, body = self.bicycle.physics, self.bicycle.body.body
+        centre, axes = physics.inertial_frame(body, self.bicycle.links["front_assembly"])
+        _, frame_axes = physics.inertial_frame(body)
+        arm = np.array(self.posture.bicycle.grip) - self.posture.bicycle.steer_origin
+        arms = [rotation.rotate_back(axes, arm * (1.0, SIGNS[side], 1.0) - centre) for side in SIDES]
+
+        def compute(position, front, frame, left, right):  # type: ignore[no-untyped-def]
+            xp = rotation.namespace(position)
+            frame = rotation.multiply(frame, rotation.conjugate(frame_axes))
+            places = xp.concat([position + rotation.rotate(front, each) for each in arms], axis=-1)
+            return places, xp.concat([rotation.rotate(frame, force) for force in (left, right)], axis=-1)
+
+        return straight_line(compute, position=3, front=4, frame=4, left=3, right=3)
+
+    def grips(self) -> np.ndarray:
+        """Places ``(2, 3)`` of left and right hand now, world, m."""
+        link = self.bicycle.links["front_assembly"]
+        front = self.bicycle.physics.state(self.bicycle.body.body, link)
+        arm = np.array(self.posture.bicycle.grip) - self.posture.bicycle.steer_origin
+        arms = np.stack([arm * (1.0, SIGNS[side], 1.0) for side in SIDES])
+        return front.position + rotation.rotate(front.orientation, arms)
+
+    def pedals(self) -> np.ndarray:
+        """Places ``(2, 3)`` of left and right pedal now, world, m."""
+        crank = self.bicycle.physics.state(self.bicycle.body.body, self.bicycle.links["crank"])
+        drive = self.posture.bicycle.drive
+        assert drive is not None
+        arms = np.stack([self.posture.pedal(side, 0.0) - np.array(drive.axle) for side in SIDES])
+        return crank.position + rotation.rotate(crank.orientation, arms)
+
+    def hand_forces(self) -> tuple[np.ndarray, np.ndarray]:
+        """Force ``(2, 3)`` of left and right hand on the handlebar (N) and where it acts (m), world axes.
+
+        ``full``: what the constraints carried in the last step; ``lumped``: what is going to act in the next one.
+        """
+        if self.full:
+            forces = np.array([constraint_force(self.bicycle.physics, number) for number in self.constraints[:2]])
+            return forces, self.grips()
+        frame = self.bicycle.physics.state(self.bicycle.body.body, BASE).orientation
+        return rotation.rotate(frame, np.array(self._hands)), self.grips()
+
+    def foot_forces(self) -> tuple[np.ndarray, np.ndarray]:
+        """Force ``(2, 3)`` of left and right foot on the pedals in the last step and where; none if lumped."""
+        if not self.full:
+            return np.zeros((2, 3)), np.zeros((2, 3))
+        forces = np.array([constraint_force(self.bicycle.physics, number) for number in self.constraints[2:]])
+        return forces, self.pedals()
+
+    def gaps(self) -> np.ndarray:
+        """Distance ``(4,)`` between each hand or foot and what it holds, m; zeros if lumped."""
+        if not self.full:
+            return np.zeros(4)
+        physics, body = self.bicycle.physics, self.bicycle.body.body
+        tips = physics.states(body, [links[3] for links in self.limb_links])
+        ends = np.array([(self.posture.limb(name).tip[0], 0.0, self.posture.limb(name).tip[1]) for name in LIMBS])
+        places = tips.position + rotation.rotate(tips.orientation, ends)
+        return np.linalg.norm(places - np.concatenate([self.grips(), self.pedals()]), axis=1)
+
+    def save(self) -> RiderMemory:
+        """Everything besides PyBullet's state."""
+        return RiderMemory(
+            tuple(self._torques),
+            tuple(self._trunk_target),
+            tuple(self._swivel),
+            self._crank_torque,
+            tuple(self._hands),
+        )
+
+    def restore(self, memory: RiderMemory) -> None:
+        """Undo :meth:`save`."""
+        self._torques, self._trunk_target = list(memory.torques), list(memory.trunk)
+        self._swivel, self._crank_torque = list(memory.swivel), memory.crank_torque
+        self._hands = list(memory.hands)
