@@ -122,7 +122,7 @@ class ExternalAcceleration(Model):
             variance = variance + expand(self.c_a**2, 2) * squared / 3.0
         if self.mode == 3:
             held = xp.greater(self._static_samples(x, y), self.window / self.dt + 0.5)
-            r = xp.where(held, r, xp.zeros_like(r) + xp.nan)
+            r = xp.where(held, r, xp.nan)
         return r, expand(self.gravity, 2) * identity, variance * identity
 
     def retract(self, x: Array, dx: Array) -> Array:
