@@ -119,10 +119,22 @@ class VariedSensors:
     bandwidth: Range = (30.0, 300.0)
     full_scale: tuple[float, float] = (2000.0 * DEG, 156.9)
     """rad/s and m/s²"""
+    lossy_share: float = 0.15
+    """of devices, which lose single samples"""
+    dropout: Range = (0.005, 0.2)
+    """share of the samples that they lose"""
+    silent_share: float = 0.1
+    """of devices, whose accelerometer pauses"""
+    pauses: Range = (0.01, 0.2)
+    """1/s, how often"""
+    pause: Range = (0.05, 2.0)
+    """s, mean length"""
 
     def draw(self, generator: np.random.Generator) -> SensorPreset:
         """Draw a device."""
         bandwidth = log_uniform(generator, self.bandwidth)
+        dropout, burst_rate = log_uniform(generator, self.dropout), log_uniform(generator, self.pauses)
+        lossy, silent = generator.random(2) < (self.lossy_share, self.silent_share)
         gyroscope = NoiseModel(
             white_noise=log_uniform(generator, self.gyroscope_noise),
             turn_on_bias=log_uniform(generator, self.gyroscope_bias),
@@ -132,6 +144,7 @@ class VariedSensors:
             resolution=float(generator.choice([0.0, DEG / 16.4])),
             full_scale=self.full_scale[0],
             bandwidth=bandwidth,
+            dropout=dropout * float(lossy),
         )
         accelerometer = NoiseModel(
             white_noise=log_uniform(generator, self.accelerometer_noise),
@@ -140,6 +153,9 @@ class VariedSensors:
             misalignment=log_uniform(generator, self.accelerometer_misalignment),
             full_scale=self.full_scale[1],
             bandwidth=bandwidth,
+            dropout=dropout * float(lossy),
+            burst_rate=burst_rate * float(silent),
+            burst_duration=log_uniform(generator, self.pause),
         )
         return SensorPreset("varied", "ranges of the curriculum", gyroscope, accelerometer)
 
@@ -223,7 +239,8 @@ class Curriculum:
             name: for the metadata.
 
         Returns:
-            Channels ``imu/gyr`` (rad/s) and ``imu/acc`` (m/s²); truth ``orientation`` (sensor to world).
+            Channels ``imu/gyr`` (rad/s) and ``imu/acc`` (m/s²), NaN where a sample is lost; truth ``orientation``
+            (sensor to world).
         """
         sequence = seed if isinstance(seed, np.random.SeedSequence) else np.random.SeedSequence(seed)
         motion, setting, shaking, noise = (np.random.default_rng(child) for child in sequence.spawn(4))

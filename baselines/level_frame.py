@@ -35,12 +35,12 @@ class LevelFrame(Recurrence):
         q̇ = ½ q ⊗ (ω − b) + ½ (k_θ v × e₃) ⊗ q,   v̇ = q f q* − g e₃ − k_v v,   ḃ = −k_b q* (v × e₃) q
 
     The gains are those in which the Kalman filter with its published settings ends, k_θ = σ_g / σ_V,
-    k_v² = 2 g k_θ + (σ_a / σ_V)², except that of the bias, which is chosen larger, to settle within a trial. A missing
-    accelerometer sample counts as no acceleration, a missing gyroscope sample as the last one.
+    k_v² = 2 g k_θ + (σ_a / σ_V)², except that of the bias, which is chosen larger, to settle within a trial. The last
+    sample stands in for missing ones; after ``hold`` without the accelerometer all integrals of force are given up.
 
     Heading is that of the start, drifting. State: q (4), b (3), v (3), level force of the tick (3), leaking integrals
     of the force over 0.25 s and 4 s (6), sums over the interval of force and rate (6), of their squares and of
-    | ‖f‖ − g | (3), length and clock of the interval (2), youth (1).
+    | ‖f‖ − g | (3), length and clock of the interval (2), youth (1), age of the accelerometer sample (1).
     """
 
     interval: float = 0.04
@@ -57,18 +57,20 @@ class LevelFrame(Recurrence):
     """s"""
     settling: float = 10.0
     """s: time constant of the youth, which is 1 at the start and tells the network that nothing has settled yet"""
+    hold: float = 0.05
+    """s: for how long the last accelerometer sample stands in for missing ones"""
     gravity: float = 9.80665
     """g, m/s²"""
 
     channels: ClassVar[tuple[Channel, ...]] = (GYROSCOPE, ACCELEROMETER)
     outputs: ClassVar[tuple[Quantity, ...]] = (RELATIVE_ORIENTATION, FEATURES, DUE)
-    state_size: ClassVar[int] = 31
+    state_size: ClassVar[int] = 32
 
     def prior(self, z: Measurement) -> Array:
         """Inclination of the first accelerometer sample; the first interval begins."""
         f = z["imu/acc"]
         one = 1.0 + 0.0 * f[..., :1]
-        return namespace(f).concat([level(f), *[0.0 * f] * 8, 0.0 * f[..., :2], one], axis=-1)
+        return namespace(f).concat([level(f), *[0.0 * f] * 8, 0.0 * f[..., :2], one, 0.0 * one], axis=-1)
 
     def predict(self, x: Array, z: Measurement, previous: Measurement) -> Array:
         """Turn by the gyroscope; a new interval begins where the last tick ended one."""
@@ -87,28 +89,31 @@ class LevelFrame(Recurrence):
             [sums[..., :3], sums[..., 3:6] + turned, sums[..., 6:7], sums[..., 7:8] + swing, sums[..., 8:9]], axis=-1
         )
         length = xp.where(due, 0.0 * clock, x[..., 28:29]) + dt
-        youth = x[..., 30:] * (1.0 - dt / expand(self.settling, 1))
-        return xp.concat([q, x[..., 4:10], force, x[..., 13:19], sums, length, clock + dt, youth], axis=-1)
+        youth = x[..., 30:31] * (1.0 - dt / expand(self.settling, 1))
+        tail = [sums, length, clock + dt, youth, x[..., 31:] + dt]
+        return xp.concat([q, x[..., 4:10], force, x[..., 13:19], *tail], axis=-1)
 
     def finish(self, x: Array, z: Measurement) -> Array:
         """Integrate the force, correct tilt and bias, add to the sums."""
         xp = namespace(x)
-        dt, f = expand(self.dt, 1), z["imu/acc"]
+        dt, f, g = expand(self.dt, 1), z["imu/acc"], expand(self.gravity, 1)
+        none = 0.0 * x[..., :1]
         brought = xp.all(xp.isfinite(f), axis=-1)[..., None]
-        g = expand(self.gravity, 1)
-        a = xp.where(brought, x[..., 10:13] - g * constant(VERTICAL, x), 0.0 * x[..., 10:13])
-        length = xp.sqrt(xp.sum(f * f, axis=-1, keepdims=True))
-        deviation = xp.where(brought, xp.abs(length - g), 0.0 * x[..., :1])
-        q, b, v = x[..., :4], x[..., 4:7], x[..., 7:10]
-        v = v + dt * (a - expand(self.velocity_gain, 1) * v)
+        age = xp.where(brought, none, x[..., 31:])
+        known = xp.where(xp.less(age, expand(self.hold, 1)), 1.0 + none, none)
+        a = known * (x[..., 10:13] - g * constant(VERTICAL, x))
+        size = xp.sqrt(xp.sum(x[..., 10:13] * x[..., 10:13], axis=-1, keepdims=True))
+        q, b = x[..., :4], x[..., 4:7]
+        v = known * (x[..., 7:10] + dt * (a - expand(self.velocity_gain, 1) * x[..., 7:10]))
         blame = dt * cross(v, constant(VERTICAL, x) + 0.0 * v)
         q = normalize(multiply(exp(expand(self.tilt_gain, 1) * blame), q))
         b = b - expand(self.bias_gain, 1) * rotate_back(q, blame)
-        fast = x[..., 13:16] + dt * (a - x[..., 13:16] / expand(self.fast_leak, 1))
-        slow = x[..., 16:19] + dt * (a - x[..., 16:19] / expand(self.slow_leak, 1))
+        fast = known * (x[..., 13:16] + dt * (a - x[..., 13:16] / expand(self.fast_leak, 1)))
+        slow = known * (x[..., 16:19] + dt * (a - x[..., 16:19] / expand(self.slow_leak, 1)))
         squares = x[..., 25:26] + dt * xp.sum(a * a, axis=-1, keepdims=True)
-        sums = [x[..., 19:22] + dt * a, x[..., 22:25], squares, x[..., 26:27], x[..., 27:28] + dt * deviation]
-        return xp.concat([q, b, v, x[..., 10:13], fast, slow, *sums, x[..., 28:]], axis=-1)
+        deviations = x[..., 27:28] + dt * known * xp.abs(size - g)
+        sums = [x[..., 19:22] + dt * a, x[..., 22:25], squares, x[..., 26:27], deviations]
+        return xp.concat([q, b, v, x[..., 10:13], fast, slow, *sums, x[..., 28:31], age], axis=-1)
 
     def pose(self, x: Array) -> dict[str, Array]:
         """Attitude of the frame; features of the interval so far; whether this tick ends it."""
@@ -126,7 +131,7 @@ class LevelFrame(Recurrence):
             xp.log(1e-3 + mean[..., 6:7]) / 4.0,
             xp.log(1e-4 + mean[..., 7:8]) / 4.0,
             xp.log(1e-2 + mean[..., 8:9]) / 3.0,
-            x[..., 30:],
+            x[..., 30:31],
         ]
         due = xp.where(self._due(x), 1.0 + 0.0 * length, 0.0 * length)
         return {"relative_orientation": q, "features": xp.concat(features, axis=-1), "due": due}

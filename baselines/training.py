@@ -34,7 +34,7 @@ class TrainingConfig:
         ValueError: a number is out of its range.
     """
 
-    episodes: int = 800
+    episodes: int = 1000
     """simulated training episodes"""
     validation_episodes: int = 64
     """simulated episodes on which the best epoch is chosen"""
@@ -44,7 +44,7 @@ class TrainingConfig:
     """sequences in a batch"""
     window: int = 250
     """intervals through which gradients flow; memory is carried on from window to window"""
-    units: int = 48
+    units: int = 64
     """units H of the network"""
     learning_rate: float = 4e-3
     """highest rate, after the warm-up; it falls to zero along a cosine"""
