@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -138,3 +138,36 @@ def joined(parts: list[Estimate]) -> Estimate:
 
     pose = {name: join([part.pose[name] for part in parts]) for name in parts[0].pose}
     return Estimate(pose, *(join([part[index] for part in parts]) for index in (1, 2, 3)))
+
+
+def shipped(weights: str, dt: float = 0.01, **parameters: Any) -> AdaptiveEstimator:
+    """An estimator with a shipped policy.
+
+    Args:
+        weights: name of the policy.
+        dt: sampling interval, s.
+        parameters: constants of the filter that shall differ from the published tuning, by the model's field names. The
+            policy was trained on the published ones.
+
+    Raises:
+        ValueError: an unknown or impossible parameter.
+    """
+    estimator = AdaptiveEstimator.load(weights, dt)
+    if not parameters:
+        return estimator
+    model = estimator.filter.model
+    known = {field.name for field in fields(model)}
+    unknown = sorted(set(parameters) - known)
+    if unknown:
+        raise ValueError(f"unknown parameters {unknown}; {type(model).__name__} has {sorted(known)}")
+    return replace(estimator, filter=replace(estimator.filter, model=replace(model, **parameters)))
+
+
+def shipped_external_acceleration(dt: float = 0.01, **parameters: Any) -> AdaptiveEstimator:
+    """The external-acceleration filter with its shipped policy; see :func:`shipped`."""
+    return shipped("external_acceleration_policy", dt, **parameters)
+
+
+def shipped_bounded_motion(dt: float = 0.01, **parameters: Any) -> AdaptiveEstimator:
+    """The bounded-motion filter with its shipped policy; see :func:`shipped`."""
+    return shipped("bounded_motion_policy", dt, **parameters)

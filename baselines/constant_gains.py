@@ -39,7 +39,7 @@ class ConstantGains:
 
     @property
     def hindsight(self) -> np.ndarray:
-        """Least error that any action tried reaches on each trajectory ``(trajectories,)``, rad: truth must be known for it."""
+        """Least error of any action tried on each trajectory ``(trajectories,)``, rad; only the truth tells it."""
         return np.min(self.scores, axis=0)
 
     @property

@@ -23,7 +23,7 @@ Layer = tuple[np.ndarray, np.ndarray]
 
 @dataclass(frozen=True, eq=False)
 class GainPolicy:
-    """Observation ``(*batch, n)`` → action ``(*batch, k)`` in [−1, 1]: layers with tanh between them, clipped at the end.
+    """Observation ``(*batch, n)`` → action ``(*batch, k)`` in [−1, 1]: layers with tanh between them, then a clip.
 
     Attributes:
         filter: name of the filter that it tunes.
@@ -49,11 +49,13 @@ class GainPolicy:
         for index, (weight, bias) in enumerate(layers):
             if weight.ndim != 2 or weight.shape[1] != width or bias.shape != weight.shape[:1]:
                 raise ValueError(
-                    f"layer {index} must take {width} inputs, got a weight of shape {weight.shape} and a bias of {bias.shape}"
+                    f"layer {index} must take {width} inputs, got weight {weight.shape} and bias {bias.shape}"
                 )
             width = weight.shape[0]
         if not layers or width != len(self.ranges):
-            raise ValueError(f"the last layer must give {len(self.ranges)} actions, got {width if layers else 'no layer'}")
+            raise ValueError(
+                f"the last layer must give {len(self.ranges)} actions, got {width if layers else 'no layer'}"
+            )
 
     @classmethod
     def constant(cls, tuned: TunedFilter, action: Sequence[float] | np.ndarray) -> GainPolicy:
@@ -103,7 +105,9 @@ class GainPolicy:
         if card.get("kind") != KIND:
             raise ValueError(f"{path_or_name} is no {KIND} but {card.get('kind')!r}")
         try:
-            ranges = tuple(GainRange(entry["gain"], float(entry["lower"]), float(entry["upper"])) for entry in card["gains"])
+            ranges = tuple(
+                GainRange(entry["gain"], float(entry["lower"]), float(entry["upper"])) for entry in card["gains"]
+            )
             features = InnovationFeatures(float(card["interval"]), tuple(float(scale) for scale in card["scales"]))
             layers = tuple((arrays[f"{index}.weight"], arrays[f"{index}.bias"]) for index in range(card["layers"]))
             return cls(card["filter"], ranges, features, layers, card)

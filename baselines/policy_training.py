@@ -1,23 +1,24 @@
 """Train a gain policy by proximal policy optimisation (Stable-Baselines3) and export it to plain arrays.
 
-The motions are simulated (:class:`poise.envs.hand_trajectories.HandTrajectories`), a fixed set drawn from a seed. First the best
-constant gains are searched; the network starts from them and is rewarded for what it gains over them, which
-changes no optimal policy but takes most of the variance away, since both see the same motion.
+The motions are simulated (:class:`poise.envs.hand_trajectories.HandTrajectories`), a fixed set drawn from a seed.
+First the best constant gains are searched; the network starts from them and is rewarded for what it gains over them,
+which changes no optimal policy but takes most of the variance away, since both see the same motion.
 """
 
 from __future__ import annotations
 
-import dataclasses
 import json
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from ..envs.gestures import Mixed
 from ..envs.hand_trajectories import HandTrajectories
+from ..envs.sensor_presets import sensor_preset
 from ..envs.trajectory import Trajectory
 from ..filters.adaptation import tunable_filter
 from ..filters.innovation_features import InnovationFeatures
@@ -26,14 +27,26 @@ from ..filters.tuned import TunedFilter
 from .constant_gains import best_constant_gains
 from .policy import GainPolicy
 
+SUSTAINED = Mixed(lengths=(15.0, 40.0), rest_share=0.1, spread=0.7, single_share=0.25)
+"""Motion of one kind that lasts, beside the quick changes of ``mixed``."""
+
+VIBRATING = replace(
+    sensor_preset("st-lsm6dsox"),
+    name="vibrating",
+    source="st-lsm6dsox on something that vibrates",
+    accelerometer=replace(sensor_preset("st-lsm6dsox").accelerometer, white_noise=0.1),
+    gyroscope=replace(sensor_preset("st-lsm6dsox").gyroscope, white_noise=2e-3),
+)
+"""A sensor that shakes at frequencies beyond those of a hand, at 100 Hz by 1 m/s² and 1 °/s."""
+
 TRAINING_MOTIONS = HandTrajectories(
-    gestures=("mixed", "mixed", "mixed", "slow", "fast", "severe", "rest"),
+    gestures=("mixed", "mixed", "mixed", SUSTAINED, SUSTAINED, "slow", "fast", "severe", "rest"),
     rates=(100.0, 286.0),
-    sensors=("paper-hand", "xsens-mtw-awinda", "st-lsm6dsox", "invensense-mpu-9250"),
-    grade=(0.1, 0.6),
+    sensors=("paper-hand", "xsens-mtw-awinda", "st-lsm6dsox", VIBRATING),
+    grade=(0.2, 2.0),
     duration=60.0,
 )
-"""What shipped policies are trained on; the errors of the devices are those of calibrated ones, hence the grade."""
+"""What shipped policies are trained on."""
 
 CHECKPOINT, STATISTICS, PROGRESS = "model.zip", "statistics.pkl", "progress.json"
 """Files of a checkpoint in the run folder."""
@@ -55,7 +68,7 @@ class TrainingConfig:
     """number of simulated trajectories to train on"""
     seed: int = 0
     """root of all randomness"""
-    steps: int = 1_000_000
+    steps: int = 1_500_000
     """decisions in total"""
     envs: int = 128
     """episodes at a time"""
@@ -65,15 +78,17 @@ class TrainingConfig:
     """decisions in a gradient step"""
     epochs: int = 5
     """passes over a rollout"""
-    learning_rate: float = 1e-3
+    learning_rate: float = 5e-4
     """at the start; falls linearly to a tenth"""
     discount: float = 0.98
     """factor a decision; 0.98 looks 5 s ahead at 10 decisions a second"""
     trace: float = 0.9
     """λ of generalised advantage estimation"""
+    error_scale: float = 1.0
+    """deg: errors far above it count by their logarithm in the reward"""
     hidden: tuple[int, ...] = (64, 64)
     """units of the hidden layers"""
-    spread: float = 0.3
+    spread: float = 0.2
     """standard deviation of the actions at the start"""
     search: int = 32
     """points of the search for constant gains to start from; 0 starts from the published tuning"""
@@ -86,6 +101,18 @@ class TrainingConfig:
             raise ValueError(f"discount must lie in [0, 1), got {self.discount}")
         if self.search < 0 or self.spread <= 0.0 or self.learning_rate <= 0.0:
             raise ValueError("search must not be negative, spread and learning_rate must be positive")
+        if not self.error_scale > 0.0:
+            raise ValueError(f"error_scale must be positive degrees, got {self.error_scale}")
+
+    def describe(self) -> dict[str, Any]:
+        """Everything, as JSON knows it."""
+        values = {part.name: getattr(self, part.name) for part in fields(self)} | {"motions": self.motions.describe()}
+        return json.loads(json.dumps(values))
+
+
+def shipped_config(filter: str) -> TrainingConfig:
+    """The configuration that the shipped weights of a filter were trained with."""
+    return TrainingConfig(filter=filter)
 
 
 def train_policy(
@@ -134,13 +161,14 @@ def train_policy(
         start = np.asarray(done["constant"])
     elif config.search:
         few = motions[: min(len(motions), 24)]
-        start = best_constant_gains(tuned, few, samples=config.search, refinements=40, seed=config.seed).action
+        start = best_constant_gains(tuned, few, samples=config.search, refinements=30, seed=config.seed).action
     else:
         start = np.zeros(tuned.actions)
     threads = torch.get_num_threads()
     torch.set_num_threads(1)
     try:
-        batch = TuningBatch(tuned, motions, config.envs, seed=config.seed, reference=start)
+        scale = config.error_scale
+        batch = TuningBatch(tuned, motions, config.envs, seed=config.seed, reference=start, error_scale=scale)
         if done and home is not None:
             env = VecNormalize.load(str(home / STATISTICS), batch)
         else:
@@ -155,13 +183,13 @@ def train_policy(
     policy = callback.best if callback.best is not None else export_policy(model, env, tuned)
     seconds = time.perf_counter() - started + float(done.get("seconds", 0.0))
     card = {
-        "training": dataclasses.asdict(config),
+        "training": config.describe(),
         "constant_action": [float(value) for value in start],
         "steps": int(model.num_timesteps),
         "chosen_steps": int(callback.best_steps or model.num_timesteps),
         "seconds": round(seconds, 1),
     }
-    return dataclasses.replace(policy, card=json.loads(json.dumps(card)))
+    return replace(policy, card=json.loads(json.dumps(card)))
 
 
 def make_model(config: TrainingConfig, env: Any, start: np.ndarray, checkpoint: Path | None, logs: Path | None) -> Any:
@@ -196,8 +224,9 @@ def make_model(config: TrainingConfig, env: Any, start: np.ndarray, checkpoint: 
         tensorboard_log=None if logs is None else str(logs),
     )
     with torch.no_grad():
-        model.policy.action_net.bias.copy_(torch.as_tensor(0.95 * start))
-        model.policy.action_net.weight.mul_(0.1)
+        parameters = dict(model.policy.action_net.named_parameters())
+        parameters["bias"].copy_(torch.as_tensor(0.95 * start))
+        parameters["weight"].mul_(0.1)
     return model
 
 
@@ -241,7 +270,7 @@ def make_callback(
             if self.num_timesteps == 0:
                 return
             seconds = time.perf_counter() - started + earlier
-            buffer = self.model.ep_info_buffer or []
+            buffer: Any = self.model.ep_info_buffer or []
             gain = float(np.mean([episode["r"] for episode in buffer])) if buffer else float("nan")
             if validate is not None and self.num_timesteps - self.looked >= config.steps / 6:
                 self._look()
@@ -273,7 +302,7 @@ def make_callback(
 
 def config_key(config: TrainingConfig) -> dict[str, Any]:
     """The configuration as JSON, without the length: a longer training may go on from a shorter one."""
-    plain = json.loads(json.dumps(dataclasses.asdict(config)))
+    plain = config.describe()
     return {name: value for name, value in plain.items() if name != "steps"}
 
 

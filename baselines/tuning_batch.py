@@ -1,11 +1,12 @@
 """Many gain-tuning episodes in one process: the environments of :mod:`poise.envs.gain_tuning`, batched for training.
 
-One call of the filter serves all episodes of a sampling rate, which is an order of magnitude faster than one environment after the other.
-Observations, actions and rewards are the same numbers (up to rounding).
+One call of the filter serves all episodes of a sampling rate, which is an order of magnitude faster than one
+environment after the other. Observations, actions and rewards are the same numbers (up to rounding).
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -30,6 +31,7 @@ class RateGroup:
         generator: of the choice of trajectories.
         quantity: what is scored.
         reference: action whose error the reward is relative to.
+        error_scale: see :class:`TuningBatch`, rad.
     """
 
     def __init__(
@@ -40,8 +42,15 @@ class RateGroup:
         generator: np.random.Generator,
         quantity: Quantity,
         reference: np.ndarray,
+        error_scale: float,
     ) -> None:
-        self.tuned, self.rows, self.generator, self.quantity = tuned.with_dt(trajectories[0].dt), rows, generator, quantity
+        self.error_scale = error_scale
+        self.tuned, self.rows, self.generator, self.quantity = (
+            tuned.with_dt(trajectories[0].dt),
+            rows,
+            generator,
+            quantity,
+        )
         self.episode = min(len(trajectory) for trajectory in trajectories) // self.tuned.ticks
         length = self.episode * self.tuned.ticks
         self.channels = {
@@ -51,13 +60,18 @@ class RateGroup:
         self.truth = np.stack([trajectory.truth_of(quantity.name)[:length] for trajectory in trajectories])
         self.scored = np.stack([trajectory.mask[:length] for trajectory in trajectories])
         gains = self.tuned.gains(reference)
-        self.reference = np.stack(
-            [
-                error(quantity, self.tuned.kalman.run(self._sequence(index), gains).pose[quantity.name], self.truth[index])
-                for index in range(len(trajectories))
-            ]
+        estimates = (
+            self.tuned.kalman.run(self._sequence(i), gains).pose[quantity.name] for i in range(len(self.truth))
         )
+        errors = [error(quantity, estimate, truth) for estimate, truth in zip(estimates, self.truth, strict=True)]
+        self.reference = self._cost(np.stack(errors))
         self.start()
+
+    def _cost(self, errors: np.ndarray) -> np.ndarray:
+        """Errors as they count in the reward."""
+        if np.isinf(self.error_scale):
+            return errors
+        return self.error_scale * np.log1p(errors / self.error_scale)
 
     def _sequence(self, index: int) -> dict[str, np.ndarray]:
         return {name: values[index] for name, values in self.channels.items()}
@@ -78,14 +92,14 @@ class RateGroup:
         """Advance by one interval.
 
         Returns:
-            Observations at the end of the interval ``(rows, n)``, rewards ``(rows,)`` in rad, and which episodes are over
-            ``(rows,)``; :meth:`restart` begins these anew.
+            Observations at the end of the interval ``(rows, n)``, rewards ``(rows,)`` in rad, and which episodes are
+            over ``(rows,)``; :meth:`restart` begins these anew.
         """
         ticks = self.decision * self.tuned.ticks + np.arange(self.tuned.ticks)[:, None]
         chunk = {name: values[self.trajectory, ticks] for name, values in self.channels.items()}
         estimate, self.state = self.tuned.advance(self.tuned.decide(self.state, actions), chunk)
         errors = error(self.quantity, estimate.pose[self.quantity.name], self.truth[self.trajectory, ticks])
-        gained = self.reference[self.trajectory, ticks] - errors
+        gained = self.reference[self.trajectory, ticks] - self._cost(errors)
         counted = self.scored[self.trajectory, ticks] & np.isfinite(gained)
         rewards = np.where(counted, gained, 0.0).sum(axis=0) / np.maximum(counted.sum(axis=0), 1)
         self.decision = self.decision + 1
@@ -113,7 +127,8 @@ class RateGroup:
 class TuningBatch(VecEnv):
     """A Stable-Baselines3 vector environment over a fixed set of trajectories.
 
-    The reward is the mean error of a constant ``reference`` action over the interval minus that of the agent, in degrees.
+    The reward is the mean error of a constant ``reference`` action over the interval minus that of the agent, in
+    degrees.
 
     Args:
         tuned: the filter, what may be chosen of it and what is seen.
@@ -122,6 +137,8 @@ class TuningBatch(VecEnv):
         seed: of the choice of trajectories.
         quantity: output that is scored; None for ``up``.
         reference: action ``(k,)``; None for the published tuning.
+        error_scale: errors far above this count by their logarithm, s ln(1 + e / s), so that a few wild seconds do not
+            drown the rest; deg; infinite for errors as they are.
 
     Raises:
         ValueError: fewer ``envs`` than rates.
@@ -136,6 +153,7 @@ class TuningBatch(VecEnv):
         seed: int = 0,
         quantity: str | None = None,
         reference: np.ndarray | None = None,
+        error_scale: float = math.inf,
     ) -> None:
         groups: dict[int, list[Trajectory]] = {}
         for trajectory in trajectories:
@@ -147,7 +165,7 @@ class TuningBatch(VecEnv):
         output = scored_quantity(tuned.kalman, quantity)
         action = np.zeros(tuned.actions) if reference is None else np.asarray(reference, float)
         self.groups = [
-            RateGroup(tuned, part, count, generator, output, action)
+            RateGroup(tuned, part, count, generator, output, action, math.radians(error_scale))
             for part, count, generator in zip(groups.values(), rows, generators, strict=True)
         ]
         self.bounds = np.cumsum([0, *rows])

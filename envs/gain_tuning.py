@@ -1,11 +1,11 @@
-"""Environments in which an agent tunes a Kalman filter while it runs: ``poise/HandMotionGain-v0``, ``poise/ReplayGain-v0``."""
+"""Environments whose agent tunes a filter while it runs: ``poise/HandMotionGain-v0``, ``poise/ReplayGain-v0``."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, ClassVar, Literal
+from typing import Any, Literal
 
 import gymnasium
 import numpy as np
@@ -17,8 +17,10 @@ from ..filters.kalman import KalmanFilter
 from ..filters.metrics import error
 from ..filters.quantity import Estimate, Quantity
 from ..filters.tuned import TunedFilter, TunedState
+from .gestures import GestureConfig
 from .hand_trajectories import HandTrajectories
 from .recordings import load_recording
+from .sensor_presets import SensorPreset
 from .trajectory import Trajectory
 
 RewardKind = Literal["error", "improvement"]
@@ -42,7 +44,7 @@ class GainTuningEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         ValueError: an unknown filter, gain, quantity or kind of reward, or a number out of its range.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": []}
+    metadata = {"render_modes": []}  # noqa: RUF012
 
     def __init__(
         self,
@@ -157,8 +159,10 @@ class HandMotionGainEnv(GainTuningEnv):
 
     | filter | gains (constant that is scaled) |
     |---|---|
-    | ``external-acceleration`` | ``process`` (σ_G), ``measurement`` (σ_A), ``c_a``: 10⁻³ to 0.5, and never so large that a gyroscope error of 1 °/s would lock the filter out (:mod:`poise.filters.adaptation`) |
+    | ``external-acceleration`` | ``process`` (σ_G), ``measurement`` (σ_A), ``c_a`` (10⁻³ to 0.5) |
     | ``bounded-motion`` | ``process`` (σ_g), ``bias`` (σ_b), ``velocity`` (σ_V) |
+
+    c_a is never so large that a gyroscope error of 1 °/s could lock the filter out (:mod:`poise.filters.adaptation`).
 
     ## Observation space
 
@@ -175,19 +179,21 @@ class HandMotionGainEnv(GainTuningEnv):
 
     ## Start and end
 
-    The filter starts from nothing, so the first observation tells nothing. Truncated when the motion is over; never terminated.
+    The filter starts from nothing, so the first observation tells nothing. Truncated when the motion is over; never
+    terminated.
 
     ## info
 
-    The same at reset and at every step, as of the last tick taken: ``time`` (s), ``pose`` (true ``quantity``), ``truth`` (all that
-    is known), ``estimate`` (outputs of the filter; NaN before it started), ``error_deg`` (mean over the interval; NaN at reset), ``gains``
-    (name → scaled constant).
+    The same at reset and at every step, as of the last tick taken: ``time`` (s), ``pose`` (true ``quantity``),
+    ``truth`` (all that is known), ``estimate`` (outputs of the filter; NaN before it started), ``error_deg`` (mean
+    over the interval; NaN at reset), ``gains`` (name → scaled constant).
 
     ## Arguments
 
-    Those of :class:`GainTuningEnv`, and ``gesture``, ``rate`` (Hz), ``sensors`` (preset), each a single one or several to draw
-    from, ``grade`` (factor on the sensor's errors, or lowest and highest), ``duration`` (s), ``mounting``, ``drive``; see
-    :class:`poise.envs.hand_trajectories.HandTrajectories`. The dynamic drive costs seconds a reset.
+    Those of :class:`GainTuningEnv`, and ``gesture``, ``rate`` (Hz), ``sensors`` (preset), each a single one or
+    several to draw from, ``grade`` (factor on the sensor's errors, or lowest and highest), ``duration`` (s),
+    ``mounting``, ``drive``; see :class:`poise.envs.hand_trajectories.HandTrajectories`. The dynamic drive costs
+    seconds a reset.
 
     ## Version history
 
@@ -198,9 +204,9 @@ class HandMotionGainEnv(GainTuningEnv):
         self,
         filter: str | KalmanFilter = "external-acceleration",
         *,
-        gesture: str | Sequence[str] = "mixed",
+        gesture: str | GestureConfig | Sequence[str | GestureConfig] = "mixed",
         rate: float | Sequence[float] = 100.0,
-        sensors: str | Sequence[str] = "xsens-mtw-awinda",
+        sensors: str | SensorPreset | Sequence[str | SensorPreset] = "xsens-mtw-awinda",
         grade: float | tuple[float, float] = 1.0,
         duration: float = 60.0,
         mounting: Literal["random", "aligned"] = "random",
@@ -229,18 +235,19 @@ class HandMotionGainEnv(GainTuningEnv):
 class ReplayGainEnv(GainTuningEnv):
     """An agent tunes the gains of an attitude filter over recordings, or any trajectories with a known truth.
 
-    Actions, observations, rewards and info are those of :class:`HandMotionGainEnv`; an episode runs through one trajectory, or a part of one.
+    Actions, observations, rewards and info are those of :class:`HandMotionGainEnv`; an episode runs through one
+    trajectory, or a part of one.
 
     ## Start and end
 
-    Each reset draws one of the trajectories and, with a ``duration``, where the episode starts in it. Truncated when the
-    part is over (ticks that fill no interval are left out); never terminated.
+    Each reset draws one of the trajectories and, with a ``duration``, where the episode starts in it. Truncated when
+    the part is over (ticks that fill no interval are left out); never terminated.
 
     ## Arguments
 
-    Those of :class:`GainTuningEnv`, and ``trajectory``: a :class:`poise.Trajectory`, the path of a recording, or a sequence of
-    such; ``duration``: length of an episode, s (None: the whole trajectory). Without a ``trajectory`` a simulated hand motion
-    of a minute stands in, always the same.
+    Those of :class:`GainTuningEnv`, and ``trajectory``: a :class:`poise.Trajectory`, the path of a recording, or a
+    sequence of such; ``duration``: length of an episode, s (None: the whole trajectory). Without a ``trajectory`` a
+    simulated hand motion of a minute stands in, always the same.
 
     ## Version history
 

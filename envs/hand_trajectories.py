@@ -1,20 +1,20 @@
-"""Random trajectories of a hand-held sensor without an environment around them: a whole episode in some milliseconds."""
+"""Random trajectories of a hand-held sensor without an environment around them: an episode in some milliseconds."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any, Literal
 
 import numpy as np
 
 from ..filters import rotation
-from .gestures import gesture_config
+from .gestures import GestureConfig, gesture_config, gesture_name
 from .hand import HandMotionEnv
 from .hand_sensing import simulate_hand
 from .recorder import record
-from .sensor_presets import sensor_preset
+from .sensor_presets import SensorPreset, sensor_preset
 from .suite import imu_suite
 from .trajectory import Trajectory
 
@@ -27,22 +27,23 @@ class HandTrajectories:
     single value stands for a tuple of one.
 
     Attributes:
-        gestures: names of :data:`poise.envs.gestures.GESTURES`.
+        gestures: names of :data:`poise.envs.gestures.GESTURES`, or configurations.
         rates: Hz.
-        sensors: names of sensor presets.
+        sensors: names of sensor presets, or presets.
         grade: lowest and highest factor on all errors of the sensor, drawn log-uniformly.
         duration: s.
         lever_arm: standard deviation of the sensor's place on the body, m an axis.
-        mounting: ``random``: the axes of the sensor are drawn evenly from all rotations; ``aligned``: they are the body's.
-        drive: ``kinematic``: the body follows the gesture exactly; ``dynamic``: forces in the physics world, far slower.
+        mounting: ``random``: the axes of the sensor are drawn evenly from all rotations; ``aligned``: they are the
+        body's. drive: ``kinematic``: the body follows the gesture exactly; ``dynamic``: forces in the physics world,
+        far slower.
 
     Raises:
         ValueError: a name is unknown or a number out of its range.
     """
 
-    gestures: tuple[str, ...] = ("mixed",)
+    gestures: tuple[str | GestureConfig, ...] = ("mixed",)
     rates: tuple[float, ...] = (100.0,)
-    sensors: tuple[str, ...] = ("xsens-mtw-awinda",)
+    sensors: tuple[str | SensorPreset, ...] = ("xsens-mtw-awinda",)
     grade: tuple[float, float] = (1.0, 1.0)
     duration: float = 60.0
     lever_arm: float = 0.05
@@ -57,7 +58,7 @@ class HandTrajectories:
         for gesture in self.gestures:
             gesture_config(gesture)
         for sensor in self.sensors:
-            sensor_preset(sensor)
+            as_preset(sensor)
         if not all(isinstance(rate, int | float) and 1.0 <= rate < math.inf for rate in self.rates):
             raise ValueError(f"rate must be at least 1 Hz and finite, got {list(self.rates)}")
         if len(grade) != 2 or not 0.0 < grade[0] <= grade[1] < math.inf:
@@ -83,7 +84,7 @@ class HandTrajectories:
         choice, episode = generator.spawn(2)
         gesture = self.gestures[choice.integers(len(self.gestures))]
         rate = float(self.rates[choice.integers(len(self.rates))])
-        device = self.sensors[choice.integers(len(self.sensors))]
+        device = as_preset(self.sensors[choice.integers(len(self.sensors))])
         grade = float(np.exp(choice.uniform(*np.log(self.grade))))
         turn = rotation.random(choice)
         axes = turn if self.mounting == "random" else np.array([1.0, 0.0, 0.0, 0.0])
@@ -98,14 +99,26 @@ class HandTrajectories:
                 trajectory = record(env, seed=seed)
             finally:
                 env.close()
-        drawn = {"gesture": gesture, "device": device, "grade": grade, "drive": self.drive}
+        drawn = {"gesture": gesture_name(gesture), "device": device.name, "grade": grade, "drive": self.drive}
         metadata = trajectory.metadata | drawn
         return trajectory.replace(metadata=metadata if name is None else metadata | {"name": name})
+
+    def describe(self) -> dict[str, Any]:
+        """Everything about it, for JSON."""
+        described = {field.name: getattr(self, field.name) for field in fields(self)}
+        described["gestures"] = [gesture_name(gesture) for gesture in self.gestures]
+        described["sensors"] = [as_preset(sensor).name for sensor in self.sensors]
+        return {name: list(value) if isinstance(value, tuple) else value for name, value in described.items()}
 
     def draw_many(self, seed: int, count: int) -> list[Trajectory]:
         """A reproducible set, named ``hand-<seed>-<index>``; a larger ``count`` keeps the first ones."""
         children = np.random.SeedSequence(seed).spawn(count)
         return [self.draw(np.random.default_rng(child), f"hand-{seed}-{index}") for index, child in enumerate(children)]
+
+
+def as_preset(sensor: str | SensorPreset) -> SensorPreset:
+    """The preset of a name, or the preset itself."""
+    return sensor if isinstance(sensor, SensorPreset) else sensor_preset(sensor)
 
 
 def several(name: str, value: Any) -> tuple[Any, ...]:

@@ -1,7 +1,7 @@
 r"""What an agent may choose: bounded actions, one for each gain of a filter, that are log factors on its constants.
 
-An action lies in [−1, 1]; 0 is the published tuning, exactly. Between 0 and ±1 the log factor is linear, with a slope of
-its own on each side (:class:`GainRange`). Variances may change by 10^±3 unless a model has a reason for less.
+An action lies in [−1, 1]; 0 is the published tuning, exactly. Between 0 and ±1 the log factor is linear, with a slope
+of its own on each side (:class:`GainRange`). Variances may change by 10^±3 unless a model has a reason for less.
 
 The constant c_a of :mod:`poise.filters.external_acceleration` has one. A steady tilt error e looks like an
 acceleration g e there: it shrinks the innovation to (1 − c_a) g e and raises the variance M to at least c_a² g² e² / 3.
@@ -10,8 +10,8 @@ With the steady covariance P = Δt σ_G √M / g of small gains, the correction 
     (1 − c_a) g e · Δt σ_G / √M  ≤  Δt · √3 σ_G (1 − c_a) / c_a,
 
 does not grow with e. A gyroscope that drifts faster than √3 σ_G (1 − c_a) / c_a carries the attitude away for good: the
-filter is locked out. :func:`log_gains` therefore keeps c_a so low that a drift of :data:`FOLLOWED_DRIFT` can be followed at
-the σ_G of the same action, and below :data:`LARGEST_C_A` in any case.
+filter is locked out. :func:`log_gains` therefore keeps c_a so low that a drift of :data:`FOLLOWED_DRIFT` can be
+followed at the σ_G of the same action, and below :data:`LARGEST_C_A` in any case.
 """
 
 from __future__ import annotations

@@ -1,18 +1,23 @@
 r"""What a gain policy sees: statistics of innovations and sensors over several times, no truth.
 
-Four streams of vectors are watched tick by tick: the whitened innovation of the filter, the gyroscope, the accelerometer, and the
-external acceleration that the filter believes in (zero where it gives none). Of each, running means of
+Five streams of vectors are watched tick by tick: the whitened innovation of the filter, the gyroscope, the
+accelerometer, the external acceleration a that the filter believes in, and the lean u × a / g with its vertical u
+(both zero where a filter gives none). A steady tilt error τ (b × u), which a gyroscope bias b leaves at a time
+constant τ, is a lean whose mean in sensor axes points along b whatever the attitude, while true accelerations of a
+hand average out. Of each stream, running means of
 
     1,  v,  |v|²,  |v − v_previous|²        and, of the accelerometer,  ‖f‖ − g  and its square
 
-are kept over each time scale; a missing sample adds nothing. An interval of ticks ends with a decision; there the means over the interval m enter
+are kept over each time scale; a missing sample adds nothing. An interval of ticks ends with a decision; there the
+means over the interval m enter
 
     average ← average + (1 − exp(−interval / τ)) (m − average)
 
-and the features are their invariants, independent of how the sensor is mounted: for every stream and scale the logarithms of its
-root mean square, of its deviation from its mean, of the length of its mean, and of its change from tick to tick. A consistent
-filter has innovations of rms √m without a mean; a mean or slow changes show a gain that is too small (R. K. Mehra, "On the
-identification of variances and adaptive Kalman filtering", IEEE Trans. Automatic Control 15(2), 1970).
+and the features are their invariants, independent of how the sensor is mounted: for every stream and scale the
+logarithms of its root mean square, of its deviation from its mean, of the length of its mean, and of its change from
+tick to tick. A consistent filter has innovations of rms √m without a mean; a mean or slow changes show a gain that is
+too small (R. K. Mehra, "On the identification of variances and adaptive Kalman filtering", IEEE Trans. Automatic
+Control 15(2), 1970).
 
 All is squashed to [−1, 1]. One memory serves a batch of sequences.
 """
@@ -28,14 +33,16 @@ import numpy as np
 
 from .kalman import KalmanFilter
 from .quantity import Estimate
+from .rotation import cross
 
-STREAMS = ("innovation", "gyr", "acc", "external")
+STREAMS = ("innovation", "gyr", "acc", "external", "lean")
 STATISTICS = ("rms", "deviation", "mean", "change")
 CENTRES = {
     "innovation": (0.0, 0.0, -0.5, 0.0),
     "gyr": (0.0, -0.5, -0.5, -1.0),
     "acc": (1.0, 0.0, 1.0, 0.0),
     "external": (0.0, 0.0, -0.5, -0.5),
+    "lean": (-1.0, -1.0, -1.5, -1.5),
 }
 """Stream → decimal logarithm of each statistic that is mapped to 0: about the middle of what a hand does."""
 FLOOR = 1e-5
@@ -107,7 +114,7 @@ class InnovationFeatures:
             ValueError: the filter does not read a gyroscope and an accelerometer.
         """
         stream_channels(kalman)
-        widths = (kalman.model.residual_size, 3, 3, 3)
+        widths = stream_widths(kalman)
         moments = sum(width + 3 for width in widths) + 2
         return FeatureMemory(
             np.zeros((*batch, len(self.scales), moments)),
@@ -154,7 +161,7 @@ class InnovationFeatures:
             action: ``(*batch, k)`` in [−1, 1].
         """
         averages, parts, start = memory.averages, [], 0
-        widths = (kalman.model.residual_size, 3, 3, 3)
+        widths = stream_widths(kalman)
         with np.errstate(divide="ignore", invalid="ignore"):
             for stream, width in zip(STREAMS, widths, strict=True):
                 block = averages[..., start : start + width + 3]
@@ -187,8 +194,10 @@ class InnovationFeatures:
         # A whitened innovation is exactly 0 where there was nothing to compare.
         innovation = np.where((innovation != 0.0).any(axis=-1, keepdims=True), innovation, np.nan)
         external = np.asarray(estimate.pose.get("external_acceleration", np.zeros_like(acc)))
+        gravity = getattr(kalman.model, "gravity", 9.81)
+        lean = cross(np.asarray(estimate.pose.get("up", np.zeros_like(acc))), external) / gravity
         parts, last, start = [], [], 0
-        for values in (innovation, gyr, acc, external):
+        for values in (innovation, gyr, acc, external, lean):
             width = values.shape[-1]
             earlier, final = before(values, memory.previous[..., start : start + width])
             start += width
@@ -199,7 +208,7 @@ class InnovationFeatures:
             squares = [np.sum(part * part, axis=-1, keepdims=True) for part in (v, change)]
             parts += [known.astype(float), v, *squares]
         size = np.sqrt(np.sum(acc * acc, axis=-1, keepdims=True))
-        excess = np.where(np.isfinite(size), size - getattr(kalman.model, "gravity", 9.81), 0.0)
+        excess = np.where(np.isfinite(size), size - gravity, 0.0)
         return np.concatenate([*parts, excess, excess * excess], axis=-1), np.concatenate(last, axis=-1)
 
 
@@ -214,6 +223,11 @@ def stream_channels(kalman: KalmanFilter) -> tuple[str, str]:
     if found[0] is None or found[1] is None:
         raise ValueError(f"a tuned filter must read a gyroscope and an accelerometer, this one reads {names}")
     return found[0], found[1]
+
+
+def stream_widths(kalman: KalmanFilter) -> tuple[int, ...]:
+    """Numbers in a vector of every stream."""
+    return (kalman.model.residual_size, *[3] * (len(STREAMS) - 1))
 
 
 def before(values: np.ndarray, held: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -1,4 +1,4 @@
-"""A Kalman filter whose gains somebody chooses, interval by interval: what environments and adaptive estimators share."""
+"""A Kalman filter whose gains somebody chooses while it runs: what environments and adaptive estimators share."""
 
 from __future__ import annotations
 

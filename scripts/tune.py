@@ -1,0 +1,252 @@
+"""Fit the gains of a filter to simulated motions: constant ones, or a policy that sets them while the filter runs."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from datetime import date
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+import tyro
+
+from .experiment import Run, start_run, versions
+from .main import run_command
+
+if TYPE_CHECKING:
+    from ..baselines.constant_gains import ConstantGains
+    from ..baselines.policy import GainPolicy
+    from ..envs.trajectory import Trajectory
+    from ..filters.tuned import TunedFilter
+
+QUICK_STEPS = 100_000
+"""Decisions of ``--preset quick``."""
+TEST_SEED, VALIDATION_SEED = 1, 2
+"""Children of the root seed for trajectories that training never sees."""
+
+
+@dataclass
+class Args:
+    """Arguments of ``poise tune``."""
+
+    filter: tyro.conf.Positional[Literal["external-acceleration", "bounded-motion"]] = "external-acceleration"
+    """filter whose gains are tuned"""
+    method: Literal["ppo", "constant"] = "ppo"
+    """ppo: train a policy that sets the gains while the filter runs; constant: search the best constant gains"""
+    preset: Literal["quick", "shipped"] = "quick"
+    """quick: a minute or two, to see that it works; shipped: the training of the weights in the package"""
+    seed: int = 0
+    """root seed of motions, sensors and training"""
+    steps: int | None = None
+    """decisions to train on, instead of the preset's"""
+    trajectories: int | None = None
+    """simulated trajectories of a minute to train on, instead of the preset's"""
+    test_trajectories: int = 32
+    """simulated trajectories that training never sees, for the comparison"""
+    recordings: tuple[Path, ...] = ()
+    """files or folders of recordings with known orientation to compare on; never trained on"""
+    resume: Path | None = None
+    """run folder of an interrupted training; give the other arguments as then"""
+    export: Path | None = None
+    """file to which the weights are written too"""
+    runs: Path = Path("runs")
+    """where the run folder goes"""
+
+
+def run(args: Args) -> int:
+    """Tune, compare with the published tuning and the best constant gains, and write what was found."""
+    from ..baselines.constant_gains import best_constant_gains
+    from ..baselines.policy import GainPolicy
+    from ..baselines.policy_training import TRAINING_MOTIONS
+    from ..filters.adaptation import tunable_filter
+    from ..filters.tuned import TunedFilter
+
+    tuned = TunedFilter.of(tunable_filter(args.filter))
+    sets = {"simulated": TRAINING_MOTIONS.draw_many(child_seed(args.seed, TEST_SEED), args.test_trajectories)}
+    recorded = load_all(args.recordings)
+    if recorded:
+        sets["recorded"] = recorded
+    folder = start_run("tune", args, args.seed, args.runs) if args.resume is None else resumed(args.resume, args.seed)
+    config = training_config(args)
+    motions = TRAINING_MOTIONS.draw_many(config.seed, min(config.trajectories, 48))
+    print(f"searching constant gains of {args.filter} on {len(motions)} trajectories")
+    constant = best_constant_gains(tuned, motions, seed=args.seed)
+    candidates = {"published": GainPolicy.neutral(tuned), "constant": GainPolicy.constant(tuned, constant.action)}
+    if args.method == "ppo":
+        candidates["policy"] = train(args, folder)
+    rows = compare(tuned, candidates, sets)
+    rows += hindsight_rows(tuned, sets["simulated"], constant)
+    folder.write_results(rows)
+    summary = means(rows, sets)
+    print_summary(summary, args.filter)
+    final = candidates["policy" if args.method == "ppo" else "constant"]
+    card = card_of(args, final, constant, summary)
+    print(f"weights: {final.save(folder.folder / 'policy', card)}")
+    if args.export is not None:
+        print(f"weights: {final.save(args.export, card)}")
+    return 0
+
+
+def training_config(args: Args) -> Any:
+    """The configuration that the arguments ask for."""
+    from ..baselines.policy_training import TrainingConfig, shipped_config
+
+    if args.preset == "shipped":
+        config = shipped_config(args.filter)
+    else:
+        config = TrainingConfig(filter=args.filter, steps=QUICK_STEPS, trajectories=48, search=16)
+    from dataclasses import replace
+
+    given = {name: getattr(args, name) for name in ("steps", "trajectories")}
+    return replace(config, seed=args.seed, **{name: value for name, value in given.items() if value is not None})
+
+
+def child_seed(seed: int, child: int) -> int:
+    """A seed that shares nothing with the training's."""
+    return int(np.random.SeedSequence(seed, spawn_key=(child,)).generate_state(1)[0])
+
+
+def load_all(paths: tuple[Path, ...]) -> list[Trajectory]:
+    """Recordings of files and folders that know an orientation or the vertical.
+
+    Raises:
+        ValueError: paths are given but hold none.
+    """
+    from ..envs.recordings import find_recordings, load_recording
+
+    files = [path for item in paths for path in (find_recordings(item) if item.is_dir() else [item])]
+    loaded = [load_recording(path) for path in files]
+    usable = [trajectory for trajectory in loaded if "up" in trajectory.quantities]
+    if paths and not usable:
+        raise ValueError(f"no recording with a known orientation in {', '.join(map(str, paths))}")
+    return usable
+
+
+def resumed(folder: Path, seed: int) -> Run:
+    """The run that is gone on with.
+
+    Raises:
+        FileNotFoundError: there is no such folder.
+    """
+    if not folder.is_dir():
+        raise FileNotFoundError(f"there is no run folder {folder}")
+    return Run(folder, "tune", seed)
+
+
+def train(args: Args, folder: Run) -> GainPolicy:
+    """Train a policy with a bar; the best look at validation trajectories is kept."""
+    from tqdm import tqdm
+
+    from ..baselines.constant_gains import policy_errors
+    from ..baselines.policy_training import TRAINING_MOTIONS, train_policy
+    from ..filters.adaptation import tunable_filter
+
+    config, kalman = training_config(args), tunable_filter(args.filter)
+    unseen = TRAINING_MOTIONS.draw_many(child_seed(args.seed, VALIDATION_SEED), 24)
+    with tqdm(total=config.steps, desc=f"tune {args.filter}", unit="step") as bar:
+
+        def report(progress: Mapping[str, float]) -> None:
+            bar.update(int(progress["steps"]) - bar.n)
+            bar.set_postfix(gain_deg=f"{progress['gain_deg']:.3f}")
+
+        return train_policy(
+            config,
+            folder=folder.folder,
+            resume=args.resume is not None,
+            report=report,
+            validate=lambda policy: float(np.mean(policy_errors(kalman, policy, unseen))),
+        )
+
+
+def compare(
+    tuned: TunedFilter, candidates: Mapping[str, GainPolicy], sets: Mapping[str, Sequence[Trajectory]]
+) -> list[dict[str, Any]]:
+    """Errors of every candidate on every trajectory, as rows of results."""
+    from ..baselines.constant_gains import policy_errors
+
+    return [
+        row(name, trajectory, value)
+        for trajectories in sets.values()
+        for name, policy in candidates.items()
+        for trajectory, value in zip(trajectories, policy_errors(tuned.kalman, policy, trajectories), strict=True)
+    ]
+
+
+def hindsight_rows(
+    tuned: TunedFilter, trajectories: Sequence[Trajectory], constant: ConstantGains, points: int = 64
+) -> list[dict[str, Any]]:
+    """Errors of the best constant gains of each trajectory, chosen knowing the truth: a bound, no method."""
+    from ..baselines.constant_gains import constant_errors
+
+    spread = np.argsort(constant.scores.mean(axis=1))[:points]
+    errors = np.stack([constant_errors(tuned, trajectories, constant.tried[index]) for index in spread])
+    return [
+        row("hindsight", trajectory, value) for trajectory, value in zip(trajectories, errors.min(axis=0), strict=True)
+    ]
+
+
+def row(name: str, trajectory: Trajectory, error: float) -> dict[str, Any]:
+    """One row of results."""
+    return {
+        "estimator": name,
+        "trajectory": trajectory.name,
+        "quantity": "up",
+        "metric": "inclination",
+        "value": float(np.degrees(error)),
+        "unit": "deg",
+    }
+
+
+def means(rows: list[dict[str, Any]], sets: Mapping[str, Sequence[Trajectory]]) -> dict[str, dict[str, float]]:
+    """Estimator → set of trajectories → mean error, deg."""
+    table: dict[str, dict[str, float]] = {}
+    for group, trajectories in sets.items():
+        names = {trajectory.name for trajectory in trajectories}
+        for estimator in dict.fromkeys(entry["estimator"] for entry in rows):
+            values = [e["value"] for e in rows if e["estimator"] == estimator and e["trajectory"] in names]
+            if values:
+                table.setdefault(estimator, {})[group] = round(float(np.mean(values)), 4)
+    return table
+
+
+def print_summary(summary: Mapping[str, Mapping[str, float]], filter: str) -> None:
+    """A table on the terminal: gains a row, a set of trajectories a column."""
+    from .tables import print_table
+
+    rows = [{"gains": name, **values} for name, values in summary.items()]
+    print_table(rows, f"Inclination error of {filter}, mean of RMS over trajectories, deg")
+
+
+def card_of(
+    args: Args, policy: GainPolicy, constant: ConstantGains, summary: Mapping[str, Mapping[str, float]]
+) -> dict[str, Any]:
+    """What the policy is and how it came about."""
+    return {
+        "name": f"{args.filter.replace('-', '_')}_policy",
+        "description": f"sets the gains of the {args.filter} filter while it runs",
+        "estimator": "poise.baselines.adaptive.AdaptiveEstimator",
+        "method": args.method,
+        "command": command_of(args),
+        "data": "simulated hand motions",
+        **policy.card,
+        "best_constant": [round(float(value), 4) for value in constant.action],
+        "test_inclination_deg": {name: dict(values) for name, values in summary.items()},
+        "versions": versions(("numpy", "numba", "torch", "stable-baselines3", "scipy")),
+        "date": date.today().isoformat(),
+        "licence": "MIT",
+    }
+
+
+def command_of(args: Args) -> str:
+    """The command line that gives these gains again."""
+    words = ["poise", "tune", args.filter, "--method", args.method, "--preset", args.preset, "--seed", str(args.seed)]
+    for name in ("steps", "trajectories"):
+        if getattr(args, name) is not None:
+            words += [f"--{name}", str(getattr(args, name))]
+    return shlex.join(words)
+
+
+if __name__ == "__main__":
+    run_command("tune")

@@ -1,0 +1,308 @@
+"""Environments in which an agent tunes a filter: what is theirs beyond the contract of all environments."""
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+import poise
+from poise.envs.gain_tuning import GainTuningEnv, HandMotionGainEnv, ReplayGainEnv
+from poise.envs.hand_trajectories import HandTrajectories
+from poise.filters.adaptation import (
+    FOLLOWED_DRIFT,
+    LARGEST_C_A,
+    followable_c_a,
+    gain_ranges,
+    gain_sizes,
+    log_gains,
+    tunable_filter,
+)
+from poise.filters.bounded_motion import BoundedMotion
+from poise.filters.external_acceleration import ExternalAcceleration
+from poise.filters.innovation_features import InnovationFeatures
+from poise.filters.kalman import KalmanFilter
+from poise.filters.metrics import direction_error
+from poise.filters.tuned import TunedFilter
+
+FILTERS = ("external-acceleration", "bounded-motion")
+FAMILIES = ("constant", "random")
+
+
+@pytest.fixture(scope="module")
+def trajectory():
+    return HandTrajectories(duration=6.0).draw_many(5, 1)[0]
+
+
+def play(env, policy, seed=0):
+    """Rewards and infos of one episode."""
+    observation, info = env.reset(seed=seed)
+    rewards, infos, over = [], [info], False
+    while not over:
+        observation, reward, terminated, truncated, info = env.step(policy(observation))
+        rewards.append(reward)
+        infos.append(info)
+        over = terminated or truncated
+        assert env.observation_space.contains(observation)
+    return rewards, infos
+
+
+@pytest.mark.parametrize("name", FILTERS)
+def test_zero_action_is_the_published_tuning_bit_by_bit(name, trajectory):
+    env = ReplayGainEnv(trajectory, name)
+    _, infos = play(env, lambda observation: env.neutral_action)
+    plain = tunable_filter(name).with_dt(trajectory.dt).run(trajectory.measurements)
+    ticks = env.tuned.ticks * np.arange(1, len(infos)) - 1
+    for output in env.tuned.kalman.outputs:
+        said = np.stack([info["estimate"][output.name] for info in infos[1:]])
+        np.testing.assert_array_equal(said, plain.pose[output.name][ticks])
+    errors = direction_error(plain.pose["up"], trajectory.truth_of("up"))
+    means = errors[: len(ticks) * env.tuned.ticks].reshape(len(ticks), -1).mean(axis=1)
+    np.testing.assert_allclose([info["error_deg"] for info in infos[1:]], np.degrees(means), rtol=1e-12)
+
+
+@pytest.mark.parametrize("name", FILTERS)
+def test_reward_is_minus_the_error_or_the_improvement(name, trajectory):
+    def choose(observation):
+        return np.array([0.5, -0.5, 0.2], np.float32)
+
+    errors, infos = play(ReplayGainEnv(trajectory, name), choose)
+    np.testing.assert_allclose(errors, [-np.radians(info["error_deg"]) for info in infos[1:]], rtol=1e-12)
+    published, _ = play(ReplayGainEnv(trajectory, name), lambda observation: np.zeros(3, np.float32))
+    better, _ = play(ReplayGainEnv(trajectory, name, reward="improvement"), choose)
+    np.testing.assert_allclose(better, np.subtract(errors, published), atol=1e-12)
+    nothing, _ = play(
+        ReplayGainEnv(trajectory, name, reward="improvement"), lambda observation: np.zeros(3, np.float32)
+    )
+    assert not np.any(nothing)
+
+
+def test_consistency_costs(trajectory):
+    plain, _ = play(ReplayGainEnv(trajectory), lambda observation: np.zeros(3))
+    strict, _ = play(ReplayGainEnv(trajectory, consistency=0.1), lambda observation: np.zeros(3))
+    assert np.all(np.array(strict) <= np.array(plain))
+    assert np.mean(strict) < np.mean(plain)
+
+
+def test_unscored_and_unknown_ticks_do_not_count(trajectory):
+    mask = np.ones(len(trajectory), bool)
+    mask[:300] = False
+    truth = {"up": trajectory.truth_of("up").copy()}
+    truth["up"][300:] = np.nan
+    rewards, infos = play(ReplayGainEnv(trajectory.replace(mask=mask, truth=truth)), lambda observation: np.ones(3))
+    assert rewards == [0.0] * len(rewards)
+    assert np.isnan([info["error_deg"] for info in infos]).all()
+
+
+def test_the_agent_sees_nothing_of_the_truth(trajectory):
+    other = trajectory.replace(truth={"up": np.roll(trajectory.truth_of("up"), 1, axis=1)})
+    seen = []
+    for item in (trajectory, other):
+        env = ReplayGainEnv(item)
+        observations = [env.reset()[0]]
+        observations += [env.step(np.array([0.1, 0.2, 0.3]))[0] for _ in range(20)]
+        seen.append(observations)
+    np.testing.assert_array_equal(seen[0], seen[1])
+
+
+def test_the_interval_is_kept_at_any_rate():
+    for rate, ticks in ((50.0, 5), (100.0, 10), (286.0, 29)):
+        env = HandMotionGainEnv(rate=rate, duration=2.0)
+        _, infos = play(env, lambda observation: np.zeros(3))
+        assert env.tuned.ticks == ticks
+        assert np.allclose(np.diff([info["time"] for info in infos[1:]]), ticks / rate)
+    assert TunedFilter.of(tunable_filter("bounded-motion"), None, InnovationFeatures(1e-3)).ticks == 1
+
+
+def test_motion_and_setting_follow_the_seed():
+    options = {"gesture": ("slow", "fast"), "rate": (50.0, 100.0), "grade": (0.5, 2.0), "duration": 3.0}
+    one, two = HandMotionGainEnv(**options), HandMotionGainEnv(**options)
+    settings = set()
+    for seed in range(8):
+        one.reset(seed=seed)
+        two.reset(seed=seed)
+        assert one.trajectory.metadata == two.trajectory.metadata
+        np.testing.assert_array_equal(one.trajectory.measurements["imu/acc"], two.trajectory.measurements["imu/acc"])
+        settings.add((one.trajectory.metadata["gesture"], one.trajectory.metadata["rate"]))
+    assert len(settings) > 2
+
+
+def test_the_dynamic_drive_is_the_same_motion():
+    kinematic, dynamic = (
+        HandTrajectories(duration=2.0, drive=kind).draw_many(0, 1)[0] for kind in ("kinematic", "dynamic")
+    )
+    assert np.degrees(np.max(direction_error(kinematic.truth_of("up"), dynamic.truth_of("up")))) < 0.1
+    env = HandMotionGainEnv(duration=1.0, drive="dynamic")
+    play(env, lambda observation: np.zeros(3))
+
+
+def test_replay_draws_parts_of_several_trajectories():
+    both = HandTrajectories(duration=5.0, rates=(50.0, 100.0)).draw_many(3, 4)
+    env = ReplayGainEnv(both, duration=1.0)
+    env.reset(seed=0)
+    starts = set()
+    for _ in range(20):
+        _, info = env.reset()
+        starts.add((env.trajectory.name, info["time"]))
+        assert len(env.trajectory) == round(1.0 / env.trajectory.dt)
+    assert len(starts) > 10
+
+
+def test_recordings_are_read_from_files(tmp_path, trajectory):
+    path = trajectory.save(tmp_path / "one.h5")
+    rewards, _ = play(gym.make("poise/ReplayGain-v0", trajectory=path), lambda observation: np.zeros(3, np.float32))
+    assert len(rewards) == len(trajectory) // 10
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ({"filter": "kalman"}, "unknown filter 'kalman'; known are external-acceleration"),
+        ({"filter": 3}, "filter must be one of"),
+        ({"gains": ("process", "cheek")}, "gains must be different ones of"),
+        ({"gains": ()}, "gains must be different ones of"),
+        ({"quantity": "position"}, "quantity must be one of"),
+        ({"interval": 0.0}, "interval must be positive"),
+        ({"reward": "fame"}, "reward must be"),
+        ({"consistency": -1.0}, "consistency must be"),
+        ({"gesture": "wave"}, "unknown gesture 'wave'"),
+        ({"sensors": "nose"}, "name must be one of"),
+        ({"rate": 0.0}, "rate must be at least 1 Hz"),
+        ({"rate": ()}, "rates must not be empty"),
+        ({"grade": (2.0, 1.0)}, "grade must be"),
+        ({"duration": 0.05}, "duration must be one interval at least"),
+        ({"drive": "magnetic"}, "drive must be one of"),
+        ({"mounting": "upside-down"}, "mounting must be one of"),
+        ({"render_mode": "human"}, "render_mode must be None"),
+    ],
+)
+def test_wrong_arguments_are_explained(arguments, words):
+    with pytest.raises(ValueError, match=words):
+        HandMotionGainEnv(**arguments)
+
+
+def test_wrong_calls_are_explained(trajectory):
+    env = ReplayGainEnv(trajectory)
+    with pytest.raises(RuntimeError, match="call reset first"):
+        env.step(np.zeros(3))
+    env.reset()
+    for action in (np.zeros(2), np.full(3, np.nan), np.zeros((1, 3))):
+        with pytest.raises(ValueError, match="action must hold 3 finite numbers"):
+            env.step(action)
+    with pytest.raises(ValueError, match="at least one trajectory"):
+        ReplayGainEnv([])
+    with pytest.raises(ValueError, match="knows no 'up'"):
+        ReplayGainEnv(trajectory.replace(truth={}))
+    with pytest.raises(ValueError, match="one interval at least"):
+        ReplayGainEnv(trajectory[:5])
+    with pytest.raises(ValueError, match="lacks the channels"):
+        ReplayGainEnv(trajectory.replace(measurements={"imu/gyr": trajectory.measurements["imu/gyr"]})).reset()
+    with pytest.raises(NotImplementedError):
+        GainTuningEnv().reset()
+
+
+# ---- what actions mean -----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", FILTERS)
+def test_actions_reach_the_documented_ranges(name):
+    model = tunable_filter(name).model
+    ranges = gain_ranges(tunable_filter(name))
+    for sign in (-1.0, 1.0):
+        sizes = gain_sizes(model, log_gains(model, ranges, np.full(len(ranges), sign)))
+        for gain, size in sizes.items():
+            if gain == "c_a":
+                assert size == pytest.approx(LARGEST_C_A if sign > 0 else 1e-3)
+            else:
+                published = getattr(model, model.gains[gain].parameter)
+                assert (size / published) ** 2 == pytest.approx(10.0 ** (3.0 * sign))
+    assert all(not np.any(factor) for factor in log_gains(model, ranges, np.zeros((4, len(ranges)))).values())
+
+
+def drifted(c_a, process, bias, seconds=120.0):
+    """Final error, deg, of a sensor at rest whose gyroscope has a bias from the 20th second on."""
+    model = ExternalAcceleration(c_a=c_a, gyroscope_noise=process)
+    length = int(seconds * 100)
+    gyr = np.zeros((length, 3))
+    gyr[2000:, 0] = bias
+    acc = np.broadcast_to([0.0, 0.0, model.gravity], gyr.shape)
+    up = KalmanFilter(model).run({"imu/gyr": gyr, "imu/acc": acc}).pose["up"]
+    return float(np.degrees(direction_error(up[-1], np.array([0.0, 0.0, 1.0]))))
+
+
+@pytest.mark.parametrize("process", [1e-3, 3e-3, 1e-2])
+def test_no_action_locks_the_filter_out(process):
+    """The bound of the closed form is where the filter is lost in simulation, and actions stay below it."""
+    limit = followable_c_a(process)
+    assert drifted(limit, process, 0.8 * FOLLOWED_DRIFT) < 10.0
+    assert drifted(limit, process, 1.5 * FOLLOWED_DRIFT) > 20.0
+    kalman = tunable_filter("external-acceleration")
+    rng = np.random.default_rng(0)
+    actions = rng.uniform(-1.0, 1.0, (1000, 3))
+    sizes = gain_sizes(kalman.model, log_gains(kalman.model, gain_ranges(kalman), actions))
+    assert np.all(sizes["c_a"] <= followable_c_a(sizes["process"]) + 1e-12)
+    assert np.all(sizes["c_a"] <= LARGEST_C_A)
+
+
+def test_a_tuning_beyond_the_bound_can_still_be_published():
+    kalman = KalmanFilter(ExternalAcceleration(c_a=0.7))
+    assert not any(log_gains(kalman.model, gain_ranges(kalman), np.zeros(3)).values())
+
+
+# ---- what the agent sees ---------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", FILTERS)
+def test_features_do_not_depend_on_the_mounting(name):
+    base = HandTrajectories(duration=8.0, mounting="aligned", lever_arm=0.0, sensors="ideal").draw_many(2, 1)[0]
+    turn = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+    seen = []
+    for axes in (np.eye(3), turn):
+        measurements = {channel: base.measurements[channel] @ axes.T for channel in ("imu/gyr", "imu/acc")}
+        tuned = TunedFilter.of(tunable_filter(name)).with_dt(base.dt)
+        state = tuned.init({channel: values[0] for channel, values in measurements.items()})
+        for start in range(0, 780, 10):
+            _, state = tuned.advance(state, {key: values[start : start + 10] for key, values in measurements.items()})
+        seen.append(tuned.observe(state))
+    names = InnovationFeatures().names
+    # whitening by a Cholesky factor depends on the axes, its length does not
+    same = [
+        index
+        for index, feature in enumerate(names)
+        if not feature.startswith(("innovation dev", "innovation mean", "innovation ch"))
+    ]
+    np.testing.assert_allclose(seen[0][same], seen[1][same], atol=1e-3)
+
+
+def test_features_tell_rest_from_motion_and_have_names():
+    names = InnovationFeatures().names
+    tuned = TunedFilter.of(tunable_filter("external-acceleration"))
+    assert len(names) + tuned.actions == tuned.observation_size == HandMotionGainEnv().observation_space.shape[0]
+    last = {}
+    for gesture in ("rest", "fast"):
+        env = HandMotionGainEnv(gesture=gesture, duration=3.0)
+        observation, _ = env.reset(seed=1)
+        for _ in range(20):
+            observation, *_ = env.step(env.neutral_action)
+        last[gesture] = dict(zip(names, observation, strict=False))
+    for feature in ("gyr deviation 0.3 s", "acc deviation 0.3 s", "acc change 0 s", "norm excess rms 1 s"):
+        assert last["fast"][feature] > last["rest"][feature] + 0.3
+
+
+def test_a_filter_of_ones_own_can_be_tuned():
+    env = HandMotionGainEnv(KalmanFilter(BoundedMotion(velocity_bound=2.0)), gains=("velocity",), duration=2.0)
+    _, infos = play(env, lambda observation: np.ones(1))
+    assert infos[-1]["gains"] == {"velocity": pytest.approx(2.0 * 10.0**1.5)}
+
+
+def test_samples_that_are_missing_do_no_harm(trajectory):
+    holes = {name: values.copy() for name, values in trajectory.measurements.items()}
+    holes["imu/acc"][100:160] = np.nan
+    holes["imu/gyr"][::7] = np.nan
+    holes["imu/acc"][:5] = np.nan
+    rewards, infos = play(ReplayGainEnv(trajectory.replace(measurements=holes)), lambda observation: np.ones(3))
+    assert np.isfinite(rewards).all()
+    assert np.isfinite(infos[-1]["error_deg"])
+
+
+def test_the_package_registers_them():
+    assert {"poise/HandMotionGain-v0", "poise/ReplayGain-v0"} <= set(gym.registry)
+    assert poise.__version__
