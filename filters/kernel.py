@@ -7,6 +7,26 @@ The text of this file is put in front of the traced equations of a model and com
 import numpy as np
 
 
+def fill(array, value):  # type: ignore[no-untyped-def]
+    """Every element of a vector ← value; loops compile faster than slices."""
+    for i in range(array.shape[0]):
+        array[i] = value
+
+
+def copy(source, target):  # type: ignore[no-untyped-def]
+    """A vector into another."""
+    for i in range(source.shape[0]):
+        target[i] = source[i]
+
+
+def finite(array):  # type: ignore[no-untyped-def]
+    """Whether every element of a vector is finite."""
+    for i in range(array.shape[0]):
+        if not np.isfinite(array[i]):
+            return False
+    return True
+
+
 def propagate(F, P, Q, work):  # type: ignore[no-untyped-def]
     """P ← F P Fᵀ + Q in place; ``work`` is scratch of the size of P."""
     e = P.shape[0]

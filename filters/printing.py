@@ -48,7 +48,7 @@ def run(x, {state}held, started, Z, parameters, poses{outputs}):
             if started[b]:
                 pose(x[b], p, poses[t, b])
             else:
-                poses[t, b, :] = np.nan
+                fill(poses[t, b], np.nan)
             {keep}
 '''
 
@@ -67,11 +67,12 @@ _KALMAN = {
                 finish(x0, z, p, x[b])""",
     "begin": """prior(current, p, x0, P0)
                 nis[t, b] = 0.0
-                whites[t, b, :] = 0.0
-                if np.all(np.isfinite(x0)) and np.all(np.isfinite(P0)):
+                fill(whites[t, b], 0.0)
+                if finite(x0) and finite(P0.ravel()):
                     started[b] = True
-                    x[b, :] = x0
-                    P[b, :, :] = P0""",
+                    copy(x0, x[b])
+                    for i in range(e):
+                        copy(P0[i], P[b, i])""",
     "keep": """if covariances.shape[0] > 0:
                 for i in range(e):
                     for j in range(e):
@@ -85,9 +86,9 @@ _RECURRENCE = {
     "advance": """predict(x[b], present, before, p, x1)
                 finish(x1, z, p, x[b])""",
     "begin": """prior(current, p, x0)
-                if np.all(np.isfinite(x0)):
+                if finite(x0):
                     started[b] = True
-                    x[b, :] = x0""",
+                    copy(x0, x[b])""",
     "keep": "",
 }
 
@@ -147,7 +148,7 @@ def print_model(model: Equations) -> str:
                 where = f"{type(model).__name__}.{signature.split('(')[0]}"
                 raise ValueError(f"{where}: {name} must have shape {shapes[name]}, got {np.shape(array)}")
         # Zeros are not printed; matrices keep theirs between calls, vectors share their memory and are cleared.
-        clear = [f"    {name}[:] = 0.0" for name in outputs if name in ("xn", "out", "r")]
+        clear = [f"    fill({name}, 0.0)" for name in outputs if name in ("xn", "out", "r")]
         code = print_code({name: np.asarray(array, dtype=object) for name, array in outputs.items()})
         lines += ['@njit(error_model="numpy")', f"def {signature}:", *clear, *code, "    return", ""]
     return "\n".join([*lines, _TICK.format(**template)])
