@@ -74,10 +74,16 @@ class LearnedEstimator:
         """The estimator of a weights file or of shipped weights.
 
         Raises:
-            FileNotFoundError, ValueError: see :func:`~poise.baselines.weights_io.load_weights`.
+            FileNotFoundError: there are no such weights.
+            ValueError: they are damaged, or are those of something else.
         """
         arrays, card = load_weights(path_or_name)
-        return cls(GruNetwork.from_arrays(arrays), LevelFrame(**{**card.get("front_end", {}), "dt": dt}))
+        network = GruNetwork.from_arrays(arrays)
+        try:
+            frame = LevelFrame(**{**card.get("front_end", {}), "dt": dt})
+        except TypeError as reason:
+            raise ValueError(f"{path_or_name}: the card tells of another front end ({reason})") from None
+        return cls(network, frame)
 
     @property
     def dt(self) -> float:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import subprocess
 import sys
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from poise.baselines.gru import NAMES, GruNetwork
 from poise.baselines.gru_module import GruModule
 from poise.baselines.learned import LearnedEstimator, LearnedState, shipped
 from poise.baselines.level_frame import FEATURES
+from poise.baselines.weights_io import save_weights
 from poise.envs.gestures import make_gesture
 from poise.envs.suite import imu_suite
 from poise.envs.trajectory import Trajectory
@@ -98,6 +100,17 @@ def test_weights_of_another_network_are_refused(module: GruModule) -> None:
         GruNetwork.from_arrays({name: array for name, array in arrays.items() if name != "output.bias"})
     with pytest.raises(ValueError, match="input_weight must have shape"):
         GruNetwork.from_arrays(arrays | {"input.weight": arrays["input.weight"][:, 1:]})
+
+
+def test_what_is_no_such_network_is_not_loaded(module: GruModule, tmp_path: Path) -> None:
+    other = save_weights(tmp_path / "policy", {"0.weight": np.zeros(3)}, {})
+    with pytest.raises(ValueError, match="hold the arrays"):
+        LearnedEstimator.load(other)
+    old = save_weights(tmp_path / "old", module.arrays(), {"front_end": {"gain": 1.0}})
+    with pytest.raises(ValueError, match="another front end"):
+        LearnedEstimator.load(old)
+    slower = save_weights(tmp_path / "slower", module.arrays(), {"front_end": {"interval": 0.1}})
+    assert LearnedEstimator.load(slower, dt=0.08).frame.interval == 0.1
 
 
 def test_stepping_is_running(network: GruNetwork, episode: Trajectory) -> None:
