@@ -30,6 +30,7 @@ class Args:
 
 def run(args: Args) -> int:
     """Evaluate, print the table, and leave a run folder."""
+    from ..baselines.benchmark import groups_of
     from ..baselines.evaluation import evaluate
     from ..baselines.zoo import list_estimators
     from ..envs.recordings import find_recordings, load_recording
@@ -44,7 +45,7 @@ def run(args: Args) -> int:
     table = evaluate(list(names), trajectories, reference=args.reference, progress=not args.json)
     folder = start_run("evaluate", args, args.seed, args.runs)
     folder.write_results(table)
-    print_comparison(table, folder, as_json=args.json)
+    print_comparison(table, folder, as_json=args.json, groups=groups_of(trajectories))
     return 0
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import statistics
 import sys
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
@@ -21,6 +22,9 @@ TITLES = {
     "total": "Total orientation error, RMS, deg",
 }
 """Metric → title; other metrics get their name."""
+
+MOST_COLUMNS = 8
+"""Groups that a terminal shows one by one; the report has them all."""
 
 
 def kinds_of(labels: Any) -> dict[str, str]:
@@ -47,6 +51,17 @@ def wide_tables(table: pandas.DataFrame, groups: Mapping[str, str] | None = None
             for name, row in wide.iterrows()
         ]
     return tables
+
+
+def narrow(row: Mapping[str, Any]) -> dict[str, Any]:
+    """A row that fits a terminal: with many groups only their mean, median and largest."""
+    numbers = [value for value in row.values() if isinstance(value, float)]
+    if len(numbers) <= MOST_COLUMNS:
+        return dict(row)
+    *groups, mean = numbers
+    texts = {name: value for name, value in row.items() if not isinstance(value, float)}
+    finite = [value for value in groups if value == value]
+    return {**texts, "mean": mean, "median": statistics.median(finite), "largest": max(finite)}
 
 
 def skipped_text(table: pandas.DataFrame) -> str:
@@ -83,7 +98,7 @@ def print_comparison(
     for title, rows in wide_tables(table, groups).items():
         heading = f"{name}: {title}" if name else title
         if not as_json:
-            print_table(rows, heading)
+            print_table([narrow(row) for row in rows], heading)
         sections[heading] = markdown_table(rows)
     for metric in table.loc[table["unit"] == "deg", "metric"].unique():
         figure = rms_bars(table, kinds_of(table["estimator"].unique()), metric, name)
