@@ -15,7 +15,7 @@ import numpy as np
 
 from ...filters import rotation
 from ..physics import BASE, Physics
-from ..sensors import BodyState
+from ..sensors import BodyState, straight_line
 from .drivetrain import Drivetrain
 from .multibody import CentreMotion, Multibody, newton_euler
 from .parameters import BicycleParameters, RigidPart
@@ -62,7 +62,7 @@ class BicycleMemory:
     """What the bicycle remembers besides PyBullet's state."""
 
     bristles: tuple[tuple[float, float], ...]
-    slipped: float
+    drivetrain: tuple[float, float, float] | None
     tyre_forces: tuple[TyreForce, ...]
 
 
@@ -131,6 +131,7 @@ class Bicycle:
         self.tyre_forces: list[TyreForce] = [AIRBORNE, AIRBORNE]
         self.drivetrain = None if parameters.drive is None else Drivetrain(parameters.drive)
         self.links = self.body.links
+        self._pose = self._pose_lines()
         self._wheels = self.body.index(WHEELS)
         self._driven = [self.links[name] for name in ("rear_wheel", "crank") if name in self.links]
         self._joints = [self.links["front_assembly"], *self._driven]
@@ -147,7 +148,7 @@ class Bicycle:
     @property
     def ratio(self) -> float:
         """Turns of the rear wheel a turn of the crank (0 without a crank)."""
-        return 0.0 if self.drivetrain is None else self.drivetrain.parameters.ratio
+        return 0.0 if self.drivetrain is None else self.drivetrain.ratio
 
     def static_loads(self) -> tuple[float, float]:
         """Weight (N) on the rear and the front tyre, at rest on level ground with the tyres' deflection."""
@@ -210,8 +211,9 @@ class Bicycle:
         for name, rate in zip(WHEELS, rates, strict=True):
             self.body.set_joint(self.links[name], 0.0, rate)
         if self.drivetrain is not None:
-            self.body.set_joint(self.links["crank"], crank, rates[0] / self.drivetrain.parameters.ratio)
-            self.drivetrain.engage(crank, 0.0)
+            ratio = self.drivetrain.gear_for(rates[0])
+            self.body.set_joint(self.links["crank"], crank, rates[0] / ratio)
+            self.drivetrain.engage(crank, 0.0, ratio)
         self.tyre_forces = [AIRBORNE, AIRBORNE]
 
     def act(
@@ -253,17 +255,20 @@ class Bicycle:
         own = (steer_torque, wheel_torque + pull, crank_torque - self.ratio * pull)
         body.drive_joints([*self._joints, *joints], [*own, *torques])
 
+    def shift(self) -> None:
+        """Let the rider change the gear where the cadence asks for it."""
+        if self.drivetrain is not None:
+            (wheel, wheel_rate), (crank, _) = self.body.joint_tuples(self._driven)
+            self.drivetrain.shift(self.physics.time, crank, wheel, wheel_rate)
+
     def state(self) -> BicycleState:
         """Where the bicycle is and how it moves, now."""
-        frame = self.physics.state(self.body.body)
-        x, y, z = frame.position.tolist()
-        yaw, pitch, roll = (float(angle) for angle in rotation.to_euler_zyx(frame.orientation))
-        p, q, r = rotation.rotate_back(frame.orientation, frame.angular_velocity).tolist()
-        turn = q * math.sin(roll) + r * math.cos(roll)
+        motion, angles = self._pose(*self.physics.base_tuples(self.body.body))
+        x, y, z, speed, roll_rate, pitch_rate, yaw_rate = motion
+        roll, pitch, yaw = angles
         joints = self.body.joint_tuples(self._joints)
         (steer, steer_rate), (_, wheel_rate) = joints[0], joints[1]
         crank, crank_rate = joints[2] if len(joints) > 2 else (0.0, 0.0)
-        vx, vy, _ = frame.velocity.tolist()
         return BicycleState(
             self.physics.time,
             x,
@@ -272,16 +277,39 @@ class Bicycle:
             roll,
             pitch,
             yaw,
-            p + math.tan(pitch) * turn,
-            q * math.cos(roll) - r * math.sin(roll),
-            turn / math.cos(pitch),
-            vx * math.cos(yaw) + vy * math.sin(yaw),
+            roll_rate,
+            pitch_rate,
+            yaw_rate,
+            speed,
             steer,
             steer_rate,
             crank,
             crank_rate,
             wheel_rate,
         )
+
+    def _pose_lines(self) -> Callable[..., list[list[float]]]:
+        """Function of the base's centre-of-mass motion: place, speed and rates ``(7,)``; roll, pitch, yaw ``(3,)``."""
+        centre, axes = self.physics.inertial_frame(self.body.body)
+
+        def compute(position, orientation, velocity, turning):  # type: ignore[no-untyped-def]
+            xp = rotation.namespace(position)
+            frame = rotation.multiply(orientation, rotation.conjugate(axes))
+            lever = rotation.rotate(frame, centre)
+            origin, velocity = position - lever, velocity - rotation.cross(turning, lever)
+            yaw, pitch, roll = rotation.to_euler_zyx(frame)
+            rate = rotation.rotate_back(frame, turning)
+            p, q, r = rate[..., 0], rate[..., 1], rate[..., 2]
+            turn = q * xp.sin(roll) + r * xp.cos(roll)
+            speed = velocity[..., 0] * xp.cos(yaw) + velocity[..., 1] * xp.sin(yaw)
+            roll_rate = p + xp.sin(pitch) / xp.cos(pitch) * turn
+            pitch_rate = q * xp.cos(roll) - r * xp.sin(roll)
+            rates = [speed, roll_rate, pitch_rate, turn / xp.cos(pitch)]
+            return xp.stack([origin[..., 0], origin[..., 1], origin[..., 2], *rates], axis=-1), xp.stack(
+                [roll, pitch, yaw], axis=-1
+            )
+
+        return straight_line(compute, position=3, orientation=4, velocity=3, turning=3)
 
     def ground_wrench(self, point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Force (N) of the ground on both tyres in the last step and its moment (N·m) about ``point``, world axes."""
@@ -300,13 +328,13 @@ class Bicycle:
 
     def save(self) -> BicycleMemory:
         """Tyre and chain memory; the rest is in :meth:`Physics.save`."""
-        slipped = 0.0 if self.drivetrain is None else self.drivetrain.slipped
-        return BicycleMemory(tuple(tyre.bristles for tyre in self.tyres), slipped, tuple(self.tyre_forces))
+        drivetrain = None if self.drivetrain is None else self.drivetrain.save()
+        return BicycleMemory(tuple(tyre.bristles for tyre in self.tyres), drivetrain, tuple(self.tyre_forces))
 
     def restore(self, memory: BicycleMemory) -> None:
         """Undo :meth:`save`."""
         for tyre, bristles in zip(self.tyres, memory.bristles, strict=True):
             tyre.bristles = bristles
-        if self.drivetrain is not None:
-            self.drivetrain.slipped = memory.slipped
+        if self.drivetrain is not None and memory.drivetrain is not None:
+            self.drivetrain.restore(memory.drivetrain)
         self.tyre_forces = list(memory.tyre_forces)

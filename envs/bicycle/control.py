@@ -8,6 +8,7 @@ pedalling, or the brake, has to provide.
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
 from dataclasses import dataclass
 
 import numpy as np
@@ -60,7 +61,7 @@ class ControlSettings:
     """m/s²: the pilot slows down for turns that would need more"""
     forward_acceleration: float = 0.8
     """m/s²: how fast the wanted speed follows changes"""
-    rate: float = 200.0
+    rate: float = 250.0
     """Hz"""
 
     def __post_init__(self) -> None:
@@ -149,8 +150,9 @@ class Pilot:
         self.bicycle = bicycle
         self.settings = ControlSettings() if settings is None else settings
         self.model = whipple_model(bicycle, gravity)
-        self._speeds = np.concatenate([np.arange(LOWEST_SPEED, 1.0, 0.1), np.arange(1.0, highest_speed + 0.25, 0.25)])
-        tables = [regulator(self.model, bicycle, float(speed), self.settings) for speed in self._speeds]
+        slow, fast = np.arange(LOWEST_SPEED, 0.95, 0.1), np.arange(1.0, highest_speed + 0.25, 0.25)
+        self._grid = [*slow.tolist(), *fast.tolist()]
+        tables = [regulator(self.model, bicycle, speed, self.settings) for speed in self._grid]
         self._gains = np.array([np.concatenate(table) for table in tables])
         self._ahead = PREVIEW_BIN * np.arange(PREVIEW_BINS + 1)
         self.period = 1.0 / self.settings.rate
@@ -164,9 +166,9 @@ class Pilot:
 
     def gains(self, speed: float) -> np.ndarray:
         """Interpolated gains: 7 on the state, then those on the curvature ahead."""
-        speed = min(max(speed, LOWEST_SPEED), float(self._speeds[-1]))
-        index = min(int(np.searchsorted(self._speeds, speed, side="right")), len(self._speeds) - 1)
-        low, high = self._speeds[index - 1], self._speeds[index]
+        speed = min(max(speed, LOWEST_SPEED), self._grid[-1])
+        index = min(bisect_right(self._grid, speed), len(self._grid) - 1)
+        low, high = self._grid[index - 1], self._grid[index]
         part = (speed - low) / (high - low)
         return (1.0 - part) * self._gains[index - 1] + part * self._gains[index]
 
@@ -190,20 +192,18 @@ class Pilot:
         self.offset_integral = max(-2.0, min(2.0, self.offset_integral + self.period * offset))
         steer = math.atan(self.bicycle.wheelbase * point.curvature) / math.cos(self.bicycle.steer_axis_tilt)
         roll, torque = self.model.steady_turn(state.speed, -steer)
-        errors = np.array(
-            [
-                state.roll - roll - roll_bias,
-                steer - state.steer,
-                state.roll_rate,
-                -state.steer_rate,
-                -heading,
-                -offset,
-                -self.offset_integral,
-            ]
+        errors = (
+            state.roll - roll - roll_bias,
+            steer - state.steer,
+            state.roll_rate,
+            -state.steer_rate,
+            -heading,
+            -offset,
+            -self.offset_integral,
         )
         ahead = self.path.curvatures(self.distance + max(state.speed, LOWEST_SPEED) * self._ahead)
         # the model counts turns to the right
-        right = torque - float(self.gains(state.speed) @ np.concatenate([errors, -np.diff(ahead)]))
+        right = torque - float(self.gains(state.speed) @ np.concatenate([errors, ahead[:-1] - ahead[1:]]))
         largest = self.settings.largest_torque
         sharpest = max(1e-6, float(np.abs(ahead).max()))
         speed = min(speed, math.sqrt(self.settings.lateral_acceleration / sharpest))

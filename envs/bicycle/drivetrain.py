@@ -2,7 +2,14 @@
 
 from __future__ import annotations
 
+import math
+
 from .parameters import DriveParameters
+
+SLOW_CADENCE, FAST_CADENCE = 4.2, 8.5
+"""rad/s (40 and 81 a minute): where a rider shifts down and up"""
+SHIFT_PAUSE = 1.0
+"""s between two shifts"""
 
 
 class Drivetrain:
@@ -12,17 +19,39 @@ class Drivetrain:
     with their reactions on the frame, are what a chain's tension does when it is tangent to both sprockets.
 
     Args:
-        parameters: ratio, stiffness and damping.
+        parameters: gears, stiffness and damping.
     """
 
     def __init__(self, parameters: DriveParameters) -> None:
         self.parameters = parameters
+        self.ratio = parameters.gears[0]
+        """turns of the wheel a turn of the crank"""
         self.slipped = 0.0
         """rad: angle by which the wheel has run ahead"""
+        self._shifted = -math.inf
 
-    def engage(self, crank: float, wheel: float) -> None:
-        """Begin with the chain just taut, at these angles (rad)."""
-        self.slipped = self.parameters.ratio * crank - wheel
+    def engage(self, crank: float, wheel: float, ratio: float | None = None) -> None:
+        """Begin with the chain just taut, at these angles (rad), in a gear (None: the present one)."""
+        self.ratio = self.ratio if ratio is None else ratio
+        self.slipped = self.ratio * crank - wheel
+        self._shifted = -math.inf
+
+    def gear_for(self, wheel_rate: float) -> float:
+        """Ratio that brings the cadence nearest to the middle of the comfortable range."""
+        middle = math.sqrt(SLOW_CADENCE * FAST_CADENCE)
+        return min(self.parameters.gears, key=lambda ratio: abs(math.log(max(1e-3, wheel_rate) / ratio / middle)))
+
+    def shift(self, time: float, crank: float, wheel: float, wheel_rate: float) -> None:
+        """Change the gear by one if the cadence is too slow or fast; the chain falls just taut on the new sprocket."""
+        if time < self._shifted + SHIFT_PAUSE:
+            return
+        gears, cadence = self.parameters.gears, wheel_rate / self.ratio
+        index = gears.index(self.ratio)
+        index += 1 if cadence > FAST_CADENCE else -1 if cadence < SLOW_CADENCE else 0
+        index = max(0, min(len(gears) - 1, index))
+        if gears[index] != self.ratio:
+            self.engage(crank, wheel, gears[index])
+            self._shifted = time
 
     def torque(self, crank: float, crank_rate: float, wheel: float, wheel_rate: float) -> float:
         """Torque on the rear wheel (N·m, not negative); the crank feels −ratio times it. Call once a step.
@@ -33,10 +62,17 @@ class Drivetrain:
             wheel: angle, rad, growing when rolling forward.
             wheel_rate: rad/s.
         """
-        drive = self.parameters
-        twist = drive.ratio * crank - wheel - self.slipped
+        twist = self.ratio * crank - wheel - self.slipped
         if twist <= 0.0:
             self.slipped += twist
             return 0.0
-        rate = drive.ratio * crank_rate - wheel_rate
-        return max(0.0, drive.chain_stiffness * twist + drive.chain_damping * rate)
+        rate = self.ratio * crank_rate - wheel_rate
+        return max(0.0, self.parameters.chain_stiffness * twist + self.parameters.chain_damping * rate)
+
+    def save(self) -> tuple[float, float, float]:
+        """Memory."""
+        return self.ratio, self.slipped, self._shifted
+
+    def restore(self, memory: tuple[float, float, float]) -> None:
+        """Undo :meth:`save`."""
+        self.ratio, self.slipped, self._shifted = memory

@@ -90,17 +90,19 @@ class DriveParameters:
     """kg: both cranks, chain ring and pedals"""
     inertia: Vector3
     """kg·m²: moments about the axle's place along x, y, z"""
-    ratio: float = 2.5
-    """turns of the rear wheel a turn of the crank"""
+    gears: tuple[float, ...] = (0.6, 0.8, 1.05, 1.4, 1.85, 2.4, 3.1)
+    """turns of the rear wheel a turn of the crank, rising"""
     chain_stiffness: float = 400.0
     """N·m/rad at the rear hub"""
     chain_damping: float = 8.0
     """N·m·s/rad at the rear hub"""
 
     def __post_init__(self) -> None:
-        for name in ("crank_length", "mass", "ratio", "chain_stiffness"):
+        for name in ("crank_length", "mass", "chain_stiffness"):
             if not 0.0 < getattr(self, name) < math.inf:
                 raise ValueError(f"{name} must be positive and finite, got {getattr(self, name)}")
+        if not self.gears or self.gears[0] <= 0.0 or list(self.gears) != sorted(set(self.gears)):
+            raise ValueError(f"gears must be positive and rise, got {self.gears}")
 
 
 @dataclass(frozen=True)

@@ -116,7 +116,7 @@ class Posture:
         return join(parts)
 
     def segments(self) -> dict[str, Mass]:
-        """Limb segments in their own frames (origin at the proximal joint): upper arm, forearm with hand, thigh, shank."""
+        """Upper arm, forearm with hand, thigh, and shank with foot, each in its frame from the proximal joint."""
         body, foot = self.body, self.body.segment("foot")
         forearm, shank = body.segment("forearm"), body.segment("shank")
         wrist = np.array([0.0, 0.0, -forearm.length])

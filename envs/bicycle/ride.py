@@ -21,6 +21,8 @@ from .tyre import TyreParameters
 
 PREVIEW = 0.3
 """s: how far ahead the rider leans into turns"""
+COASTING = 5.0
+"""N of wanted slowing that is left to drag, before the brake is used"""
 FALLEN = 1.0
 """rad of roll at which a ride is over"""
 
@@ -66,7 +68,7 @@ class Ride:
         *,
         ground: Ground | None = None,
         fidelity: Fidelity = "full",
-        physics_rate: float = 1000.0,
+        physics_rate: float = 500.0,
         tyre: TyreParameters | None = None,
         control: ControlSettings | None = None,
         crank: float = 0.3,
@@ -107,12 +109,13 @@ class Ride:
             self._control()
         self._count += 1
         torques, crank = rider.act()
-        brake = min(0.0, self.pilot.command[1]) * bicycle.parameters.rear_wheel.radius
+        brake = min(0.0, self.pilot.command[1] + COASTING) * bicycle.parameters.rear_wheel.radius
         bicycle.act(0.0, brake, crank, rider.joints, torques)
         self.physics.step()
 
     def _control(self) -> None:
         self.state = state = self.bicycle.state()
+        self.bicycle.shift()
         lean = self.rider.intended_lean
         # a rider who leans to the right holds the bicycle further to the left
         torque, drive = self.pilot.update(state, self.speed(state.time), -self._lean_effect * lean)

@@ -19,6 +19,7 @@ from ...filters import rotation
 from ..joints import connect_points, constraint_force
 from ..physics import BASE
 from ..sensors import straight_line
+from .anthropometry import Mass
 from .bicycle import Bicycle, BicycleState
 from .limbs import reach_to, three_turns, tip_torques
 from .posture import KNEE_OUT, LIMBS, SIDES, SIGNS, Posture
@@ -33,10 +34,16 @@ LIMB_DAMPING = 0.3
 """N·m·s/rad of every joint of a limb"""
 SWIVEL_STIFFNESS, SWIVEL_DAMPING = 20.0, 1.0
 """N·m/rad, N·m·s/rad: hold elbows and knees in their plane"""
-DOWNSTROKE = 0.15
+DOWNSTROKE = 0.3
 """the pedal force is this plus the cosine of the crank angle where that is positive"""
 MEAN_STROKE = 2.0 * (1.0 / math.pi + DOWNSTROKE)
 """mean of both legs' strength over a turn"""
+SHOULDERS_FOLLOW = 0.25
+"""part of the steering angle by which the trunk twists"""
+STEERS = np.linspace(-0.6, 0.6, 49)
+"""rad at which the arms' posture is tabulated"""
+KEEPING_UP = 4.0
+"""N·m/(rad/s) on the crank, towards the wheel's pace"""
 LARGEST_PEDAL_FORCE = 450.0
 """N"""
 
@@ -79,11 +86,11 @@ class Rider:
         self._steer_in_trunk = straight_line(_into_trunk, angles=3, force=3)
         self._limb_torques = [tip_torques(posture.limb(name)) for name in LIMBS]
         axis, origin = posture.bicycle.steer_axis, posture.bicycle.steer_origin
-        self._steer_axis = axis
         arm = np.array(posture.bicycle.grip) - origin
         self._grip_arm = float(np.linalg.norm(np.cross(axis, arm)))
         # direction in which each hand moves when the bar turns to the left, at straight steering
-        self._pull = {side: np.cross(axis, arm * (1.0, SIGNS[side], 1.0)) / self._grip_arm for side in SIDES}
+        pulls = [np.cross(axis, arm * (1.0, SIGNS[side], 1.0)) / self._grip_arm for side in SIDES]
+        self._pulls = [(pull.tolist(), np.cross(axis, pull).tolist()) for pull in pulls]
         trunk = posture.trunk()
         self._trunk_moment = trunk.mass * float(trunk.centre[2])
         self.constraints: list[int] = []
@@ -126,12 +133,10 @@ class Rider:
         for constraint in self.constraints:
             body.release(constraint)
         self.constraints = []
-        angles, bit = self.limb_angles(crank), 0.01
-        turned = self.limb_angles(crank, extra=bit)
-        self._abduction = [float(limb[1]) for limb in angles]
-        self._per_swivel = [float(b[1] - a[1]) / bit for a, b in zip(angles, turned, strict=True)]
+        angles = self.limb_angles(crank)
         self._first_swivel = motion.at(0.0, 0.0, 0.0)[1]
-        self._swivel = list(self._abduction)
+        self._tabulate()
+        self._swivel = self._abductions(0.0, crank, [0.0] * 4)
         self._torques = [0.0] * len(self.joints)
         self._crank_torque = 0.0
         self._hands = [(0.0, 0.0, 0.0), (0.0, 0.0, 0.0)]
@@ -159,8 +164,14 @@ class Rider:
         """Wanted lean of the trunk relative to the bicycle, rad, right positive."""
         return self._trunk_target[1]
 
-    def limb_angles(self, crank: float, extra: float = 0.0) -> list[np.ndarray]:
-        """Joint angles ``(4,)`` of each limb at the start by inverse kinematics, swivelled by ``extra`` rad more."""
+    def limb_angles(self, crank: float, steer: float = 0.0, extra: float = 0.0) -> list[np.ndarray]:
+        """Joint angles ``(4,)`` of each limb by inverse kinematics, in the trunk's posture at the start.
+
+        Args:
+            crank: rad.
+            steer: rad, left positive.
+            extra: rad of swivel besides that at the start.
+        """
         posture, motion = self.posture, self.motion
         swivel = motion.at(0.0, 0.0, 0.0)[1] + extra
         flexion, lean, twist = (np.array(angle) for angle in self._trunk_target)
@@ -168,11 +179,37 @@ class Rider:
         for name, turn in zip(LIMBS, swivel.tolist(), strict=True):
             side = name.split("_")[1]
             if name.startswith("arm"):
-                target, out = posture.arm_target(side, 0.0, trunk), posture.elbow_out(side, trunk)
+                target, out = posture.arm_target(side, steer, trunk), posture.elbow_out(side, trunk)
             else:
                 target, out = posture.leg_target(side, crank), KNEE_OUT
             angles.append(reach_to(posture.limb(name), target, out, turn).angles)
         return angles
+
+    def _tabulate(self) -> None:
+        """Abduction of each limb over steer (arms) and crank (legs), and the legs' weight felt at the crank."""
+        bit, rows = 0.01, []
+        self._cranks = np.linspace(0.0, 2.0 * math.pi, 49)
+        for steer, crank in zip(STEERS, self._cranks, strict=True):
+            now, turned = self.limb_angles(crank, steer), self.limb_angles(crank, steer, bit)
+            rows.append([[a[1], (b[1] - a[1]) / bit] for a, b in zip(now, turned, strict=True)])
+        self._abduction_table = np.array(rows).transpose(1, 2, 0)
+        heights = [sum(m.mass * m.centre[2] for m in self._legs_at(crank)) for crank in self._cranks[:-1]]
+        # derivative of a periodic function through its Fourier series
+        spectrum = np.fft.rfft(heights) * 1j * np.arange(25)
+        spectrum[-1] = 0.0
+        rising = np.fft.irfft(spectrum, 48) * self.bicycle.physics.gravity
+        self._leg_weight = np.append(rising, rising[0])
+
+    def _legs_at(self, crank: float) -> list[Mass]:
+        return [mass for name, mass in self.posture.limbs_at(crank).items() if name.startswith("leg")]
+
+    def _abductions(self, steer: float, crank: float, swivel: list[float]) -> list[float]:
+        """Abduction that puts elbows and knees where the rider wants them, rad."""
+        found, turn = [], crank % (2.0 * math.pi)
+        for index, (angles, slopes) in enumerate(self._abduction_table):
+            place, grid = (steer, STEERS) if index < 2 else (turn, self._cranks)
+            found.append(float(np.interp(place, grid, angles) + np.interp(place, grid, slopes) * swivel[index]))
+        return found
 
     def plan(self, state: BicycleState, curvature: float, steer_torque: float, drive: float) -> None:
         """Decide on muscle torques for the next control period.
@@ -184,16 +221,17 @@ class Rider:
             drive: wanted force at the wheel, N; braking is not the rider's legs' business.
         """
         change, swivel, unsteady = self.motion.at(state.time - self._began, curvature, state.roll)
-        self._trunk_target = [self.posture.flexion + float(change[0]), float(change[1]), float(change[2])]
+        # the shoulders follow the handlebar a little, which keeps the outer hand within reach
+        follow = SHOULDERS_FOLLOW * max(-0.8, min(0.8, state.steer))
+        self._trunk_target = [self.posture.flexion + float(change[0]), float(change[1]), float(change[2]) + follow]
         steer_torque += unsteady
         c, s = math.cos(state.steer), math.sin(state.steer)
-        load = np.array([0.0, 0.0, -self.motion.style.hand_load])
+        strength, load = 0.5 * steer_torque / self._grip_arm, self.motion.style.hand_load
         hands = []
-        for side in SIDES:
-            pull = self._pull[side]
-            turned = c * pull + s * np.cross(self._steer_axis, pull)
-            hands.append((0.5 * steer_torque / self._grip_arm * turned + load).tolist())
-        self._hands = [tuple(hand) for hand in hands]
+        for pull, turned in self._pulls:
+            x, y, z = (strength * (c * a + s * b) for a, b in zip(pull, turned, strict=True))
+            hands.append((x, y, z - load))
+        self._hands = hands
         ratio = self.bicycle.ratio
         bicycle = self.posture.bicycle
         assert bicycle.drive is not None
@@ -203,21 +241,21 @@ class Rider:
         if not self.full:
             self._crank_torque = wanted * sum(max(0.0, math.cos(a)) + DOWNSTROKE for a in phases) / MEAN_STROKE
             return
-        moved = swivel - self._first_swivel
-        self._swivel = [
-            angle + slope * float(turn)
-            for angle, slope, turn in zip(self._abduction, self._per_swivel, moved, strict=True)
-        ]
+        self._swivel = self._abductions(state.steer, state.crank, (swivel - self._first_swivel).tolist())
         angles = [pair[0] for pair in self.bicycle.body.joint_tuples(self.joints)]
         trunk = angles[:3]
         torques = [0.0, 0.0, 0.0]
         push = min(LARGEST_PEDAL_FORCE, wanted / (length * MEAN_STROKE))
+        # muscles also carry the legs' weight around, half of it each
+        lift = float(np.interp(state.crank % (2.0 * math.pi), self._cranks, self._leg_weight))
+        # and keep the feet up with the wheel, so that the chain stays nearly taut
+        lift += max(-15.0, min(15.0, KEEPING_UP * (state.wheel_rate / ratio - state.crank_rate)))
         for index, compute in enumerate(self._limb_torques):
             if index < 2:
-                force = self._steer_in_trunk(trunk, hands[index])[0]
+                force = self._steer_in_trunk(trunk, list(hands[index]))[0]
             else:
                 phase = phases[index - 2]
-                strength = push * (max(0.0, math.cos(phase)) + DOWNSTROKE)
+                strength = push * (max(0.0, math.cos(phase)) + DOWNSTROKE) + 0.5 * lift / length
                 force = [-strength * math.sin(phase), 0.0, -strength * math.cos(phase)]
             torques += compute(angles[3 + 4 * index : 7 + 4 * index], force)[0]
         self._torques = torques

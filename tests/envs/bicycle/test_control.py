@@ -20,7 +20,7 @@ STRAIGHT = Path(np.zeros(2))
 
 
 def ride(bike, path, speed, duration, roll_rate=0.0):
-    """Roll, steer, speed, offset and steer torque at 200 Hz."""
+    """Roll, steer, speed, offset and steer torque at 250 Hz."""
     pilot = Pilot(bike.with_load())
     with Physics() as physics:
         bicycle = Bicycle(physics, bike)
@@ -29,7 +29,7 @@ def ride(bike, path, speed, duration, roll_rate=0.0):
         pilot.start(path, speed)
         rows = []
         for step in range(round(duration / physics.time_step)):
-            if step % 5 == 0:
+            if step % 4 == 0:
                 state = bicycle.state()
                 torque, drive = pilot.update(state, speed)
                 rows.append((state.roll, state.steer, state.speed, pilot.offset, torque))
@@ -85,7 +85,7 @@ def test_the_pilot_slows_down_for_a_sharp_turn():
 def test_two_minutes_outdoors(speed):
     path = wandering_path(np.random.default_rng(7), 120.0 * speed)
     roll, _, _, offset, _ = ride(LOADED, path, speed, 120.0)
-    assert len(roll) == 24000
+    assert len(roll) == 30000
     assert np.abs(roll).max() < 0.5
     assert np.abs(offset).max() < 0.5
 
