@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import sys
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
@@ -10,6 +11,10 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
+
+
+PIPE_WIDTH = 120
+"""Columns of a table that does not go to a terminal."""
 
 
 def records(rows: Iterable[Any]) -> list[dict[str, Any]]:
@@ -63,7 +68,11 @@ def rich_table(
     names = _columns(data, columns)
     table = Table(title=title, title_justify="left")
     for name in names:
-        table.add_column(name, justify="right" if _numeric(data, name) else "left", no_wrap=_numeric(data, name))
+        # Long headings of numbers break into lines; names stay whole.
+        if _numeric(data, name):
+            table.add_column(name, justify="right", overflow="fold")
+        else:
+            table.add_column(name, no_wrap=True)
     for record in data:
         # Text, so that a name in brackets is no markup.
         table.add_row(*(Text(cell(record.get(name), digits)) for name in names))
@@ -78,7 +87,9 @@ def print_table(
     console: Console | None = None,
 ) -> None:
     """Print rows as a table; the arguments are those of :func:`rich_table`."""
-    (console or Console()).print(rich_table(rows, title, columns, digits))
+    # A pipe or a file has no width of its own.
+    console = console or (Console() if sys.stdout.isatty() else Console(width=PIPE_WIDTH))
+    console.print(rich_table(rows, title, columns, digits))
 
 
 def markdown_table(rows: Iterable[Any], columns: Sequence[str] | None = None, digits: int = 3) -> str:
