@@ -20,7 +20,7 @@ from .backend import Array, constant, is_torch, namespace
 from .estimator import check_measurements, run_by_steps
 from .model import Gain, Model
 from .quantity import Channel, Estimate, Measurement, Quantity
-from .sampling import Gains, check_gains, empty_memory, filled, hold, join, per_tick_gains, scaled, split
+from .sampling import Gains, check_batch, check_gains, empty_memory, filled, hold, join, per_tick_gains, scaled, split
 
 
 class FilterState(NamedTuple):
@@ -94,9 +94,11 @@ class KalmanFilter:
             gains: log factors for this tick.
 
         Raises:
-            ValueError: a channel is missing or has a wrong shape, or a gain is unknown.
+            ValueError: a channel is missing or has a wrong shape, a gain is unknown, or the state belongs to another
+                batch.
         """
         arrays = check_measurements(self.channels, measurement, time_axis=False)
+        check_batch(arrays, state.started)
         check_gains(self.gains, gains, type(self.model).__name__)
         if self.compiled and not is_torch(state.x):
             from .compiled import compiled_model
@@ -124,6 +126,7 @@ class KalmanFilter:
         check_gains(self.gains, gains, type(self.model).__name__)
         if state is None:
             state = self.init({name: array[0] for name, array in arrays.items()})
+        check_batch({name: array[0] for name, array in arrays.items()}, state.started)
         if self.compiled and not is_torch(state.x):
             from .compiled import compiled_model
 

@@ -14,7 +14,7 @@ from .backend import Array, is_torch, namespace
 from .estimator import check_measurements, run_by_steps
 from .model import Recurrence
 from .quantity import Channel, Estimate, Measurement, Quantity
-from .sampling import empty_memory, filled, hold, join, split
+from .sampling import check_batch, empty_memory, filled, hold, join, split
 
 
 class ObserverState(NamedTuple):
@@ -70,6 +70,7 @@ class Observer:
     def step(self, state: ObserverState, measurement: Measurement) -> tuple[ObserverState, Estimate]:
         """Take one sample of every channel, ``(*batch, size)``; NaN where there is none."""
         arrays = check_measurements(self.channels, measurement, time_axis=False)
+        check_batch(arrays, state.started)
         if self.compiled and not is_torch(state.x):
             from .compiled import compiled_recurrence
 

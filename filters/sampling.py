@@ -62,6 +62,17 @@ def empty_memory(like: Array, *shapes: tuple[int, ...]) -> tuple[Array, ...]:
     return (*arrays, copy(xp.zeros_like(like) + xp.nan), copy(started))
 
 
+def check_batch(arrays: Measurement, started: Array) -> None:
+    """Refuse a state that belongs to another batch shape than the samples.
+
+    Raises:
+        ValueError: names both shapes.
+    """
+    batch = tuple(next(iter(arrays.values())).shape[:-1])
+    if batch != tuple(started.shape):
+        raise ValueError(f"the state is of batch shape {tuple(started.shape)}, the samples are of {batch}")
+
+
 def check_gains(known: Mapping[str, Gain], gains: Gains | None, owner: str) -> None:
     """Refuse gains that a model does not have.
 

@@ -144,3 +144,12 @@ def test_parameters_must_be_finite_and_intervals_positive():
 def test_importing_the_filters_compiles_nothing():
     code = "import sys, poise.filters.kalman, poise.filters.catalogue; assert 'numba' not in sys.modules"
     subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_a_state_of_another_batch_is_refused(measurements):
+    kalman = KalmanFilter(ExternalAcceleration())
+    single = kalman.init({name: array[0, 0] for name, array in measurements.items()})
+    with pytest.raises(ValueError, match=r"state is of batch shape \(\), the samples are of \(4,\)"):
+        kalman.step(single, {name: array[0] for name, array in measurements.items()})
+    with pytest.raises(ValueError, match=r"state is of batch shape \(\), the samples are of \(4,\)"):
+        kalman.run_from(single, measurements)
