@@ -80,17 +80,17 @@ class TrainingConfig:
     """passes over a rollout"""
     learning_rate: float = 5e-4
     """at the start; falls linearly to a tenth"""
-    discount: float = 0.98
-    """factor a decision; 0.98 looks 5 s ahead at 10 decisions a second"""
-    trace: float = 0.9
+    discount: float = 0.995
+    """factor a decision; 0.995 looks 20 s ahead at 10 decisions a second, as a biased gyroscope takes time to show"""
+    trace: float = 0.95
     """λ of generalised advantage estimation"""
-    error_scale: float = 1.0
+    error_scale: float = 5.0
     """deg: errors far above it count by their logarithm in the reward"""
     hidden: tuple[int, ...] = (64, 64)
     """units of the hidden layers"""
     spread: float = 0.2
     """standard deviation of the actions at the start"""
-    search: int = 32
+    search: int = 64
     """points of the search for constant gains to start from; 0 starts from the published tuning"""
 
     def __post_init__(self) -> None:
@@ -160,8 +160,8 @@ def train_policy(
     if done:
         start = np.asarray(done["constant"])
     elif config.search:
-        few = motions[: min(len(motions), 24)]
-        start = best_constant_gains(tuned, few, samples=config.search, refinements=30, seed=config.seed).action
+        few = motions[:24]
+        start = best_constant_gains(tuned, few, samples=config.search, refinements=config.search, seed=config.seed).action
     else:
         start = np.zeros(tuned.actions)
     threads = torch.get_num_threads()
@@ -197,6 +197,9 @@ def make_model(config: TrainingConfig, env: Any, start: np.ndarray, checkpoint: 
     import torch
     from stable_baselines3 import PPO
 
+    from .asymmetric import AsymmetricPolicy
+    from .tuning_batch import PRIVILEGED
+
     def learning_rate(remaining: float) -> float:
         return config.learning_rate * (0.1 + 0.9 * remaining)
 
@@ -204,7 +207,7 @@ def make_model(config: TrainingConfig, env: Any, start: np.ndarray, checkpoint: 
         return PPO.load(checkpoint / CHECKPOINT, env=env, device="cpu", custom_objects={"learning_rate": learning_rate})
     size = config.envs * config.rollout
     model = PPO(
-        "MlpPolicy",
+        AsymmetricPolicy,
         env,
         learning_rate=learning_rate,
         n_steps=config.rollout,
@@ -215,6 +218,7 @@ def make_model(config: TrainingConfig, env: Any, start: np.ndarray, checkpoint: 
         clip_range=0.2,
         ent_coef=0.0,
         policy_kwargs={
+            "seen": env.observation_space.shape[0] - PRIVILEGED,
             "net_arch": list(config.hidden),
             "activation_fn": torch.nn.Tanh,
             "log_std_init": float(np.log(config.spread)),
@@ -234,14 +238,15 @@ def export_policy(model: Any, env: Any, tuned: TunedFilter) -> GainPolicy:
     """The deterministic part of an SB3 policy as plain arrays, with the normalisation of ``env`` in the first layer.
 
     Args:
-        model: a PPO model with an ``MlpPolicy`` of tanh units.
+        model: from :func:`make_model`.
         env: its VecNormalize.
         tuned: what it was trained on.
     """
     modules = [*model.policy.mlp_extractor.policy_net, model.policy.action_net]
     linear = [module for module in modules if hasattr(module, "weight")]
     layers = [(m.weight.detach().numpy().astype(float), m.bias.detach().numpy().astype(float)) for m in linear]
-    mean, deviation = env.obs_rms.mean, np.sqrt(env.obs_rms.var + env.epsilon)
+    seen = tuned.observation_size
+    mean, deviation = env.obs_rms.mean[:seen], np.sqrt(env.obs_rms.var[:seen] + env.epsilon)
     weight, bias = layers[0]
     layers[0] = (weight / deviation, bias - (weight / deviation) @ mean)
     return GainPolicy(tuned.name, tuned.ranges, tuned.features, tuple(layers))

@@ -20,6 +20,11 @@ from ..filters.metrics import error
 from ..filters.quantity import Quantity
 from ..filters.tuned import TunedFilter, TunedState
 
+AHEAD = (1, 10, 40)
+"""Decisions over which the critic looks ahead."""
+PRIVILEGED = 2 + 2 * len(AHEAD)
+"""Numbers at the end of an observation that only the critic may see."""
+
 
 class RateGroup:
     """Episodes that advance together: same rate, one row each.
@@ -44,13 +49,8 @@ class RateGroup:
         reference: np.ndarray,
         error_scale: float,
     ) -> None:
-        self.error_scale = error_scale
-        self.tuned, self.rows, self.generator, self.quantity = (
-            tuned.with_dt(trajectories[0].dt),
-            rows,
-            generator,
-            quantity,
-        )
+        self.tuned, self.error_scale = tuned.with_dt(trajectories[0].dt), error_scale
+        self.rows, self.generator, self.quantity = rows, generator, quantity
         self.episode = min(len(trajectory) for trajectory in trajectories) // self.tuned.ticks
         length = self.episode * self.tuned.ticks
         self.channels = {
@@ -65,7 +65,27 @@ class RateGroup:
         )
         errors = [error(quantity, estimate, truth) for estimate, truth in zip(estimates, self.truth, strict=True)]
         self.reference = self._cost(np.stack(errors))
+        self.known = self._foresight(trajectories)
         self.start()
+
+    def _foresight(self, trajectories: Sequence[Trajectory]) -> np.ndarray:
+        """What is known of every decision beforehand ``(trajectories, decisions + 1, PRIVILEGED - 1)``.
+
+        The gyroscope's bias, and over each of :data:`AHEAD` the mean cost of the reference and the mean acceleration.
+        """
+        per_decision = (len(trajectories), self.episode, self.tuned.ticks)
+        length = self.episode * self.tuned.ticks
+        none = np.zeros((length, 3))
+        bias, force = (
+            np.stack([np.linalg.norm(t.truth.get(name, none)[:length], axis=-1) for t in trajectories])
+            for name in ("gyroscope_bias", "external_acceleration")
+        )
+        columns = [np.log1p(np.degrees(bias[:, :: self.tuned.ticks]))]
+        for values in (np.degrees(self.reference), force):
+            means = np.nan_to_num(values).reshape(per_decision).mean(axis=-1)
+            columns += [np.log1p(mean_ahead(means, ahead)) for ahead in AHEAD]
+        table = np.stack(columns, axis=-1)
+        return np.concatenate([table, table[:, -1:]], axis=1)
 
     def _cost(self, errors: np.ndarray) -> np.ndarray:
         """Errors as they count in the reward."""
@@ -82,18 +102,20 @@ class RateGroup:
         self.decision = np.zeros(self.rows, int)
         self.end = self.generator.integers(1, self.episode + 1, size=self.rows)
         self.fresh = self.tuned.init({name: values[self.trajectory, 0] for name, values in self.channels.items()})
-        self.state = self.fresh
+        self.state, self.error = self.fresh, np.zeros(self.rows)
 
     def observe(self) -> np.ndarray:
-        """Observations ``(rows, n)``."""
-        return self.tuned.observe(self.state)
+        """Observations, and what only the critic may see ``(rows, n + PRIVILEGED)``."""
+        own = np.log1p(np.degrees(self.error))[:, None]
+        parts = [self.tuned.observe(self.state), self.known[self.trajectory, self.decision], own]
+        return np.concatenate(parts, axis=-1).astype(np.float32)
 
     def step(self, actions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Advance by one interval.
 
         Returns:
-            Observations at the end of the interval ``(rows, n)``, rewards ``(rows,)`` in rad, and which episodes are
-            over ``(rows,)``; :meth:`restart` begins these anew.
+            Observations at the end of the interval, see :meth:`observe`, rewards ``(rows,)`` in rad, and which
+            episodes are over ``(rows,)``; :meth:`restart` begins these anew.
         """
         ticks = self.decision * self.tuned.ticks + np.arange(self.tuned.ticks)[:, None]
         chunk = {name: values[self.trajectory, ticks] for name, values in self.channels.items()}
@@ -102,7 +124,7 @@ class RateGroup:
         gained = self.reference[self.trajectory, ticks] - self._cost(errors)
         counted = self.scored[self.trajectory, ticks] & np.isfinite(gained)
         rewards = np.where(counted, gained, 0.0).sum(axis=0) / np.maximum(counted.sum(axis=0), 1)
-        self.decision = self.decision + 1
+        self.decision, self.error = self.decision + 1, np.nan_to_num(errors[-1])
         return self.observe(), rewards, self.decision >= self.end
 
     def restart(self, over: np.ndarray) -> None:
@@ -110,7 +132,7 @@ class RateGroup:
         count = int(over.sum())
         self.trajectory = self.trajectory.copy()
         self.trajectory[over] = self.generator.integers(len(self.truth), size=count)
-        self.decision[over], self.end[over] = 0, self.episode
+        self.decision[over], self.end[over], self.error[over] = 0, self.episode, 0.0
 
         def mixed(new: np.ndarray, old: np.ndarray) -> np.ndarray:
             if new.ndim == 0:
@@ -124,8 +146,20 @@ class RateGroup:
         )
 
 
+def mean_ahead(values: np.ndarray, ahead: int) -> np.ndarray:
+    """Mean of each entry of ``(n, decisions)`` and those after it, ``ahead`` in all or as many as there are."""
+    total = np.concatenate([np.zeros((len(values), 1)), np.cumsum(values, axis=1)], axis=1)
+    first = np.arange(values.shape[1])
+    last = np.minimum(first + ahead, values.shape[1])
+    return (total[:, last] - total[:, first]) / (last - first)
+
+
 class TuningBatch(VecEnv):
     """A Stable-Baselines3 vector environment over a fixed set of trajectories.
+
+    An observation is that of the registered environment, followed by :data:`PRIVILEGED` numbers that take the truth
+    or the future to know: for the critic (:mod:`poise.baselines.asymmetric`), whose value is a baseline and reaches
+    no policy.
 
     The reward is the mean error of a constant ``reference`` action over the interval minus that of the agent, in
     degrees.
@@ -173,7 +207,7 @@ class TuningBatch(VecEnv):
         self.returns = np.zeros(envs)
         super().__init__(
             envs,
-            spaces.Box(-1.0, 1.0, (tuned.observation_size,), np.float32),
+            spaces.Box(-np.inf, np.inf, (tuned.observation_size + PRIVILEGED,), np.float32),
             spaces.Box(-1.0, 1.0, (tuned.actions,), np.float32),
         )
 

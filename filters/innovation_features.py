@@ -59,7 +59,7 @@ class FeatureMemory(NamedTuple):
     Attributes:
         averages: ``(*batch, scales, moments)`` running means.
         sums: ``(*batch, moments)`` over the ticks of the interval that is not over.
-        previous: ``(*batch, width)`` last sample of every stream, NaN if there was none.
+        previous: ``(*batch, streams, width)`` last sample of every stream; NaN if there was none.
         tick: ``()`` int, ticks of the interval that is not over; 0 asks for a decision.
         decisions: ``(*batch,)`` int, intervals that are over.
     """
@@ -114,12 +114,12 @@ class InnovationFeatures:
             ValueError: the filter does not read a gyroscope and an accelerometer.
         """
         stream_channels(kalman)
-        widths = stream_widths(kalman)
-        moments = sum(width + 3 for width in widths) + 2
+        width = max(3, kalman.model.residual_size)
+        moments = len(STREAMS) * (width + 3) + 2
         return FeatureMemory(
             np.zeros((*batch, len(self.scales), moments)),
             np.zeros((*batch, moments)),
-            np.full((*batch, sum(widths)), np.nan),
+            np.full((*batch, len(STREAMS), width), np.nan),
             np.array(0),
             np.zeros(batch, int),
         )
@@ -160,56 +160,48 @@ class InnovationFeatures:
             kalman: the filter.
             action: ``(*batch, k)`` in [−1, 1].
         """
-        averages, parts, start = memory.averages, [], 0
-        widths = stream_widths(kalman)
+        batch, scales = memory.averages.shape[:-2], len(self.scales)
+        block = memory.averages[..., :-2].reshape(*batch, scales, len(STREAMS), -1)
         with np.errstate(divide="ignore", invalid="ignore"):
-            for stream, width in zip(STREAMS, widths, strict=True):
-                block = averages[..., start : start + width + 3]
-                start += width + 3
-                mean = block[..., 1:-2] / block[..., :1]
-                squares = block[..., -2:] / block[..., :1]
-                mean_square = np.sum(mean * mean, axis=-1)
-                sizes = [squares[..., 0], squares[..., 0] - mean_square, mean_square, squares[..., 1]]
-                if stream != "innovation":
-                    sizes[3] = sizes[3] * (CHANGE_TIME / kalman.dt) ** 2
-                centred = 0.5 * np.log10(np.fmax(np.stack(sizes, axis=-1), FLOOR**2)) - CENTRES[stream]
-                parts.append(centred)
-                if stream == "acc":
-                    weight = block[..., 0]
-            excess = averages[..., start : start + 2] / weight[..., None]
+            means = block[..., 1:] / block[..., :1]
+            excess = memory.averages[..., -2:] / block[..., STREAMS.index("acc"), :1]
+        mean, square, change = means[..., :-2], means[..., -2], means[..., -1]
+        mean_square = np.sum(mean * mean, axis=-1)
+        # Innovations come at a pace of their own; the change of all else is given per time.
+        pace = np.where(np.array(STREAMS) == "innovation", 1.0, (CHANGE_TIME / kalman.dt) ** 2)
+        sizes = np.stack([square, square - mean_square, mean_square, change * pace], axis=-1)
+        logarithms = 0.5 * np.log10(np.fmax(sizes, FLOOR**2)) - np.array([CENTRES[stream] for stream in STREAMS])
         excess = np.where(np.isfinite(excess), excess, 0.0)
-        parts.append(excess[..., :1])
-        parts.append(0.5 * np.log10(np.fmax(excess[..., 1:], FLOOR**2)) + 0.5)
-        features = np.tanh(np.concatenate(parts, axis=-1))
-        features = features.reshape(*features.shape[:-2], -1)
-        age = np.tanh(memory.decisions * (self.ticks(kalman.dt) * kalman.dt / START_TIME))
-        return np.concatenate([features, age[..., None], action], axis=-1).astype(np.float32)
+        excess_rms = 0.5 * np.log10(np.fmax(excess[..., 1:], FLOOR**2)) + 0.5
+        features = np.concatenate([logarithms.reshape(*batch, scales, -1), excess[..., :1], excess_rms], axis=-1)
+        age = memory.decisions * (self.ticks(kalman.dt) * kalman.dt / START_TIME)
+        squashed = np.tanh(np.concatenate([features.reshape(*batch, -1), age[..., None]], axis=-1))
+        return np.concatenate([squashed, action], axis=-1).astype(np.float32)
 
     def _moments(
         self, memory: FeatureMemory, kalman: KalmanFilter, measurements: Mapping[str, np.ndarray], estimate: Estimate
     ) -> tuple[np.ndarray, np.ndarray]:
         """Moments ``(T, *batch, moments)`` of the ticks, and the last sample of every stream."""
         gyr, acc = (np.asarray(measurements[name], dtype=float) for name in stream_channels(kalman))
+        gravity = getattr(kalman.model, "gravity", 9.81)
         innovation = np.asarray(estimate.innovation)
         # A whitened innovation is exactly 0 where there was nothing to compare.
         innovation = np.where((innovation != 0.0).any(axis=-1, keepdims=True), innovation, np.nan)
         external = np.asarray(estimate.pose.get("external_acceleration", np.zeros_like(acc)))
-        gravity = getattr(kalman.model, "gravity", 9.81)
         lean = cross(np.asarray(estimate.pose.get("up", np.zeros_like(acc))), external) / gravity
-        parts, last, start = [], [], 0
-        for values in (innovation, gyr, acc, external, lean):
-            width = values.shape[-1]
-            earlier, final = before(values, memory.previous[..., start : start + width])
-            start += width
-            last.append(final)
-            known = np.isfinite(values).all(axis=-1, keepdims=True)
-            v = np.where(known, values, 0.0)
-            change = np.where(known & np.isfinite(earlier).all(axis=-1, keepdims=True), values - earlier, 0.0)
-            squares = [np.sum(part * part, axis=-1, keepdims=True) for part in (v, change)]
-            parts += [known.astype(float), v, *squares]
+        values = np.zeros((*acc.shape[:-1], *memory.previous.shape[-2:]))
+        for index, stream in enumerate((innovation, gyr, acc, external, lean)):
+            values[..., index, : stream.shape[-1]] = stream
+        earlier, last = before(values, memory.previous)
+        known = np.isfinite(values).all(axis=-1, keepdims=True)
+        v = np.where(known, values, 0.0)
+        change = np.where(known & np.isfinite(earlier).all(axis=-1, keepdims=True), values - earlier, 0.0)
+        squares = [np.sum(part * part, axis=-1, keepdims=True) for part in (v, change)]
+        moments = np.concatenate([known, v, *squares], axis=-1)
         size = np.sqrt(np.sum(acc * acc, axis=-1, keepdims=True))
         excess = np.where(np.isfinite(size), size - gravity, 0.0)
-        return np.concatenate([*parts, excess, excess * excess], axis=-1), np.concatenate(last, axis=-1)
+        flat = moments.reshape(*acc.shape[:-1], -1)
+        return np.concatenate([flat, excess, excess * excess], axis=-1), last
 
 
 def stream_channels(kalman: KalmanFilter) -> tuple[str, str]:
@@ -223,11 +215,6 @@ def stream_channels(kalman: KalmanFilter) -> tuple[str, str]:
     if found[0] is None or found[1] is None:
         raise ValueError(f"a tuned filter must read a gyroscope and an accelerometer, this one reads {names}")
     return found[0], found[1]
-
-
-def stream_widths(kalman: KalmanFilter) -> tuple[int, ...]:
-    """Numbers in a vector of every stream."""
-    return (kalman.model.residual_size, *[3] * (len(STREAMS) - 1))
 
 
 def before(values: np.ndarray, held: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from ..filters.tuned import TunedFilter
 
 QUICK_STEPS = 100_000
-"""Decisions of ``--preset quick``."""
+"""Decisions with ``--preset quick``."""
 TEST_SEED, VALIDATION_SEED = 1, 2
 """Children of the root seed for trajectories that training never sees."""
 
@@ -70,14 +70,16 @@ def run(args: Args) -> int:
         sets["recorded"] = recorded
     folder = start_run("tune", args, args.seed, args.runs) if args.resume is None else resumed(args.resume, args.seed)
     config = training_config(args)
-    motions = TRAINING_MOTIONS.draw_many(config.seed, min(config.trajectories, 48))
+    motions = TRAINING_MOTIONS.draw_many(config.seed, min(config.trajectories, 32))
     print(f"searching constant gains of {args.filter} on {len(motions)} trajectories")
-    constant = best_constant_gains(tuned, motions, seed=args.seed)
+    effort = {"samples": 64, "refinements": 60} if args.preset == "shipped" else {"samples": 16, "refinements": 20}
+    constant = best_constant_gains(tuned, motions, seed=args.seed, **effort)
     candidates = {"published": GainPolicy.neutral(tuned), "constant": GainPolicy.constant(tuned, constant.action)}
     if args.method == "ppo":
         candidates["policy"] = train(args, folder)
     rows = compare(tuned, candidates, sets)
-    rows += hindsight_rows(tuned, sets["simulated"], constant)
+    for trajectories in sets.values():
+        rows += hindsight_rows(tuned, trajectories, constant)
     folder.write_results(rows)
     summary = means(rows, sets)
     print_summary(summary, args.filter)
@@ -96,7 +98,7 @@ def training_config(args: Args) -> Any:
     if args.preset == "shipped":
         config = shipped_config(args.filter)
     else:
-        config = TrainingConfig(filter=args.filter, steps=QUICK_STEPS, trajectories=48, search=16)
+        config = TrainingConfig(filter=args.filter, steps=QUICK_STEPS, trajectories=48, search=8)
     from dataclasses import replace
 
     given = {name: getattr(args, name) for name in ("steps", "trajectories")}
@@ -144,7 +146,7 @@ def train(args: Args, folder: Run) -> GainPolicy:
     from ..filters.adaptation import tunable_filter
 
     config, kalman = training_config(args), tunable_filter(args.filter)
-    unseen = TRAINING_MOTIONS.draw_many(child_seed(args.seed, VALIDATION_SEED), 24)
+    unseen = TRAINING_MOTIONS.draw_many(child_seed(args.seed, VALIDATION_SEED), min(24, config.trajectories))
     with tqdm(total=config.steps, desc=f"tune {args.filter}", unit="step") as bar:
 
         def report(progress: Mapping[str, float]) -> None:
@@ -175,7 +177,7 @@ def compare(
 
 
 def hindsight_rows(
-    tuned: TunedFilter, trajectories: Sequence[Trajectory], constant: ConstantGains, points: int = 64
+    tuned: TunedFilter, trajectories: Sequence[Trajectory], constant: ConstantGains, points: int = 32
 ) -> list[dict[str, Any]]:
     """Errors of the best constant gains of each trajectory, chosen knowing the truth: a bound, no method."""
     from ..baselines.constant_gains import constant_errors

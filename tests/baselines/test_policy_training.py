@@ -103,7 +103,7 @@ def test_the_exported_policy_is_the_trained_one(trajectories):
     policy = export_policy(model, env, tuned)
     for _ in range(30):
         action, _ = model.predict(observation, deterministic=True)
-        np.testing.assert_allclose(policy(env.get_original_obs()), action, atol=1e-5)
+        np.testing.assert_allclose(policy(env.get_original_obs()[:, : tuned.observation_size]), action, atol=1e-5)
         observation, *_ = env.step(action)
 
 
@@ -118,14 +118,33 @@ def test_the_batch_is_the_registered_environment(trajectories):
     rng = np.random.default_rng(0)
     batch.groups[0].end[:] = batch.groups[0].episode
     for _ in range(batch.groups[0].episode):
-        np.testing.assert_allclose(many, single, atol=1e-6)
+        np.testing.assert_allclose(many[: tuned.observation_size], single, atol=1e-6)
         action = rng.uniform(-1.0, 1.0, 3).astype(np.float32)
         observations, rewards, overs, infos = batch.step(np.stack([action, action]))
         single, reward, _, truncated, _ = env.step(action)
         assert overs[0] == truncated
         np.testing.assert_allclose(rewards[0], np.degrees(reward), atol=1e-5)
         many = infos[0]["terminal_observation"] if overs[0] else observations[0]
-    np.testing.assert_allclose(observations[0], batch.groups[0].tuned.observe(batch.groups[0].fresh)[0])
+    fresh = batch.groups[0].tuned.observe(batch.groups[0].fresh)[0]
+    np.testing.assert_allclose(observations[0, : tuned.observation_size], fresh)
+
+
+def test_what_only_the_critic_knows_reaches_no_action(trajectories):
+    import torch
+    from stable_baselines3.common.vec_env import VecNormalize
+
+    from poise.baselines.tuning_batch import PRIVILEGED, TuningBatch
+
+    tuned = TunedFilter.of(tunable_filter("bounded-motion"))
+    env = VecNormalize(TuningBatch(tuned, trajectories, 4))
+    model = make_model(dataclasses.replace(SMALL, gains=None), env, np.zeros(3), None, None)
+    observation = torch.as_tensor(env.reset())
+    other = observation.clone()
+    other[:, -PRIVILEGED:] += 1.0
+    with torch.no_grad():
+        one, two = (model.policy.get_distribution(x).distribution.mean for x in (observation, other))
+        assert torch.equal(one, two)
+        assert not torch.equal(model.policy.predict_values(observation), model.policy.predict_values(other))
 
 
 def test_stable_baselines_trains_on_the_registered_environment(trajectories):
