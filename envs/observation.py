@@ -19,30 +19,31 @@ class ObservationLayout:
 
     Args:
         channels: in the order of the flags.
-        limits: channel name → largest magnitude, in the channel's unit; larger values are clipped.
+        limits: channel name → largest magnitude, in the channel's unit, for all axes or ``(size,)``; larger values are
+            clipped.
 
     Raises:
         ValueError: two channels share a name, one is called ``fresh``, or a limit is missing, not positive or infinite.
     """
 
-    def __init__(self, channels: Sequence[Channel], limits: Mapping[str, float]) -> None:
+    def __init__(self, channels: Sequence[Channel], limits: Mapping[str, float | np.ndarray]) -> None:
         names = [channel.name for channel in channels]
         if len(set(names)) < len(names) or FRESH in names or not names:
             raise ValueError(f"channels must have names of their own, none of them {FRESH!r}, got {names}")
         boxes: dict[str, spaces.Space] = {}
         for channel in channels:
             limit = limits.get(channel.name, math.nan)
-            if not 0.0 < limit < math.inf:
+            if not np.all((np.asarray(limit) > 0.0) & (np.asarray(limit) < math.inf)):
                 raise ValueError(
                     f"limits[{channel.name!r}] must be positive and finite ({channel.unit}), got {limit}: observations "
                     "need bounds (NoiseModel.full_scale)"
                 )
-            bound = np.float32(limit)
-            boxes[channel.name] = spaces.Box(-bound, bound, (channel.size,), np.float32)
+            bound = np.full(channel.size, limit, np.float32)
+            boxes[channel.name] = spaces.Box(-bound, bound, dtype=np.float32)
         boxes[FRESH] = spaces.MultiBinary(len(names))
         self.channels = tuple(channels)
         self.space = spaces.Dict(boxes)
-        self._limits = {name: float(np.float32(limits[name])) for name in names}
+        self._limits = {name: np.asarray(limits[name], np.float32).astype(float) for name in names}
         self.reset()
 
     def reset(self) -> None:

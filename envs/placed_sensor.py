@@ -10,7 +10,9 @@ from typing import Any, Literal
 import numpy as np
 
 from ..filters.quantity import Channel
+from .error_forms import FORMS, Form, FormedNoise, error_size
 from .noise_model import NoiseModel
+from .sensor_noise import NoiseProcess
 from .sensors import SAMPLINGS, BodyState, Mounting, Sampling
 
 Kind = Literal["gyroscope", "accelerometer", "magnetometer", "given"]
@@ -41,6 +43,10 @@ class Sensor:
     sampling: Sampling = "interval"
     device: str = ""
     """preset or product, for the record"""
+    form: Form = "additive"
+    """how errors meet the reading; other forms are for given readings"""
+    units: tuple[float, ...] = ()
+    """size of one unit of ``noise`` on each axis of the error, for axes of different kinds; empty for ones"""
 
     def __post_init__(self) -> None:
         if self.kind not in (*WIDTHS, "given"):
@@ -51,11 +57,32 @@ class Sensor:
             raise ValueError(f"rate of {self.channel.name!r} must be positive and finite (Hz), got {self.rate}")
         if self.channel.size != WIDTHS.get(self.kind, self.channel.size):
             raise ValueError(f"a {self.kind} has 3 axes, but channel {self.channel.name!r} has {self.channel.size}")
+        if self.form not in FORMS or (self.form != "additive" and self.kind != "given"):
+            raise ValueError(f"form must be 'additive', or for a given reading one of {list(FORMS)}, got {self.form!r}")
+        if self.form == "rotation" and self.channel.size != 4:
+            raise ValueError(f"a rotation has 4 values, but channel {self.channel.name!r} has {self.channel.size}")
+        size = error_size(self.form, self.channel.size)
+        if self.units and not (len(self.units) == size and all(0.0 < unit < math.inf for unit in self.units)):
+            raise ValueError(f"units must be {size} positive and finite numbers or none, got {self.units}")
 
     @property
     def placement(self) -> tuple[str, Mounting, Sampling, float] | None:
         """What sensors have in common whose readings are computed together; None for a given reading."""
         return None if self.kind == "given" else (self.body, self.mounting, self.sampling, float(self.rate))
+
+    @property
+    def limit(self) -> float | np.ndarray:
+        """Largest magnitude of a reading, of each axis ``(size,)`` where they differ."""
+        if self.form == "rotation":
+            return 1.0
+        return self.noise.full_scale * np.array(self.units) if self.units else self.noise.full_scale
+
+    def errors(self, generator: np.random.Generator) -> NoiseProcess:
+        """Errors of an episode, drawn from ``generator``."""
+        size = self.channel.size
+        if self.form == "additive" and not self.units:
+            return NoiseProcess(self.noise, size, self.rate, generator)
+        return FormedNoise(self.noise, size, self.rate, generator, self.form, self.units)
 
     def due(self, tick: int | np.ndarray, tick_rate: float) -> Any:
         """Whether it is sampled at ``tick`` (a number or ``(T,)``): whether its own clock struck since the tick before.
@@ -90,6 +117,8 @@ class Sensor:
             "rotation": list(self.mounting.rotation),
             "sampling": self.sampling,
             "noise": self.noise.describe(),
+            "form": self.form,
+            "units": list(self.units),
         }
 
 

@@ -52,6 +52,8 @@ class NoiseState:
     """(N,) bool"""
     used: int
     """rows already taken"""
+    carry: np.ndarray | None = None
+    """(W,) what counting left for the next sample, u; None where nothing is counted"""
 
 
 class NoiseProcess:

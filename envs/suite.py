@@ -68,7 +68,7 @@ class SensorSuite:
         self.sensors, self.rate, self.gravity = tuple(sensors), float(rate), float(gravity)
         self.field = vector("field", magnetic_field() if field is None else field, 3)
         self.channels = tuple(sensor.channel for sensor in sensors)
-        limits = {sensor.channel.name: sensor.noise.full_scale for sensor in sensors}
+        limits = {sensor.channel.name: sensor.limit for sensor in sensors}
         self._layout = ObservationLayout(self.channels, limits)
         keys = [sensor.placement for sensor in sensors]
         places = {
@@ -94,10 +94,7 @@ class SensorSuite:
             rng: every sensor draws from a child of its own, so adding sensors at the end changes nothing before them.
         """
         children = rng.spawn(len(self.sensors))
-        self._noise = [
-            NoiseProcess(sensor.noise, sensor.channel.size, sensor.rate, child)
-            for sensor, child in zip(self.sensors, children, strict=True)
-        ]
+        self._noise = [sensor.errors(child) for sensor, child in zip(self.sensors, children, strict=True)]
         for place in self._motion:
             place.reset()
         self._layout.reset()
