@@ -139,6 +139,8 @@ def test(estimator: LearnedEstimator, config: TrainingConfig, episodes: int) -> 
     contenders: dict[str, Any] = {"gru": estimator, "gru (front end alone)": replace(estimator, network=still)}
     contenders |= {name: name for name in CONTENDERS}
     table = evaluate(contenders, test_trajectories(config, episodes), progress=True)
+    for name, reason in dict.fromkeys((name, reason) for name, _, reason in table.attrs["skipped"]):
+        print(f"not compared with {name}: {reason}")
     return table[table["metric"] == "inclination"]
 
 
