@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from bisect import bisect_right
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from scipy.linalg import expm, solve_discrete_are
@@ -130,6 +131,17 @@ def regulator(
     return gains[0], kernel
 
 
+@lru_cache(maxsize=64)
+def gain_table(
+    bicycle: BicycleParameters, settings: ControlSettings, gravity: float, highest_speed: float
+) -> tuple[list[float], np.ndarray]:
+    """Speeds (m/s) and, for each, the gains on the state and on the curvature ahead ``(n, 7 + PREVIEW_BINS)``."""
+    model = whipple_model(bicycle, gravity)
+    slow, fast = np.arange(LOWEST_SPEED, 0.95, 0.1), np.arange(1.0, highest_speed + 0.25, 0.25)
+    speeds = [*slow.tolist(), *fast.tolist()]
+    return speeds, np.array([np.concatenate(regulator(model, bicycle, speed, settings)) for speed in speeds])
+
+
 class Pilot:
     """Keeps a bicycle upright, on a path and at a speed.
 
@@ -150,10 +162,7 @@ class Pilot:
         self.bicycle = bicycle
         self.settings = ControlSettings() if settings is None else settings
         self.model = whipple_model(bicycle, gravity)
-        slow, fast = np.arange(LOWEST_SPEED, 0.95, 0.1), np.arange(1.0, highest_speed + 0.25, 0.25)
-        self._grid = [*slow.tolist(), *fast.tolist()]
-        tables = [regulator(self.model, bicycle, speed, self.settings) for speed in self._grid]
-        self._gains = np.array([np.concatenate(table) for table in tables])
+        self._grid, self._gains = gain_table(bicycle, self.settings, gravity, highest_speed)
         self._ahead = PREVIEW_BIN * np.arange(PREVIEW_BINS + 1)
         self.period = 1.0 / self.settings.rate
         self.start(Path(np.zeros(2)))

@@ -120,12 +120,13 @@ def forward(limb: Limb, angles: np.ndarray) -> tuple[LimbPosture, np.ndarray]:
 
 @lru_cache(maxsize=64)
 def tip_torques(limb: Limb) -> Callable[..., list[list[float]]]:
-    """Function of joint angles and a force: lists ``(4,)`` and ``(3,)`` (root axes) → ``[torques (4,)]``.
+    """Function of joint angles and two forces: lists ``(4,)``, ``(3,)``, ``(3,)`` (root axes) → ``[torques (4,)]``.
 
-    The joint torques let the tip push with that force on what it holds (virtual work), N·m.
+    The joint torques let the tip push with the first force on what it holds, and lift the hinge with the second, N·m
+    (virtual work).
     """
 
-    def compute(angles, force):  # type: ignore[no-untyped-def]
+    def compute(angles, force, lift):  # type: ignore[no-untyped-def]
         xp = rotation.namespace(angles)
         half = 0.5 * angles
         c, s, zero = xp.cos(half), xp.sin(half), 0.0 * half[..., 0]
@@ -137,7 +138,7 @@ def tip_torques(limb: Limb) -> Callable[..., list[list[float]]]:
         upper = rotation.multiply(second, turn_z)
         hinge = rotation.rotate(upper, np.array([0.0, 0.0, -limb.upper]))
         lower = rotation.rotate(rotation.multiply(upper, bend), np.array([limb.tip[0], 0.0, limb.tip[1]]))
-        root = rotation.cross(hinge + lower, force)
+        root = rotation.cross(hinge + lower, force) + rotation.cross(hinge, lift)
         axis_x = rotation.rotate(turn_y, np.array([1.0, 0.0, 0.0]))
         axis_z = rotation.rotate(second, np.array([0.0, 0.0, 1.0]))
         axis_hinge = rotation.rotate(upper, np.array([0.0, 1.0, 0.0]))
@@ -146,4 +147,4 @@ def tip_torques(limb: Limb) -> Callable[..., list[list[float]]]:
         along_hinge = xp.sum(axis_hinge * rotation.cross(lower, force), axis=-1)
         return (xp.stack([root[..., 1], along_x, along_z, along_hinge], axis=-1),)
 
-    return straight_line(compute, angles=4, force=3)
+    return straight_line(compute, angles=4, force=3, lift=3)

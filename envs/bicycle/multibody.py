@@ -24,13 +24,13 @@ class CentreMotion(NamedTuple):
     """Motion of the centre-of-mass frames of n links, world axes."""
 
     position: np.ndarray
-    """(n, 3) m"""
+    """(..., n, 3) m"""
     orientation: np.ndarray
-    """(n, 4) principal axes to world"""
+    """(..., n, 4) principal axes to world"""
     velocity: np.ndarray
-    """(n, 3) m/s"""
+    """(..., n, 3) m/s"""
     angular_velocity: np.ndarray
-    """(n, 3) rad/s"""
+    """(..., n, 3) rad/s"""
 
 
 class Multibody:
@@ -123,20 +123,21 @@ def newton_euler(
         after: motion after it; the step's accelerations belong to positions ``before``, as the integrator has it.
         masses: ``(n,)`` kg.
         moments: ``(n, 3)`` principal moments of inertia, kg·m².
-        point: ``(3,)`` m, world.
+        point: ``(..., 3)`` m, world.
         duration: of the step, s.
         gravity: m/s², along −z.
 
     Returns:
-        Force ``(3,)`` N and moment ``(3,)`` N·m, world axes.
+        Force ``(..., 3)`` N and moment ``(..., 3)`` N·m, world axes.
     """
     acceleration = (after.velocity - before.velocity) / duration
     forces = masses[:, None] * (acceleration + np.array((0.0, 0.0, gravity)))
     spin = (spin_momentum(after, moments) - spin_momentum(before, moments)) / duration
-    return forces.sum(axis=0), (rotation.cross(before.position - point, forces) + spin).sum(axis=0)
+    arms = before.position - point[..., None, :]
+    return forces.sum(axis=-2), (rotation.cross(arms, forces) + spin).sum(axis=-2)
 
 
 def spin_momentum(motion: CentreMotion, moments: np.ndarray) -> np.ndarray:
-    """Angular momentum ``(n, 3)`` of links about their own centres of mass, N·m·s, world axes."""
+    """Angular momentum ``(..., n, 3)`` of links about their own centres of mass, N·m·s, world axes."""
     rate = rotation.rotate_back(motion.orientation, motion.angular_velocity)
     return rotation.rotate(motion.orientation, moments * rate)

@@ -18,7 +18,7 @@ import numpy as np
 from ...filters import rotation
 from ..joints import connect_points, constraint_force
 from ..physics import BASE
-from ..sensors import straight_line
+from ..sensors import STANDARD_GRAVITY, straight_line
 from .anthropometry import Mass
 from .bicycle import Bicycle, BicycleState
 from .limbs import reach_to, three_turns, tip_torques
@@ -32,7 +32,7 @@ TRUNK_STIFFNESS, TRUNK_DAMPING = 900.0, 90.0
 """N·m/rad and N·m·s/rad of the lumbar joint's muscles"""
 LIMB_DAMPING = 0.3
 """N·m·s/rad of every joint of a limb"""
-SWIVEL_STIFFNESS, SWIVEL_DAMPING = 20.0, 1.0
+SWIVEL_STIFFNESS, SWIVEL_DAMPING = 60.0, 2.0
 """N·m/rad, N·m·s/rad: hold elbows and knees in their plane"""
 DOWNSTROKE = 0.3
 """the pedal force is this plus the cosine of the crank angle where that is positive"""
@@ -55,6 +55,8 @@ class RiderMemory:
     torques: tuple[float, ...]
     trunk: tuple[float, ...]
     swivel: tuple[float, ...]
+    wanted_swivel: tuple[float, ...]
+    applied: tuple[float, ...]
     crank_torque: float
     hands: tuple[tuple[float, float, float], ...]
 
@@ -83,7 +85,7 @@ class Rider:
             raise ValueError(f"fidelity must be 'full' or 'lumped', got {fidelity!r}")
         self.posture, self.fidelity = posture, fidelity
         self.full = fidelity == "full"
-        self._steer_in_trunk = straight_line(_into_trunk, angles=3, force=3)
+        self._into_trunk = straight_line(_into_trunk, angles=3, force=3)
         self._limb_torques = [tip_torques(posture.limb(name)) for name in LIMBS]
         axis, origin = posture.bicycle.steer_axis, posture.bicycle.steer_origin
         arm = np.array(posture.bicycle.grip) - origin
@@ -92,6 +94,13 @@ class Rider:
         pulls = [np.cross(axis, arm * (1.0, SIGNS[side], 1.0)) / self._grip_arm for side in SIDES]
         self._pulls = [(pull.tolist(), np.cross(axis, pull).tolist()) for pull in pulls]
         trunk = posture.trunk()
+        segments = posture.segments()
+        upper, lower = (segments[part] for part in ("upper_arm", "forearm"))
+        # what an elbow carries of an arm whose shoulder and hand are held
+        share = -upper.mass * upper.centre[2] / posture.arm.upper + lower.mass * (
+            1.0 - lower.centre[2] / posture.arm.tip[1]
+        )
+        self._elbow_weight = STANDARD_GRAVITY * float(share)
         self._trunk_moment = trunk.mass * float(trunk.centre[2])
         self.constraints: list[int] = []
 
@@ -135,9 +144,11 @@ class Rider:
         self.constraints = []
         angles = self.limb_angles(crank)
         self._first_swivel = motion.at(0.0, 0.0, 0.0)[1]
+        self._wanted_swivel = self._first_swivel.tolist()
         self._tabulate()
         self._swivel = self._abductions(0.0, crank, [0.0] * 4)
         self._torques = [0.0] * len(self.joints)
+        self._applied = list(self._torques)
         self._crank_torque = 0.0
         self._hands = [(0.0, 0.0, 0.0), (0.0, 0.0, 0.0)]
         if not self.full:
@@ -164,18 +175,27 @@ class Rider:
         """Wanted lean of the trunk relative to the bicycle, rad, right positive."""
         return self._trunk_target[1]
 
-    def limb_angles(self, crank: float, steer: float = 0.0, extra: float = 0.0) -> list[np.ndarray]:
-        """Joint angles ``(4,)`` of each limb by inverse kinematics, in the trunk's posture at the start.
+    def limb_angles(
+        self,
+        crank: float | np.ndarray,
+        steer: float | np.ndarray = 0.0,
+        extra: float = 0.0,
+        lean: float = 0.0,
+        twist: float = 0.0,
+    ) -> list[np.ndarray]:
+        """Joint angles ``(..., 4)`` of each limb by inverse kinematics, in the trunk's posture at the start.
 
         Args:
             crank: rad.
             steer: rad, left positive.
             extra: rad of swivel besides that at the start.
+            lean: rad of the trunk, likewise.
+            twist: rad of the trunk, likewise.
         """
         posture, motion = self.posture, self.motion
         swivel = motion.at(0.0, 0.0, 0.0)[1] + extra
-        flexion, lean, twist = (np.array(angle) for angle in self._trunk_target)
-        trunk, angles = three_turns(flexion, lean, twist), []
+        flexion, first_lean, first_twist = self._trunk_target
+        trunk, angles = three_turns(np.array(flexion), np.array(first_lean + lean), np.array(first_twist + twist)), []
         for name, turn in zip(LIMBS, swivel.tolist(), strict=True):
             side = name.split("_")[1]
             if name.startswith("arm"):
@@ -187,12 +207,21 @@ class Rider:
 
     def _tabulate(self) -> None:
         """Abduction of each limb over steer (arms) and crank (legs), and the legs' weight felt at the crank."""
-        bit, rows = 0.01, []
+        bit = 0.01
         self._cranks = np.linspace(0.0, 2.0 * math.pi, 49)
-        for steer, crank in zip(STEERS, self._cranks, strict=True):
-            now, turned = self.limb_angles(crank, steer), self.limb_angles(crank, steer, bit)
-            rows.append([[a[1], (b[1] - a[1]) / bit] for a, b in zip(now, turned, strict=True)])
-        self._abduction_table = np.array(rows).transpose(1, 2, 0)
+        self._first_trunk = list(self._trunk_target)
+        now = self.limb_angles(self._cranks, STEERS)
+        changed = [
+            self.limb_angles(self._cranks, STEERS, extra=bit),
+            self.limb_angles(self._cranks, STEERS, lean=bit),
+            self.limb_angles(self._cranks, STEERS, twist=bit),
+        ]
+        rows = []
+        for limb in range(len(LIMBS)):
+            slopes = [(there[limb][:, 1] - now[limb][:, 1]) / bit for there in changed]
+            rows.append(np.stack([now[limb][:, 1], *slopes], axis=1))
+        # (posture, limb, value and slopes)
+        self._abduction_table = np.stack(rows, axis=1)
         heights = [sum(m.mass * m.centre[2] for m in self._legs_at(crank)) for crank in self._cranks[:-1]]
         # derivative of a periodic function through its Fourier series
         spectrum = np.fft.rfft(heights) * 1j * np.arange(25)
@@ -204,11 +233,18 @@ class Rider:
         return [mass for name, mass in self.posture.limbs_at(crank).items() if name.startswith("leg")]
 
     def _abductions(self, steer: float, crank: float, swivel: list[float]) -> list[float]:
-        """Abduction that puts elbows and knees where the rider wants them, rad."""
-        found, turn = [], crank % (2.0 * math.pi)
-        for index, (angles, slopes) in enumerate(self._abduction_table):
-            place, grid = (steer, STEERS) if index < 2 else (turn, self._cranks)
-            found.append(float(np.interp(place, grid, angles) + np.interp(place, grid, slopes) * swivel[index]))
+        """Abduction that puts elbows and knees where the rider wants them, rad; linear in swivel, lean and twist."""
+        lean, twist = (self._trunk_target[axis] - self._first_trunk[axis] for axis in (1, 2))
+        table, last = self._abduction_table, len(STEERS) - 1
+        arms = (steer - STEERS[0]) / (STEERS[-1] - STEERS[0]) * last
+        legs = (crank % (2.0 * math.pi)) / (2.0 * math.pi) * last
+        found = []
+        for limb, turn in enumerate(swivel):
+            place = max(0.0, min(last - 1e-9, arms if limb < 2 else legs))
+            index = int(place)
+            first, second = table[index, limb], table[index + 1, limb]
+            angle, by_swivel, by_lean, by_twist = (first + (place - index) * (second - first)).tolist()
+            found.append(angle + by_swivel * turn + by_lean * lean + by_twist * twist)
         return found
 
     def plan(self, state: BicycleState, curvature: float, steer_torque: float, drive: float) -> None:
@@ -238,6 +274,7 @@ class Rider:
         length = bicycle.drive.crank_length
         wanted = max(0.0, drive) * bicycle.rear_wheel.radius * ratio
         phases = [state.crank, state.crank + math.pi]
+        self._wanted_swivel = swivel.tolist()
         if not self.full:
             self._crank_torque = wanted * sum(max(0.0, math.cos(a)) + DOWNSTROKE for a in phases) / MEAN_STROKE
             return
@@ -250,14 +287,16 @@ class Rider:
         lift = float(np.interp(state.crank % (2.0 * math.pi), self._cranks, self._leg_weight))
         # and keep the feet up with the wheel, so that the chain stays nearly taut
         lift += max(-15.0, min(15.0, KEEPING_UP * (state.wheel_rate / ratio - state.crank_rate)))
+        up = self._into_trunk(trunk, [0.0, 0.0, self._elbow_weight])[0]
         for index, compute in enumerate(self._limb_torques):
             if index < 2:
-                force = self._steer_in_trunk(trunk, list(hands[index]))[0]
+                force = self._into_trunk(trunk, list(hands[index]))[0]
             else:
                 phase = phases[index - 2]
                 strength = push * (max(0.0, math.cos(phase)) + DOWNSTROKE) + 0.5 * lift / length
                 force = [-strength * math.sin(phase), 0.0, -strength * math.cos(phase)]
-            torques += compute(angles[3 + 4 * index : 7 + 4 * index], force)[0]
+            held = up if index < 2 else [0.0, 0.0, 0.0]
+            torques += compute(angles[3 + 4 * index : 7 + 4 * index], force, held)[0]
         self._torques = torques
 
     def act(self) -> tuple[list[float], float]:
@@ -276,6 +315,7 @@ class Rider:
                 torques[4 + 4 * index] += SWIVEL_STIFFNESS * (target - angle) - SWIVEL_DAMPING * rate
         if not self.full:
             self._press()
+        self._applied = torques
         return torques, self._crank_torque
 
     def _press(self) -> None:
@@ -332,6 +372,22 @@ class Rider:
         frame = self.bicycle.physics.state(self.bicycle.body.body, BASE).orientation
         return rotation.rotate(frame, np.array(self._hands)), self.grips()
 
+    def raw_forces(self) -> list[np.ndarray | tuple[float, float, float]]:
+        """Forces in the last step, unturned: hands and feet in world axes (full), hands in bicycle axes (lumped)."""
+        if not self.full:
+            return list(self._hands)
+        return [constraint_force(self.bicycle.physics, number) for number in self.constraints]
+
+    @property
+    def swivel(self) -> list[float]:
+        """Wanted swivel of left arm, right arm, left leg and right leg, rad."""
+        return self._wanted_swivel
+
+    @property
+    def torques(self) -> list[float]:
+        """N·m on the rider's joints in the last step, in the order of :attr:`joints`."""
+        return self._applied
+
     def foot_forces(self) -> tuple[np.ndarray, np.ndarray]:
         """Force ``(2, 3)`` of left and right foot on the pedals in the last step and where; none if lumped."""
         if not self.full:
@@ -355,6 +411,8 @@ class Rider:
             tuple(self._torques),
             tuple(self._trunk_target),
             tuple(self._swivel),
+            tuple(self._wanted_swivel),
+            tuple(self._applied),
             self._crank_torque,
             tuple(self._hands),
         )
@@ -363,4 +421,5 @@ class Rider:
         """Undo :meth:`save`."""
         self._torques, self._trunk_target = list(memory.torques), list(memory.trunk)
         self._swivel, self._crank_torque = list(memory.swivel), memory.crank_torque
+        self._wanted_swivel, self._applied = list(memory.wanted_swivel), list(memory.applied)
         self._hands = list(memory.hands)

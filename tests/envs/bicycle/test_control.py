@@ -38,10 +38,11 @@ def ride(bike, path, speed, duration, roll_rate=0.0):
     return np.array(rows).T
 
 
-@pytest.mark.parametrize("speed", [0.5, 1.0, 3.0, 6.0])
-@pytest.mark.parametrize("bike", [BENCHMARK, LOADED], ids=["benchmark", "mountain-bike"])
+@pytest.mark.parametrize(
+    ("bike", "speed"), [(BENCHMARK, 0.5), (BENCHMARK, 5.0), (LOADED, 0.5), (LOADED, 1.0), (LOADED, 3.0), (LOADED, 6.0)]
+)
 def test_balance_after_a_push(bike, speed):
-    roll, _, ridden, offset, torque = ride(bike, STRAIGHT, speed, 12.0, roll_rate=0.02)
+    roll, _, ridden, offset, torque = ride(bike, STRAIGHT, speed, 9.0, roll_rate=0.02)
     late = slice(len(roll) * 2 // 3, None)
     assert np.abs(roll).max() < 0.15
     assert np.abs(roll[late]).max() < 2e-3

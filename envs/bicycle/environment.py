@@ -1,0 +1,344 @@
+"""``poise/RiderBicycle-v0``: a rider on a bicycle, their sensors, and an agent that says the pose."""
+
+from __future__ import annotations
+
+import copy
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar
+
+import numpy as np
+from gymnasium import spaces
+
+from ...filters.quantity import Quantity
+from ..base import Block, Observation, PoseEnv, Scene, pose_error
+from ..sensors import STANDARD_GRAVITY, Sampling
+from .anthropometry import RiderBody, rider_body
+from .bicycle_sensors import CATALOGUE, RiderSensing
+from .control import ControlSettings
+from .parameters import BICYCLES, BicycleParameters
+from .posture import sit
+from .ride import Ride, RideMemory
+from .ride_log import RideRecorder
+from .ride_truth import QUANTITIES, other_truth, segment_states, true_pose
+from .rider import Fidelity
+from .scenarios import Scenario
+from .scenarios import scenario as named_scenario
+from .style import RiderMotion, RiderStyle, rider_style
+
+BLOCK = 50
+"""ticks that are computed together"""
+SETTLING = 1.0
+"""s of riding before the first tick"""
+KEPT = 8
+"""snapshots that can be restored without riding again"""
+
+
+class RiderBicycleEnv(PoseEnv):
+    """A rider balances a bicycle along a course; from few sensors an agent says the pose.
+
+    ## Description
+
+    Rider and bicycle are a multibody in PyBullet on tyres of our own. The rider steers with the arms, pedals with the
+    legs, sways and leans (``fidelity="full"``), or is a lump with a moving trunk (``"lumped"``: limb angles follow by
+    inverse kinematics, feet exert no forces of their own). World: x east, y north, z up; quaternions w, x, y, z, body
+    to world; bodies have x forward, y left, z up along the body. Actions do not change the ride.
+
+    ## Action Space
+
+    ``Box(float32)``: the agent's own estimate, at the last observation, of the quantities in ``score`` one after the
+    other: quaternions w, x, y, z (normalised; zeros count as no rotation) or values in rad or m/s.
+
+    ## Observation Space
+
+    ``Dict``; bounds are the full scales of the sensors. Channels by suite:
+
+    | key | shape | unit | suites |
+    |---|---|---|---|
+    | ``bicycle_imu/gyr``, ``trunk_imu/gyr`` | (3,) | rad/s | all |
+    | ``bicycle_imu/acc``, ``trunk_imu/acc`` | (3,) | m/s², specific force | force-inertial, whole-body |
+    | ``upper_arm_left/gyr``, ``…_right``, ``thigh_left/gyr``, ``…_right`` | (3,) | rad/s | whole-body |
+    | ``seat/force``, ``seat/moment`` | (3,) | N, N·m on the seat, sensor 20° nose down | force-inertial, whole-body |
+    | ``seat/load_cells`` | (3,) | N, upward support: front, rear left, rear right | force-inertial |
+    | ``handlebar/force`` | (6,) | N of left and right hand on the bar, bicycle axes | force-inertial |
+    | ``wheel/speed`` | (1,) | m/s | force-inertial, whole-body |
+    | ``steer/angle``, ``crank/angle`` | (1,) | rad, left positive; 0 with the left pedal in front | whole-body |
+    | ``relative/orientation`` | (4,) | trunk to bicycle, camera | two-gyro, 25 Hz |
+    | ``bicycle_imu/mag`` | (3,) | µT | only in a list of channels |
+    | ``fresh`` | (channels,) int8 | 1 for a new sample, 0 where the last value is repeated | all |
+
+    The bicycle's IMU sits 0.37 m ahead of the rear contact and 0.71 m high, nose 10° up; the trunk's at T6.
+
+    ## Rewards
+
+    Minus the sum of the errors of the scored quantities (rad; m/s for speed), at the pose that the action answers.
+
+    ## Starting State
+
+    Riding, one second after a start at static tyre deflection with consistent velocities.
+
+    ## Episode End
+
+    Terminated when the bicycle rolls beyond 57°; truncated after ``duration``.
+
+    ## Info
+
+    ``time`` (s), ``scored`` and, arrays float64:
+
+    | key | size | meaning |
+    |---|---|---|
+    | ``pose/<body>/orientation`` | 4 | bicycle, trunk, upper_arm, forearm, thigh, shank with ``_left`` and ``_right`` |
+    | ``pose/bicycle/roll``, ``pitch``, ``yaw`` | 1 | rad, Z-Y-X angles, roll to the right, nose down positive |
+    | ``pose/bicycle/steer``, ``crank``, ``speed`` | 1 | rad, rad, m/s |
+    | ``pose/trunk/angles``, ``hip_…/angles`` | 3 | rad, ISB Z-X-Y to the bicycle |
+    | ``pose/shoulder_…/angles`` | 3 | rad, ISB Y-X-Y to the trunk |
+    | ``pose/elbow_…/flexion``, ``knee_…/flexion`` | 1 | rad |
+    | ``truth/bicycle/position``, ``velocity``, ``acceleration`` | 3 | of the bicycle frame's origin, world |
+    | ``truth/trunk/position``, ``acceleration`` | 3 | of the lumbar joint, world |
+    | ``truth/…/angular_rate`` | 3 | rad/s, body axes |
+    | ``truth/seat/force``, ``moment`` | 3 | of the rider on the saddle, bicycle axes, N, N·m |
+    | ``truth/handlebar/force_…``, ``pedal/force_…`` | 3 | of hands and feet, bicycle axes, N |
+    | ``truth/joints/angles``, ``torques`` | 19 | rad, N·m (torques of a lumped rider: 3) |
+    | ``truth/steer/rate``, ``crank/rate``, ``wheel/rate``, ``wheel/angle`` | 1 | rad/s, rad |
+    | ``truth/<place>/gyroscope_bias`` … | | bias of the last sample of each sensor |
+
+    ## Arguments
+
+    Args:
+        scenario: name, see :func:`poise.envs.bicycle.scenarios.list_scenarios`; ``"slalom+bumps"`` composes; or a
+            :class:`poise.envs.bicycle.scenarios.Scenario`. ``reset(options={"scenario": …})`` replaces it once.
+        subject: 0…4, ``"random"``, or a :class:`poise.envs.bicycle.anthropometry.RiderBody`; also a reset option.
+        style: ``still``, ``mild``, ``normal``, ``aggressive``, or a style; None for that of the scenario.
+        suite: ``two-gyro``, ``force-inertial``, ``whole-body``, ``all``, or a list of channels.
+        sensors: ``paper``, ``ideal``, or a number by which the papers' errors are multiplied.
+        rate: Hz; None for that of the suite.
+        duration: s.
+        fidelity: ``full`` or ``lumped``.
+        bicycle: ``mountain-bike`` or parameters with a crank.
+        physics_rate: physics steps a second, Hz; a multiple of 250 Hz and of ``rate``.
+        score: one quantity or several of ``info["pose"]``.
+        sampling: ``interval`` or ``instant``, of gyroscopes and accelerometers.
+        render_mode: ``human`` (a window), ``rgb_array`` or None.
+
+    Raises:
+        ValueError: an argument out of its range, an unknown name, or a rider who does not fit on the bicycle.
+
+    ## Version History
+
+    * v0: first release.
+    """
+
+    reset_options: ClassVar[tuple[str, ...]] = ("scenario", "subject")
+
+    def __init__(
+        self,
+        scenario: str | Scenario = "indoor_circle",
+        subject: int | str | RiderBody = 0,
+        style: str | RiderStyle | None = None,
+        suite: str | Sequence[str] = "whole-body",
+        sensors: str | float = "paper",
+        rate: float | None = None,
+        duration: float = 60.0,
+        fidelity: Fidelity = "full",
+        bicycle: str | BicycleParameters = "mountain-bike",
+        physics_rate: float = 500.0,
+        score: str | Sequence[str] = "bicycle/roll",
+        *,
+        sampling: Sampling = "interval",
+        render_mode: str | None = None,
+    ) -> None:
+        self.scenario, self.subject, self.style = named_scenario(scenario), subject, style
+        if style is not None:
+            rider_style(style)
+        self.parameters = _bicycle(bicycle)
+        if subject != "random":
+            sit(self.parameters, rider_body(subject))
+        if fidelity not in ("full", "lumped"):
+            raise ValueError(f"fidelity must be 'full' or 'lumped', got {fidelity!r}")
+        if not 0.1 <= duration < math.inf:
+            raise ValueError(f"duration must be at least 0.1 s and finite, got {duration}")
+        self.fidelity, self.duration, self.physics_rate = fidelity, float(duration), float(physics_rate)
+        self.sensing = RiderSensing(suite, rate, _grade(sensors), sampling, STANDARD_GRAVITY)
+        limbs = [name for name in self.sensing.names if CATALOGUE[name].body not in ("bicycle", "trunk")]
+        if fidelity == "lumped" and sampling == "instant" and limbs:
+            raise ValueError(
+                f"a lumped rider's limbs have no instantaneous rates: sampling must be 'interval' for {limbs}"
+            )
+        control = ControlSettings().rate
+        for name, value in (("the sensors' rate", self.sensing.rate), ("the control rate", control)):
+            if abs(physics_rate / value - max(1, round(physics_rate / value))) > 1e-9:
+                raise ValueError(f"physics_rate must be a multiple of {name} of {value:g} Hz, got {physics_rate:g} Hz")
+        self.quantities = _quantities(score)
+        super().__init__(self.sensing.build((0.0, 0.0, 0.0)), self.quantities[0], self.sensing.rate, render_mode)
+        limits = np.concatenate([np.full(q.size, _bound(q), np.float32) for q in self.quantities])
+        self.action_space = spaces.Box(-limits, limits, dtype=np.float32)
+        self._ride: Ride | None = None
+        self._kept: dict[int, RideMemory] = {}
+        self._token = 0
+        self._fallen_at = math.inf
+
+    @property
+    def neutral_action(self) -> np.ndarray:
+        """``(size,)`` float32: no rotations, zero angles."""
+        parts = [np.eye(1, q.size, dtype=np.float32)[0] * (q.kind == "rotation") for q in self.quantities]
+        return np.concatenate(parts).astype(np.float32)
+
+    def begin(self, motion: np.random.Generator, sensors: np.random.Generator, options: Mapping[str, Any]) -> int:
+        """Draw rider, course and movements, and start the ride."""
+        chosen = named_scenario(options.get("scenario", self.scenario))
+        subject = options.get("subject", self.subject)
+        self._start(chosen, subject, motion)
+        noise, camera = sensors.spawn(2)
+        self.suite.reset(noise)
+        self.sensing.start(camera)
+        return max(1, round(self.duration * self.rate))
+
+    def _start(self, chosen: Scenario, subject: Any, motion: np.random.Generator) -> None:
+        """Build the ride; what was drawn is kept to ride it again."""
+        self._plan = (chosen, subject, copy.deepcopy(motion))
+        for_body, for_course, for_movement, for_crank = motion.spawn(4)
+        posture = sit(self.parameters, rider_body(subject, for_body))
+        course = chosen.draw(for_course, self.duration + SETTLING + 1.0)
+        style = rider_style(chosen.style if self.style is None else self.style)
+        self._stop()
+        self._posture, self._ground = posture, course.ground
+        self._ride = Ride(
+            posture,
+            RiderMotion(style, for_movement),
+            course.path,
+            course.speed,
+            ground=course.ground,
+            fidelity=self.fidelity,
+            physics_rate=self.physics_rate,
+            crank=float(for_crank.uniform(0.0, 2.0 * math.pi)),
+        )
+        steps = round(self.physics_rate / self.rate)
+        for _ in range(round(SETTLING * self.rate) * steps):
+            self._ride.step()
+        self._recorder = RideRecorder(self._ride, steps)
+        self._began = self._ride.physics.time + 1.0 / self.rate
+        self._ticks, self._fallen_at = 0, math.inf
+        self.suite = self._suite = self.sensing.build(posture.trunk_imu)
+        if self._scene is not None:
+            self._scene.close()
+            self._scene = None
+
+    def next_block(self, most: int) -> Block:
+        """Ride on and let the sensors see it."""
+        log = self._recorder.record(min(most, BLOCK))
+        bodies = segment_states(log)
+        time = log.time - self._began
+        bodies = {name: state._replace(time=time) for name, state in bodies.items()}
+        given = self.sensing.given(log, self._posture, bodies)
+        measurements, biases = self._suite.simulate(bodies, given)
+        if log.fallen.any():
+            self._fallen_at = self._ticks + len(time) - 1
+        self._ticks += len(time)
+        truth = {**other_truth(log), **biases}
+        return Block(time, measurements, true_pose(log, bodies), truth, np.ones(len(time), bool))
+
+    def step(self, action: np.ndarray) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
+        """Judge the estimate ``action`` of the last observation, then advance by one tick; a fall terminates.
+
+        Raises:
+            ValueError: the action has another shape than the action space, or is not finite.
+            RuntimeError: :meth:`reset` was not called, or the episode is over.
+        """
+        observation, reward, _, truncated, info = super().step(action)
+        terminated = self._tick >= self._fallen_at
+        if terminated:
+            self._last_tick = self._tick
+        return observation, reward, terminated, truncated and not terminated, info
+
+    def _checked(self, action: np.ndarray) -> np.ndarray:
+        estimate = np.array(action, dtype=float)
+        if estimate.shape != self.action_space.shape or not np.isfinite(estimate).all():
+            raise ValueError(f"action must hold {self.action_space.shape[0]} finite numbers, got {action!r}")  # type: ignore[index]
+        begin = 0
+        for quantity in self.quantities:
+            part = estimate[begin : begin + quantity.size]
+            if quantity.kind == "rotation" and not part.any():
+                part[0] = 1.0
+            begin += quantity.size
+        return estimate
+
+    def _reward(self, block: Block) -> float:
+        begin, total = 0, 0.0
+        for quantity in self.quantities:
+            part = self._estimate[begin : begin + quantity.size]
+            total += pose_error(quantity, part, block.pose[quantity.name][self._row])
+            begin += quantity.size
+        return -total
+
+    def save_source(self) -> Any:
+        """The drawn ride and how far it is; also where PyBullet's state is kept for a quick return."""
+        assert self._ride is not None
+        self._token += 1
+        self._kept[self._token] = self._ride.save()
+        if len(self._kept) > KEPT:
+            self._ride.forget(self._kept.pop(min(self._kept)))
+        return self._plan, self._ticks, self._fallen_at, self._suite.save(), self.sensing.save(), self._token
+
+    def restore_source(self, saved: Any) -> None:
+        """Undo :meth:`save_source`: from memory where the ride is still there, else by riding it again."""
+        plan, ticks, fallen_at, suite, sensing, token = saved
+        same = self._ride is not None and plan is self._plan
+        if same and token in self._kept:
+            assert self._ride is not None
+            self._ride.restore(self._kept[token])
+        else:
+            chosen, subject, motion = plan
+            self._start(chosen, subject, copy.deepcopy(motion))
+            self._plan = plan
+            if ticks:
+                self._recorder.record(ticks)
+        self._ticks, self._fallen_at = ticks, fallen_at
+        self._suite.restore(suite)
+        self.sensing.restore(sensing)
+
+    def make_scene(self, gui: bool) -> Scene:
+        """Rider, bicycle and ground."""
+        from .scene import RideScene
+
+        return RideScene(self._posture, self._ground, gui=gui)
+
+    def _stop(self) -> None:
+        ride, self._ride = self._ride, None
+        self._kept = {}
+        if ride is not None:
+            ride.close()
+
+    def close(self) -> None:
+        """Close window and physics; may be called twice."""
+        super().close()
+        self._stop()
+        self._block = None
+
+
+def _bicycle(bicycle: str | BicycleParameters) -> BicycleParameters:
+    if isinstance(bicycle, BicycleParameters):
+        return bicycle
+    if bicycle not in BICYCLES:
+        raise ValueError(f"bicycle must be one of {list(BICYCLES)} or BicycleParameters, got {bicycle!r}")
+    return BICYCLES[bicycle]
+
+
+def _grade(sensors: str | float) -> float:
+    named = {"paper": 1.0, "ideal": 0.0}
+    if isinstance(sensors, str):
+        if sensors not in named:
+            raise ValueError(f"sensors must be 'paper', 'ideal' or a number, got {sensors!r}")
+        return named[sensors]
+    return float(sensors)
+
+
+def _quantities(score: str | Sequence[str]) -> tuple[Quantity, ...]:
+    names = (score,) if isinstance(score, str) else tuple(score)
+    unknown = [name for name in names if name not in QUANTITIES]
+    if unknown or not names or len(set(names)) < len(names):
+        raise ValueError(f"score must name different ones of {list(QUANTITIES)}, got {list(names)}")
+    return tuple(QUANTITIES[name] for name in names)
+
+
+def _bound(quantity: Quantity) -> float:
+    return {"rotation": 1.0, "angle": math.pi}.get(quantity.kind, 20.0)

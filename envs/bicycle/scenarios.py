@@ -1,0 +1,233 @@
+"""Where and how fast to ride: a registry of scenarios, each drawn anew from a generator, and composable."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from .path import Path, smooth_curvature, wandering_path
+from .terrain import Bump, FlatGround, Ground, GroundSum, Ramp, RoughGround
+
+Factory = Callable[[np.random.Generator, float], "SpeedProfile"]
+
+
+class SpeedProfile:
+    """Wanted speed over time: random levels, blended smoothly.
+
+    Args:
+        levels: m/s, one every ``hold`` seconds.
+        hold: s.
+    """
+
+    def __init__(self, levels: np.ndarray, hold: float = 10.0) -> None:
+        self.levels, self.hold = np.atleast_1d(levels).astype(float), hold
+
+    @property
+    def mean(self) -> float:
+        """Mean level, m/s."""
+        return float(self.levels.mean())
+
+    def __call__(self, time: float) -> float:
+        """Speed (m/s) at a time (s); the last level stays."""
+        place = max(0.0, time / self.hold)
+        index = min(int(place), len(self.levels) - 1)
+        following = min(index + 1, len(self.levels) - 1)
+        part = min(1.0, place - index)
+        blend = 0.5 - 0.5 * math.cos(math.pi * part)
+        return float(self.levels[index] + blend * (self.levels[following] - self.levels[index]))
+
+
+@dataclass(frozen=True)
+class Course:
+    """One drawn scenario."""
+
+    path: Path
+    speed: SpeedProfile
+    ground: Ground
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """How a kind of course is drawn. Replace a part (``dataclasses.replace``) to compose another scenario."""
+
+    name: str
+    summary: str
+    speed: Factory
+    """generator, duration (s) → wanted speed"""
+    path: Callable[[np.random.Generator, float], Path]
+    """generator, length (m) → path"""
+    ground: Callable[[np.random.Generator, Path, SpeedProfile], Ground]
+    """generator, path, speed → ground"""
+    style: str = "normal"
+    """how the rider moves unless told otherwise"""
+
+    def draw(self, rng: np.random.Generator, duration: float) -> Course:
+        """Draw a course for a ride of ``duration`` seconds."""
+        for_speed, for_path, for_ground = rng.spawn(3)
+        speed = self.speed(for_speed, duration)
+        longest = float(speed.levels.max()) * duration + 10.0
+        path = self.path(for_path, longest)
+        return Course(path, speed, self.ground(for_ground, path, speed))
+
+
+def _steady_speed(rng: np.random.Generator, duration: float, low: float, high: float) -> SpeedProfile:
+    return SpeedProfile(rng.uniform(low, high, 1))
+
+
+def _varied_speed(rng: np.random.Generator, duration: float, low: float, high: float, hold: float) -> SpeedProfile:
+    return SpeedProfile(rng.uniform(low, high, max(2, math.ceil(duration / hold) + 1)), hold)
+
+
+def _flat(rng: np.random.Generator, path: Path, speed: SpeedProfile) -> Ground:
+    return FlatGround()
+
+
+def _paving(rng: np.random.Generator, path: Path, speed: SpeedProfile, deviation: float) -> Ground:
+    return RoughGround.random(rng, deviation)
+
+
+def _all_of(rng: np.random.Generator, path: Path, speed: SpeedProfile, scenes: tuple[Scenario, ...]) -> Ground:
+    return GroundSum(
+        [scene.ground(child, path, speed) for scene, child in zip(scenes, rng.spawn(len(scenes)), strict=True)]
+    )
+
+
+def _two_bumps(rng: np.random.Generator, path: Path, speed: SpeedProfile) -> Ground:
+    """Two bumps of 4 cm, reached about 13 and 15 s after the start, as in the whole-body paper's ride."""
+    bumps = []
+    for time in (13.0, 15.0):
+        point = path.at(speed.mean * (time + float(rng.uniform(-0.2, 0.2))))
+        bumps.append(Bump((point.x, point.y), point.heading, float(rng.uniform(0.035, 0.045)), 0.4))
+    return GroundSum(bumps)
+
+
+def _hill(rng: np.random.Generator, path: Path, speed: SpeedProfile) -> Ground:
+    """A ramp of up to 20°, reached about 12 s after the start."""
+    point = path.at(speed.mean * 12.0)
+    angle = math.radians(float(rng.uniform(17.0, 20.0)))
+    return Ramp((point.x, point.y), point.heading, angle, rounding=1.8, steep=0.6, top=4.0)
+
+
+def _straight(rng: np.random.Generator, length: float) -> Path:
+    return Path(np.zeros(max(2, math.ceil(length / 0.02))), (0.0, 0.0, float(rng.uniform(-math.pi, math.pi))))
+
+
+def _circle(rng: np.random.Generator, length: float) -> Path:
+    radius = float(rng.uniform(2.3, 2.7)) * (1.0 if rng.random() < 0.5 else -1.0)
+    curvature = smooth_curvature(lambda s: np.where(s > 2.5, 1.0 / radius, 0.0), length, blend=2.0)
+    return Path(curvature, (0.0, 0.0, float(rng.uniform(-math.pi, math.pi))))
+
+
+def _wander(rng: np.random.Generator, length: float) -> Path:
+    return wandering_path(rng, length, start=(0.0, 0.0, float(rng.uniform(-math.pi, math.pi))))
+
+
+def _nudged(rng: np.random.Generator, length: float) -> Path:
+    """A straight line with a short gentle turn, one way or the other, every 20 to 30 m."""
+    places = np.cumsum(rng.uniform(20.0, 30.0, max(1, math.ceil(length / 20.0))))
+    turns = rng.uniform(0.05, 0.08, len(places)) * rng.choice([-1.0, 1.0], len(places))
+
+    def curvature(s: np.ndarray) -> np.ndarray:
+        near = np.abs(s[:, None] - places) < 3.0
+        return (near * turns).sum(axis=1)
+
+    start = (0.0, 0.0, float(rng.uniform(-math.pi, math.pi)))
+    return Path(smooth_curvature(curvature, length, blend=3.0), start)
+
+
+def _weave(rng: np.random.Generator, length: float) -> Path:
+    period, radius = float(rng.uniform(14.0, 18.0)), float(rng.uniform(6.0, 8.0))
+    wave = 2.0 * math.pi / period
+    curvature = smooth_curvature(lambda s: (s > 4.0) * np.sin(wave * (s - 4.0)) / radius, length, blend=2.0)
+    return Path(curvature, (0.0, 0.0, float(rng.uniform(-math.pi, math.pi))))
+
+
+SCENARIOS = {
+    scenario.name: scenario
+    for scenario in (
+        Scenario(
+            "indoor_circle",
+            "a circle of about 2.5 m radius at about 1 m/s on a hall floor",
+            partial(_steady_speed, low=0.9, high=1.1),
+            _circle,
+            _flat,
+        ),
+        Scenario(
+            "outdoor",
+            "an arbitrary path in 50 × 40 m at 0.5 to 6 m/s on uneven paving",
+            partial(_varied_speed, low=0.7, high=6.0, hold=12.0),
+            _wander,
+            partial(_paving, deviation=0.0015),
+        ),
+        Scenario(
+            "straight",
+            "nearly straight at 2.5 to 3.5 m/s, turning only now and then",
+            partial(_steady_speed, low=2.5, high=3.5),
+            _nudged,
+            partial(_paving, deviation=0.0007),
+            "mild",
+        ),
+        Scenario(
+            "bumps",
+            "two bumps at 13 and 15 s",
+            partial(_steady_speed, low=2.8, high=3.4),
+            _straight,
+            _two_bumps,
+            "mild",
+        ),
+        Scenario(
+            "pitch",
+            "up and down a ramp of up to 20°",
+            partial(_steady_speed, low=3.6, high=4.2),
+            _straight,
+            _hill,
+            "mild",
+        ),
+        Scenario(
+            "slalom",
+            "left and right around cones at 2.5 to 3.5 m/s",
+            partial(_steady_speed, low=2.5, high=3.5),
+            _weave,
+            _flat,
+        ),
+        Scenario(
+            "slow",
+            "almost a track stand: 0.5 to 0.7 m/s",
+            partial(_steady_speed, low=0.5, high=0.7),
+            _straight,
+            _flat,
+            "mild",
+        ),
+    )
+}
+"""The scenarios by name."""
+
+
+def list_scenarios() -> list[str]:
+    """Names that :func:`scenario` takes."""
+    return list(SCENARIOS)
+
+
+def scenario(name: str | Scenario) -> Scenario:
+    """A scenario by name, as given, or composed: ``"slalom+bumps"`` rides the first on the ground of both.
+
+    Raises:
+        ValueError: there is none of that name.
+    """
+    if isinstance(name, Scenario):
+        return name
+    parts = str(name).split("+")
+    unknown = [part for part in parts if part not in SCENARIOS]
+    if unknown:
+        raise ValueError(f"scenario must be one of {list_scenarios()} or several joined by '+', got {name!r}")
+    first, *others = (SCENARIOS[part] for part in parts)
+    if not others:
+        return first
+
+    scenes = (first, *others)
+    summary = "; ".join(each.summary for each in scenes)
+    return replace(first, name=str(name), summary=summary, ground=partial(_all_of, scenes=scenes))
