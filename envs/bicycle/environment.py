@@ -13,18 +13,21 @@ from gymnasium import spaces
 from ...filters.quantity import Quantity
 from ..base import Block, Observation, PoseEnv, Scene, pose_error
 from ..sensors import STANDARD_GRAVITY, Sampling
+from ..suite import SensorSuite
 from .anthropometry import RiderBody, rider_body
-from .bicycle_sensors import CATALOGUE, RiderSensing
 from .control import ControlSettings
+from .paper_sensors import CATALOGUE, SensorPlaces, rider_bicycle_suite, sensor_places, suite_channels
 from .parameters import BICYCLES, BicycleParameters
-from .posture import sit
+from .posture import Posture, sit
 from .ride import Ride, RideMemory
 from .ride_log import RideRecorder
 from .ride_truth import QUANTITIES, other_truth, segment_states, true_pose
 from .rider import Fidelity
 from .scenarios import Scenario
 from .scenarios import scenario as named_scenario
+from .sensor_readings import RideQuantities, given_readings
 from .style import RiderMotion, RiderStyle, rider_style
+from .tyre import TyreParameters
 
 BLOCK = 50
 """ticks that are computed together"""
@@ -58,13 +61,14 @@ class RiderBicycleEnv(PoseEnv):
     | ``bicycle_imu/gyr``, ``trunk_imu/gyr`` | (3,) | rad/s | all |
     | ``bicycle_imu/acc``, ``trunk_imu/acc`` | (3,) | m/s², specific force | force-inertial, whole-body |
     | ``upper_arm_left/gyr``, ``…_right``, ``thigh_left/gyr``, ``…_right`` | (3,) | rad/s | whole-body |
-    | ``seat/force``, ``seat/moment`` | (3,) | N, N·m on the seat, sensor 20° nose down | force-inertial, whole-body |
-    | ``seat/load_cells`` | (3,) | N, upward support: front, rear left, rear right | force-inertial |
+    | ``seat/wrench`` | (6,) | N, N·m of the rider on the sensor in the seat post, its axes | force-inertial |
+    | ``seat/load_cells`` | (3,) | N, compression: front, rear left, rear right | force-inertial, whole-body |
     | ``handlebar/force`` | (6,) | N of left and right hand on the bar, bicycle axes | force-inertial |
     | ``wheel/speed`` | (1,) | m/s | force-inertial, whole-body |
     | ``steer/angle``, ``crank/angle`` | (1,) | rad, left positive; 0 with the left pedal in front | whole-body |
-    | ``relative/orientation`` | (4,) | trunk to bicycle, camera | two-gyro, 25 Hz |
-    | ``bicycle_imu/mag`` | (3,) | µT | only in a list of channels |
+    | ``relative/orientation`` | (4,) | trunk to bicycle, camera at 16 Hz | two-gyro |
+    | ``relative/distances`` | (3,) | m, of three markers on the trunk from the camera, 16 Hz | all |
+    | ``bicycle_imu/mag``, ``trunk_imu/mag`` | (3,) | µT | only in a list of channels |
     | ``fresh`` | (channels,) int8 | 1 for a new sample, 0 where the last value is repeated | all |
 
     The bicycle's IMU sits 0.37 m ahead of the rear contact and 0.71 m high, nose 10° up; the trunk's at T6.
@@ -109,14 +113,17 @@ class RiderBicycleEnv(PoseEnv):
             :class:`poise.envs.bicycle.scenarios.Scenario`. ``reset(options={"scenario": …})`` replaces it once.
         subject: 0…4, ``"random"``, or a :class:`poise.envs.bicycle.anthropometry.RiderBody`; also a reset option.
         style: ``still``, ``mild``, ``normal``, ``aggressive``, or a style; None for that of the scenario.
-        suite: ``two-gyro``, ``force-inertial``, ``whole-body``, ``all``, or a list of channels.
-        sensors: ``paper``, ``ideal``, or a number by which the papers' errors are multiplied.
+        suite: ``two-gyro``, ``force-inertial``, ``whole-body``, ``all``, or a list of channels
+            (:mod:`poise.envs.bicycle.paper_sensors` says where they sit and how they err).
+        sensors: ``paper``, ``ideal``, or a device (:func:`poise.envs.sensor_presets.list_sensor_presets`) in place of
+            the papers' inertial sensors.
         rate: Hz; None for that of the suite.
         duration: s.
         fidelity: ``full`` or ``lumped``.
         bicycle: ``mountain-bike`` or parameters with a crank.
         physics_rate: physics steps a second, Hz; a multiple of 250 Hz and of ``rate``.
         score: one quantity or several of ``info["pose"]``.
+        grade: all errors times this, 0 for none.
         sampling: ``interval`` or ``instant``, of gyroscopes and accelerometers.
         render_mode: ``human`` (a window), ``rgb_array`` or None.
 
@@ -136,7 +143,7 @@ class RiderBicycleEnv(PoseEnv):
         subject: int | str | RiderBody = 0,
         style: str | RiderStyle | None = None,
         suite: str | Sequence[str] = "whole-body",
-        sensors: str | float = "paper",
+        sensors: str = "paper",
         rate: float | None = None,
         duration: float = 60.0,
         fidelity: Fidelity = "full",
@@ -144,6 +151,7 @@ class RiderBicycleEnv(PoseEnv):
         physics_rate: float = 500.0,
         score: str | Sequence[str] = "bicycle/roll",
         *,
+        grade: float = 1.0,
         sampling: Sampling = "interval",
         render_mode: str | None = None,
     ) -> None:
@@ -151,25 +159,35 @@ class RiderBicycleEnv(PoseEnv):
         if style is not None:
             rider_style(style)
         self.parameters = _bicycle(bicycle)
-        if subject != "random":
-            sit(self.parameters, rider_body(subject))
+        posture = sit(self.parameters, RiderBody() if subject == "random" else rider_body(subject))
         if fidelity not in ("full", "lumped"):
             raise ValueError(f"fidelity must be 'full' or 'lumped', got {fidelity!r}")
         if not 0.1 <= duration < math.inf:
             raise ValueError(f"duration must be at least 0.1 s and finite, got {duration}")
         self.fidelity, self.duration, self.physics_rate = fidelity, float(duration), float(physics_rate)
-        self.sensing = RiderSensing(suite, rate, _grade(sensors), sampling, STANDARD_GRAVITY)
-        limbs = [name for name in self.sensing.names if CATALOGUE[name].body not in ("bicycle", "trunk")]
+        names, _ = suite_channels(suite)
+        if any(name.startswith("disk") for name in names):
+            raise ValueError(f"suite must be one that a rider wears: there is no disk on this bicycle, got {suite!r}")
+        self._sensors: dict[str, Any] = {
+            "name": suite if isinstance(suite, str) else names,
+            "sensors": sensors,
+            "rate": rate,
+            "grade": grade,
+            "sampling": sampling,
+        }
+        self.tyre = TyreParameters()
+        made, _ = self._make_suite(posture)
+        limbs = [name for name in names if CATALOGUE[name].body not in ("bicycle", "trunk")]
         if fidelity == "lumped" and sampling == "instant" and limbs:
             raise ValueError(
                 f"a lumped rider's limbs have no instantaneous rates: sampling must be 'interval' for {limbs}"
             )
         control = ControlSettings().rate
-        for name, value in (("the sensors' rate", self.sensing.rate), ("the control rate", control)):
+        for name, value in (("the sensors' rate", made.rate), ("the control rate", control)):
             if abs(physics_rate / value - max(1, round(physics_rate / value))) > 1e-9:
                 raise ValueError(f"physics_rate must be a multiple of {name} of {value:g} Hz, got {physics_rate:g} Hz")
         self.quantities = _quantities(score)
-        super().__init__(self.sensing.build((0.0, 0.0, 0.0)), self.quantities[0], self.sensing.rate, render_mode)
+        super().__init__(made, self.quantities[0], made.rate, render_mode)
         limits = np.concatenate([np.full(q.size, _bound(q), np.float32) for q in self.quantities])
         self.action_space = spaces.Box(-limits, limits, dtype=np.float32)
         self._ride: Ride | None = None
@@ -188,9 +206,7 @@ class RiderBicycleEnv(PoseEnv):
         chosen = named_scenario(options.get("scenario", self.scenario))
         subject = options.get("subject", self.subject)
         self._start(chosen, subject, motion)
-        noise, camera = sensors.spawn(2)
-        self.suite.reset(noise)
-        self.sensing.start(camera)
+        self.suite.reset(sensors)
         return max(1, round(self.duration * self.rate))
 
     def _start(self, chosen: Scenario, subject: Any, motion: np.random.Generator) -> None:
@@ -210,6 +226,7 @@ class RiderBicycleEnv(PoseEnv):
             ground=course.ground,
             fidelity=self.fidelity,
             physics_rate=self.physics_rate,
+            tyre=self.tyre,
             crank=float(for_crank.uniform(0.0, 2.0 * math.pi)),
         )
         steps = round(self.physics_rate / self.rate)
@@ -218,10 +235,21 @@ class RiderBicycleEnv(PoseEnv):
         self._recorder = RideRecorder(self._ride, steps)
         self._began = self._ride.physics.time + 1.0 / self.rate
         self._ticks, self._fallen_at = 0, math.inf
-        self.suite = self._suite = self.sensing.build(posture.trunk_imu)
+        self._suite, self._places = self._make_suite(posture)
+        self.suite = self._suite
         if self._scene is not None:
             self._scene.close()
             self._scene = None
+
+    def _make_suite(self, posture: Posture) -> tuple[SensorSuite, SensorPlaces]:
+        """Sensors of a person on the bicycle, and their places."""
+        load = posture.load()
+        whole = posture.bicycle.with_load(load).parts
+        mass = sum(part.mass for part in whole)
+        front = sum(part.mass * part.centre[0] for part in whole) / mass / posture.bicycle.wheelbase
+        sinking = STANDARD_GRAVITY * mass * (1.0 - front) / self.tyre.stiffness
+        places = sensor_places(posture, wheel_sinking=sinking)
+        return rider_bicycle_suite(places=places, gravity=STANDARD_GRAVITY, **self._sensors), places
 
     def next_block(self, most: int) -> Block:
         """Ride on and let the sensors see it."""
@@ -229,7 +257,12 @@ class RiderBicycleEnv(PoseEnv):
         bodies = segment_states(log)
         time = log.time - self._began
         bodies = {name: state._replace(time=time) for name, state in bodies.items()}
-        given = self.sensing.given(log, self._posture, bodies)
+        contact = log.contact
+        wheel = log.rates[:, 2]
+        true = RideQuantities(
+            bodies, wheel, log.steer, log.crank, contact.seat_force, contact.seat_moment, contact.hands
+        )
+        given = given_readings(self._suite, true, self._places)
         measurements, biases = self._suite.simulate(bodies, given)
         if log.fallen.any():
             self._fallen_at = self._ticks + len(time) - 1
@@ -277,11 +310,11 @@ class RiderBicycleEnv(PoseEnv):
         self._kept[self._token] = self._ride.save()
         if len(self._kept) > KEPT:
             self._ride.forget(self._kept.pop(min(self._kept)))
-        return self._plan, self._ticks, self._fallen_at, self._suite.save(), self.sensing.save(), self._token
+        return self._plan, self._ticks, self._fallen_at, self._suite.save(), self._token
 
     def restore_source(self, saved: Any) -> None:
         """Undo :meth:`save_source`: from memory where the ride is still there, else by riding it again."""
-        plan, ticks, fallen_at, suite, sensing, token = saved
+        plan, ticks, fallen_at, suite, token = saved
         same = self._ride is not None and plan is self._plan
         if same and token in self._kept:
             assert self._ride is not None
@@ -294,7 +327,6 @@ class RiderBicycleEnv(PoseEnv):
                 self._recorder.record(ticks)
         self._ticks, self._fallen_at = ticks, fallen_at
         self._suite.restore(suite)
-        self.sensing.restore(sensing)
 
     def make_scene(self, gui: bool) -> Scene:
         """Rider, bicycle and ground."""
@@ -321,15 +353,6 @@ def _bicycle(bicycle: str | BicycleParameters) -> BicycleParameters:
     if bicycle not in BICYCLES:
         raise ValueError(f"bicycle must be one of {list(BICYCLES)} or BicycleParameters, got {bicycle!r}")
     return BICYCLES[bicycle]
-
-
-def _grade(sensors: str | float) -> float:
-    named = {"paper": 1.0, "ideal": 0.0}
-    if isinstance(sensors, str):
-        if sensors not in named:
-            raise ValueError(f"sensors must be 'paper', 'ideal' or a number, got {sensors!r}")
-        return named[sensors]
-    return float(sensors)
 
 
 def _quantities(score: str | Sequence[str]) -> tuple[Quantity, ...]:

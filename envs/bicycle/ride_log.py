@@ -63,7 +63,7 @@ class RideRecorder:
 
     def _look(self) -> list[LinkState]:
         body = self.ride.bicycle.body
-        return [self.ride.physics.base_tuples(body.body), *body.link_tuples(self._links)]  # type: ignore[list-item]
+        return [self.ride.physics.base_tuples(body.body), *body.link_tuples(self._links)]
 
     def record(self, ticks: int) -> RideLog:
         """Ride on for some ticks; stops early after the tick in which the rider fell."""
@@ -168,8 +168,8 @@ class RideRecorder:
         posture, frame, front, crank = rider.posture, start["rear_frame"], start["front_assembly"], start["crank"]
         saddle = frame.position + rotation.rotate(frame.orientation, np.array(posture.bicycle.saddle))
         rows = slice(3, 3 + len(rider.masses))
-        motions = (CentreMotion(*(field[:, rows] for field in motion)) for motion in (before, after))
-        force, moment = newton_euler(*motions, rider.masses, rider.moments, saddle, physics.time_step, physics.gravity)
+        then, now = (CentreMotion(*(field[:, rows] for field in motion)) for motion in (before, after))
+        force, moment = newton_euler(then, now, rider.masses, rider.moments, saddle, physics.time_step, physics.gravity)
         if rider.full:
             hands, feet = forces[:, :2], forces[:, 2:]
         else:

@@ -19,10 +19,10 @@ from ...filters import rotation
 from ..joints import connect_points, constraint_force
 from ..physics import BASE
 from ..sensors import STANDARD_GRAVITY, straight_line
-from .anthropometry import Mass
 from .bicycle import Bicycle, BicycleState
-from .limbs import reach_to, three_turns, tip_torques
-from .posture import KNEE_OUT, LIMBS, SIDES, SIGNS, Posture
+from .limb_tables import LimbTables
+from .limbs import tip_torques
+from .posture import LIMBS, SIDES, SIGNS, Posture
 from .rider_links import LUMPED_MASSES, TRUNK_JOINTS, add_full_rider, add_lumped_rider, limb_joints, segment_links
 from .style import RiderMotion
 from .urdf import Tree
@@ -40,8 +40,6 @@ MEAN_STROKE = 2.0 * (1.0 / math.pi + DOWNSTROKE)
 """mean of both legs' strength over a turn"""
 SHOULDERS_FOLLOW = 0.25
 """part of the steering angle by which the trunk twists"""
-STEERS = np.linspace(-0.6, 0.6, 49)
-"""rad at which the arms' posture is tabulated"""
 KEEPING_UP = 4.0
 """N·m/(rad/s) on the crank, towards the wheel's pace"""
 LARGEST_PEDAL_FORCE = 450.0
@@ -142,11 +140,10 @@ class Rider:
         for constraint in self.constraints:
             body.release(constraint)
         self.constraints = []
-        angles = self.limb_angles(crank)
         self._first_swivel = motion.at(0.0, 0.0, 0.0)[1]
         self._wanted_swivel = self._first_swivel.tolist()
-        self._tabulate()
-        self._swivel = self._abductions(0.0, crank, [0.0] * 4)
+        self._tables = LimbTables(self.posture, self._trunk_target, self._first_swivel, physics.gravity)
+        self._swivel = self._tables.abductions(0.0, crank, self._trunk_target, [0.0] * 4)
         self._torques = [0.0] * len(self.joints)
         self._applied = list(self._torques)
         self._crank_torque = 0.0
@@ -154,7 +151,7 @@ class Rider:
         if not self.full:
             return
         step = 1e-5
-        later = self.limb_angles(crank + step * crank_rate)
+        angles, later = self._tables.angles(crank), self._tables.angles(crank + step * crank_rate)
         for links, now, then in zip(self.limb_links, angles, later, strict=True):
             for link, angle, rate in zip(links, now, (then - now) / step, strict=True):
                 body.set_joint(link, float(angle), float(rate))
@@ -174,78 +171,6 @@ class Rider:
     def intended_lean(self) -> float:
         """Wanted lean of the trunk relative to the bicycle, rad, right positive."""
         return self._trunk_target[1]
-
-    def limb_angles(
-        self,
-        crank: float | np.ndarray,
-        steer: float | np.ndarray = 0.0,
-        extra: float = 0.0,
-        lean: float = 0.0,
-        twist: float = 0.0,
-    ) -> list[np.ndarray]:
-        """Joint angles ``(..., 4)`` of each limb by inverse kinematics, in the trunk's posture at the start.
-
-        Args:
-            crank: rad.
-            steer: rad, left positive.
-            extra: rad of swivel besides that at the start.
-            lean: rad of the trunk, likewise.
-            twist: rad of the trunk, likewise.
-        """
-        posture, motion = self.posture, self.motion
-        swivel = motion.at(0.0, 0.0, 0.0)[1] + extra
-        flexion, first_lean, first_twist = self._trunk_target
-        trunk, angles = three_turns(np.array(flexion), np.array(first_lean + lean), np.array(first_twist + twist)), []
-        for name, turn in zip(LIMBS, swivel.tolist(), strict=True):
-            side = name.split("_")[1]
-            if name.startswith("arm"):
-                target, out = posture.arm_target(side, steer, trunk), posture.elbow_out(side, trunk)
-            else:
-                target, out = posture.leg_target(side, crank), KNEE_OUT
-            angles.append(reach_to(posture.limb(name), target, out, turn).angles)
-        return angles
-
-    def _tabulate(self) -> None:
-        """Abduction of each limb over steer (arms) and crank (legs), and the legs' weight felt at the crank."""
-        bit = 0.01
-        self._cranks = np.linspace(0.0, 2.0 * math.pi, 49)
-        self._first_trunk = list(self._trunk_target)
-        now = self.limb_angles(self._cranks, STEERS)
-        changed = [
-            self.limb_angles(self._cranks, STEERS, extra=bit),
-            self.limb_angles(self._cranks, STEERS, lean=bit),
-            self.limb_angles(self._cranks, STEERS, twist=bit),
-        ]
-        rows = []
-        for limb in range(len(LIMBS)):
-            slopes = [(there[limb][:, 1] - now[limb][:, 1]) / bit for there in changed]
-            rows.append(np.stack([now[limb][:, 1], *slopes], axis=1))
-        # (posture, limb, value and slopes)
-        self._abduction_table = np.stack(rows, axis=1)
-        heights = [sum(m.mass * m.centre[2] for m in self._legs_at(crank)) for crank in self._cranks[:-1]]
-        # derivative of a periodic function through its Fourier series
-        spectrum = np.fft.rfft(heights) * 1j * np.arange(25)
-        spectrum[-1] = 0.0
-        rising = np.fft.irfft(spectrum, 48) * self.bicycle.physics.gravity
-        self._leg_weight = np.append(rising, rising[0])
-
-    def _legs_at(self, crank: float) -> list[Mass]:
-        return [mass for name, mass in self.posture.limbs_at(crank).items() if name.startswith("leg")]
-
-    def _abductions(self, steer: float, crank: float, swivel: list[float]) -> list[float]:
-        """Abduction that puts elbows and knees where the rider wants them, rad; linear in swivel, lean and twist."""
-        lean, twist = (self._trunk_target[axis] - self._first_trunk[axis] for axis in (1, 2))
-        table, last = self._abduction_table, len(STEERS) - 1
-        arms = (steer - STEERS[0]) / (STEERS[-1] - STEERS[0]) * last
-        legs = (crank % (2.0 * math.pi)) / (2.0 * math.pi) * last
-        found = []
-        for limb, turn in enumerate(swivel):
-            place = max(0.0, min(last - 1e-9, arms if limb < 2 else legs))
-            index = int(place)
-            first, second = table[index, limb], table[index + 1, limb]
-            angle, by_swivel, by_lean, by_twist = (first + (place - index) * (second - first)).tolist()
-            found.append(angle + by_swivel * turn + by_lean * lean + by_twist * twist)
-        return found
 
     def plan(self, state: BicycleState, curvature: float, steer_torque: float, drive: float) -> None:
         """Decide on muscle torques for the next control period.
@@ -278,13 +203,14 @@ class Rider:
         if not self.full:
             self._crank_torque = wanted * sum(max(0.0, math.cos(a)) + DOWNSTROKE for a in phases) / MEAN_STROKE
             return
-        self._swivel = self._abductions(state.steer, state.crank, (swivel - self._first_swivel).tolist())
+        moved = (swivel - self._first_swivel).tolist()
+        self._swivel = self._tables.abductions(state.steer, state.crank, self._trunk_target, moved)
         angles = [pair[0] for pair in self.bicycle.body.joint_tuples(self.joints)]
         trunk = angles[:3]
         torques = [0.0, 0.0, 0.0]
         push = min(LARGEST_PEDAL_FORCE, wanted / (length * MEAN_STROKE))
         # muscles also carry the legs' weight around, half of it each
-        lift = float(np.interp(state.crank % (2.0 * math.pi), self._cranks, self._leg_weight))
+        lift = self._tables.leg_weight(state.crank)
         # and keep the feet up with the wheel, so that the chain stays nearly taut
         lift += max(-15.0, min(15.0, KEEPING_UP * (state.wheel_rate / ratio - state.crank_rate)))
         up = self._into_trunk(trunk, [0.0, 0.0, self._elbow_weight])[0]
