@@ -21,10 +21,11 @@ from ..sensor_presets import list_sensor_presets, sensor_preset
 from ..sensors import STANDARD_GRAVITY, Mounting, Sampling
 from ..suite import SensorSuite
 from . import paper_devices as devices
+from .anthropometry import RiderBody
 from .contact_forces import LoadCells
 from .paper_devices import DEG, Device
-from .parameters import Vector3
-from .posture import SIDES, Posture
+from .parameters import MOUNTAIN_BIKE, Vector3
+from .posture import SIDES, Posture, sit
 
 BICYCLE_IMU_PLACE, BICYCLE_IMU_TILT = (0.37, 0.0, 0.71), 10.0 * DEG
 """m ahead of the rear contact and above ground, rad nose up: p_x, p_z, α (force-inertial table I; whole-body's ξ)"""
@@ -230,12 +231,12 @@ def _device(name: str, entry: Entry, sensors: str, places: SensorPlaces, rate: f
 
 
 def rider_bicycle_suite(
-    name: str | Sequence[str],
-    places: SensorPlaces,
+    name: str | Sequence[str] = "all",
     sensors: str = "paper",
     rate: float | None = None,
-    *,
     grade: float = 1.0,
+    *,
+    places: SensorPlaces | None = None,
     magnetometer: bool = False,
     relative_rate: float | None = None,
     sampling: Sampling = "interval",
@@ -246,11 +247,11 @@ def rider_bicycle_suite(
 
     Args:
         name: a suite (:func:`list_bicycle_suites`) or a list of channels of :data:`CATALOGUE`.
-        places: where they sit, see :func:`sensor_places`.
         sensors: ``paper`` for the papers' devices, ``ideal`` for none of their errors, or the name of a device
             (:func:`poise.envs.sensor_presets.list_sensor_presets`) in place of all inertial sensors.
         rate: ticks a second and rate of all sensors but the camera, Hz; None for that of the paper.
         grade: all errors times this, between 0 (ideal, with the papers' ranges and camera rate) and 1 or beyond.
+        places: where they sit, see :func:`sensor_places`; None for the papers' mean rider on their mountain bike.
         magnetometer: add magnetometers to the bicycle's IMU, and to the trunk's where the suite has one.
         relative_rate: of the camera, Hz; None for the papers' 16 Hz (or ``rate``, if that is less), and for ``rate``
             with ideal sensors.
@@ -274,6 +275,9 @@ def rider_bicycle_suite(
         names = (*names, *extra)
     slow = ticks if sensors == "ideal" else min(CAMERA_RATE, ticks)
     slow = slow if relative_rate is None else float(relative_rate)
+    if not 0.0 < slow <= ticks:
+        raise ValueError(f"relative_rate must lie in (0, {ticks:g}] Hz, the rate of the suite, got {relative_rate}")
+    places = sensor_places(sit(MOUNTAIN_BIKE, RiderBody())) if places is None else places
     made = []
     for each in names:
         entry = CATALOGUE[each]
