@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ...filters import rotation
 from .limbs import reach_to, three_turns
 from .posture import KNEE_OUT, LIMBS, Posture
 
@@ -15,6 +16,10 @@ STEERS = np.linspace(-0.6, 0.6, POINTS)
 """rad at which the arms' posture is tabulated"""
 CRANKS = np.linspace(0.0, 2.0 * math.pi, POINTS)
 """rad at which that of the legs is"""
+SHOULDERS_FOLLOW = 0.25
+"""part of the steering angle by which the trunk twists, so that the outer hand stays within reach"""
+STRAIGHTEST = 0.985
+"""part of the straight arm's length that an arm is stretched to"""
 BIT = 0.01
 """rad for slopes"""
 
@@ -67,11 +72,15 @@ class LimbTables:
             twist: rad of the trunk, likewise.
         """
         posture, (flexion, first_lean, first_twist) = self.posture, self.trunk
-        trunk, angles = three_turns(np.array(flexion), np.array(first_lean + lean), np.array(first_twist + twist)), []
+        turn = first_twist + twist + SHOULDERS_FOLLOW * np.asarray(steer, dtype=float)
+        trunk = three_turns(np.full_like(turn, flexion), np.full_like(turn, first_lean + lean), turn)
+        angles = []
         for name, turn in zip(LIMBS, (self.swivel + extra).tolist(), strict=True):
             side = name.split("_")[1]
             if name.startswith("arm"):
                 target, out = posture.arm_target(side, steer, trunk), posture.elbow_out(side, trunk)
+                # the outer arm is nearly straight in a tight turn
+                target = target * np.minimum(1.0, STRAIGHTEST * posture.arm.reach / rotation.norm(target))
             else:
                 target, out = posture.leg_target(side, crank), KNEE_OUT
             angles.append(reach_to(posture.limb(name), target, out, turn).angles)
@@ -86,7 +95,7 @@ class LimbTables:
             trunk: wanted angles about y, x, z.
             swivel: change of each limb's swivel, rad.
         """
-        lean, twist = trunk[1] - self.trunk[1], trunk[2] - self.trunk[2]
+        lean, twist = trunk[1] - self.trunk[1], trunk[2] - self.trunk[2] - SHOULDERS_FOLLOW * steer
         last = POINTS - 1
         arms = (steer - STEERS[0]) / (STEERS[-1] - STEERS[0]) * last
         legs = (crank % (2.0 * math.pi)) / (2.0 * math.pi) * last

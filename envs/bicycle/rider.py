@@ -20,7 +20,7 @@ from ..joints import connect_points, constraint_force
 from ..physics import BASE
 from ..sensors import STANDARD_GRAVITY, straight_line
 from .bicycle import Bicycle, BicycleState
-from .limb_tables import LimbTables
+from .limb_tables import SHOULDERS_FOLLOW, LimbTables
 from .limbs import tip_torques
 from .posture import LIMBS, SIDES, SIGNS, Posture
 from .rider_links import LUMPED_MASSES, TRUNK_JOINTS, add_full_rider, add_lumped_rider, limb_joints, segment_links
@@ -38,8 +38,6 @@ DOWNSTROKE = 0.3
 """the pedal force is this plus the cosine of the crank angle where that is positive"""
 MEAN_STROKE = 2.0 * (1.0 / math.pi + DOWNSTROKE)
 """mean of both legs' strength over a turn"""
-SHOULDERS_FOLLOW = 0.25
-"""part of the steering angle by which the trunk twists"""
 KEEPING_UP = 4.0
 """N·m/(rad/s) on the crank, towards the wheel's pace"""
 LARGEST_PEDAL_FORCE = 450.0
@@ -182,7 +180,6 @@ class Rider:
             drive: wanted force at the wheel, N; braking is not the rider's legs' business.
         """
         change, swivel, unsteady = self.motion.at(state.time - self._began, curvature, state.roll)
-        # the shoulders follow the handlebar a little, which keeps the outer hand within reach
         follow = SHOULDERS_FOLLOW * max(-0.8, min(0.8, state.steer))
         self._trunk_target = [self.posture.flexion + float(change[0]), float(change[1]), float(change[2]) + follow]
         steer_torque += unsteady
