@@ -41,10 +41,10 @@ class Command(NamedTuple):
 
 COMMANDS: dict[str, Command] = {
     "record": Command(".record", "record trajectories of an environment into files"),
-    "train": Command(".train", "train a learned estimator or a gain policy"),
-    "tune": Command(".tune", "fit a filter's gains to trajectories"),
+    "train": Command(".train", "train a learned estimator"),
+    "tune": Command(".tune", "fit the gains of a filter: constant ones, or a policy that sets them"),
     "evaluate": Command(".evaluate", "measure estimators on recorded trajectories"),
-    "benchmark": Command(".benchmark", "compare all estimators on all environments"),
+    "benchmark": Command(".benchmark", "compare all estimators on simulated motion and on recordings"),
     "speed": Command(".speed", "measure steps a second of environments and estimators"),
 }
 

@@ -1,30 +1,27 @@
-"""Train a learned estimator or a gain policy; weights, card and all that led to them stay in the run folder."""
+"""Train a learned estimator; weights, card and all that led to them stay in the run folder."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Literal
 
 import tyro
 
 from .main import run_command
 from .train_gru import Gru, run_gru
-from .train_policy import Policy, run_policy
 
 
 @dataclass
-class Args:
+class Args(Gru):
     """Arguments of ``poise train``."""
 
-    what: tyro.conf.OmitArgPrefixes[
-        Annotated[Gru, tyro.conf.subcommand("gru")] | Annotated[Policy, tyro.conf.subcommand("policy")]
-    ]
-    """what is trained; `poise train gru --help` tells its arguments"""
+    network: tyro.conf.Positional[Literal["gru"]] = "gru"
+    """what is trained; gain policies are trained by `poise tune`"""
 
 
 def run(args: Args) -> int:
     """Train."""
-    return run_gru(args.what) if isinstance(args.what, Gru) else run_policy(args.what)
+    return run_gru(args)
 
 
 if __name__ == "__main__":

@@ -70,13 +70,13 @@ def run(args: Args) -> int:
         sets["recorded"] = recorded
     folder = start_run("tune", args, args.seed, args.runs) if args.resume is None else resumed(args.resume, args.seed)
     config = training_config(args)
-    motions = TRAINING_MOTIONS.draw_many(config.seed, min(config.trajectories, 32))
+    motions = TRAINING_MOTIONS.draw_many(config.seed, min(config.trajectories, 48))
     print(f"searching constant gains of {args.filter} on {len(motions)} trajectories")
-    effort = {"samples": 64, "refinements": 60} if args.preset == "shipped" else {"samples": 16, "refinements": 20}
-    constant = best_constant_gains(tuned, motions, seed=args.seed, **effort)
+    samples, refinements = (64, 60) if args.preset == "shipped" else (16, 20)
+    constant = best_constant_gains(tuned, motions, samples=samples, refinements=refinements, seed=args.seed)
     candidates = {"published": GainPolicy.neutral(tuned), "constant": GainPolicy.constant(tuned, constant.action)}
     if args.method == "ppo":
-        candidates["policy"] = train(args, folder)
+        candidates["policy"] = train(args, folder, constant.action)
     rows = compare(tuned, candidates, sets)
     for trajectories in sets.values():
         rows += hindsight_rows(tuned, trajectories, constant)
@@ -137,8 +137,8 @@ def resumed(folder: Path, seed: int) -> Run:
     return Run(folder, "tune", seed)
 
 
-def train(args: Args, folder: Run) -> GainPolicy:
-    """Train a policy with a bar; the best look at validation trajectories is kept."""
+def train(args: Args, folder: Run, start: np.ndarray) -> GainPolicy:
+    """Train a policy from a constant action, with a bar; the best look at validation trajectories is kept."""
     from tqdm import tqdm
 
     from ..baselines.constant_gains import policy_errors
@@ -151,10 +151,11 @@ def train(args: Args, folder: Run) -> GainPolicy:
 
         def report(progress: Mapping[str, float]) -> None:
             bar.update(int(progress["steps"]) - bar.n)
-            bar.set_postfix(gain_deg=f"{progress['gain_deg']:.3f}")
+            bar.set_postfix(gain=f"{progress['gain']:.3f}")
 
         return train_policy(
             config,
+            start=start,
             folder=folder.folder,
             resume=args.resume is not None,
             report=report,
