@@ -7,6 +7,7 @@ import gymnasium
 ENTRY_POINTS: dict[str, str] = {
     "poise/HandMotion-v0": "poise.envs.hand:HandMotionEnv",
     "poise/Replay-v0": "poise.envs.replay:ReplayEnv",
+    "poise/BicycleFixture-v0": "poise.envs.bicycle.fixture:BicycleFixtureEnv",
     "poise/RiderBicycle-v0": "poise.envs.bicycle.environment:RiderBicycleEnv",
     "poise/HandMotionGain-v0": "poise.envs.gain_tuning:HandMotionGainEnv",
     "poise/ReplayGain-v0": "poise.envs.gain_tuning:ReplayGainEnv",
