@@ -173,6 +173,11 @@ class Pilot:
         self.offset = self.offset_integral = self.speed_integral = 0.0
         self.command = (0.0, 0.0)
 
+    def comfortable_speed(self, path: Path, speed: float) -> float:
+        """The most of ``speed`` (m/s) with which to begin a path that may turn soon."""
+        ahead = np.abs(path.curvatures(max(speed, LOWEST_SPEED) * self._ahead)).max()
+        return min(speed, math.sqrt(self.settings.lateral_acceleration / max(1e-6, float(ahead))))
+
     def gains(self, speed: float) -> np.ndarray:
         """Interpolated gains: 7 on the state, then those on the curvature ahead."""
         speed = min(max(speed, LOWEST_SPEED), self._grid[-1])

@@ -12,6 +12,10 @@ SPACING = 0.02
 """m between the points that a path keeps"""
 
 
+RUN_UP = 12.0
+"""m over which a random path begins to turn"""
+
+
 class PathPoint(NamedTuple):
     """One point of a path."""
 
@@ -141,7 +145,9 @@ def wandering_path(
         if dx * dx + dy * dy < (1.2 * smallest_radius) ** 2:
             goal = rng.uniform(-inner, inner)
         bearing = math.remainder(math.atan2(dy, dx) - heading, 2.0 * math.pi)
-        wanted = max(-largest, min(largest, 0.5 * bearing))
+        # a ride begins straight
+        sharpest = largest * min(1.0, index * SPACING / RUN_UP)
+        wanted = max(-sharpest, min(sharpest, 0.5 * bearing))
         # a rider turns the bar over a metre or two
         curvature += (wanted - curvature) * SPACING / 1.2
         heading += curvature * SPACING

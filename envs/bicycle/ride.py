@@ -86,7 +86,7 @@ class Ride:
         self.rider.mount(self.bicycle)
         self.pilot = Pilot(posture.bicycle.with_load(load), settings, gravity)
         self.path, self.speed = path, speed
-        point, first = path.at(0.0), speed(0.0)
+        point, first = path.at(0.0), self.pilot.comfortable_speed(path, speed(0.0))
         self.bicycle.start(first, (point.x, point.y), point.heading, crank=crank)
         self.rider.start(motion, crank, self.bicycle.state().crank_rate)
         self.pilot.start(path, first)

@@ -225,6 +225,15 @@ def test_scenarios_are_ridden_upright(name):
         assert force == pytest.approx(2.0 * STANDARD_GRAVITY)  # saturated
 
 
+@pytest.mark.parametrize("seed", [100, 101, 103, 104])
+def test_outdoor_rides_begin_at_a_speed_for_their_first_turn(seed):
+    env = make(scenario="outdoor", subject=seed % 5, duration=4.0, suite=["wheel/speed"])
+    _, infos = ride(env, seed=seed)
+    env.close()
+    assert len(infos) == 401
+    assert np.abs(stack(infos, "pose", "bicycle/roll")).max() < 0.4
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("subject", range(5))
 @pytest.mark.parametrize("name", list_scenarios())
