@@ -29,13 +29,13 @@ class Args:
 
 
 def run(args: Args) -> int:
-    """Evaluate, print the table, and leave a run folder."""
+    """Evaluate, print the table, and leave a run folder with a report."""
     from ..baselines.benchmark import groups_of
     from ..baselines.evaluation import evaluate
     from ..baselines.zoo import list_estimators
     from ..envs.recordings import find_recordings, load_recording
     from .experiment import start_run
-    from .report import print_comparison
+    from .report import draw_example, print_comparison, print_progress, provenance
 
     paths = [path for item in args.recordings for path in (find_recordings(item) if item.is_dir() else [item])]
     if not paths:
@@ -45,7 +45,10 @@ def run(args: Args) -> int:
     table = evaluate(list(names), trajectories, reference=args.reference, progress=not args.json)
     folder = start_run("evaluate", args, args.seed, args.runs)
     folder.write_results(table)
-    print_comparison(table, folder, as_json=args.json, groups=groups_of(trajectories))
+    sections = print_comparison(table, folder, as_json=args.json, groups=groups_of(trajectories))
+    sections |= draw_example(table, trajectories, {name: name for name in names}, folder, "recordings")
+    sections["Provenance"] = provenance(folder)
+    print_progress(args.json, f"report: {folder.write_report('poise evaluate', sections)}")
     return 0
 
 

@@ -72,6 +72,7 @@ def test_evaluate_prints_tables_and_leaves_a_run(episodes, tmp_path, capsys):
     table = pandas.read_csv(folder / "results.csv")
     assert tuple(table.columns) == COLUMNS
     assert (folder / "figures" / "inclination.png").stat().st_size > 5_000
+    assert "recordings-over-time.png" in (folder / "report.md").read_text()
     assert main(["evaluate", str(tmp_path / "nothing"), "--runs", str(tmp_path)]) == 2
     assert "nothing" in capsys.readouterr().err
 
