@@ -5,6 +5,8 @@ from __future__ import annotations
 import itertools
 import math
 import pickle
+import subprocess
+import sys
 
 import gymnasium
 import numpy as np
@@ -113,6 +115,27 @@ def test_snapshot_and_restore_are_bitwise(quick):
         assert all(np.array_equal(v, after[4]["truth"][name]) for name, v in before[4]["truth"].items())
     env.close()
     other.close()
+
+
+RIDE_HASH = """
+import hashlib
+from poise.envs.bicycle.environment import RiderBicycleEnv
+env = RiderBicycleEnv(fidelity="full", suite="all", duration=0.5)
+digest = hashlib.sha256()
+observation, info = env.reset(seed=11)
+for _ in range(50):
+    observation, _, _, _, info = env.step(env.neutral_action)
+    for values in (*observation.values(), *info["pose"].values(), *info["truth"].values()):
+        digest.update(values.tobytes())
+print(digest.hexdigest())
+"""
+
+
+def test_two_processes_agree_bitwise():
+    runs = [subprocess.run([sys.executable, "-c", RIDE_HASH], capture_output=True, text=True, check=True) for _ in "ab"]
+    hashes = [run.stdout.split()[-1] for run in runs]
+    assert hashes[0] == hashes[1]
+    assert len(hashes[0]) == 64
 
 
 def strapdown_errors(duration, **options):
