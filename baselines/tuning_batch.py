@@ -26,6 +26,10 @@ PRIVILEGED = 2 + 2 * len(AHEAD)
 """Numbers at the end of an observation that only the critic may see."""
 
 
+SMALL_ERROR = math.radians(0.2)
+"""Added to the error that relative rewards are divided by."""
+
+
 class RateGroup:
     """Episodes that advance together: same rate, one row each.
 
@@ -37,6 +41,7 @@ class RateGroup:
         quantity: what is scored.
         reference: action whose error the reward is relative to.
         error_scale: see :class:`TuningBatch`, rad.
+        relative: likewise.
     """
 
     def __init__(
@@ -48,6 +53,7 @@ class RateGroup:
         quantity: Quantity,
         reference: np.ndarray,
         error_scale: float,
+        relative: bool,
     ) -> None:
         self.tuned, self.error_scale = tuned.with_dt(trajectories[0].dt), error_scale
         self.rows, self.generator, self.quantity = rows, generator, quantity
@@ -65,6 +71,8 @@ class RateGroup:
         )
         errors = [error(quantity, estimate, truth) for estimate, truth in zip(estimates, self.truth, strict=True)]
         self.reference = self._cost(np.stack(errors))
+        usual = np.nanmean(np.where(self.scored, self.reference, np.nan), axis=1)
+        self.weight = 1.0 / (usual + SMALL_ERROR) if relative else np.full(len(self.truth), np.degrees(1.0))
         self.known = self._foresight(trajectories)
         self.start()
 
@@ -114,7 +122,7 @@ class RateGroup:
         """Advance by one interval.
 
         Returns:
-            Observations at the end of the interval, see :meth:`observe`, rewards ``(rows,)`` in rad, and which
+            Observations at the end of the interval, see :meth:`observe`, rewards ``(rows,)``, and which
             episodes are over ``(rows,)``; :meth:`restart` begins these anew.
         """
         ticks = self.decision * self.tuned.ticks + np.arange(self.tuned.ticks)[:, None]
@@ -123,7 +131,8 @@ class RateGroup:
         errors = error(self.quantity, estimate.pose[self.quantity.name], self.truth[self.trajectory, ticks])
         gained = self.reference[self.trajectory, ticks] - self._cost(errors)
         counted = self.scored[self.trajectory, ticks] & np.isfinite(gained)
-        rewards = np.where(counted, gained, 0.0).sum(axis=0) / np.maximum(counted.sum(axis=0), 1)
+        gains = np.where(counted, gained, 0.0).sum(axis=0) / np.maximum(counted.sum(axis=0), 1)
+        rewards = gains * self.weight[self.trajectory]
         self.decision, self.error = self.decision + 1, np.nan_to_num(errors[-1])
         return self.observe(), rewards, self.decision >= self.end
 
@@ -173,6 +182,8 @@ class TuningBatch(VecEnv):
         reference: action ``(k,)``; None for the published tuning.
         error_scale: errors far above this count by their logarithm, s ln(1 + e / s), so that a few wild seconds do not
             drown the rest; deg; infinite for errors as they are.
+        relative: whether rewards are divided by the mean error of the reference on the trajectory, so that easy and
+            hard trajectories count the same.
 
     Raises:
         ValueError: fewer ``envs`` than rates.
@@ -188,6 +199,7 @@ class TuningBatch(VecEnv):
         quantity: str | None = None,
         reference: np.ndarray | None = None,
         error_scale: float = math.inf,
+        relative: bool = False,
     ) -> None:
         groups: dict[int, list[Trajectory]] = {}
         for trajectory in trajectories:
@@ -199,7 +211,7 @@ class TuningBatch(VecEnv):
         output = scored_quantity(tuned.kalman, quantity)
         action = np.zeros(tuned.actions) if reference is None else np.asarray(reference, float)
         self.groups = [
-            RateGroup(tuned, part, count, generator, output, action, math.radians(error_scale))
+            RateGroup(tuned, part, count, generator, output, action, math.radians(error_scale), relative)
             for part, count, generator in zip(groups.values(), rows, generators, strict=True)
         ]
         self.bounds = np.cumsum([0, *rows])
@@ -229,7 +241,7 @@ class TuningBatch(VecEnv):
         for group, first, last in zip(self.groups, self.bounds[:-1], self.bounds[1:], strict=True):
             observation, reward, over = group.step(self.actions[first:last])
             lengths = group.decision.copy()
-            self.returns[first:last] += np.degrees(reward)
+            self.returns[first:last] += reward
             if over.any():
                 terminal = observation
                 group.restart(over)
@@ -244,7 +256,7 @@ class TuningBatch(VecEnv):
                     }
                     self.returns[index] = 0.0
             observations.append(observation)
-            rewards.append(np.degrees(reward))
+            rewards.append(reward)
             overs.append(over)
         return (
             np.concatenate(observations),

@@ -155,7 +155,7 @@ class HandMotionGainEnv(GainTuningEnv):
     ## Action space
 
     ``Box(-1, 1, (k,), float32)``, one number for each gain; 0 is the published tuning exactly, and between 0 and ±1
-    the logarithm of the constant is changed linearly, variances by up to 10^±3.
+    the logarithm of the constant is changed linearly, variances by up to 10^±1.5.
 
     | filter | gains (constant that is scaled) |
     |---|---|

@@ -1,7 +1,7 @@
 r"""What an agent may choose: bounded actions, one for each gain of a filter, that are log factors on its constants.
 
 An action lies in [−1, 1]; 0 is the published tuning, exactly. Between 0 and ±1 the log factor is linear, with a slope
-of its own on each side (:class:`GainRange`). Variances may change by 10^±3 unless a model has a reason for less.
+of its own on each side (:class:`GainRange`). Variances may change by 10^±1.5 unless a model has a reason for less.
 
 The constant c_a of :mod:`poise.filters.external_acceleration` has one. A steady tilt error e looks like an
 acceleration g e there: it shrinks the innovation to (1 − c_a) g e and raises the variance M to at least c_a² g² e² / 3.
@@ -27,8 +27,11 @@ from .external_acceleration import ExternalAcceleration
 from .kalman import KalmanFilter
 from .model import Model, parameters_of
 
-DECADES = 3.0
-"""Powers of ten by which a variance may change either way."""
+DECADES = 1.5
+"""Powers of ten by which a variance may change either way.
+
+In the external-acceleration filter the ratio of its two variances sets the time constant, 0.1 s as published: it can
+change from 3 ms to 3 s, beyond which a biased gyroscope costs more than any acceleration."""
 LARGEST_C_A = 0.5
 """Highest c_a that an action reaches; from 0.7 any bias of the gyroscope can lock the filter out."""
 SMALLEST_C_A = 1e-3

@@ -183,8 +183,9 @@ def hindsight_rows(
     """Errors of the best constant gains of each trajectory, chosen knowing the truth: a bound, no method."""
     from ..baselines.constant_gains import constant_errors
 
-    spread = np.argsort(constant.scores.mean(axis=1))[:points]
-    errors = np.stack([constant_errors(tuned, trajectories, constant.tried[index]) for index in spread])
+    # The first that were tried lie evenly in the box; those at the end crowd around the best.
+    actions = [constant.action, *constant.tried[:points]]
+    errors = np.stack([constant_errors(tuned, trajectories, action) for action in actions])
     return [
         row("hindsight", trajectory, value) for trajectory, value in zip(trajectories, errors.min(axis=0), strict=True)
     ]

@@ -135,7 +135,7 @@ def test_what_does_not_fit_is_refused():
 def test_the_search_for_constant_gains_finds_a_wrong_tuning():
     trajectories = HandTrajectories(duration=10.0, gestures=("slow", "fast")).draw_many(1, 4)
     model = tunable_filter("bounded-motion").model
-    wrong = TunedFilter.of(KalmanFilter(replace(model, velocity_bound=30.0 * model.velocity_bound)), ("velocity",))
+    wrong = TunedFilter.of(KalmanFilter(replace(model, velocity_bound=5.0 * model.velocity_bound)), ("velocity",))
     found = best_constant_gains(wrong, trajectories, samples=8, refinements=15)
     assert found.score < 0.7 * found.neutral.mean()
     assert found.score == pytest.approx(np.mean(constant_errors(wrong, trajectories, found.action)))

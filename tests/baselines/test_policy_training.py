@@ -36,7 +36,7 @@ SMALL = TrainingConfig(
 def wrong():
     """A filter whose pseudo-measurement is believed far too little."""
     model = tunable_filter("bounded-motion").model
-    return KalmanFilter(dataclasses.replace(model, velocity_bound=30.0 * model.velocity_bound), keep_covariance=False)
+    return KalmanFilter(dataclasses.replace(model, velocity_bound=5.0 * model.velocity_bound), keep_covariance=False)
 
 
 @pytest.fixture(scope="module")

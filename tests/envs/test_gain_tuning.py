@@ -8,6 +8,7 @@ import poise
 from poise.envs.gain_tuning import GainTuningEnv, HandMotionGainEnv, ReplayGainEnv
 from poise.envs.hand_trajectories import HandTrajectories
 from poise.filters.adaptation import (
+    DECADES,
     FOLLOWED_DRIFT,
     LARGEST_C_A,
     followable_c_a,
@@ -213,7 +214,7 @@ def test_actions_reach_the_documented_ranges(name):
                 assert size == pytest.approx(LARGEST_C_A if sign > 0 else 1e-3)
             else:
                 published = getattr(model, model.gains[gain].parameter)
-                assert (size / published) ** 2 == pytest.approx(10.0 ** (3.0 * sign))
+                assert (size / published) ** 2 == pytest.approx(10.0 ** (DECADES * sign))
     assert all(not np.any(factor) for factor in log_gains(model, ranges, np.zeros((4, len(ranges)))).values())
 
 
@@ -290,7 +291,7 @@ def test_features_tell_rest_from_motion_and_have_names():
 def test_a_filter_of_ones_own_can_be_tuned():
     env = HandMotionGainEnv(KalmanFilter(BoundedMotion(velocity_bound=2.0)), gains=("velocity",), duration=2.0)
     _, infos = play(env, lambda observation: np.ones(1))
-    assert infos[-1]["gains"] == {"velocity": pytest.approx(2.0 * 10.0**1.5)}
+    assert infos[-1]["gains"] == {"velocity": pytest.approx(2.0 * 10.0 ** (DECADES / 2.0))}
 
 
 def test_samples_that_are_missing_do_no_harm(trajectory):
