@@ -25,6 +25,7 @@ from ..filters.innovation_features import InnovationFeatures
 from ..filters.kalman import KalmanFilter
 from ..filters.tuned import TunedFilter
 from .constant_gains import best_constant_gains
+from .hindsight import Chooser, fit_hindsight
 from .policy import GainPolicy
 
 SUSTAINED = Mixed(lengths=(15.0, 40.0), rest_share=0.1, spread=0.5, single_share=0.25)
@@ -68,7 +69,7 @@ class TrainingConfig:
     """number of simulated trajectories to train on"""
     seed: int = 0
     """root of all randomness"""
-    steps: int = 2_000_000
+    steps: int = 1_000_000
     """decisions in total"""
     envs: int = 256
     """episodes at a time"""
@@ -78,7 +79,7 @@ class TrainingConfig:
     """decisions in a gradient step"""
     epochs: int = 8
     """passes over a rollout, fewer if the policy has changed enough"""
-    learning_rate: float = 3e-4
+    learning_rate: float = 1e-4
     """at the start; falls linearly to a tenth"""
     discount: float = 0.995
     """factor a decision; 0.995 looks 20 s ahead at 10 decisions a second, as a biased gyroscope takes time to show"""
@@ -88,12 +89,14 @@ class TrainingConfig:
     """deg: errors far above it count by their logarithm in the reward"""
     hidden: tuple[int, ...] = (64, 64)
     """units of the hidden layers"""
-    spread: float = 0.2
+    spread: float = 0.1
     """standard deviation of the actions at the start, about"""
     persistence: int = 32
     """decisions for which the exploration stays the same function of what is seen; a filter forgets single ones"""
+    hindsight: int = 150
+    """trajectories on which the first policy is fitted to hindsight; 0 starts from the constant gains"""
     search: int = 64
-    """points of the search for constant gains to start from; 0 starts from the published tuning"""
+    """points of the search for constant gains, the reference of the reward; 0 takes the published tuning"""
 
     def __post_init__(self) -> None:
         for name in ("trajectories", "steps", "envs", "rollout", "batch", "epochs"):
@@ -101,8 +104,8 @@ class TrainingConfig:
                 raise ValueError(f"{name} must be at least 1, got {getattr(self, name)}")
         if not 0.0 <= self.discount < 1.0:
             raise ValueError(f"discount must lie in [0, 1), got {self.discount}")
-        if self.search < 0 or self.spread <= 0.0 or self.learning_rate <= 0.0:
-            raise ValueError("search must not be negative, spread and learning_rate must be positive")
+        if self.hindsight < 0 or self.search < 0 or self.spread <= 0.0 or self.learning_rate <= 0.0:
+            raise ValueError("hindsight and search must not be negative, spread and learning_rate must be positive")
         if not self.error_scale > 0.0:
             raise ValueError(f"error_scale must be positive degrees, got {self.error_scale}")
 
@@ -183,6 +186,9 @@ def train_policy(
         else:
             env = VecNormalize(batch, gamma=config.discount, clip_obs=1e6)
         model = make_model(config, env, start, home if done else None, home)
+        if config.hindsight and not done:
+            first = fit_hindsight(tuned, motions[: config.hindsight], start, hidden=config.hidden, seed=config.seed)
+            begin_with(model, env, first, batch)
         callback = make_callback(config, tuned, start, home, report, validate, started, float(done.get("seconds", 0.0)))
         remaining = config.steps - int(model.num_timesteps)
         if remaining > 0:
@@ -195,7 +201,7 @@ def train_policy(
         "training": config.describe(),
         "constant_action": [float(value) for value in start],
         "steps": int(model.num_timesteps),
-        "chosen_steps": int(callback.best_steps or model.num_timesteps),
+        "chosen_steps": int(model.num_timesteps if callback.best_steps is None else callback.best_steps),
         "seconds": round(seconds, 1),
     }
     return replace(policy, card=json.loads(json.dumps(card)))
@@ -225,7 +231,7 @@ def make_model(config: TrainingConfig, env: Any, start: np.ndarray, checkpoint: 
         gamma=config.discount,
         gae_lambda=config.trace,
         clip_range=0.2,
-        target_kl=0.02,
+        target_kl=0.01,
         use_sde=True,
         sde_sample_freq=config.persistence,
         ent_coef=0.0,
@@ -245,6 +251,23 @@ def make_model(config: TrainingConfig, env: Any, start: np.ndarray, checkpoint: 
         parameters["bias"].copy_(torch.as_tensor(0.95 * start))
         parameters["weight"].mul_(0.1)
     return model
+
+
+def begin_with(model: Any, env: Any, first: Chooser, batch: Any) -> None:
+    """Give the actor the weights of a network, and ``env`` the normalisation that it was trained with."""
+    import torch
+
+    modules = [*model.policy.mlp_extractor.policy_net, model.policy.action_net]
+    linear = [module for module in modules if hasattr(module, "weight")]
+    with torch.no_grad():
+        for mine, theirs in zip(linear, first.linear, strict=True):
+            mine.weight.copy_(theirs.weight)
+            mine.bias.copy_(theirs.bias)
+    privileged = batch.privileged_statistics()
+    env.obs_rms.mean = np.concatenate([first.mean, privileged[0]])
+    env.obs_rms.var = np.concatenate([first.deviation**2, privileged[1] ** 2])
+    # From here on the normalisation is part of the actor and must not drift.
+    env.obs_rms.count = 1e12
 
 
 def export_policy(model: Any, env: Any, tuned: TunedFilter) -> GainPolicy:
@@ -286,6 +309,8 @@ def make_callback(
 
         def _on_rollout_start(self) -> None:
             if self.num_timesteps == 0:
+                if validate is not None and config.hindsight:
+                    self._look()
                 return
             seconds = time.perf_counter() - started + earlier
             buffer: Any = self.model.ep_info_buffer or []

@@ -223,6 +223,13 @@ class TuningBatch(VecEnv):
             spaces.Box(-1.0, 1.0, (tuned.actions,), np.float32),
         )
 
+    def privileged_statistics(self) -> tuple[np.ndarray, np.ndarray]:
+        """Mean and deviation of the numbers that only the critic may see, each ``(PRIVILEGED,)``."""
+        known = np.concatenate([group.known.reshape(-1, PRIVILEGED - 1) for group in self.groups])
+        # The agent's own error is not known beforehand; it is about that of the reference.
+        table = np.concatenate([known, known[:, 1:2]], axis=1)
+        return table.mean(axis=0), table.std(axis=0) + 1e-3
+
     def reset(self) -> np.ndarray:
         """Begin all episodes."""
         for group in self.groups:

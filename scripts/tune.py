@@ -98,7 +98,7 @@ def training_config(args: Args) -> Any:
     if args.preset == "shipped":
         config = shipped_config(args.filter)
     else:
-        config = TrainingConfig(filter=args.filter, steps=QUICK_STEPS, trajectories=48, search=8)
+        config = TrainingConfig(filter=args.filter, steps=QUICK_STEPS, trajectories=48, search=8, hindsight=24)
     from dataclasses import replace
 
     given = {name: getattr(args, name) for name in ("steps", "trajectories")}

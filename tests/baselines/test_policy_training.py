@@ -25,6 +25,7 @@ SMALL = TrainingConfig(
     rollout=64,
     batch=256,
     search=0,
+    hindsight=0,
     hidden=(16,),
     learning_rate=3e-3,
     discount=0.9,
@@ -157,7 +158,13 @@ def test_stable_baselines_trains_on_the_registered_environment(trajectories):
 
 @pytest.mark.parametrize(
     ("arguments", "words"),
-    [({"steps": 0}, "steps"), ({"discount": 1.0}, "discount"), ({"spread": 0.0}, "spread"), ({"search": -1}, "search")],
+    [
+        ({"steps": 0}, "steps"),
+        ({"discount": 1.0}, "discount"),
+        ({"spread": 0.0}, "spread"),
+        ({"search": -1}, "search"),
+        ({"error_scale": 0.0}, "error_scale"),
+    ],
 )
 def test_wrong_configurations_are_explained(arguments, words):
     with pytest.raises(ValueError, match=words):
