@@ -1,0 +1,161 @@
+"""``poise/RiderBicycleGain-v0``: an agent tunes the filter of one IMU while a rider rides."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from ...filters.kalman import KalmanFilter
+from ..gain_tuning import GainTuningEnv
+from ..recorder import record
+from ..sensors import Sampling
+from ..trajectory import Trajectory
+from .anthropometry import RiderBody
+from .environment import RiderBicycleEnv
+from .rider import Fidelity
+from .scenarios import Scenario
+from .single_imu import PLACES, imu_of
+from .style import RiderStyle
+
+Scenarios = str | Scenario | Sequence[str | Scenario]
+
+
+class RiderBicycleGainEnv(GainTuningEnv):
+    """An agent tunes the gains of an attitude filter on the IMU of a bicycle, or of its rider's trunk.
+
+    Every episode is a new ride of ``poise/RiderBicycle-v0`` with new sensor errors, simulated at reset and then
+    filtered: a step runs the filter over ``interval`` seconds (several samples) with the gains of the action. A bicycle
+    is what filters with an accelerometer find hard: it leans into its turns, so that the mean specific force points
+    along its own vertical and not along the world's. Nothing that the agent sees contains the truth, and actions do
+    not change the ride.
+
+    ## Action Space
+
+    ``Box(-1, 1, (k,), float32)``, one number for each gain; 0 is the published tuning exactly, and between 0 and ±1
+    the logarithm of the constant is changed linearly (:mod:`poise.filters.adaptation` has the ranges).
+
+    | filter | gains (constant that is scaled) |
+    |---|---|
+    | ``external-acceleration`` | ``process`` (σ_G), ``measurement`` (σ_A), ``c_a`` |
+    | ``bounded-motion`` | ``process`` (σ_g), ``bias`` (σ_b), ``velocity`` (σ_V) |
+
+    ## Observation Space
+
+    ``Box(-1, 1, (n,), float32)``: statistics of the whitened innovations, the sensors and the estimated external
+    acceleration over five time scales up to 16 s, the time since the start, and the last action
+    (:class:`poise.filters.innovation_features.InnovationFeatures`; ``env.unwrapped.tuned.features.names``).
+
+    ## Rewards
+
+    ``error``: minus the mean error of ``quantity`` over the interval, rad. ``improvement``: that of the published
+    tuning, run beside it, minus the agent's. With ``consistency`` w, minus w·|ln(mean NIS / m)| of the m innovations.
+
+    ## Starting State
+
+    Riding, as in ``poise/RiderBicycle-v0``; the filter has seen nothing, so the first observation tells nothing.
+
+    ## Episode End
+
+    Truncated when the ride is over, or early where the rider fell (no preset scenario makes them fall); never
+    terminated. Ticks that fill no interval are left out.
+
+    ## Info
+
+    The same at reset and at every step, as of the last tick taken: ``time`` (s), ``pose`` (true ``quantity``),
+    ``truth`` (name → array: ``orientation`` of the sensor to the world, ``up``, ``angular_rate`` in rad/s,
+    ``position`` in m, ``gyroscope_bias``, ``accelerometer_bias``; mounting included, see
+    :func:`poise.envs.bicycle.single_imu.imu_of`), ``estimate`` (outputs of the filter; NaN before it started),
+    ``error_deg`` (mean over the interval; NaN at reset), ``gains`` (name → scaled constant).
+
+    ## Cost
+
+    A reset simulates the whole ride: with the lumped rider a tenth of its duration or so, with the full one a
+    quarter. To train for long, record rides once and give their :func:`~poise.envs.bicycle.single_imu.imu_of` to
+    ``poise/ReplayGain-v0``: its resets are free.
+
+    ## Arguments
+
+    Args:
+        filter: name (``external-acceleration``, ``bounded-motion``) or a Kalman filter with gains.
+        place: ``bicycle_imu`` or ``trunk_imu``.
+        scenario: of the rides, one or several to draw from with equal probability.
+        subject: 0…4, ``"random"`` for a new rider in every episode, or a rider.
+        style: how the rider moves; None for that of the scenario.
+        sensors: ``paper``, ``ideal``, or a device (:func:`poise.envs.sensor_presets.list_sensor_presets`).
+        rate: samples a second, Hz.
+        duration: of an episode, s.
+        fidelity: ``lumped`` (cheap; hands, feet and limbs exert no reactions of their own on frame and trunk) or
+            ``full``.
+        physics_rate: physics steps a second, Hz; a multiple of 250 Hz and of ``rate``.
+        grade: all sensor errors times this.
+        sampling: ``interval`` or ``instant``.
+        common: ``gains``, ``quantity``, ``interval`` (s), ``reward``, ``consistency`` of
+            :class:`poise.envs.gain_tuning.GainTuningEnv`.
+
+    Raises:
+        ValueError: an unknown place, filter, scenario or rider, or a number out of its range.
+
+    ## Version History
+
+    * v0: first release.
+    """
+
+    def __init__(
+        self,
+        filter: str | KalmanFilter = "external-acceleration",
+        place: str = "bicycle_imu",
+        scenario: Scenarios = "outdoor",
+        subject: int | str | RiderBody = "random",
+        *,
+        style: str | RiderStyle | None = None,
+        sensors: str = "paper",
+        rate: float = 100.0,
+        duration: float = 20.0,
+        fidelity: Fidelity = "lumped",
+        physics_rate: float = 500.0,
+        grade: float = 1.0,
+        sampling: Sampling = "interval",
+        **common: Any,
+    ) -> None:
+        super().__init__(filter, **common)
+        if place not in PLACES:
+            raise ValueError(f"place must be one of {list(PLACES)}, got {place!r}")
+        self.place = place
+        kinds = [channel.name.removeprefix("imu/") for channel in self.tuned.kalman.channels]
+        scenarios = [scenario] if isinstance(scenario, str | Scenario) else list(scenario)
+        if not scenarios:
+            raise ValueError("scenario must name at least one scenario, got none")
+        self.rides = tuple(
+            RiderBicycleEnv(
+                each,
+                subject,
+                style,
+                [f"{place}/{kind}" for kind in dict.fromkeys((*kinds, "gyr", "acc"))],
+                sensors,
+                rate,
+                duration,
+                fidelity,
+                physics_rate=physics_rate,
+                grade=grade,
+                sampling=sampling,
+            )
+            for each in scenarios
+        )
+        longest = self.tuned.features.ticks(1.0 / rate) / rate
+        if duration < longest:
+            raise ValueError(f"duration must be one interval at least ({longest:g} s), got {duration}")
+
+    def next_trajectory(self) -> Trajectory:
+        """A new ride and new sensor errors."""
+        generator = self.np_random.spawn(1)[0]
+        ride = self.rides[int(generator.integers(len(self.rides)))]
+        trajectory = imu_of(record(ride, seed=int(generator.integers(2**32))), self.place)
+        # a world that nobody looks at any more would keep its memory until the next reset
+        ride.close()
+        return trajectory
+
+    def close(self) -> None:
+        """Close the worlds of the rides; may be called twice."""
+        super().close()
+        for ride in self.rides:
+            ride.close()

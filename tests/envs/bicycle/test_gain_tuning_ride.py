@@ -1,0 +1,102 @@
+"""Gain tuning on rides: what is its own beyond the contract of all environments."""
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+import poise
+from poise.envs.bicycle.environment import RiderBicycleEnv
+from poise.envs.bicycle.gain_tuning import RiderBicycleGainEnv
+from poise.envs.bicycle.single_imu import PLACES, imu_of
+from poise.envs.gain_tuning import ReplayGainEnv
+from poise.filters.bounded_motion import BoundedMotion
+from poise.filters.kalman import KalmanFilter
+
+
+def rewards_of(env, seed=0):
+    env.reset(seed=seed)
+    rewards, over, info = [], False, None
+    while not over:
+        _, reward, terminated, truncated, info = env.step(np.full(env.action_space.shape, 0.3, np.float32))
+        rewards.append(reward)
+        over = terminated or truncated
+    return rewards, info
+
+
+@pytest.mark.parametrize("place", PLACES)
+@pytest.mark.parametrize("name", ["external-acceleration", "bounded-motion"])
+def test_it_tunes_named_filters_at_both_places(place, name):
+    env = gym.make("poise/RiderBicycleGain-v0", filter=name, place=place, duration=1.0)
+    rewards, info = rewards_of(env)
+    assert len(rewards) == 10
+    assert np.isfinite(rewards).all()
+    assert max(rewards) < 0.0
+    assert {"orientation", "up", "gyroscope_bias", "accelerometer_bias", "position"} <= set(info["truth"])
+    trajectory = env.unwrapped.trajectory
+    assert set(trajectory.measurements) == {"imu/gyr", "imu/acc"}
+    assert trajectory.metadata["place"] == place
+    env.close()
+    env.unwrapped.close()
+
+
+def test_an_episode_is_a_recorded_ride():
+    """The same seed of the ride gives the same trajectory, and replaying it gives the same rewards bit by bit."""
+    env = RiderBicycleGainEnv(scenario="slow", subject=1, duration=1.0)
+    rewards, _ = rewards_of(env, seed=4)
+    trajectory = env.trajectory
+    ride = RiderBicycleEnv("slow", 1, suite=["bicycle_imu/gyr", "bicycle_imu/acc"], fidelity="lumped", duration=1.0)
+    again = imu_of(poise.record(ride, seed=trajectory.metadata["seed"]))
+    for name, values in trajectory.measurements.items():
+        np.testing.assert_array_equal(values, again.measurements[name])
+    replayed, _ = rewards_of(ReplayGainEnv(again))
+    assert replayed == rewards
+    env.close()
+    ride.close()
+
+
+def test_riders_and_scenarios_follow_the_seed():
+    options = {"scenario": ("slow", "indoor_circle"), "duration": 0.3}
+    one, two = RiderBicycleGainEnv(**options), RiderBicycleGainEnv(**options)
+    speeds = []
+    for seed in range(4):
+        one.reset(seed=seed)
+        two.reset(seed=seed)
+        for name, values in one.trajectory.measurements.items():
+            np.testing.assert_array_equal(values, two.trajectory.measurements[name])
+        position = one.trajectory.truth["position"]
+        speeds.append(np.linalg.norm(position[-1] - position[0]) / 0.3)
+    assert min(speeds) < 0.75
+    assert max(speeds) > 0.85
+    one.close()
+    two.close()
+
+
+def test_a_filter_of_ones_own_and_the_full_rider():
+    own = KalmanFilter(BoundedMotion(velocity_bound=2.0))
+    env = RiderBicycleGainEnv(
+        own, "trunk_imu", gains=("velocity",), fidelity="full", duration=0.2, reward="improvement"
+    )
+    rewards, info = rewards_of(env)
+    assert len(rewards) == 2
+    assert set(info["gains"]) == {"velocity"}
+    env.close()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ({"place": "thigh_left"}, "place must be one of"),
+        ({"filter": "kalman"}, "unknown filter 'kalman'"),
+        ({"scenario": "moon"}, "scenario must be one of"),
+        ({"scenario": ()}, "at least one scenario"),
+        ({"subject": 9}, "subject"),
+        ({"duration": 0.1, "interval": 0.5}, "one interval at least"),
+        ({"fidelity": "rough"}, "fidelity must be"),
+        ({"rate": 33.0}, "physics_rate must be a multiple"),
+        ({"grade": -1.0}, "grade|factor|scale"),
+        ({"render_mode": "human"}, "render_mode must be None"),
+    ],
+)
+def test_wrong_arguments_are_explained(arguments, words):
+    with pytest.raises(ValueError, match=words):
+        RiderBicycleGainEnv(**arguments)
