@@ -41,6 +41,7 @@ class Command(NamedTuple):
 
 COMMANDS: dict[str, Command] = {
     "record": Command(".record", "record trajectories of an environment into files"),
+    "rides": Command(".rides", "ride every scenario with every rider; numbers beside those of the papers"),
     "train": Command(".train", "train a learned estimator"),
     "tune": Command(".tune", "fit the gains of a filter: constant ones, or a policy that sets them"),
     "evaluate": Command(".evaluate", "measure estimators on recorded trajectories"),

@@ -1,0 +1,186 @@
+"""Ride every preset scenario with every preset rider; numbers of each ride beside what the papers report."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from itertools import product
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from .experiment import COLUMNS, Run
+from .main import run_command
+
+if TYPE_CHECKING:
+    from ..baselines.ride_statistics import RideStatistics
+
+SHOWN = {
+    "scenario": "scenario",
+    "subject": "subject",
+    "upright": "upright",
+    "speed_mean": "speed m/s",
+    "speed_max": "max m/s",
+    "roll_sd": "roll sd deg",
+    "roll_max": "max deg",
+    "lean_mean": "lean mean deg",
+    "lean_sd": "lean sd deg",
+    "yaw_rate_mean": "yaw deg/s",
+    "acceleration_max": "acc max m/s²",
+    "seat_force_mean": "seat mean N",
+    "seat_force_max": "seat max N",
+    "handlebar_force_mean": "hand mean N",
+    "handlebar_force_max": "hand max N",
+    "gap_max": "gap max mm",
+}
+"""Field → column of the table."""
+UNITS = {
+    "speed": "m/s",
+    "roll": "deg",
+    "pitch": "deg",
+    "lean": "deg",
+    "yaw_rate": "deg/s",
+    "acceleration": "m/s²",
+    "seat_force": "N",
+    "handlebar_force": "N",
+    "gap": "mm",
+}
+"""Quantity → unit."""
+
+
+@dataclass
+class Args:
+    """Arguments of ``poise rides``."""
+
+    duration: float = 16.0
+    """of each ride, s; bumps and ramp come between 12 and 16 s"""
+    fidelity: Literal["lumped", "full"] = "lumped"
+    """lumped, or full with hands and feet in closed loops (about twice the time)"""
+    scenarios: tuple[str, ...] = ()
+    """names of scenarios (default: all)"""
+    subjects: tuple[int, ...] = (0, 1, 2, 3, 4)
+    """numbers of riders"""
+    processes: int = 2
+    """rides at a time"""
+    seed: int = 0
+    """root seed; every scenario and rider has a child of its own"""
+    resume: Path | None = None
+    """folder of a run that was interrupted; its finished rides are kept"""
+    runs: Path = Path("runs")
+    """where the run folder goes"""
+    json: bool = False
+    """print machine-readable rows instead of tables"""
+
+
+def run(args: Args) -> int:
+    """Ride, print both tables, and leave a run folder; 1 if anybody fell."""
+    from tqdm import tqdm
+
+    from ..baselines.ride_reports import comparison
+    from ..baselines.ride_statistics import ride_all
+    from ..envs.bicycle.anthropometry import SUBJECTS
+    from ..envs.bicycle.scenarios import list_scenarios
+    from ..envs.bicycle.scenarios import scenario as known
+    from .report import print_progress, provenance
+    from .tables import markdown_table, print_table
+
+    scenarios = args.scenarios or tuple(list_scenarios())
+    for name in scenarios:
+        known(name)
+    if not args.subjects or not all(0 <= subject < len(SUBJECTS) for subject in args.subjects):
+        raise ValueError(f"subjects must be numbers from 0 to {len(SUBJECTS) - 1}, got {list(args.subjects)}")
+    folder = begun(args)
+    seeds = ride_seeds(args.seed, len(SUBJECTS))
+    rides: list[RideStatistics] = []
+    total = len(scenarios) * len(args.subjects)
+    with tqdm(total=total, desc=f"ride {args.duration:g} s, {args.fidelity}", unit="ride") as bar:
+        for found in ride_all(
+            folder.folder / "rides",
+            scenarios,
+            args.subjects,
+            duration=args.duration,
+            fidelity=args.fidelity,
+            seeds=seeds,
+            processes=args.processes,
+        ):
+            rides.append(found)
+            folder.write_results(results(rides))
+            bar.update()
+    rides.sort(key=lambda each: (scenarios.index(each.scenario), each.subject))
+    folder.write_results(results(rides))
+    table = [{title: asdict(each)[field] for field, title in SHOWN.items()} for each in rides]
+    if args.fidelity == "lumped":
+        table = [{title: value for title, value in row.items() if title != SHOWN["gap_max"]} for row in table]
+    papers = comparison(rides)
+    titles = (f"{total} rides of {args.duration:g} s, {args.fidelity} rider", "Beside the papers, range over riders")
+    if args.json:
+        print("\n".join(json.dumps(asdict(each)) for each in rides))
+    else:
+        print_table(table, titles[0], console=wide())
+        print_table(papers, titles[1], console=wide())
+    sections = {
+        titles[0]: markdown_table(table),
+        titles[1]: markdown_table(papers),
+        "Provenance": provenance(folder),
+    }
+    upright = sum(each.upright for each in rides)
+    print_progress(args.json, f"{upright} of {total} rides upright")
+    print_progress(args.json, f"report: {folder.write_report('poise rides', sections)}")
+    return 0 if upright == total else 1
+
+
+def begun(args: Args) -> Run:
+    """A new run, or the one that is gone on with.
+
+    Raises:
+        FileNotFoundError: there is no such folder.
+        ValueError: the rides in it have another duration, fidelity or seed.
+    """
+    from .experiment import jsonable, start_run
+
+    if args.resume is None:
+        return start_run("rides", args, args.seed, args.runs)
+    path = args.resume / "args.json"
+    if not path.exists():
+        raise FileNotFoundError(f"there is no run in {args.resume}")
+    before = json.loads(path.read_text(encoding="utf-8"))["args"]
+    for name in ("duration", "fidelity", "seed"):
+        if before[name] != jsonable(getattr(args, name)):
+            raise ValueError(f"{args.resume} has rides with {name} {before[name]}, not {getattr(args, name)}")
+    return Run(args.resume, "rides", args.seed)
+
+
+def ride_seeds(seed: int, riders: int) -> dict[tuple[str, int], int]:
+    """Seed of every scenario and rider, whichever of them ride."""
+    from ..envs.bicycle.scenarios import list_scenarios
+    from .experiment import seeds
+
+    pairs = list(product(list_scenarios(), range(riders)))
+    return dict(zip(pairs, seeds(seed, len(pairs)), strict=True))
+
+
+def results(rides: Sequence[RideStatistics]) -> list[dict[str, Any]]:
+    """Rows of ``results.csv``; what is true of a ride has the estimator ``truth``."""
+    rows = []
+    for ride in rides:
+        name = f"{ride.scenario}-{ride.subject}"
+        rows.append(dict(zip(COLUMNS, ("truth", name, "ride", "upright", float(ride.upright), "1"), strict=True)))
+        for quantity, unit in UNITS.items():
+            for metric in ("mean", "sd", "min", "max"):
+                value = getattr(ride, f"{quantity}_{metric}", None)
+                if value is not None:
+                    rows.append(dict(zip(COLUMNS, ("truth", name, quantity, metric, value, unit), strict=True)))
+    return rows
+
+
+def wide() -> Any:
+    """A console with room for all columns where the output is no terminal."""
+    import sys
+
+    from rich.console import Console
+
+    return Console() if sys.stdout.isatty() else Console(width=190)
+
+
+if __name__ == "__main__":
+    run_command("rides")

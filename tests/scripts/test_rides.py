@@ -1,0 +1,127 @@
+"""Rides from the command line: recorded episodes, the table of rides, going on after an interruption."""
+
+import json
+
+import numpy as np
+import pandas
+import pytest
+
+from poise.baselines.evaluation import COLUMNS
+from poise.baselines.ride_reports import REPORTED, comparison
+from poise.baselines.ride_statistics import RideStatistics, ride, trunk_lean
+from poise.envs.bicycle.scenarios import list_scenarios
+from poise.envs.storage import load_trajectory
+from poise.filters import rotation
+from poise.scripts.main import main
+
+RECORD = ["--options", "scenario=outdoor", "subject=2", "fidelity=full", "suite=whole-body", "duration=2.0"]
+
+
+def record(folder, *words):
+    return main(["record", "rider-bicycle", "--folder", str(folder), "--episodes", "2", "--seed", "5", *words, *RECORD])
+
+
+@pytest.fixture(scope="module")
+def episodes(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("rides")
+    assert record(folder, "--processes", "1") == 0
+    return folder
+
+
+def test_rides_recorded_in_two_processes_are_bitwise_those_of_one(episodes, tmp_path):
+    assert record(tmp_path, "--processes", "2") == 0
+    paths = sorted(episodes.glob("*.h5"))
+    assert [path.name for path in paths] == ["rider_bicycle_0000.h5", "rider_bicycle_0001.h5"]
+    for path in paths:
+        one, other = load_trajectory(path), load_trajectory(tmp_path / path.name)
+        assert len(one) == 201
+        assert one.metadata["environment"]["kwargs"]["subject"] == 2
+        for part in ("measurements", "truth"):
+            left, right = getattr(one, part), getattr(other, part)
+            assert left.keys() == right.keys()
+            assert all(values.tobytes() == right[name].tobytes() for name, values in left.items())
+
+
+def test_recording_goes_on_where_it_was_interrupted(episodes, capsys):
+    first, second = sorted(episodes.glob("*.h5"))
+    stamp, lost = first.stat().st_mtime_ns, load_trajectory(second)
+    second.unlink()
+    assert record(episodes, "--processes", "2") == 0
+    assert first.stat().st_mtime_ns == stamp
+    again = load_trajectory(second)
+    assert all(values.tobytes() == again.measurements[name].tobytes() for name, values in lost.measurements.items())
+    assert "2 episodes" in capsys.readouterr().out
+
+
+def test_wrong_options_are_explained(tmp_path, capsys):
+    words = ["record", "rider-bicycle", "--folder", str(tmp_path), "--processes", "1", "--options", "scenario=moon"]
+    assert main(words) == 2
+    assert "scenario must be one of" in capsys.readouterr().err
+
+
+def rides(folder, *words):
+    short = ["--duration", "0.5", "--scenarios", "slow", "indoor_circle", "--subjects", "0", "4", "--processes", "1"]
+    return main(["rides", "--runs", str(folder), *short, *words])
+
+
+def test_rides_prints_tables_leaves_a_run_and_goes_on(tmp_path, capsys):
+    assert rides(tmp_path) == 0
+    output = capsys.readouterr().out
+    assert "4 of 4 rides upright" in output
+    assert "Beside the papers" in output
+    (folder,) = (tmp_path / "rides").iterdir()
+    table = pandas.read_csv(folder / "results.csv")
+    assert tuple(table.columns) == COLUMNS
+    assert set(table["trajectory"]) == {"slow-0", "slow-4", "indoor_circle-0", "indoor_circle-4"}
+    assert "about 1 m/s" in (folder / "report.md").read_text(encoding="utf-8")
+
+    kept = folder / "rides" / "slow-0.json"
+    stamp = kept.stat().st_mtime_ns
+    lost = json.loads((folder / "rides" / "slow-4.json").read_text())
+    (folder / "rides" / "slow-4.json").unlink()
+    assert rides(tmp_path, "--resume", str(folder), "--json") == 0
+    rows = [json.loads(line) for line in capsys.readouterr().out.splitlines() if line.startswith("{")]
+    assert kept.stat().st_mtime_ns == stamp
+    assert rows[1] == lost
+    assert len(list((tmp_path / "rides").iterdir())) == 1
+
+
+def test_a_run_is_not_gone_on_with_otherwise(tmp_path, capsys):
+    assert rides(tmp_path) == 0
+    (folder,) = (tmp_path / "rides").iterdir()
+    assert rides(tmp_path, "--resume", str(folder), "--seed", "3") == 2
+    assert "has rides with seed 0, not 3" in capsys.readouterr().err
+    assert rides(tmp_path, "--resume", str(tmp_path / "none")) == 2
+    assert rides(tmp_path, "--processes", "0") == 2
+    assert main(["rides", "--scenarios", "moon", "--runs", str(tmp_path)]) == 2
+    assert main(["rides", "--subjects", "5", "--runs", str(tmp_path)]) == 2
+
+
+def test_a_full_ride_has_gaps_and_a_lumped_one_none():
+    full, lumped = (ride("slow", 1, 0.3, fidelity, 2) for fidelity in ("full", "lumped"))
+    assert 0.0 < full.gap_max < 1.0
+    assert lumped.gap_max is None
+    assert full.upright
+    assert full.duration == pytest.approx(0.3)
+    assert full.speed_min <= full.speed_mean <= full.speed_max
+    assert 200.0 < full.seat_force_mean < lumped.seat_force_mean < 900.0
+
+
+def test_lean_is_to_the_right_of_the_heading():
+    heading = np.array([0.0, 1.0, -2.5])
+    lean = np.radians([10.0, -20.0, 5.0])
+    forward = rotation.from_axis_angle(np.array([0.0, 1.0, 0.0]), np.array(0.4))
+    turn = rotation.exp(np.stack([np.zeros(3), np.zeros(3), heading], axis=1))
+    side = rotation.exp(np.stack([lean, np.zeros(3), np.zeros(3)], axis=1))
+    truth = {
+        "trunk/orientation": rotation.multiply(rotation.multiply(turn, side), forward),
+        "bicycle/yaw": heading[:, None],
+    }
+    np.testing.assert_allclose(trunk_lean(truth), lean, atol=1e-12)
+
+
+def test_what_the_papers_report_is_about_fields_and_scenarios_that_exist():
+    for line in REPORTED:
+        assert line.scenario in list_scenarios()
+        assert line.field in RideStatistics.__dataclass_fields__
+    assert comparison([]) == []
