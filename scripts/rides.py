@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from itertools import product
 from pathlib import Path
@@ -34,6 +34,8 @@ SHOWN = {
     "gap_max": "gap max mm",
 }
 """Field → column of the table."""
+DRAWN = 20.0
+"""s of a ride at most in the figure"""
 UNITS = {
     "speed": "m/s",
     "roll": "deg",
@@ -73,7 +75,7 @@ class Args:
 
 
 def run(args: Args) -> int:
-    """Ride, print both tables, and leave a run folder; 1 if anybody fell."""
+    """Ride, print both tables, draw one ride, and leave a run folder; 1 if anybody fell."""
     from tqdm import tqdm
 
     from ..baselines.ride_reports import comparison
@@ -118,15 +120,26 @@ def run(args: Args) -> int:
     else:
         print_table(table, titles[0], console=wide())
         print_table(papers, titles[1], console=wide())
-    sections = {
-        titles[0]: markdown_table(table),
-        titles[1]: markdown_table(papers),
-        "Provenance": provenance(folder),
-    }
+    sections = {titles[0]: markdown_table(table), titles[1]: markdown_table(papers)}
+    sections |= drawn(args, folder, scenarios, seeds)
+    sections["Provenance"] = provenance(folder)
     upright = sum(each.upright for each in rides)
     print_progress(args.json, f"{upright} of {total} rides upright")
     print_progress(args.json, f"report: {folder.write_report('poise rides', sections)}")
     return 0 if upright == total else 1
+
+
+def drawn(args: Args, folder: Run, scenarios: Sequence[str], seeds: Mapping[tuple[str, int], int]) -> dict[str, str]:
+    """Heading → Markdown: the beginning of one of the rides with the papers' sensors."""
+    from ..baselines.plots import save
+    from ..baselines.ride_plots import example_ride, ride_signals
+
+    scenario, subject = "outdoor" if "outdoor" in scenarios else scenarios[0], args.subjects[0]
+    seconds = min(args.duration, DRAWN)
+    ride = example_ride(scenario, subject, seeds[scenario, subject], seconds, args.fidelity)
+    title = f"{scenario}, subject {subject}: {seconds:g} s"
+    save(ride_signals(ride, title), folder.figures / "signals.png")
+    return {f"Figure: {title}": "![signals](figures/signals.png)"}
 
 
 def begun(args: Args) -> Run:

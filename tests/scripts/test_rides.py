@@ -75,6 +75,7 @@ def test_rides_prints_tables_leaves_a_run_and_goes_on(tmp_path, capsys):
     assert set(table["trajectory"]) == {"slow-0", "slow-4", "indoor_circle-0", "indoor_circle-4"}
     assert "about 1 m/s" in (folder / "report.md").read_text(encoding="utf-8")
 
+    assert (folder / "figures" / "signals.png").stat().st_size > 20_000
     kept = folder / "rides" / "slow-0.json"
     stamp = kept.stat().st_mtime_ns
     lost = json.loads((folder / "rides" / "slow-4.json").read_text())
