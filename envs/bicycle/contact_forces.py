@@ -16,6 +16,9 @@ from .bicycle import Bicycle
 from .multibody import CentreMotion, newton_euler
 from .rider import Rider
 
+CELLS_LONG, CELLS_WIDE, CELLS_BEHIND = 0.20, 0.12, 0.043
+"""m: Lx from rear to front cell, Ly between the rear ones, Lm from these to the post (force-inertial table I)"""
+
 
 class Contact(NamedTuple):
     """Forces of the rider on the bicycle in the last physics step, world axes."""
@@ -32,16 +35,16 @@ class Contact(NamedTuple):
 
 @dataclass(frozen=True)
 class LoadCells:
-    """Three vertical load cells under a saddle.
+    """Three vertical load cells under a saddle; by default those of the force-inertial paper.
 
     Raises:
         ValueError: the cells lie on one line.
     """
 
-    x: tuple[float, float, float] = (0.13, -0.07, -0.07)
-    """m from the saddle point: front, rear left, rear right; the paper's L1 = 0.13 and Lx = 0.20"""
-    y: tuple[float, float, float] = (0.0, 0.06, -0.06)
-    """m; half of the paper's Ly = 0.12"""
+    x: tuple[float, float, float] = (CELLS_LONG - CELLS_BEHIND, -CELLS_BEHIND, -CELLS_BEHIND)
+    """m from the saddle point: front, rear left, rear right"""
+    y: tuple[float, float, float] = (0.0, 0.5 * CELLS_WIDE, -0.5 * CELLS_WIDE)
+    """m"""
 
     def __post_init__(self) -> None:
         if abs(np.linalg.det(self.matrix)) < 1e-6:

@@ -99,7 +99,8 @@ SEAT_WRENCH = Device(
 )
 LOAD_CELL = Device(
     "Transducer Techniques SLB-250",
-    "whole-body section II-A names the cell; capacity 250 lbf from its name; assumed: 2 N a sample at 50 Hz, zero 2 N, scale 0.25 %",
+    "whole-body section II-A names the cell; capacity 250 lbf from its name; assumed: 2 N a sample at 50 Hz, zero 2 N, "
+    "scale 0.25 %",
     NoiseModel(white_noise=0.28, turn_on_bias=2.0, scale_factor=0.0025, full_scale=250.0 * 4.4482216),
 )
 STRAIN_GAUGES = Device(

@@ -31,8 +31,6 @@ BICYCLE_IMU_PLACE, BICYCLE_IMU_TILT = (0.37, 0.0, 0.71), 10.0 * DEG
 """m ahead of the rear contact and above ground, rad nose up: p_x, p_z, α (force-inertial table I; whole-body's ξ)"""
 POST_TILT, POST_LENGTH = 20.0 * DEG, 0.13
 """rad, backwards, and m from the saddle down to the six-axis sensor: γ, L1 (force-inertial table I)"""
-CELLS_LONG, CELLS_WIDE, CELLS_BEHIND = 0.20, 0.12, 0.043
-"""m: Lx from rear to front cell, Ly between the rear ones, Lm from these to the post (force-inertial table I)"""
 CAMERA_RATE = 16.0
 """Hz (force-inertial and whole-body section II-A)"""
 CAMERA_PLACE = (-0.45, 0.0, 1.45)
@@ -116,9 +114,7 @@ def sensor_places(
         thigh=Mounting((0.0, 0.0, -0.5 * posture.leg.upper)),
         saddle=bicycle.saddle,
         seat_sensor=Mounting(seat, pitched(POST_TILT)),
-        load_cells=LoadCells(
-            (CELLS_LONG - CELLS_BEHIND, -CELLS_BEHIND, -CELLS_BEHIND), (0.0, 0.5 * CELLS_WIDE, -0.5 * CELLS_WIDE)
-        ),
+        load_cells=LoadCells(),
         wheel_radius=bicycle.rear_wheel.radius - wheel_sinking,
         markers=tuple(tuple((trunk + marker).tolist()) for marker in np.array(MARKERS)),  # type: ignore[arg-type]
         viewpoints=tuple(viewpoints),  # type: ignore[arg-type]

@@ -157,6 +157,9 @@ def test_load_cells_are_in_balance():
     assert shared.sum() == pytest.approx(400.0)
     assert shared @ cells.y == pytest.approx(5.0)
     assert -(shared @ cells.x) == pytest.approx(-8.0)
+    # the force-inertial paper's table I: Lx = 0.20, Ly = 0.12, Lm = 0.043
+    assert cells.x == pytest.approx((0.157, -0.043, -0.043))
+    assert cells.y == pytest.approx((0.0, 0.06, -0.06))
     with pytest.raises(ValueError, match="line"):
         LoadCells((0.1, 0.0, -0.1), (0.0, 0.0, 0.0))
 
