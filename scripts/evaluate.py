@@ -20,6 +20,8 @@ class Args:
     """names of estimators; `poise evaluate --estimators all .` takes every one that is installed"""
     reference: str = "mekf-9"
     """estimator that stands in for the truth of recordings without one (agreement, not error)"""
+    place: str | None = None
+    """in recorded rides of a bicycle, the IMU to look at: bicycle_imu or trunk_imu"""
     seed: int = 0
     """names the run folder; evaluation draws no random numbers"""
     runs: Path = Path("runs")
@@ -41,6 +43,10 @@ def run(args: Args) -> int:
     if not paths:
         raise ValueError(f"no recording in {', '.join(map(str, args.recordings))}")
     trajectories = [load_recording(path) for path in paths]
+    if args.place is not None:
+        from ..envs.bicycle.single_imu import imu_of
+
+        trajectories = [imu_of(trajectory, args.place) for trajectory in trajectories]
     names = tuple(list_estimators()) if args.estimators == ("all",) else args.estimators
     table = evaluate(list(names), trajectories, reference=args.reference, progress=not args.json)
     folder = start_run("evaluate", args, args.seed, args.runs)

@@ -53,6 +53,17 @@ def test_recording_goes_on_where_it_was_interrupted(episodes, capsys):
     assert "2 episodes" in capsys.readouterr().out
 
 
+def test_filters_are_evaluated_on_one_imu_of_recorded_rides(episodes, tmp_path, capsys):
+    words = ["evaluate", str(episodes), "--estimators", "mekf", "tilt", "--runs", str(tmp_path)]
+    assert main([*words, "--place", "trunk_imu"]) == 0
+    assert "Inclination error" in capsys.readouterr().out
+    (folder,) = (tmp_path / "evaluate").iterdir()
+    table = pandas.read_csv(folder / "results.csv")
+    assert set(table["trajectory"]) == {"rider_bicycle_0000-trunk_imu", "rider_bicycle_0001-trunk_imu"}
+    assert main([*words, "--place", "nose"]) == 2
+    assert "place must be one of" in capsys.readouterr().err
+
+
 def test_wrong_options_are_explained(tmp_path, capsys):
     words = ["record", "rider-bicycle", "--folder", str(tmp_path), "--processes", "1", "--options", "scenario=moon"]
     assert main(words) == 2
