@@ -111,7 +111,6 @@ class Bicycle:
         extend: Callable[[Tree], None] | None = None,
     ) -> None:
         self.physics, self.parameters = physics, parameters
-        self.ground: Ground = FlatGround() if ground is None else ground
         tree = bicycle_tree(parameters)
         if extend is not None:
             extend(tree)
@@ -122,12 +121,13 @@ class Bicycle:
                 wheel.radius,
                 wheel.crown_radius,
                 TyreParameters() if tyre is None else tyre,
-                self.ground,
+                FlatGround(),
                 physics.time_step,
                 parameters.rolling_resistance,
             )
             for wheel in wheels
         ]
+        self.lay(ground)
         self.tyre_forces: list[TyreForce] = [AIRBORNE, AIRBORNE]
         self.drivetrain = None if parameters.drive is None else Drivetrain(parameters.drive)
         self.links = self.body.links
@@ -149,6 +149,12 @@ class Bicycle:
     def ratio(self) -> float:
         """Turns of the rear wheel a turn of the crank (0 without a crank)."""
         return 0.0 if self.drivetrain is None else self.drivetrain.ratio
+
+    def lay(self, ground: Ground | None) -> None:
+        """Put another ground (None: a level plane at height 0) under the wheels; :meth:`start` anew afterwards."""
+        self.ground: Ground = FlatGround() if ground is None else ground
+        for tyre in self.tyres:
+            tyre.ground = self.ground
 
     def static_loads(self) -> tuple[float, float]:
         """Weight (N) on the rear and the front tyre, at rest on level ground with the tyres' deflection."""

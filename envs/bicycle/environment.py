@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import math
+import uuid
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
@@ -191,8 +192,7 @@ class RiderBicycleEnv(PoseEnv):
         limits = np.concatenate([np.full(q.size, _bound(q), np.float32) for q in self.quantities])
         self.action_space = spaces.Box(-limits, limits, dtype=np.float32)
         self._ride: Ride | None = None
-        self._kept: dict[int, RideMemory] = {}
-        self._token = 0
+        self._kept: dict[str, RideMemory] = {}
         self._fallen_at = math.inf
 
     @property
@@ -210,36 +210,64 @@ class RiderBicycleEnv(PoseEnv):
         return max(1, round(self.duration * self.rate))
 
     def _start(self, chosen: Scenario, subject: Any, motion: np.random.Generator) -> None:
-        """Build the ride; what was drawn is kept to ride it again."""
-        self._plan = (chosen, subject, copy.deepcopy(motion))
-        for_body, for_course, for_movement, for_crank = motion.spawn(4)
-        posture = sit(self.parameters, rider_body(subject, for_body))
-        course = chosen.draw(for_course, self.duration + SETTLING + 1.0)
-        style = rider_style(chosen.style if self.style is None else self.style)
-        self._stop()
-        self._posture, self._ground = posture, course.ground
-        self._ride = Ride(
-            posture,
-            RiderMotion(style, for_movement),
-            course.path,
-            course.speed,
-            ground=course.ground,
-            fidelity=self.fidelity,
-            physics_rate=self.physics_rate,
-            tyre=self.tyre,
-            crank=float(for_crank.uniform(0.0, 2.0 * math.pi)),
-        )
-        steps = round(self.physics_rate / self.rate)
-        for _ in range(round(SETTLING * self.rate) * steps):
-            self._ride.step()
-        self._recorder = RideRecorder(self._ride, steps)
+        """Begin the ride at the end of its first second; what was drawn is kept to ride it again.
+
+        The same draw again goes back to the state that was kept there. Another one of the same person begins in the
+        same world, its first second ridden anew, since course, speed, crank and habits differ. Another person, or a
+        world in which someone fell, needs a new world. All three give the same ride, bit for bit.
+        """
+        seed = str(motion.bit_generator.seed_seq.state)  # type: ignore[attr-defined]
+        key = (chosen, subject, self.style, self.duration, self.physics_rate, self.tyre, seed)
+        if self._ride is not None and self._ride.fallen:
+            self._stop()
+        if self._ride is None or key != self._motion_key:
+            self._plan = (chosen, subject, copy.deepcopy(motion))
+            self._ride_first_second(chosen, subject, motion)
+            self._motion_key = key
+        else:
+            self._ride.restore(self._first)
+        assert self._ride is not None
+        self._recorder = RideRecorder(self._ride, round(self.physics_rate / self.rate))
         self._began = self._ride.physics.time + 1.0 / self.rate
         self._ticks, self._fallen_at = 0, math.inf
-        self._suite, self._places = self._make_suite(posture)
         self.suite = self._suite
+
+    def _ride_first_second(self, chosen: Scenario, subject: Any, motion: np.random.Generator) -> None:
+        """Draw rider, course and movements, and settle on the saddle."""
+        for_body, for_course, for_movement, for_crank = motion.spawn(4)
+        body = rider_body(subject, for_body)
+        world = (body, self.physics_rate, self.tyre)
+        posture = self._posture if self._ride is not None and world == self._world_key else sit(self.parameters, body)
+        course = chosen.draw(for_course, self.duration + SETTLING + 1.0)
+        movement = RiderMotion(rider_style(chosen.style if self.style is None else self.style), for_movement)
+        crank = float(for_crank.uniform(0.0, 2.0 * math.pi))
+        if self._ride is not None and world == self._world_key:
+            for memory in (*self._kept.values(), self._first):
+                self._ride.forget(memory)
+            self._kept = {}
+            self._ride.begin(movement, course.path, course.speed, ground=course.ground, crank=crank)
+        else:
+            self._stop()
+            self._ride = Ride(
+                posture,
+                movement,
+                course.path,
+                course.speed,
+                ground=course.ground,
+                fidelity=self.fidelity,
+                physics_rate=self.physics_rate,
+                tyre=self.tyre,
+                crank=crank,
+            )
+            self._world_key, self._posture = world, posture
+            self._suite, self._places = self._make_suite(posture)
+        self._ground = course.ground
         if self._scene is not None:
             self._scene.close()
             self._scene = None
+        for _ in range(round(SETTLING * self.rate) * round(self.physics_rate / self.rate)):
+            self._ride.step()
+        self._first = self._ride.save()
 
     def _make_suite(self, posture: Posture) -> tuple[SensorSuite, SensorPlaces]:
         """Sensors of a person on the bicycle, and their places."""
@@ -306,11 +334,11 @@ class RiderBicycleEnv(PoseEnv):
     def save_source(self) -> Any:
         """The drawn ride and how far it is; also where PyBullet's state is kept for a quick return."""
         assert self._ride is not None
-        self._token += 1
-        self._kept[self._token] = self._ride.save()
+        token = uuid.uuid4().hex
+        self._kept[token] = self._ride.save()
         if len(self._kept) > KEPT:
-            self._ride.forget(self._kept.pop(min(self._kept)))
-        return self._plan, self._ticks, self._fallen_at, self._suite.save(), self._token
+            self._ride.forget(self._kept.pop(next(iter(self._kept))))
+        return self._plan, self._ticks, self._fallen_at, self._suite.save(), token
 
     def restore_source(self, saved: Any) -> None:
         """Undo :meth:`save_source`: from memory where the ride is still there, else by riding it again."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...filters import rotation
 from .limbs import reach_to, three_turns
-from .posture import KNEE_OUT, LIMBS, Posture
+from .posture import KNEE_OUT, LIMBS, SIDES, Posture
 
 POINTS = 49
 STEERS = np.linspace(-0.6, 0.6, POINTS)
@@ -44,10 +44,13 @@ class LimbTables:
             rows.append(np.stack([now[limb][:, 1], *slopes], axis=1))
         # (point, limb, value and slopes)
         self._table = np.stack(rows, axis=1)
-        heights = []
-        for crank in CRANKS[:-1].tolist():
-            limbs = posture.limbs_at(crank)
-            heights.append(sum(m.mass * m.centre[2] for name, m in limbs.items() if name.startswith("leg")))
+        legs, lift = posture.segments(), np.array([0.0, 0.0, 1.0])
+        heights = np.zeros(POINTS - 1)
+        for side in SIDES:
+            leg = reach_to(posture.leg, posture.leg_target(side, CRANKS[:-1]), KNEE_OUT)
+            thigh, shank = legs["thigh"], legs["shank"]
+            heights += thigh.mass * (rotation.rotate(leg.upper, thigh.centre) @ lift)
+            heights += shank.mass * ((leg.hinge + rotation.rotate(leg.lower, shank.centre)) @ lift)
         # derivative of a periodic function through its Fourier series
         spectrum = np.fft.rfft(heights) * 1j * np.arange(POINTS // 2 + 1)
         spectrum[-1] = 0.0

@@ -84,15 +84,33 @@ class Ride:
         self.rider = Rider(posture, fidelity)
         self.bicycle = Bicycle(self.physics, posture.bicycle, ground, tyre, load=load, extend=self.rider.extend)
         self.rider.mount(self.bicycle)
-        self.pilot = Pilot(posture.bicycle.with_load(load), settings, gravity)
+        self._loaded, self._settings = posture.bicycle.with_load(load), settings
+        trunk = posture.trunk()
+        whole = sum(part.mass * part.centre[2] for part in self._loaded.parts)
+        self._lean_effect = trunk.mass * float(trunk.centre[2]) * np.cos(posture.flexion) / whole
+        self.begin(motion, path, speed, ground=ground, crank=crank)
+
+    def begin(
+        self,
+        motion: RiderMotion,
+        path: Path,
+        speed: Callable[[float], float],
+        *,
+        ground: Ground | None = None,
+        crank: float = 0.3,
+    ) -> None:
+        """Start another ride of the same person in the same world; bit for bit what a new :class:`Ride` would do.
+
+        Nothing that was saved before can be restored any more. Arguments as those of the class.
+        """
+        self.physics.steps = 0
+        self.bicycle.lay(ground)
+        self.pilot = Pilot(self._loaded, self._settings, self.physics.gravity)
         self.path, self.speed = path, speed
         point, first = path.at(0.0), self.pilot.comfortable_speed(path, speed(0.0))
         self.bicycle.start(first, (point.x, point.y), point.heading, crank=crank)
         self.rider.start(motion, crank, self.bicycle.state().crank_rate)
         self.pilot.start(path, first)
-        trunk = posture.trunk()
-        whole = sum(part.mass * part.centre[2] for part in posture.bicycle.with_load(load).parts)
-        self._lean_effect = trunk.mass * float(trunk.centre[2]) * np.cos(posture.flexion) / whole
         self._count = 0
         self.state = self.bicycle.state()
 

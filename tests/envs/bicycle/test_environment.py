@@ -117,6 +117,44 @@ def test_snapshot_and_restore_are_bitwise(quick):
     other.close()
 
 
+@pytest.mark.parametrize(("fidelity", "name"), [("full", "outdoor"), ("lumped", "indoor_circle")])
+def test_a_reset_is_a_new_environment_bitwise(fidelity, name):
+    """Another motion in the same world, the same motion again from its kept start, a new world: one and the same."""
+    options = {"fidelity": fidelity, "scenario": name, "suite": "all", "duration": 2.0}
+    env, fresh = make(**options), make(**options)
+    ride(env, seed=1, steps=30)
+    wanted = ride(fresh, seed=2, steps=100)
+    world = env._ride
+    for _ in ("another motion", "the same motion"):
+        observations, infos = ride(env, seed=2, steps=100)
+        assert env._ride is world
+        for here, there in zip(observations, wanted[0], strict=True):
+            assert all(np.array_equal(here[channel], there[channel]) for channel in there)
+        for here, there in zip(infos, wanted[1], strict=True):
+            for part in ("pose", "truth"):
+                assert all(np.array_equal(here[part][key], there[part][key]) for key in there[part])
+    env.reset(seed=2, options={"subject": 4})
+    assert env._ride is not world
+    env.close()
+    fresh.close()
+
+
+def test_snapshots_of_two_environments_do_not_mix():
+    first, second = make(duration=1.0), make(duration=1.0)
+    ride(first, seed=1, steps=20)
+    foreign = first.snapshot()
+    ride(second, seed=2, steps=5)
+    second.restore(foreign)
+    wanted = [second.step(second.neutral_action)[4] for _ in range(30)]
+    second.snapshot()
+    second.restore(foreign)
+    again = [second.step(second.neutral_action)[4] for _ in range(30)]
+    for before, after in zip(wanted, again, strict=True):
+        assert all(np.array_equal(before["pose"][name], after["pose"][name]) for name in QUANTITIES)
+    first.close()
+    second.close()
+
+
 RIDE_HASH = """
 import hashlib
 from poise.envs.bicycle.environment import RiderBicycleEnv
