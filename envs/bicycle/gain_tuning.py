@@ -149,10 +149,7 @@ class RiderBicycleGainEnv(GainTuningEnv):
         """A new ride and new sensor errors."""
         generator = self.np_random.spawn(1)[0]
         ride = self.rides[int(generator.integers(len(self.rides)))]
-        trajectory = imu_of(record(ride, seed=int(generator.integers(2**32))), self.place)
-        # a world that nobody looks at any more would keep its memory until the next reset
-        ride.close()
-        return trajectory
+        return imu_of(record(ride, seed=int(generator.integers(2**32))), self.place)
 
     def close(self) -> None:
         """Close the worlds of the rides; may be called twice."""
