@@ -193,6 +193,11 @@ class RiderBicycleEnv(PoseEnv):
         self.action_space = spaces.Box(-limits, limits, dtype=np.float32)
         self._ride: Ride | None = None
         self._kept: dict[str, RideMemory] = {}
+        self._first: RideMemory
+        self._motion_key: tuple[Any, ...]
+        self._world_key: tuple[Any, ...]
+        self._posture: Posture
+        self._suite: SensorSuite
         self._fallen_at = math.inf
 
     @property
