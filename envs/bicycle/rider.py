@@ -40,6 +40,8 @@ MEAN_STROKE = 2.0 * (1.0 / math.pi + DOWNSTROKE)
 """mean of both legs' strength over a turn"""
 KEEPING_UP = 4.0
 """N·m/(rad/s) on the crank, towards the wheel's pace"""
+LEAN_SUPPORT, LEAST_PRESS = 1.0, 0.2
+"""1: part of the leaning trunk's weight moment that the inner hand props; part of the load that the outer one keeps"""
 LARGEST_PEDAL_FORCE = 450.0
 """N"""
 
@@ -98,6 +100,11 @@ class Rider:
         )
         self._elbow_weight = STANDARD_GRAVITY * float(share)
         self._trunk_moment = trunk.mass * float(trunk.centre[2])
+        self._axis = axis.tolist()
+        # N along the steering axis, on one hand and off the other, that carry the trunk's moment lying on its side
+        self._prop = LEAN_SUPPORT * STANDARD_GRAVITY * self._trunk_moment / (2.0 * abs(float(arm[1])) * float(axis[2]))
+        # how far ahead of the lumbar joint the hands press down
+        self._press_arm = float(posture.bicycle.grip[0] - posture.lumbar[0])
         self.constraints: list[int] = []
 
     def extend(self, tree: Tree) -> None:
@@ -185,10 +192,15 @@ class Rider:
         steer_torque += unsteady
         c, s = math.cos(state.steer), math.sin(state.steer)
         strength, load = 0.5 * steer_torque / self._grip_arm, self.motion.style.hand_load
+        # a rider who leans props on the inner hand, along the steering axis so that the bar does not turn
+        prop = self._prop * math.sin(self._trunk_target[1])
+        most = (1.0 - LEAST_PRESS) * load
+        prop = max(-most, min(most, prop))
         hands = []
-        for pull, turned in self._pulls:
+        for (pull, turned), side in zip(self._pulls, SIDES, strict=True):
             x, y, z = (strength * (c * a + s * b) for a, b in zip(pull, turned, strict=True))
-            hands.append((x, y, z - load))
+            ax, ay, az = (SIGNS[side] * prop * a for a in self._axis)
+            hands.append((x + ax, y + ay, z + az - load))
         self._hands = hands
         ratio = self.bicycle.ratio
         bicycle = self.posture.bicycle
@@ -230,8 +242,9 @@ class Rider:
         for index in range(3):
             angle, rate = felt[index]
             torques[index] += TRUNK_STIFFNESS * (self._trunk_target[index] - angle) - TRUNK_DAMPING * rate
-        # a rider knows the weight of the own trunk
+        # a rider knows the weight of the own trunk, and braces against what the hands press
         torques[0] -= gravity * self._trunk_moment * math.sin(felt[0][0])
+        torques[0] += len(SIDES) * self.motion.style.hand_load * self._press_arm
         for index, target in enumerate(self._swivel):
             if self.full:
                 angle, rate = felt[3 + index]
