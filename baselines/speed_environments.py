@@ -5,17 +5,25 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
 
 from .speed_filters import REPEATS, Speed, measure
+
+if TYPE_CHECKING:
+    from ..envs.bicycle.ride import Ride
 
 STEPS = 500
 PHYSICS_PER_TICK = 10
 """1 kHz of physics under 100 Hz of observations."""
+RIDER = "poise/RiderBicycle-v0"
+RIDER_RATE, RIDER_PHYSICS = 100.0, 500.0
+"""Hz of observations and of physics"""
 
 
 def environment_speeds() -> Iterator[Speed]:
-    """Steps a CPU second of hand motion in both drives, of replay, of gain tuning; then simulation without steps."""
+    """Steps a CPU second of hand motion, replay and gain tuning; simulation without steps; riders on bicycles."""
     group = "environments at 100 Hz"
     bare = measure(bare_steps(STEPS * PHYSICS_PER_TICK), STEPS * PHYSICS_PER_TICK)
     yield Speed(group, "bare stepSimulation of one free body, 10 a tick", bare / PHYSICS_PER_TICK, "ticks/s", 1.0)
@@ -29,6 +37,55 @@ def environment_speeds() -> Iterator[Speed]:
         yield Speed(group, what, rate, "steps/s", rate / (bare / PHYSICS_PER_TICK))
     rate = bulk_rate()
     yield Speed(group, "simulate_hand, whole episode at once", rate, "ticks/s", rate / (bare / PHYSICS_PER_TICK))
+    yield from rider_speeds("full")
+    yield from rider_speeds("lumped")
+
+
+def rider_speeds(fidelity: Literal["full", "lumped"]) -> Iterator[Speed]:
+    """Bare physics of rider and bicycle, the environment with all sensors, how much faster than life, and resets."""
+    group = f"rider on a bicycle, {fidelity}, at {RIDER_RATE:.0f} Hz"
+    per_tick = round(RIDER_PHYSICS / RIDER_RATE)
+    with standing_ride(fidelity) as ride:
+        start = ride.save()
+
+        def fall() -> None:
+            ride.restore(start)
+            for _ in range(STEPS):
+                ride.physics.step()
+
+        bare = measure(fall, STEPS) / per_tick
+    yield Speed(group, f"bare stepSimulation of the same bodies, {per_tick} a tick", bare, "ticks/s", 1.0)
+    options = {"fidelity": fidelity, "suite": "all", "rate": RIDER_RATE, "physics_rate": RIDER_PHYSICS}
+    rate = environment_rate(RIDER, options)
+    yield Speed(group, "RiderBicycle", rate, "steps/s", rate / bare)
+    yield Speed(group, "RiderBicycle, real-time factor", rate / RIDER_RATE, "s of riding/s")
+    yield Speed(group, "RiderBicycle, reset to another motion", reset_rate(RIDER, options), "resets/s")
+
+
+def standing_ride(fidelity: Literal["full", "lumped"]) -> Ride:
+    """A rider on a mountain bike about to ride straight on, without the environment around them."""
+    from ..envs.bicycle.anthropometry import rider_body
+    from ..envs.bicycle.parameters import BICYCLES
+    from ..envs.bicycle.path import Path
+    from ..envs.bicycle.posture import sit
+    from ..envs.bicycle.ride import Ride
+    from ..envs.bicycle.style import RiderMotion, rider_style
+
+    posture = sit(BICYCLES["mountain-bike"], rider_body(0))
+    motion = RiderMotion(rider_style("normal"), np.random.default_rng(0))
+    return Ride(posture, motion, Path(np.zeros(2)), lambda _: 3.0, fidelity=fidelity, physics_rate=RIDER_PHYSICS)
+
+
+def reset_rate(identity: str, options: dict[str, Any]) -> float:
+    """Median resets a CPU second, each to a motion not ridden before."""
+    import gymnasium
+
+    env = gymnasium.make(identity, disable_env_checker=True, **options)
+    env.reset(seed=0)
+    try:
+        return measure(env.reset, 1)
+    finally:
+        env.close()
 
 
 def bare_steps(count: int) -> Callable[[], None]:

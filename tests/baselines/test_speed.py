@@ -31,9 +31,13 @@ def test_the_command_prints_rates_and_ratios(capsys):
     assert main(["speed", "--what", "filters", "environments", "--json"]) == 0
     rows = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
     groups = {row["group"] for row in rows}
-    assert len(groups) == 3
+    assert len(groups) == 5
     for group in groups:
         yardsticks = [row for row in rows if row["group"] == group and row["ratio"] == 1.0]
         assert len(yardsticks) == (0 if group == "whole sequence by name" else 1)
     assert all(row["rate"] > 0.0 for row in rows)
+    riding = {(row["group"].split(", ")[1], row["what"]): row["rate"] for row in rows if "rider" in row["group"]}
+    for fidelity in ("full", "lumped"):
+        steps, factor = (riding[fidelity, f"RiderBicycle{what}"] for what in ("", ", real-time factor"))
+        assert factor == pytest.approx(steps / speed_environments.RIDER_RATE)
     assert {"batch of 8, compiled", "whole sequence, compiled"} <= {row["what"] for row in rows}
