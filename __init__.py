@@ -9,9 +9,9 @@ estimators and policies that adapt filter gains, compared on the same data, simu
 >>> table = poise.evaluate(["bounded-motion", "tilt"], [trajectory])
 
 Four floors, imports only downwards: :mod:`poise.filters` (rotations, the Kalman core, published filters, metrics),
-:mod:`poise.envs` (physics, sensors, environments, recordings), :mod:`poise.baselines` (learned estimators, gain policies, the
-list of all estimators, evaluation), :mod:`poise.scripts` (the command ``poise``). Importing poise registers its environments
-with Gymnasium and loads neither PyBullet nor torch.
+:mod:`poise.envs` (physics, sensors, environments, recordings), :mod:`poise.baselines` (learned estimators, gain
+policies, the list of all estimators, evaluation), :mod:`poise.scripts` (the command ``poise``). Importing poise
+registers its environments with Gymnasium and loads neither PyBullet nor torch.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ import importlib
 from importlib.metadata import PackageNotFoundError, version
 from typing import TYPE_CHECKING, Any
 
-from . import envs
+from .envs import register_environments
 
 if TYPE_CHECKING:
     from .baselines.evaluation import evaluate
@@ -63,7 +63,7 @@ try:
 except PackageNotFoundError:  # a checkout that is not installed
     __version__ = "0+unknown"
 
-getattr(envs, 'register_environments', lambda: None)()
+register_environments()
 
 
 def __getattr__(name: str) -> Any:
