@@ -80,7 +80,8 @@ class RiderBicycleEnv(PoseEnv):
 
     ## Starting State
 
-    Riding, one second after a start at static tyre deflection with consistent velocities.
+    Riding, one second after a start at static tyre deflection with consistent velocities. This second is ridden at
+    every reset to another motion; a reset to the same motion of the same person returns to its end at once.
 
     ## Episode End
 
