@@ -218,9 +218,8 @@ class RiderBicycleEnv(PoseEnv):
     def _start(self, chosen: Scenario, subject: Any, motion: np.random.Generator) -> None:
         """Begin the ride at the end of its first second; what was drawn is kept to ride it again.
 
-        The same draw again goes back to the state that was kept there. Another one of the same person begins in the
-        same world, its first second ridden anew, since course, speed, crank and habits differ. Another person, or a
-        world in which someone fell, needs a new world. All three give the same ride, bit for bit.
+        The same draw goes back to the state kept there; another one of the same person begins in the same world;
+        another person, or a fall before, needs a new world. All three give the same ride, bit for bit.
         """
         seed = str(motion.bit_generator.seed_seq.state)  # type: ignore[attr-defined]
         key = (chosen, subject, self.style, self.duration, self.physics_rate, self.tyre, seed)
