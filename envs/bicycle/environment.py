@@ -226,9 +226,9 @@ class RiderBicycleEnv(PoseEnv):
         if self._ride is not None and self._ride.fallen:
             self._stop()
         if self._ride is None or key != self._motion_key:
-            self._plan = (chosen, subject, copy.deepcopy(motion))
+            plan = (chosen, subject, copy.deepcopy(motion))
             self._ride_first_second(chosen, subject, motion)
-            self._motion_key = key
+            self._plan, self._motion_key = plan, key
         else:
             self._ride.restore(self._first)
         assert self._ride is not None
