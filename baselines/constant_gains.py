@@ -53,6 +53,7 @@ def best_constant_gains(
     trajectories: Sequence[Trajectory],
     *,
     quantity: str | None = None,
+    guesses: Sequence[Sequence[float]] = (),
     samples: int = 64,
     refinements: int = 60,
     seed: int = 0,
@@ -63,6 +64,7 @@ def best_constant_gains(
         filter: the filter, with all its gains or with chosen ones.
         trajectories: with a truth for ``quantity``.
         quantity: output that is scored; None for ``up``.
+        guesses: further actions to try in the first stage.
         samples: points of the first stage, besides the neutral one; best a power of two.
         refinements: evaluations of the second stage.
         seed: of the points.
@@ -88,7 +90,7 @@ def best_constant_gains(
     if not np.isfinite(neutral):
         raise ValueError("some trajectory has no tick with a known truth that is scored")
     spread = 2.0 * qmc.Sobol(tuned.actions, rng=np.random.default_rng(seed)).random(samples) - 1.0 if samples else []
-    values = [neutral, *(evaluate(point) for point in spread)]
+    values = [neutral, *(evaluate(point) for point in spread), *(evaluate(np.asarray(point)) for point in guesses)]
     if refinements:
         start = tried[int(np.argmin(values))]
         # Steps inwards, so that the first simplex lies in the box.

@@ -26,6 +26,8 @@ BEHAVIOURS = 4
 """Candidates under which the features are recorded, besides the policy itself."""
 ROUNDS = 3
 """Trainings, each with the features of the policy before as well."""
+REACH = 0.7
+"""How far candidates lie from the start: within one valley of the cost, since what lies between two is bad."""
 SMALL_COST = 0.05
 """Added to relative costs before their logarithm is taken."""
 
@@ -93,7 +95,7 @@ def fit_hindsight(
     start: np.ndarray,
     *,
     hidden: tuple[int, ...] = (64, 64),
-    discount: float = 0.97,
+    discount: float = 0.98,
     candidates: int = 63,
     epochs: int = 6,
     seed: int = 0,
@@ -103,7 +105,7 @@ def fit_hindsight(
     Args:
         tuned: the filter, what may be chosen of it and what is seen.
         trajectories: simulated, with truth.
-        start: constant action ``(k,)``, the first of the candidates.
+        start: constant action ``(k,)``, the first of the candidates; the others lie within :data:`REACH` of it.
         hidden: units of the layers.
         discount: how far ahead costs count, per decision.
         candidates: further actions, spread evenly.
@@ -116,8 +118,9 @@ def fit_hindsight(
     from scipy.stats import qmc
 
     rng = np.random.default_rng(seed)
-    spread = 2.0 * qmc.Sobol(tuned.actions, rng=rng.spawn(1)[0]).random(candidates + 1)[1:] - 1.0
-    actions = np.concatenate([start[None], spread])
+    lowest, highest = np.maximum(start - REACH, -1.0), np.minimum(start + REACH, 1.0)
+    spread = qmc.Sobol(tuned.actions, rng=rng.spawn(1)[0]).random(candidates + 1)[1:]
+    actions = np.concatenate([start[None], lowest + (highest - lowest) * spread])
     rates: dict[int, list[Trajectory]] = {}
     for trajectory in trajectories:
         rates.setdefault(round(1e6 * trajectory.dt), []).append(trajectory)
@@ -129,7 +132,7 @@ def fit_hindsight(
     targets: list[np.ndarray] = []
     width = tuned.observation_size
     fit = np.linalg.pinv(cubic(actions)).T
-    chooser = Chooser(width, hidden, start, seed)
+    chooser = Chooser(width, hidden, start, seed, lowest, highest)
     for _ in range(ROUNDS):
         for behaviour in behaviours:
             for group, cost in zip(groups, costs, strict=True):
@@ -158,10 +161,23 @@ class Chooser:
         hidden: units of the layers.
         start: action at the beginning.
         seed: of weights and order.
+        lowest: smallest action ``(k,)`` of which the polynomials know.
+        highest: largest likewise.
     """
 
-    def __init__(self, inputs: int, hidden: tuple[int, ...], start: np.ndarray, seed: int) -> None:
+    def __init__(
+        self,
+        inputs: int,
+        hidden: tuple[int, ...],
+        start: np.ndarray,
+        seed: int,
+        lowest: np.ndarray | float = -1.0,
+        highest: np.ndarray | float = 1.0,
+    ) -> None:
         import torch
+
+        none = np.zeros(len(start))
+        self.lowest, self.highest = (torch.as_tensor(none + bound, dtype=torch.float32) for bound in (lowest, highest))
 
         with torch.random.fork_rng(devices=[]):
             torch.manual_seed(seed)
@@ -188,7 +204,7 @@ class Chooser:
                 for layer in self.linear[:-1]:
                     action = torch.tanh(layer(action))
                 action = self.linear[-1](action)
-                bounded = action.clamp(-1.0, 1.0)
+                bounded = torch.minimum(torch.maximum(action, self.lowest), self.highest)
                 cost = torch.exp((cubic(bounded) * coefficients[rows]).sum(dim=-1)).mean()
                 loss = cost + (action - bounded).square().sum(dim=-1).mean()
                 optimiser.zero_grad()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import date
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -63,17 +63,20 @@ def run(args: Args) -> int:
     from ..filters.adaptation import tunable_filter
     from ..filters.tuned import TunedFilter
 
-    tuned = TunedFilter.of(tunable_filter(args.filter))
+    config = training_config(args)
+    tuned = TunedFilter.of(tunable_filter(args.filter), config.gains)
     sets = {"simulated": TRAINING_MOTIONS.draw_many(child_seed(args.seed, TEST_SEED), args.test_trajectories)}
     recorded = load_all(args.recordings)
     if recorded:
         sets["recorded"] = recorded
     folder = start_run("tune", args, args.seed, args.runs) if args.resume is None else resumed(args.resume, args.seed)
-    config = training_config(args)
     motions = TRAINING_MOTIONS.draw_many(config.seed, min(config.trajectories, 48))
     print(f"searching constant gains of {args.filter} on {len(motions)} trajectories")
     samples, refinements = (64, 60) if args.preset == "shipped" else (16, 20)
-    constant = best_constant_gains(tuned, motions, samples=samples, refinements=refinements, seed=args.seed)
+    guesses = () if config.centre is None else (config.centre,)
+    constant = best_constant_gains(
+        tuned, motions, guesses=guesses, samples=samples, refinements=refinements, seed=args.seed
+    )
     candidates = {"published": GainPolicy.neutral(tuned), "constant": GainPolicy.constant(tuned, constant.action)}
     if args.method == "ppo":
         candidates["policy"] = train(args, folder, constant.action)
@@ -93,14 +96,12 @@ def run(args: Args) -> int:
 
 def training_config(args: Args) -> Any:
     """The configuration that the arguments ask for."""
-    from ..baselines.policy_training import TrainingConfig, shipped_config
+    from ..baselines.policy_training import shipped_config
 
     if args.preset == "shipped":
         config = shipped_config(args.filter)
     else:
-        config = TrainingConfig(filter=args.filter, steps=QUICK_STEPS, trajectories=48, search=8, hindsight=24)
-    from dataclasses import replace
-
+        config = replace(shipped_config(args.filter), steps=QUICK_STEPS, trajectories=48, hindsight=24)
     given = {name: getattr(args, name) for name in ("steps", "trajectories")}
     return replace(config, seed=args.seed, **{name: value for name, value in given.items() if value is not None})
 
