@@ -120,8 +120,8 @@ class TrainingConfig:
 def shipped_config(filter: str) -> TrainingConfig:
     """The configuration that the shipped weights of a filter were trained with.
 
-    They begin from hindsight. Started from the best constant gains alone, the same number of steps wins a third as much
-    in simulation and loses on recordings; from hindsight over the whole box of actions, single motions are lost.
+    They begin from hindsight. Started from the best constant gains, the same number of steps wins little in simulation
+    and loses on recordings; from hindsight over the whole box of actions, the filter is lost in single motions.
     """
     if filter == "bounded-motion":
         # The bias gain is left alone: motion that looks like a wandering bias is more frequent than one.

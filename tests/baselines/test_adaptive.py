@@ -17,8 +17,8 @@ from poise.filters.kalman import KalmanFilter
 from poise.filters.tuned import TunedFilter
 
 FILTERS = ("external-acceleration", "bounded-motion")
-"""Trajectories of the tests of shipped policies; training draws its own from other seeds."""
 HELD_OUT = 987_654
+"""Seed of the motions on which shipped policies are tested; training draws from others."""
 
 
 @pytest.fixture(scope="module")
@@ -154,16 +154,14 @@ def test_a_constant_policy_has_the_errors_of_constant_gains(name):
     np.testing.assert_allclose(by_policy, constant_errors(tuned, trajectories, action), rtol=1e-10)
 
 
-@pytest.mark.parametrize("name", FILTERS)
-def test_shipped_policies_beat_the_published_tuning_and_the_best_constant_gains(name):
-    """On motions that training never saw; the best constant gains are those that training started from."""
+@pytest.mark.parametrize(("name", "share"), [("external-acceleration", 0.8), ("bounded-motion", 1.0)])
+def test_shipped_policies_beat_the_published_tuning_and_the_best_constant_gains(name, share):
+    """On motions that training never saw; the best constant gains are those that were found on the training's."""
     from poise.baselines.policy_training import TRAINING_MOTIONS
 
-    trajectories = TRAINING_MOTIONS.draw_many(HELD_OUT, 12)
+    trajectories = TRAINING_MOTIONS.draw_many(HELD_OUT, 16)
     estimator = poise.make_estimator(f"{name}+policy")
-    tuned = TunedFilter.of(tunable_filter(name))
-    policy = policy_errors(tuned.kalman, estimator.policy, trajectories).mean()
-    constant = constant_errors(tuned, trajectories, np.array(estimator.policy.card["best_constant"])).mean()
-    neutral = constant_errors(tuned, trajectories, np.zeros(3)).mean()
-    assert policy < 0.95 * constant
-    assert policy < 0.9 * neutral
+    assert estimator.policy.card["training"]["motions"] == TRAINING_MOTIONS.describe()
+    policy = policy_errors(estimator.filter, estimator.policy, trajectories).mean()
+    for action in (np.zeros(estimator.tuned.actions), np.array(estimator.policy.card["best_constant"])):
+        assert policy < share * constant_errors(estimator.tuned, trajectories, action).mean()
