@@ -88,7 +88,7 @@ def compare_modes(seeds: Sequence[int]) -> list[dict[str, float | str | int]]:
                 up = estimate_up(trial, ExternalAcceleration(mode=mode, exact_rotation=exact))
                 angles = zip(rotation.roll_pitch(up), rotation.roll_pitch(trial.up), strict=True)
                 roll, pitch = (float(rms(rotation.wrap(a - b)).mean()) * DEGREES for a, b in angles)
-                row: dict[str, float | str | int] = {"test": test, "mean |a|": level, "peak |a|": peak}
+                row: dict[str, float | str | int] = {"test": test, "mean a": level, "peak a": peak}
                 row |= {"rotation": rotated, "mode": mode}
                 row |= {"roll": roll, "pitch": pitch, "inclination": inclination_rms(up, trial.up)}
                 rows.append(row)

@@ -76,7 +76,7 @@ def rms_bars(
         ax.text(1.02 * limit, position, f"{mean:.2f}", va="center", fontsize=8.5)
     ax.set_yticks(positions, [str(name) for name in means.index])
     ax.set_xlim(0.0, 1.12 * limit)
-    ax.set_xlabel(f"{metric} error, RMS, {unit} (bar and number: mean of trajectories, dot: one trajectory)")
+    ax.set_xlabel(f"{metric} error, RMS, {unit} (bar: mean, dot: one trajectory)")
     ax.grid(axis="y", visible=False)
     present = [kind for kind in COLOURS if kind in {kinds.get(str(name)) for name in means.index}]
     patches = [_patch(COLOURS[kind]) for kind in present]

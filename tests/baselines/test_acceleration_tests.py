@@ -16,7 +16,7 @@ def errors(table, rotation="printed"):
 
 
 def test_the_motions_have_the_levels_of_the_paper(table):
-    levels = table.groupby("test")[["mean |a|", "peak |a|"]].first()
+    levels = table.groupby("test")[["mean a", "peak a"]].first()
     paper = {"A": (0.40, 1.83), "B": (3.06, 16.71), "C": (6.29, 37.22)}
     for test, expected in paper.items():
         assert levels.loc[test].to_numpy() == pytest.approx(expected, rel=0.02)
