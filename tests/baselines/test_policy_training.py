@@ -10,7 +10,7 @@ import pytest
 
 from poise.baselines.constant_gains import constant_errors, policy_errors
 from poise.baselines.policy import GainPolicy
-from poise.baselines.policy_training import TrainingConfig, export_policy, make_model, train_policy
+from poise.baselines.policy_training import TrainingConfig, export_policy, make_model, shipped_config, train_policy
 from poise.envs.gain_tuning import ReplayGainEnv
 from poise.envs.hand_trajectories import HandTrajectories
 from poise.filters.adaptation import tunable_filter
@@ -202,8 +202,8 @@ def test_the_command_tunes_compares_and_exports(tmp_path, capsys):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["external-acceleration", "bounded-motion"])
-def test_a_minute_of_training_beats_the_best_constant_gains(name):
-    config = TrainingConfig(filter=name, steps=300_000, trajectories=96)
+def test_minutes_of_training_beat_the_best_constant_gains(name):
+    config = dataclasses.replace(shipped_config(name), steps=200_000, trajectories=96, hindsight=96)
     policy = train_policy(config)
     unseen = config.motions.draw_many(4321, 16)
     tuned = TunedFilter.of(tunable_filter(name))
