@@ -124,7 +124,7 @@ class RiderBicycleEnv(PoseEnv):
         fidelity: ``full`` or ``lumped``.
         bicycle: ``mountain-bike`` or parameters with a crank.
         physics_rate: physics steps a second, Hz; a multiple of 250 Hz and of ``rate``.
-        score: one quantity or several of ``info["pose"]``.
+        score: one quantity or several of ``info["pose"]``; by default the orientations of bicycle and trunk.
         grade: all errors times this, 0 for none.
         sampling: ``interval`` or ``instant``, of gyroscopes and accelerometers.
         render_mode: ``human`` (a window), ``rgb_array`` or None.
@@ -151,7 +151,7 @@ class RiderBicycleEnv(PoseEnv):
         fidelity: Fidelity = "full",
         bicycle: str | BicycleParameters = "mountain-bike",
         physics_rate: float = 500.0,
-        score: str | Sequence[str] = "bicycle/roll",
+        score: str | Sequence[str] = ("bicycle/orientation", "trunk/orientation"),
         *,
         grade: float = 1.0,
         sampling: Sampling = "interval",

@@ -84,8 +84,6 @@ def test_checkers_have_nothing_to_say(identity):
     env = gym.make(identity)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        # an estimate of an angle is an action in rad
-        warnings.filterwarnings("ignore", message=".*symmetric and normalized")
         check_env(env.unwrapped, skip_render_check=True)
         check_env_sb3(env.unwrapped, warn=True)
     env.close()
