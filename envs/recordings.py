@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -72,6 +72,11 @@ def recognise(path: Path) -> RecordingFormat | None:
     with path.open("rb") as file:
         head = file.read(HEAD_LENGTH)
     return next((known for known in FORMATS if known.recognises(head, path)), None)
+
+
+def recording_files(paths: Iterable[Path]) -> list[Path]:
+    """Files as they are, folders as the recordings below them; see :func:`find_recordings`."""
+    return [file for path in paths for file in (find_recordings(path) if path.is_dir() else [path])]
 
 
 def find_recordings(folder: str | Path) -> list[Path]:

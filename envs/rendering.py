@@ -106,23 +106,35 @@ class DeviceScene:
 
     def image(self) -> np.ndarray:
         """The view of a camera beside and above the device, ``(height, width, 3)`` uint8."""
-        width, height = IMAGE_SIZE
-        client = self._physics.client
         eye = self._target + np.array([0.25, -0.5, 0.25])
-        view = pybullet.computeViewMatrix(eye.tolist(), self._target.tolist(), [0.0, 0.0, 1.0], physicsClientId=client)
-        lens = pybullet.computeProjectionMatrixFOV(50.0, width / height, 0.05, 10.0, physicsClientId=client)
-        pixels = pybullet.getCameraImage(
-            width,
-            height,
-            view,
-            lens,
-            lightDirection=[1.0, -1.5, 3.0],
-            shadow=1,
-            renderer=pybullet.ER_TINY_RENDERER,
-            physicsClientId=client,
-        )[2]
-        return np.reshape(np.asarray(pixels, dtype=np.uint8), (height, width, 4))[..., :3].copy()
+        return take_picture(self._physics.client, eye, self._target, angle=50.0, reach=10.0)
 
     def close(self) -> None:
         """Close the world or the window."""
         self._physics.close()
+
+
+def take_picture(client: int, eye: np.ndarray, target: np.ndarray, *, angle: float, reach: float) -> np.ndarray:
+    """What a camera sees of a world, ``(height, width, 3)`` uint8, drawn without a screen.
+
+    Args:
+        client: number of the PyBullet world.
+        eye: ``(3,)`` m, where the camera is.
+        target: ``(3,)`` m, what it looks at.
+        angle: vertical field of view, deg.
+        reach: m, nothing beyond is drawn.
+    """
+    width, height = IMAGE_SIZE
+    view = pybullet.computeViewMatrix(eye.tolist(), target.tolist(), [0.0, 0.0, 1.0], physicsClientId=client)
+    lens = pybullet.computeProjectionMatrixFOV(angle, width / height, 0.05, reach, physicsClientId=client)
+    pixels = pybullet.getCameraImage(
+        width,
+        height,
+        view,
+        lens,
+        lightDirection=[1.0, -1.5, 3.0],
+        shadow=1,
+        renderer=pybullet.ER_TINY_RENDERER,
+        physicsClientId=client,
+    )[2]
+    return np.reshape(np.asarray(pixels, dtype=np.uint8), (height, width, 4))[..., :3].copy()

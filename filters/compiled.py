@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .model import Equations, Model, Recurrence, parameters_of, structure_of
-from .printing import cache_folder, load, print_model
+from .printing import load, print_model
 from .quantity import Estimate, Measurement
 from .sampling import Gains, join, per_tick_gains
 
@@ -184,12 +184,3 @@ class CompiledRecurrence(_Form):
         poses = np.empty((*Z.shape[:2], self.pose_size))
         self._execute(states, Z, self._parameters(model, None, Z.shape[0], batch), [poses])
         return Estimate(self._pose(poses, batch)), state._replace(**_unflatten(state, states, batch))
-
-
-def clear_compiled(remove_files: bool = False) -> None:
-    """Forget the compiled forms of this process; with ``remove_files`` those of the cache folder too."""
-    _FORMS.clear()
-    if remove_files:
-        for path in cache_folder().rglob("*"):
-            if path.is_file():
-                path.unlink(missing_ok=True)

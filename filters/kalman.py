@@ -235,9 +235,4 @@ def correct(P: Array, r: Array, H: Array, R: Array) -> tuple[Array, Array, Array
     return (K @ r[..., None])[..., 0], 0.5 * (joseph + joseph.mT), whitened
 
 
-def neutral(model: Model) -> dict[str, float]:
-    """Gains that change nothing."""
-    return dict.fromkeys(model.gains, 0.0)
-
-
-__all__ = ["FilterState", "Gain", "Gains", "KalmanFilter", "Model", "correct", "neutral", "scaled"]
+__all__ = ["FilterState", "Gain", "Gains", "KalmanFilter", "Model", "correct", "scaled"]

@@ -39,13 +39,13 @@ def run(args: Args) -> int:
     from ..baselines.acceleration_tests import compare_modes
     from ..baselines.benchmark import contenders, groups_of, simulated
     from ..baselines.evaluation import evaluate
-    from ..envs.recordings import find_recordings, load_recording
+    from ..envs.recordings import load_recording, recording_files
     from .experiment import start_run
     from .report import draw_example, print_comparison, print_progress, provenance
     from .tables import markdown_table, print_table
 
     chosen = contenders(args.estimators)
-    paths = [path for item in args.recordings for path in (find_recordings(item) if item.is_dir() else [item])]
+    paths = recording_files(args.recordings)
     folder = start_run("benchmark", args, args.seed, args.runs)
     sections: dict[str, str] = {}
     tables = []

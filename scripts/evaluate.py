@@ -35,11 +35,11 @@ def run(args: Args) -> int:
     from ..baselines.benchmark import groups_of
     from ..baselines.evaluation import evaluate
     from ..baselines.zoo import list_estimators
-    from ..envs.recordings import find_recordings, load_recording
+    from ..envs.recordings import load_recording, recording_files
     from .experiment import start_run
     from .report import draw_example, print_comparison, print_progress, provenance
 
-    paths = [path for item in args.recordings for path in (find_recordings(item) if item.is_dir() else [item])]
+    paths = recording_files(args.recordings)
     if not paths:
         raise ValueError(f"no recording in {', '.join(map(str, args.recordings))}")
     trajectories = [load_recording(path) for path in paths]

@@ -111,9 +111,9 @@ def load_all(paths: tuple[Path, ...]) -> list[Trajectory]:
     Raises:
         ValueError: there are none.
     """
-    from ..envs.recordings import find_recordings, load_recording
+    from ..envs.recordings import load_recording, recording_files
 
-    files = [path for item in paths for path in (find_recordings(item) if item.is_dir() else [item])]
+    files = recording_files(paths)
     if not files:
         raise ValueError(f"no recording in {', '.join(map(str, paths))}")
     return [load_recording(path) for path in files]

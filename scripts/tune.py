@@ -117,9 +117,9 @@ def load_all(paths: tuple[Path, ...]) -> list[Trajectory]:
     Raises:
         ValueError: paths are given but hold none.
     """
-    from ..envs.recordings import find_recordings, load_recording
+    from ..envs.recordings import load_recording, recording_files
 
-    files = [path for item in paths for path in (find_recordings(item) if item.is_dir() else [item])]
+    files = recording_files(paths)
     loaded = [load_recording(path) for path in files]
     usable = [trajectory for trajectory in loaded if "up" in trajectory.quantities]
     if paths and not usable:

@@ -9,7 +9,7 @@ import numpy as np
 import pybullet
 
 from ..physics import Physics
-from ..rendering import IMAGE_SIZE, TILE_COLOURS
+from ..rendering import TILE_COLOURS, take_picture
 from ..sensors import BodyState
 from .bicycle import bicycle_tree
 from .posture import LIMBS, Posture
@@ -86,22 +86,9 @@ class RideScene:
 
     def image(self) -> np.ndarray:
         """The view from the front right, ``(height, width, 3)`` uint8."""
-        width, height = IMAGE_SIZE
-        client, angle = self._physics.client, self._heading - 1.0
+        angle = self._heading - 1.0
         eye = self._target + np.array([2.6 * math.cos(angle), 2.6 * math.sin(angle), 0.55])
-        view = pybullet.computeViewMatrix(eye.tolist(), self._target.tolist(), [0.0, 0.0, 1.0], physicsClientId=client)
-        lens = pybullet.computeProjectionMatrixFOV(45.0, width / height, 0.05, 30.0, physicsClientId=client)
-        pixels = pybullet.getCameraImage(
-            width,
-            height,
-            view,
-            lens,
-            lightDirection=[1.0, -1.5, 3.0],
-            shadow=1,
-            renderer=pybullet.ER_TINY_RENDERER,
-            physicsClientId=client,
-        )[2]
-        return np.reshape(np.asarray(pixels, dtype=np.uint8), (height, width, 4))[..., :3].copy()
+        return take_picture(self._physics.client, eye, self._target, angle=45.0, reach=30.0)
 
     def close(self) -> None:
         """Close the world or the window."""
