@@ -1,0 +1,1 @@
+"""Methods for arrays of accelerometers: angular rate, planar and spatial orientation, calibration."""

@@ -1,0 +1,137 @@
+"""Rider and bicycle in numbers: what a filter is told about the person and the machine it looks at.
+
+The frame is the bicycle's: origin on the ground under the rear hub of the upright bicycle, x forward, y left, z up. The
+trunk's frame has its origin in the lumbar joint and z up the trunk. The right side mirrors the left (y changes sign).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, fields
+from typing import Any, Self
+
+Point = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class RiderGeometry:
+    """Lengths in m, masses in kg, angles in rad. The defaults are a person of 1.76 m and 68 kg on the mountain bike.
+
+    Raises:
+        ValueError: a number that is not finite, or a length or mass that is not positive.
+    """
+
+    wheelbase: float = 1.05
+    saddle: Point = (0.2593, 0.0, 0.8825)
+    """point where post and saddle meet"""
+    trunk_pivot: Point = (0.2593, 0.0, 1.037)
+    """lumbar joint: the trunk turns about it"""
+    trunk_flexion: float = 0.5847
+    """usual forward lean of the trunk against the bicycle's upright"""
+    shoulder: Point = (0.0, 0.1896, 0.4287)
+    """left shoulder joint, trunk frame"""
+    hip: Point = (0.2593, 0.0859, 0.9634)
+    """left hip joint"""
+    grip: Point = (0.79, 0.27, 1.04)
+    """left hand's place at zero steer"""
+    steer_origin: Point = (0.8761, 0.0, 0.72)
+    """a point of the steering axis"""
+    steer_axis: Point = (-0.309017, 0.0, 0.951057)
+    """unit vector, upwards"""
+    crank_axle: Point = (0.426, 0.0, 0.28)
+    crank_length: float = 0.17
+    pedal_offset: float = 0.12
+    """of a foot from the middle plane"""
+    upper_arm: float = 0.2848
+    forearm: float = 0.2718
+    """elbow to grip"""
+    thigh: float = 0.4268
+    shank: float = 0.4387
+    """knee to ankle"""
+    ankle_to_pedal: float = 0.1516
+    ankle_angle: float = math.radians(80.0)
+    """exterior: 0 with the foot in line with the shank"""
+    trunk_mass: float = 26.6764
+    """of all that turns about the lumbar joint without the arms: trunk above it and head"""
+    trunk_centre: Point = (0.0053, 0.0, 0.3648)
+    """its centre of mass, trunk frame"""
+    trunk_moments: Point = (1.0733, 0.9346, 0.2787)
+    """its moments of inertia about the centre, trunk axes, kg·m²"""
+    rider_mass: float = 68.0
+    bicycle_imu: Point = (0.37, 0.0, 0.71)
+    bicycle_imu_tilt: float = math.radians(10.0)
+    """nose up"""
+    trunk_imu: Point = (-0.1011, 0.0, 0.2729)
+    """trunk frame"""
+    wheel_radius: float = 0.335
+    """rolling radius of the rear wheel"""
+    post_length: float = 0.13
+    """from the saddle down the post to the six-axis sensor"""
+    post_tilt: float = math.radians(20.0)
+    """backwards"""
+    cells_long: float = 0.20
+    """from the rear load cells to the front one"""
+    cells_wide: float = 0.12
+    """between the rear ones"""
+    cells_behind: float = 0.043
+    """from the rear ones forward to the saddle point"""
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value = getattr(self, field.name)
+            numbers = value if isinstance(value, tuple) else (value,)
+            if not all(math.isfinite(number) for number in numbers):
+                raise ValueError(f"{field.name} must be finite, got {value}")
+            if isinstance(field.default, tuple) and len(numbers) != 3:
+                raise ValueError(f"{field.name} must be a point of three numbers, got {value}")
+            if field.name in POSITIVE and not value > 0.0:
+                raise ValueError(f"{field.name} must be positive, got {value}")
+
+    @property
+    def knee_to_pedal(self) -> float:
+        """Distance from knee to pedal with the ankle held (whole-body paper: l_sp)."""
+        a, b = self.shank, self.ankle_to_pedal
+        return math.sqrt(a * a + b * b + 2.0 * a * b * math.cos(self.ankle_angle))
+
+    def describe(self) -> dict[str, Any]:
+        """All numbers, for JSON; :meth:`read` turns them back."""
+        return {name: list(value) if isinstance(value, tuple) else value for name, value in asdict(self).items()}
+
+    @classmethod
+    def read(cls, described: Mapping[str, Any]) -> Self:
+        """From what :meth:`describe` gave (``trajectory.metadata["geometry"]``).
+
+        Raises:
+            ValueError: a name that is unknown, or what the constructor refuses.
+        """
+        known = {field.name for field in fields(cls)}
+        unknown = sorted(set(described) - known)
+        if unknown:
+            raise ValueError(f"unknown geometry {unknown}; there are {sorted(known)}")
+        return cls(
+            **{
+                name: tuple(float(part) for part in value) if isinstance(value, list | tuple) else float(value)
+                for name, value in described.items()
+            }
+        )
+
+
+POSITIVE = frozenset(
+    [
+        "wheelbase",
+        "crank_length",
+        "upper_arm",
+        "forearm",
+        "thigh",
+        "shank",
+        "ankle_to_pedal",
+        "trunk_mass",
+        "rider_mass",
+        "wheel_radius",
+        "post_length",
+        "cells_long",
+        "cells_wide",
+    ]
+)
+"""Fields that must be positive."""
