@@ -109,12 +109,11 @@ class RiderGeometry:
         unknown = sorted(set(described) - known)
         if unknown:
             raise ValueError(f"unknown geometry {unknown}; there are {sorted(known)}")
-        return cls(
-            **{
-                name: tuple(float(part) for part in value) if isinstance(value, list | tuple) else float(value)
-                for name, value in described.items()
-            }
-        )
+        values: dict[str, Any] = {
+            name: tuple(map(float, value)) if isinstance(value, list | tuple) else float(value)
+            for name, value in described.items()
+        }
+        return cls(**values)
 
 
 POSITIVE = frozenset(
