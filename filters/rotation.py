@@ -14,6 +14,9 @@ from .backend import Array, namespace, rows
 SMALL_ANGLE_SQUARED = 1e-8
 """Below this squared angle (rad²) sin(x)/x and its kin are taken from their series, exact to double precision."""
 
+NEWTON_STEPS = 8
+"""Steps of :func:`nearest_matrix`: full precision unless two singular values almost vanish."""
+
 
 def identity(like: Array) -> Array:
     """The quaternion of no rotation, with the batch shape and kind of the array ``like`` ``(..., n)``."""
@@ -124,6 +127,31 @@ def from_matrix(m: Array) -> Array:
         q = xp.where(larger, candidates[index], q)
         best = xp.where(larger, squares[..., index : index + 1], best)
     return positive(normalize(q))
+
+
+def nearest_matrix(m: Array) -> Array:
+    """The rotation matrix nearest to ``m`` ``(..., 3, 3)`` in the sense of the Frobenius norm, determinant +1.
+
+    With the singular values s of m the largest root of p(λ) = (λ² − ‖m‖²)² − 8 λ det m − 4 ‖adj m‖² is
+    λ = s₁ + s₂ ± s₃; Newton's steps from √3 ‖m‖ fall to it. No branches and no decomposition
+    (F. L. Markley, "Attitude Determination using Vector Observations: a Fast Optimal Matrix Algorithm", Journal of the
+    Astronautical Sciences 41(2), 1993). Not finite where the nearest rotation is not unique.
+    """
+    xp = namespace(m)
+    first, second, third = m[..., 0, :], m[..., 1, :], m[..., 2, :]
+    cofactors = xp.stack([cross(second, third), cross(third, first), cross(first, second)], axis=-2)
+    determinant = xp.sum(first * cofactors[..., 0, :], axis=-1)
+    squared = xp.sum(first * first + second * second + third * third, axis=-1)
+    minors = 4.0 * xp.sum(cofactors[..., 0, :] ** 2 + cofactors[..., 1, :] ** 2 + cofactors[..., 2, :] ** 2, axis=-1)
+    root = xp.sqrt(3.0 * squared)
+    for _ in range(NEWTON_STEPS):
+        rest = root * root - squared
+        slope = 4.0 * root * rest - 8.0 * determinant
+        root = root - (rest * rest - 8.0 * root * determinant - minors) / slope
+    kappa = 0.5 * (root * root - squared)
+    scale = kappa * root - determinant
+    combined = (kappa + squared)[..., None, None] * m + root[..., None, None] * cofactors - m @ m.mT @ m
+    return combined / scale[..., None, None]
 
 
 def positive(q: Array) -> Array:

@@ -276,3 +276,18 @@ def test_random_rotations_are_uniform():
     np.testing.assert_allclose(rotation.to_matrix(q).mean(0), 0.0, atol=0.02)
     # Of uniform rotations the density of the angle is (1 − cos) / pi, its mean pi / 2 + 2 / pi.
     assert rotation.angle(q).mean() == pytest.approx(math.pi / 2 + 2 / math.pi, abs=0.02)
+
+
+def test_nearest_matrix_equals_the_singular_value_decomposition(q, rng):
+    for spread in (0.0, 0.05, 0.4, 1.0):
+        m = rotation.to_matrix(q) + spread * rng.standard_normal((N, 3, 3))
+        left, values, right = np.linalg.svd(m)
+        values[:, 2] *= np.sign(np.linalg.det(m))
+        sign = np.ones((N, 3))
+        sign[:, 2] = np.sign(np.linalg.det(left @ right))
+        expected = (left * sign[:, None, :]) @ right
+        well = values[:, 1] + values[:, 2] > 0.3 * values[:, 0]  # two large singular values: well conditioned
+        assert well.mean() > 0.5
+        np.testing.assert_allclose(rotation.nearest_matrix(m)[well], expected[well], atol=1e-9)
+    mirror = np.diag([1.0, 0.9, -0.2])
+    np.testing.assert_allclose(rotation.nearest_matrix(mirror), np.eye(3), atol=1e-12)
