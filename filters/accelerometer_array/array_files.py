@@ -1,0 +1,66 @@
+"""Arrays of accelerometers from names, JSON files and plain data."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from .array import ARRAYS, AccelerometerArray, PlanarArray
+
+
+def read_array(described: Mapping[str, Any]) -> AccelerometerArray:
+    """An array from ``positions``, ``axes`` and, if wanted, ``name`` and ``reference``; planar if rows have 2 numbers.
+
+    Raises:
+        ValueError: a name is missing or unknown, or what the constructor refuses.
+    """
+    unknown = sorted(set(described) - {"name", "positions", "axes", "reference"})
+    missing = sorted({"positions", "axes"} - set(described))
+    if unknown or missing:
+        raise ValueError(f"an array has positions and axes (and name, reference); missing {missing}, unknown {unknown}")
+    planar = all(len(row) == 2 for row in described["positions"])
+    kind = PlanarArray if planar else AccelerometerArray
+    return kind(
+        described["positions"],
+        described["axes"],
+        str(described.get("name", "array")),
+        tuple(described.get("reference", ())),
+    )
+
+
+def load_array(source: str | Path) -> AccelerometerArray:
+    """The array of a name (:data:`ARRAYS`) or of a JSON file with what :func:`read_array` takes.
+
+    Raises:
+        ValueError: neither a known name nor a file, or a file that does not describe an array.
+    """
+    if str(source) in ARRAYS:
+        return ARRAYS[str(source)]
+    path = Path(source)
+    if not path.is_file():
+        raise ValueError(f"array must be one of {', '.join(ARRAYS)} or a JSON file, got {str(source)!r}")
+    try:
+        described = json.loads(path.read_text(encoding="utf-8"))
+    except (json.JSONDecodeError, UnicodeDecodeError) as error:
+        raise ValueError(f"{path} is not JSON: {error}") from None
+    if not isinstance(described, dict):
+        raise ValueError(f"{path} must hold one object with positions and axes")
+    return read_array({"name": path.stem} | described)
+
+
+def describe_array(array: AccelerometerArray) -> list[dict[str, Any]]:
+    """What the readings of an array determine: a row for each entry of z, for :mod:`poise.scripts.tables`.
+
+    Returns:
+        Rows with ``quantity``, ``unit`` of its standard deviation per m/s² of noise, ``determined`` and ``noise gain``
+        (None where it is not determined).
+    """
+    units = {"P": "1", "T": "1/m", "C": "1/m"}
+    unit_of = [units[block] for block, part in array.blocks.items() for _ in range(part.stop - part.start)]
+    columns = zip(array.components, unit_of, array.determined, array.noise_gains, strict=True)
+    return [
+        {"quantity": name, "determined": bool(known), "noise gain": float(gain) if known else None, "unit": unit}
+        for name, unit, known, gain in columns
+    ]
