@@ -1,0 +1,168 @@
+"""What a study tells: texts, tables, figures and numbers, in the order in which they were found."""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..evaluation import COLUMNS
+from ..plots import save
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+RANGE = "mean, smallest … largest over riders and seeds"
+DEVIATION = "mean ± standard deviation over riders and seeds"
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One piece of a report."""
+
+    title: str
+    """heading; empty for a text without one"""
+    text: str = ""
+    """Markdown: the text, or the note under a table or figure"""
+    rows: tuple[dict[str, Any], ...] = ()
+    """of a table"""
+    figure: Path | None = None
+    """file of a picture"""
+
+
+@dataclass
+class Report:
+    """Collects what a study finds; tables are also written as CSV, figures as PNG.
+
+    Args:
+        folder: the run's; ``tables/`` and ``figures/`` are made in it.
+        publish: called with every entry when it is added.
+    """
+
+    folder: Path
+    publish: Callable[[Entry], None] = lambda entry: None
+    entries: list[Entry] = field(default_factory=list)
+    results: list[dict[str, Any]] = field(default_factory=list)
+    """rows of ``results.csv``"""
+    files: set[Path] = field(default_factory=set)
+    """of tables and figures"""
+
+    def text(self, markdown: str, title: str = "") -> None:
+        """Add a paragraph or more."""
+        self._add(Entry(title, markdown.strip()))
+
+    def table(self, title: str, rows: Sequence[Mapping[str, Any]], note: str = "") -> None:
+        """Add a table, and write it to ``tables/<title>.csv`` with all digits.
+
+        Args:
+            title: heading, of its own in this report.
+            rows: column → value; texts, numbers, None.
+            note: Markdown beneath.
+
+        Raises:
+            ValueError: no row, or a title that another entry has.
+        """
+        if not rows:
+            raise ValueError(f"a table needs rows, {title!r} has none")
+        path = self._new_file("tables", title, ".csv")
+        columns = list(dict.fromkeys(name for row in rows for name in row))
+        with path.open("w", encoding="utf-8", newline="") as file:
+            writer = csv.DictWriter(file, columns, lineterminator="\n")
+            writer.writeheader()
+            writer.writerows(rows)
+        self._add(Entry(title, note.strip(), tuple(map(dict, rows))))
+
+    def figure(self, name: str, figure: Figure, title: str, note: str = "") -> Path:
+        """Add a picture, written to ``figures/<name>.png``; returns the file.
+
+        Raises:
+            ValueError: a name or title that another entry has.
+        """
+        path = save(figure, self._new_file("figures", name, ".png"))
+        self._add(Entry(title, note.strip(), figure=path))
+        return path
+
+    def numbers(self, rows: Sequence[Mapping[str, Any]]) -> None:
+        """Add rows to ``results.csv``: estimator, trajectory, quantity, metric, value, unit.
+
+        Raises:
+            ValueError: a row has other fields.
+        """
+        for row in rows:
+            if set(row) != set(COLUMNS):
+                raise ValueError(f"a result has the fields {', '.join(COLUMNS)}, got {', '.join(map(str, row))}")
+        self.results.extend(dict(row) for row in rows)
+
+    def compare(self, title: str, rows: Sequence[Mapping[str, Any]], note: str = "", *, interval: str = RANGE) -> None:
+        """Add a table of printed values beside ours.
+
+        Args:
+            title: heading.
+            rows: each with ``quantity``, ``printed`` (text or number; None where the paper has none), ``unit``, and
+                ours: either ``values`` (one a ride; NaN are left out), or ``ours`` and ``interval`` ``(low, high)``
+                (for :data:`DEVIATION` the deviation). Further keys are columns before the quantity (``filter``, …).
+            note: Markdown beneath.
+            interval: what stands behind our value: :data:`RANGE`, :data:`DEVIATION`, or a text of one's own for a pair.
+
+        Raises:
+            ValueError: a row lacks one of these.
+        """
+        shown = []
+        for row in rows:
+            missing = {"quantity", "printed", "unit"} - set(row)
+            if missing or not ("values" in row or {"ours", "interval"} <= set(row)):
+                raise ValueError(
+                    f"a comparison needs quantity, printed, unit, and values or ours and interval; got {sorted(row)}"
+                )
+            ours, spread = row.get("ours"), row.get("interval")
+            if "values" in row:
+                ours, spread = summarised(row["values"], interval)
+            others = {name: value for name, value in row.items() if name not in OWN}
+            shown.append(
+                others
+                | {"quantity": row["quantity"], "printed": row["printed"], "ours": ours}
+                | {"interval": interval_text(spread), "unit": row["unit"]}
+            )
+        self.table(title, shown, f"Ours: {interval}. {note}".strip())
+
+    def _new_file(self, folder: str, name: str, suffix: str) -> Path:
+        path = self.folder / folder / (re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-")[:80] + suffix)
+        if path in self.files:
+            raise ValueError(f"the report has {path.name} already: choose another title than {name!r}")
+        self.files.add(path)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        return path
+
+    def _add(self, entry: Entry) -> None:
+        self.entries.append(entry)
+        self.publish(entry)
+
+
+OWN = ("quantity", "printed", "ours", "interval", "unit", "values")
+"""Keys of a comparison that have a meaning."""
+
+
+def summarised(values: Any, interval: str = RANGE) -> tuple[float, Any]:
+    """Mean of values (NaN left out), and their smallest and largest, or for :data:`DEVIATION` their deviation."""
+    found = np.asarray(values, dtype=float).ravel()
+    found = found[np.isfinite(found)]
+    if len(found) == 0:
+        return float("nan"), None
+    if interval == DEVIATION:
+        return float(found.mean()), float(found.std(ddof=1)) if len(found) > 1 else None
+    return float(found.mean()), (float(found.min()), float(found.max()))
+
+
+def interval_text(spread: Any) -> str | None:
+    """An interval as text: ``± 0.4`` or ``0.9 … 1.6``."""
+    if spread is None:
+        return None
+    if np.ndim(spread) == 0:
+        return f"± {float(spread):.3g}"
+    low, high = spread
+    return f"{float(low):.3g} … {float(high):.3g}"

@@ -1,0 +1,157 @@
+"""Do the study of a paper again: its tables and figures beside what this package gets.
+
+Papers: two-gyro, force-inertial, whole-body, accelerometer-array, external-acceleration. What is computed stays in the
+run's folder; an interrupted study goes on with --resume.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import tyro
+
+from .experiment import Run
+from .main import run_command
+
+if TYPE_CHECKING:
+    from ..baselines.reproduce.report import Entry, Report
+
+SAME = ("paper", "quick", "seed", "seeds", "subjects", "duration", "recordings")
+"""Arguments that a resumed run must share with what is there."""
+
+
+@dataclass
+class Args:
+    """Arguments of ``poise reproduce``."""
+
+    paper: tyro.conf.Positional[str]
+    """two-gyro, force-inertial, whole-body, accelerometer-array or external-acceleration"""
+    quick: bool = False
+    """less than five minutes: two riders, one ride each of 20 s, unless told otherwise"""
+    seed: int = 0
+    """root seed; every ride has a child of its own"""
+    seeds: int | None = None
+    """rides of each rider (default: 3, with --quick 1)"""
+    subjects: tuple[int, ...] | None = None
+    """numbers of riders (default: 0 1 2 3 4, with --quick 0 1)"""
+    duration: float | None = None
+    """of a ride, s (default: 60, with --quick 20)"""
+    recordings: tuple[Path, ...] = ()
+    """recorded data to look at as well, where the study does (default: the folder in POISE_DATA, if that is set)"""
+    processes: int = 2
+    """how much is computed at a time"""
+    resume: Path | None = None
+    """folder of a run that was interrupted; what it computed is kept"""
+    runs: Path = Path("runs")
+    """where the run folder goes"""
+    json: bool = False
+    """print machine-readable rows instead of tables"""
+
+
+def run(args: Args) -> int:
+    """Do the study, print what it finds as it is found, and leave a run folder with a report."""
+    from ..baselines.reproduce import find_paper
+    from ..baselines.reproduce.report import Report
+    from ..baselines.reproduce.study import Study
+    from ..envs.bicycle.anthropometry import SUBJECTS
+    from .report import print_progress
+
+    reproduce = find_paper(args.paper)
+    args = filled(args)
+    if not all(0 <= subject < len(SUBJECTS) for subject in args.subjects or ()):
+        raise ValueError(f"subjects must be numbers from 0 to {len(SUBJECTS) - 1}, got {list(args.subjects or ())}")
+    # Refuses wrong numbers before a folder is made.
+    shared = ("quick", "seed", "subjects", "seeds", "duration", "processes", "recordings")
+    settings: dict[str, Any] = {name: getattr(args, name) for name in shared}
+    Study(Path(), **settings)
+    folder = begun(args)
+    study = Study(folder.folder.resolve(), **settings)
+
+    def publish(entry: Entry) -> None:
+        show(entry, as_json=args.json)
+        write(args, folder, report)
+
+    report = Report(folder.folder, publish)
+    reproduce(study, report)
+    folder.write_results(report.results)
+    print_progress(args.json, f"report: {write(args, folder, report)}")
+    return 0
+
+
+def filled(args: Args) -> Args:
+    """The arguments with what ``quick`` stands for where nothing was given."""
+    few = args.quick
+    data = os.environ.get("POISE_DATA")
+    return dataclasses.replace(
+        args,
+        seeds=(1 if few else 3) if args.seeds is None else args.seeds,
+        subjects=((0, 1) if few else (0, 1, 2, 3, 4)) if args.subjects is None else args.subjects,
+        duration=(20.0 if few else 60.0) if args.duration is None else args.duration,
+        recordings=(Path(data),) if data and not args.recordings else args.recordings,
+    )
+
+
+def begun(args: Args) -> Run:
+    """A new run, or the one that is gone on with.
+
+    Raises:
+        FileNotFoundError: there is no such run.
+        ValueError: it has other arguments.
+    """
+    from .experiment import jsonable, start_run
+
+    if args.resume is None:
+        return start_run("reproduce", args, args.seed, args.runs)
+    path = args.resume / "args.json"
+    if not path.exists():
+        raise FileNotFoundError(f"there is no run in {args.resume}")
+    before = json.loads(path.read_text(encoding="utf-8"))["args"]
+    for name in SAME:
+        if before.get(name) != jsonable(getattr(args, name)):
+            raise ValueError(f"{args.resume} was begun with {name} {before.get(name)}, not {getattr(args, name)}")
+    return Run(args.resume, "reproduce", args.seed)
+
+
+def show(entry: Entry, *, as_json: bool) -> None:
+    """Print one entry."""
+    from .tables import print_table
+
+    if as_json:
+        for row in entry.rows:
+            print(json.dumps({"table": entry.title, **row}, default=str), flush=True)
+    elif entry.rows:
+        print_table(entry.rows, entry.title)
+        print(f"{entry.text}\n" if entry.text else "", flush=True)
+    elif entry.figure is not None:
+        print(f"figure: {entry.figure} ({entry.title})\n", flush=True)
+    else:
+        print("\n".join(part for part in (entry.title, entry.text) if part) + "\n", flush=True)
+
+
+def write(args: Args, folder: Run, report: Report) -> Path:
+    """Write ``report.md`` with all entries so far."""
+    from .experiment import write_text
+    from .report import provenance
+    from .tables import markdown_table
+
+    parts = [f"# poise reproduce {args.paper}"]
+    for entry in report.entries:
+        if entry.title:
+            parts.append(f"## {entry.title}")
+        if entry.rows:
+            parts.append(markdown_table(entry.rows))
+        if entry.figure is not None:
+            parts.append(f"![{entry.title}]({entry.figure.relative_to(folder.folder).as_posix()})")
+        if entry.text:
+            parts.append(entry.text)
+    parts.append(f"## Provenance\n\n{provenance(folder)}")
+    return write_text(folder.folder / "report.md", "\n\n".join(parts) + "\n")
+
+
+if __name__ == "__main__":
+    run_command("reproduce")

@@ -1,0 +1,100 @@
+"""``poise reproduce`` with a small study made for the test."""
+
+from __future__ import annotations
+
+import json
+import sys
+from types import ModuleType
+
+import pandas
+import pytest
+
+from poise.baselines import reproduce as package
+from poise.baselines.plots import new_figure
+from poise.scripts.main import main
+
+STUDIES = []
+
+
+def square(number):
+    return number * number
+
+
+def reproduce(study, report):
+    STUDIES.append(study)
+    rides = study.episodes("poise/BicycleFixture-v0", 2, name="push", options={"duration": 1.0})
+    values = study.map("squares", square, [(number,) for number in range(study.seeds)])
+    report.text("What was done.")
+    report.table("Squares", [{"number": number, "square": value} for number, value in enumerate(values)])
+    report.compare("Lengths", [{"quantity": "ticks", "printed": 100, "values": [len(r) for r in rides], "unit": "1"}])
+    report.figure("empty", new_figure(2.0, 1.0)[0], "An empty figure")
+    row = {"estimator": "none", "trajectory": "push", "quantity": "ticks", "metric": "mean", "value": 101.0}
+    report.numbers([{**row, "unit": "1"}])
+
+
+@pytest.fixture(autouse=True)
+def _paper(monkeypatch):
+    module = ModuleType("poise.baselines.reproduce.small")
+    vars(module).update(reproduce=reproduce)
+    monkeypatch.setitem(sys.modules, module.__name__, module)
+    monkeypatch.setitem(package.PAPERS, "small", ".small")
+    monkeypatch.delenv("POISE_DATA", raising=False)
+    STUDIES.clear()
+
+
+def start(folder, *words):
+    return main(["reproduce", "small", "--runs", str(folder), "--processes", "1", *words])
+
+
+def test_a_study_leaves_report_tables_figures_and_results(tmp_path, capsys):
+    assert start(tmp_path, "--quick", "--seeds", "2") == 0
+    out = capsys.readouterr().out
+    assert "What was done." in out
+    assert "Squares" in out
+    (folder,) = (tmp_path / "reproduce").iterdir()
+    text = (folder / "report.md").read_text(encoding="utf-8")
+    for piece in (
+        "# poise reproduce small",
+        "| number | square |",
+        "Ours: mean",
+        "![An empty figure](figures/empty.png)",
+    ):
+        assert piece in text
+    assert (folder / "figures" / "empty.png").exists()
+    assert pandas.read_csv(folder / "tables" / "squares.csv")["square"].tolist() == [0, 1]
+    assert pandas.read_csv(folder / "results.csv")["value"].tolist() == [101.0]
+    study = STUDIES[0]
+    assert (study.quick, study.seeds, study.subjects, study.duration) == (True, 2, (0, 1), 20.0)
+
+
+def test_an_interrupted_study_goes_on_and_refuses_other_arguments(tmp_path, capsys):
+    assert start(tmp_path) == 0
+    (folder,) = (tmp_path / "reproduce").iterdir()
+    assert (STUDIES[0].seeds, STUDIES[0].subjects, STUDIES[0].duration) == (3, (0, 1, 2, 3, 4), 60.0)
+    files = {path: path.stat().st_mtime_ns for kind in ("*.h5", "cache/*/*.json") for path in folder.rglob(kind)}
+    assert len(files) == 5
+    assert start(tmp_path, "--resume", str(folder)) == 0
+    assert files == {path: path.stat().st_mtime_ns for path in files}
+    assert start(tmp_path, "--resume", str(folder), "--seed", "3") == 2
+    assert "was begun with seed 0, not 3" in capsys.readouterr().err
+    assert start(tmp_path, "--resume", str(tmp_path / "nothing")) == 2
+
+
+def test_rows_are_machine_readable(tmp_path, capsys):
+    assert start(tmp_path, "--json") == 0
+    lines = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    assert lines[1] == {"table": "Squares", "number": 1, "square": 1}
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["two-gyr"], "did you mean 'two-gyro'"),
+        (["small", "--subjects", "7"], "subjects must be numbers from 0 to 4, got [7]"),
+        (["small", "--seeds", "0"], "seeds must be at least 1, got 0"),
+    ],
+)
+def test_wrong_arguments_are_named_and_leave_no_folder(tmp_path, capsys, words, message):
+    assert main(["reproduce", *words, "--runs", str(tmp_path)]) == 2
+    assert message in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
