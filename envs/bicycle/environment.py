@@ -2,40 +2,37 @@
 
 from __future__ import annotations
 
-import copy
 import math
-import uuid
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
 import numpy as np
 from gymnasium import spaces
 
+from ...filters.bicycle.geometry import RiderGeometry
+from ...filters.bicycle.geometry import RiderGeometry
 from ...filters.quantity import Quantity
 from ..base import Block, Observation, PoseEnv, Scene, pose_error
 from ..sensors import STANDARD_GRAVITY, Sampling
-from ..suite import SensorSuite
 from .anthropometry import RiderBody, rider_body
 from .control import ControlSettings
-from .paper_sensors import CATALOGUE, SensorPlaces, rider_bicycle_suite, sensor_places, suite_channels
+from .measured_geometry import rider_geometry
+from .measured_geometry import rider_geometry
+from .paper_sensors import CATALOGUE, rider_bicycle_suite, sensor_places, suite_channels
 from .parameters import BICYCLES, BicycleParameters
 from .posture import Posture, sit
-from .ride import Ride, RideMemory
-from .ride_log import RideRecorder
-from .ride_truth import QUANTITIES, other_truth, segment_states, true_pose
+from .ride import Ride
+from .ride_source import RideSource, SavedRide
+from .ride_truth import QUANTITIES, other_truth
 from .rider import Fidelity
 from .scenarios import Scenario
 from .scenarios import scenario as named_scenario
 from .sensor_readings import RideQuantities, given_readings
-from .style import RiderMotion, RiderStyle, rider_style
+from .style import RiderStyle, rider_style
 from .tyre import TyreParameters
 
 BLOCK = 50
 """ticks that are computed together"""
-SETTLING = 1.0
-"""s of riding before the first tick"""
-KEPT = 8
-"""snapshots that can be restored without riding again"""
 
 
 class RiderBicycleEnv(PoseEnv):
@@ -161,7 +158,6 @@ class RiderBicycleEnv(PoseEnv):
         if style is not None:
             rider_style(style)
         self.parameters = _bicycle(bicycle)
-        posture = sit(self.parameters, RiderBody() if subject == "random" else rider_body(subject))
         if fidelity not in ("full", "lumped"):
             raise ValueError(f"fidelity must be 'full' or 'lumped', got {fidelity!r}")
         if not 0.1 <= duration < math.inf:
@@ -178,7 +174,8 @@ class RiderBicycleEnv(PoseEnv):
             "sampling": sampling,
         }
         self.tyre = TyreParameters()
-        made, _ = self._make_suite(posture)
+        self._fit(sit(self.parameters, RiderBody() if subject == "random" else rider_body(subject)))
+        made = self._suite
         limbs = [name for name in names if CATALOGUE[name].body not in ("bicycle", "trunk")]
         if fidelity == "lumped" and sampling == "instant" and limbs:
             raise ValueError(
@@ -189,17 +186,22 @@ class RiderBicycleEnv(PoseEnv):
             if abs(physics_rate / value - max(1, round(physics_rate / value))) > 1e-9:
                 raise ValueError(f"physics_rate must be a multiple of {name} of {value:g} Hz, got {physics_rate:g} Hz")
         self.quantities = _quantities(score)
+        self._source = RideSource(
+            self.parameters, style, self.duration, made.rate, self.physics_rate, fidelity, self.tyre
+        )
         super().__init__(made, self.quantities[0], made.rate, render_mode)
         limits = np.concatenate([np.full(q.size, _bound(q), np.float32) for q in self.quantities])
         self.action_space = spaces.Box(-limits, limits, dtype=np.float32)
-        self._ride: Ride | None = None
-        self._kept: dict[str, RideMemory] = {}
-        self._first: RideMemory
-        self._motion_key: tuple[Any, ...]
-        self._world_key: tuple[Any, ...]
-        self._posture: Posture
-        self._suite: SensorSuite
-        self._fallen_at = math.inf
+
+    @property
+    def ride(self) -> Ride | None:
+        """The ride in progress; None before the first reset."""
+        return self._source.ride
+
+    @property
+    def geometry(self) -> RiderGeometry:
+        """What a filter may be told about the present rider on this bicycle; before a reset the configured one."""
+        return rider_geometry(self._posture, self._places)
 
     @property
     def neutral_action(self) -> np.ndarray:
@@ -207,101 +209,50 @@ class RiderBicycleEnv(PoseEnv):
         parts = [np.eye(1, q.size, dtype=np.float32)[0] * (q.kind == "rotation") for q in self.quantities]
         return np.concatenate(parts).astype(np.float32)
 
+    @property
+    def geometry(self) -> RiderGeometry:
+        """Of the present rider on the bicycle: what a filter may be told."""
+        return rider_geometry(self._posture, self._places)
+
     def begin(self, motion: np.random.Generator, sensors: np.random.Generator, options: Mapping[str, Any]) -> int:
         """Draw rider, course and movements, and start the ride."""
         chosen = named_scenario(options.get("scenario", self.scenario))
         subject = options.get("subject", self.subject)
-        self._start(chosen, subject, motion)
+        self._source.begin(chosen, subject, motion)
+        self._begun()
         self.suite.reset(sensors)
         return max(1, round(self.duration * self.rate))
 
-    def _start(self, chosen: Scenario, subject: Any, motion: np.random.Generator) -> None:
-        """Begin the ride at the end of its first second; what was drawn is kept to ride it again.
-
-        The same draw goes back to the state kept there; another one of the same person begins in the same world;
-        another person, or a fall before, needs a new world. All three give the same ride, bit for bit.
-        """
-        seed = str(motion.bit_generator.seed_seq.state)  # type: ignore[attr-defined]
-        key = (chosen, subject, self.style, self.duration, self.physics_rate, self.tyre, seed)
-        if self._ride is not None and self._ride.fallen:
-            self._stop()
-        if self._ride is None or key != self._motion_key:
-            plan = (chosen, subject, copy.deepcopy(motion))
-            self._ride_first_second(chosen, subject, motion)
-            self._plan, self._motion_key = plan, key
-        else:
-            self._ride.restore(self._first)
-        assert self._ride is not None
-        self._recorder = RideRecorder(self._ride, round(self.physics_rate / self.rate))
-        self._began = self._ride.physics.time + 1.0 / self.rate
-        self._ticks, self._fallen_at = 0, math.inf
+    def _begun(self) -> None:
+        """Sensors and picture of the ride that has just begun."""
+        if self._source.posture is not self._posture:
+            self._fit(self._source.posture)
         self.suite = self._suite
-
-    def _ride_first_second(self, chosen: Scenario, subject: Any, motion: np.random.Generator) -> None:
-        """Draw rider, course and movements, and settle on the saddle."""
-        for_body, for_course, for_movement, for_crank = motion.spawn(4)
-        body = rider_body(subject, for_body)
-        world = (body, self.physics_rate, self.tyre)
-        posture = self._posture if self._ride is not None and world == self._world_key else sit(self.parameters, body)
-        course = chosen.draw(for_course, self.duration + SETTLING + 1.0)
-        movement = RiderMotion(rider_style(chosen.style if self.style is None else self.style), for_movement)
-        crank = float(for_crank.uniform(0.0, 2.0 * math.pi))
-        if self._ride is not None and world == self._world_key:
-            for memory in (*self._kept.values(), self._first):
-                self._ride.forget(memory)
-            self._kept = {}
-            self._ride.begin(movement, course.path, course.speed, ground=course.ground, crank=crank)
-        else:
-            self._stop()
-            self._ride = Ride(
-                posture,
-                movement,
-                course.path,
-                course.speed,
-                ground=course.ground,
-                fidelity=self.fidelity,
-                physics_rate=self.physics_rate,
-                tyre=self.tyre,
-                crank=crank,
-            )
-            self._world_key, self._posture = world, posture
-            self._suite, self._places = self._make_suite(posture)
-        self._ground = course.ground
-        if self._scene is not None:
+        if self._scene is not None and self._source.ground is not self._drawn_ground:
             self._scene.close()
             self._scene = None
-        for _ in range(round(SETTLING * self.rate) * round(self.physics_rate / self.rate)):
-            self._ride.step()
-        self._first = self._ride.save()
 
-    def _make_suite(self, posture: Posture) -> tuple[SensorSuite, SensorPlaces]:
-        """Sensors of a person on the bicycle, and their places."""
+    def _fit(self, posture: Posture) -> None:
+        """Put the sensors on a person on the bicycle."""
         load = posture.load()
         whole = posture.bicycle.with_load(load).parts
         mass = sum(part.mass for part in whole)
         front = sum(part.mass * part.centre[0] for part in whole) / mass / posture.bicycle.wheelbase
         sinking = STANDARD_GRAVITY * mass * (1.0 - front) / self.tyre.stiffness
-        places = sensor_places(posture, wheel_sinking=sinking)
-        return rider_bicycle_suite(places=places, gravity=STANDARD_GRAVITY, **self._sensors), places
+        self._posture, self._places = posture, sensor_places(posture, wheel_sinking=sinking)
+        self._suite = rider_bicycle_suite(places=self._places, gravity=STANDARD_GRAVITY, **self._sensors)
 
     def next_block(self, most: int) -> Block:
         """Ride on and let the sensors see it."""
-        log = self._recorder.record(min(most, BLOCK))
-        bodies = segment_states(log)
-        time = log.time - self._began
-        bodies = {name: state._replace(time=time) for name, state in bodies.items()}
+        log, bodies, pose = self._source.record(min(most, BLOCK))
         contact = log.contact
-        wheel = log.rates[:, 2]
         true = RideQuantities(
-            bodies, wheel, log.steer, log.crank, contact.seat_force, contact.seat_moment, contact.hands
+            bodies, log.rates[:, 2], log.steer, log.crank, contact.seat_force, contact.seat_moment, contact.hands
         )
         given = given_readings(self._suite, true, self._places)
         measurements, biases = self._suite.simulate(bodies, given)
-        if log.fallen.any():
-            self._fallen_at = self._ticks + len(time) - 1
-        self._ticks += len(time)
         truth = {**other_truth(log), **biases}
-        return Block(time, measurements, true_pose(log, bodies), truth, np.ones(len(time), bool))
+        return Block(log.time, measurements, pose, truth, np.ones(len(log.time), bool))
 
     def step(self, action: np.ndarray) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Judge the estimate ``action`` of the last observation, then advance by one tick; a fall terminates.
@@ -311,7 +262,7 @@ class RiderBicycleEnv(PoseEnv):
             RuntimeError: :meth:`reset` was not called, or the episode is over.
         """
         observation, reward, _, truncated, info = super().step(action)
-        terminated = self._tick >= self._fallen_at
+        terminated = self._tick >= self._source.fallen_at
         if terminated:
             self._last_tick = self._tick
         return observation, reward, terminated, truncated and not terminated, info
@@ -336,47 +287,28 @@ class RiderBicycleEnv(PoseEnv):
             begin += quantity.size
         return -total
 
-    def save_source(self) -> Any:
-        """The drawn ride and how far it is; also where PyBullet's state is kept for a quick return."""
-        assert self._ride is not None
-        token = uuid.uuid4().hex
-        self._kept[token] = self._ride.save()
-        if len(self._kept) > KEPT:
-            self._ride.forget(self._kept.pop(next(iter(self._kept))))
-        return self._plan, self._ticks, self._fallen_at, self._suite.save(), token
+    def save_source(self) -> tuple[SavedRide, Any]:
+        """The ride, and the sensors' state."""
+        return self._source.save(), self._suite.save()
 
-    def restore_source(self, saved: Any) -> None:
-        """Undo :meth:`save_source`: from memory where the ride is still there, else by riding it again."""
-        plan, ticks, fallen_at, suite, token = saved
-        same = self._ride is not None and plan is self._plan
-        if same and token in self._kept:
-            assert self._ride is not None
-            self._ride.restore(self._kept[token])
-        else:
-            chosen, subject, motion = plan
-            self._start(chosen, subject, copy.deepcopy(motion))
-            self._plan = plan
-            if ticks:
-                self._recorder.record(ticks)
-        self._ticks, self._fallen_at = ticks, fallen_at
+    def restore_source(self, saved: tuple[SavedRide, Any]) -> None:
+        """Undo :meth:`save_source`."""
+        ride, suite = saved
+        self._source.restore(ride)
+        self._begun()
         self._suite.restore(suite)
 
     def make_scene(self, gui: bool) -> Scene:
         """Rider, bicycle and ground."""
         from .scene import RideScene
 
-        return RideScene(self._posture, self._ground, gui=gui)
-
-    def _stop(self) -> None:
-        ride, self._ride = self._ride, None
-        self._kept = {}
-        if ride is not None:
-            ride.close()
+        self._drawn_ground = self._source.ground
+        return RideScene(self._posture, self._source.ground, gui=gui)
 
     def close(self) -> None:
         """Close window and physics; may be called twice."""
         super().close()
-        self._stop()
+        self._source.close()
         self._block = None
 
 

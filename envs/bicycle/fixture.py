@@ -14,11 +14,13 @@ from typing import Any
 import numpy as np
 
 from ...filters import rotation
+from ...filters.bicycle.geometry import RiderGeometry
 from ...filters.quantity import Quantity
 from ..base import Block, PoseEnv, Scene, choose_quantity
 from ..sensors import BodyState
 from .anthropometry import SUBJECTS
 from .limbs import half_turns
+from .measured_geometry import rider_geometry
 from .paper_sensors import fixture_places, rider_bicycle_suite, sensor_places
 from .parameters import MOUNTAIN_BIKE
 from .posture import sit
@@ -182,7 +184,8 @@ class BicycleFixtureEnv(PoseEnv):
             raise ValueError(f"duration must be at least 0.1 s and finite, got {duration}")
         if render_mode is not None:
             raise ValueError(f"render_mode must be None: there is no picture of the fixture, got {render_mode!r}")
-        self.places = fixture_places(sensor_places(sit(MOUNTAIN_BIKE, SUBJECTS[0])), DISK_CENTRE)
+        self._posture = sit(MOUNTAIN_BIKE, SUBJECTS[0])
+        self.places = fixture_places(sensor_places(self._posture), DISK_CENTRE)
         self._suite = rider_bicycle_suite(suite, sensors=sensors, rate=rate, grade=grade, places=self.places)
         missing = {sensor.body for sensor in self._suite.sensors} - {"bicycle", "disk"}
         forces = [s.channel.name for s in self._suite.sensors if s.channel.name.split("/")[0] in ("seat", "handlebar")]
@@ -201,6 +204,11 @@ class BicycleFixtureEnv(PoseEnv):
         if self.quantity.kind == "rotation":
             neutral[0] = 1.0
         return neutral
+
+    @property
+    def geometry(self) -> RiderGeometry:
+        """Of the bicycle; the rider in it is not there."""
+        return rider_geometry(self._posture, self.places)
 
     def begin(self, motion: np.random.Generator, sensors: np.random.Generator, options: Mapping[str, Any]) -> int:
         """Draw the push and the sensors' errors."""

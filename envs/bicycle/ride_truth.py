@@ -47,6 +47,9 @@ QUANTITIES = {
 }
 """All quantities of ``info["pose"]`` by name."""
 
+Quaternions = dict[str, np.ndarray]
+"""Orientation → quaternion ``(4,)`` of one tick."""
+
 
 def isb_zxy(q: np.ndarray) -> np.ndarray:
     """Flexion, lateral bending (to the right positive) and axial rotation ``(..., 3)``: Z-X-Y angles in ISB axes.
@@ -124,6 +127,27 @@ def true_pose(log: RideLog, states: dict[str, BodyState]) -> dict[str, np.ndarra
         pose[f"elbow_{side}/flexion"] = _column(-arm.angles[:, 3])
         pose[f"knee_{side}/flexion"] = _column(leg.angles[:, 3])
     return pose
+
+
+def continuous_pose(pose: dict[str, np.ndarray], last: Quaternions) -> tuple[dict[str, np.ndarray], Quaternions]:
+    """The same pose with quaternions that never change sign from one tick to the next.
+
+    Args:
+        pose: quantity → ``(n, size)``, n ≥ 1.
+        last: quantity → quaternion ``(4,)`` of the tick before; empty at the first tick, where w ≥ 0 is chosen.
+
+    Returns:
+        The pose, and its quaternions at the last tick.
+    """
+    found, now = dict(pose), {}
+    for name, values in pose.items():
+        if QUANTITIES[name].kind != "rotation":
+            continue
+        before = np.concatenate([last.get(name, np.eye(4)[0])[None], values[:-1]])
+        signs = np.cumprod(np.where((before * values).sum(axis=1) < 0.0, -1.0, 1.0))
+        found[name] = values * signs[:, None]
+        now[name] = found[name][-1]
+    return found, now
 
 
 def joint_angles(log: RideLog) -> np.ndarray:

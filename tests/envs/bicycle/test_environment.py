@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
-import math
 import pickle
 import subprocess
 import sys
@@ -15,12 +13,10 @@ from gymnasium.utils.env_checker import check_env
 
 from poise.envs.bicycle.anthropometry import SUBJECTS, RiderBody
 from poise.envs.bicycle.environment import RiderBicycleEnv
-from poise.envs.bicycle.paper_sensors import BICYCLE_IMU_PLACE, BICYCLE_IMU_TILT, SUITES, pitched
+from poise.envs.bicycle.measured_geometry import rider_geometry
+from poise.envs.bicycle.paper_sensors import SUITES
 from poise.envs.bicycle.parameters import BENCHMARK
-from poise.envs.bicycle.ride_truth import BODIES, ISB, QUANTITIES, isb_yxy, isb_zxy
-from poise.envs.bicycle.scenarios import list_scenarios, scenario
-from poise.envs.sensors import STANDARD_GRAVITY
-from poise.filters import rotation
+from poise.envs.bicycle.ride_truth import QUANTITIES
 
 
 def make(**options):
@@ -71,6 +67,16 @@ def test_info_has_one_structure():
     assert [info["time"] for info in infos] == pytest.approx(np.arange(31) / 100.0, abs=1e-9)
 
 
+def test_geometry_is_that_of_the_rider_in_the_saddle():
+    env = make(subject=0, duration=0.2)
+    assert env.ride is None
+    assert env.geometry.rider_mass == SUBJECTS[0].mass
+    env.reset(seed=0, options={"subject": 4})
+    assert env.geometry == rider_geometry(env.ride.rider.posture, env._places)
+    assert env.geometry.rider_mass == SUBJECTS[4].mass
+    env.close()
+
+
 @pytest.mark.parametrize("suite", [name for name in SUITES if name != "two-gyro-fixture"])
 def test_suites_have_their_channels_and_rates(suite):
     env = make(suite=suite, duration=0.2)
@@ -112,7 +118,8 @@ def test_snapshot_and_restore_are_bitwise(quick):
     for before, after in zip(rest, [again.step(env.neutral_action) for _ in range(80)], strict=True):
         assert all(np.array_equal(before[0][name], after[0][name]) for name in before[0])
         assert before[1] == after[1]
-        assert all(np.array_equal(v, after[4]["truth"][name]) for name, v in before[4]["truth"].items())
+        for part in ("pose", "truth"):
+            assert all(np.array_equal(v, after[4][part][name]) for name, v in before[4][part].items())
     env.close()
     other.close()
 
@@ -124,17 +131,17 @@ def test_a_reset_is_a_new_environment_bitwise(fidelity, name):
     env, fresh = make(**options), make(**options)
     ride(env, seed=1, steps=30)
     wanted = ride(fresh, seed=2, steps=100)
-    world = env._ride
+    world = env.ride
     for _ in ("another motion", "the same motion"):
         observations, infos = ride(env, seed=2, steps=100)
-        assert env._ride is world
+        assert env.ride is world
         for here, there in zip(observations, wanted[0], strict=True):
             assert all(np.array_equal(here[channel], there[channel]) for channel in there)
         for here, there in zip(infos, wanted[1], strict=True):
             for part in ("pose", "truth"):
                 assert all(np.array_equal(here[part][key], there[part][key]) for key in there[part])
     env.reset(seed=2, options={"subject": 4})
-    assert env._ride is not world
+    assert env.ride is not world
     env.close()
     fresh.close()
 
@@ -158,6 +165,7 @@ def test_snapshots_of_two_environments_do_not_mix():
 RIDE_HASH = """
 import hashlib
 from poise.envs.bicycle.environment import RiderBicycleEnv
+from poise.envs.bicycle.measured_geometry import rider_geometry
 env = RiderBicycleEnv(fidelity="full", suite="all", duration=0.5)
 digest = hashlib.sha256()
 observation, info = env.reset(seed=11)
@@ -176,148 +184,10 @@ def test_two_processes_agree_bitwise():
     assert len(hashes[0]) == 64
 
 
-def strapdown_errors(duration, **options):
-    """Position (m) and attitude (rad) error after integrating the bicycle's ideal IMU."""
-    channels = ["bicycle_imu/gyr", "bicycle_imu/acc"]
-    env = make(suite=channels, sensors="ideal", duration=duration, **options)
-    observations, infos = ride(env, seed=2)
-    env.close()
-    mounting, lever, dt = np.array(pitched(BICYCLE_IMU_TILT)), np.array(BICYCLE_IMU_PLACE), 1.0 / env.rate
-    frame, omega = stack(infos, "pose", "bicycle/orientation"), stack(infos, "truth", "bicycle/angular_rate")
-    places = stack(infos, "truth", "bicycle/position") + rotation.rotate(frame, lever)
-    swing = rotation.rotate(frame, np.cross(omega, lever))
-    q, v, p = rotation.multiply(frame[0], mounting), stack(infos, "truth", "bicycle/velocity")[0] + swing[0], places[0]
-    for observation in observations[1:]:
-        turn = observation["bicycle_imu/gyr"].astype(float) * dt
-        middle = rotation.multiply(q, rotation.exp(0.5 * turn))
-        change = rotation.rotate(middle, observation["bicycle_imu/acc"].astype(float)) - [0.0, 0.0, STANDARD_GRAVITY]
-        p = p + v * dt + 0.5 * change * dt**2
-        v = v + change * dt
-        q = rotation.multiply(q, rotation.exp(turn))
-    last = rotation.multiply(frame[-1], mounting)
-    return np.linalg.norm(p - places[-1]), rotation.angle(rotation.multiply(rotation.conjugate(last), q))
-
-
-def test_strapdown_returns_to_the_truth():
-    position, attitude = strapdown_errors(5.0, fidelity="full", scenario="straight")
-    assert position < 0.01
-    assert math.degrees(attitude) < 0.01
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["indoor_circle", "outdoor"])
-def test_strapdown_over_thirty_seconds(name):
-    position, attitude = strapdown_errors(30.0, fidelity="full", scenario=name)
-    assert position < 0.01
-    assert math.degrees(attitude) < 0.01
-
-
-def test_sensors_read_what_is_true():
-    env = make(suite="all", sensors="ideal", fidelity="full", duration=2.0)
-    observations, infos = ride(env)
-    env.close()
-    for observation, info in list(zip(observations, infos, strict=True))[1:]:
-        pose, truth = info["pose"], info["truth"]
-        assert observation["seat/load_cells"].sum() == pytest.approx(-truth["seat/force"][2], rel=1e-4)
-        hands = np.concatenate([truth["handlebar/force_left"], truth["handlebar/force_right"]])
-        np.testing.assert_allclose(observation["handlebar/force"], hands, rtol=1e-4, atol=1e-3)
-        assert np.linalg.norm(observation["seat/wrench"][:3]) == pytest.approx(
-            np.linalg.norm(truth["seat/force"]), rel=1e-4
-        )
-        assert observation["steer/angle"][0] == pytest.approx(pose["bicycle/steer"][0], abs=1e-6)
-        assert observation["wheel/speed"][0] == pytest.approx(pose["bicycle/speed"][0], abs=0.05)
-        total = truth["seat/force"] + hands[:3] + hands[3:] + truth["pedal/force_left"] + truth["pedal/force_right"]
-        assert total[2] == pytest.approx(-SUBJECTS[0].mass * STANDARD_GRAVITY, rel=0.3)
-    middle = [
-        0.5 * (a["truth"]["trunk/angular_rate"] + b["truth"]["trunk/angular_rate"])
-        for a, b in itertools.pairwise(infos)
-    ]
-    read = [observation["trunk_imu/gyr"] for observation in observations[1:]]
-    np.testing.assert_allclose(read, middle, atol=0.02)
-
-
-def test_angles_rebuild_the_orientations():
-    q = rotation.random(np.random.default_rng(0), (50,))
-
-    def turn(angle, axis):
-        v = np.zeros((len(angle), 3))
-        v[:, axis] = angle
-        return rotation.exp_matrix(v)
-
-    R = ISB @ rotation.to_matrix(q) @ ISB.T
-    z, x, y = isb_zxy(q).T
-    np.testing.assert_allclose(turn(z, 2) @ turn(x, 0) @ turn(y, 1), R, atol=1e-9)
-    first, second, third = isb_yxy(q).T
-    np.testing.assert_allclose(turn(first, 1) @ turn(second, 0) @ turn(third, 1), R, atol=1e-7)
-    assert np.all(second <= 0.0)
-
-
-def test_postures_are_those_of_a_rider():
-    env = make(fidelity="full", duration=3.0, scenario="straight")
-    _, infos = ride(env)
-    env.close()
-    trunk = np.degrees(stack(infos, "pose", "trunk/angles"))
-    assert -50.0 < trunk[:, 0].mean() < -20.0
-    knee = np.degrees(stack(infos, "pose", "knee_left/flexion"))
-    assert 20.0 < knee.min() < 60.0
-    assert 95.0 < knee.max() < 130.0
-    elbow = np.degrees(stack(infos, "pose", "elbow_right/flexion"))
-    assert 30.0 < elbow.mean() < 100.0
-    heights = {
-        body: rotation.rotate(stack(infos, "pose", f"{body}/orientation"), np.array([0.0, 0.0, 1.0]))[:, 2]
-        for body in BODIES
-    }
-    assert heights["bicycle"].min() > 0.95
-    assert heights["thigh_left"].min() > 0.1
-
-
-@pytest.mark.parametrize("name", list_scenarios())
-def test_scenarios_are_ridden_upright(name):
-    duration = 15.0 if name in ("bumps", "pitch") else 7.0
-    env = make(scenario=name, duration=duration, subject=3, suite=["bicycle_imu/acc"])
-    observations, infos = ride(env, seed=4)
-    env.close()
-    assert len(infos) == 100 * duration + 1
-    assert np.abs(stack(infos, "pose", "bicycle/roll")).max() < 0.6
-    pitch = np.degrees(np.abs(stack(infos, "pose", "bicycle/pitch"))).max()
-    force = np.abs([observation["bicycle_imu/acc"] for observation in observations]).max()
-    assert (pitch > 14.0) == (name == "pitch")
-    if name == "bumps":
-        assert force == pytest.approx(2.0 * STANDARD_GRAVITY)  # saturated
-
-
-@pytest.mark.parametrize("seed", [100, 101, 103, 104])
-def test_outdoor_rides_begin_at_a_speed_for_their_first_turn(seed):
-    env = make(scenario="outdoor", subject=seed % 5, duration=4.0, suite=["wheel/speed"])
-    _, infos = ride(env, seed=seed)
-    env.close()
-    assert len(infos) == 401
-    assert np.abs(stack(infos, "pose", "bicycle/roll")).max() < 0.4
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("subject", range(5))
-@pytest.mark.parametrize("name", list_scenarios())
-def test_two_minutes_of_every_scenario_with_every_rider(name, subject):
-    env = make(scenario=name, duration=120.0, subject=subject, suite=["wheel/speed"], fidelity="full")
-    _, infos = ride(env, seed=subject)
-    gaps = env._ride.rider.gaps().max()
-    env.close()
-    assert len(infos) == 12001
-    assert gaps < 1e-3
-
-
-def test_scenarios_compose():
-    course = scenario("slalom+bumps").draw(np.random.default_rng(0), 20.0)
-    heights = [course.ground.height_and_slope(*course.path.points[i, :2].tolist())[0] for i in range(0, 2400, 2)]
-    assert max(heights) > 0.02
-    assert np.abs(course.path.points[:, 3]).max() > 0.05
-
-
 def test_a_fall_terminates():
     env = make(duration=10.0, suite="two-gyro")
     env.reset(seed=0)
-    env._ride.pilot.update = lambda *arguments: (0.0, 0.0)
+    env.ride.pilot.update = lambda *arguments: (0.0, 0.0)
     for _ in range(1000):
         _, _, terminated, truncated, info = env.step(env.neutral_action)
         if terminated:
@@ -354,18 +224,6 @@ def test_pictures_show_something(fidelity):
     blue = (image[..., 2] > 90) & (image[..., 0] < 60)
     assert red.sum() > 200  # the frame
     assert blue.sum() > 500  # the shirt
-
-
-@pytest.mark.slow
-def test_halving_the_physics_step_changes_little():
-    signals = []
-    for physics_rate in (500.0, 1000.0):
-        env = make(fidelity="full", sensors="ideal", suite="all", duration=10.0, physics_rate=physics_rate)
-        observations, _ = ride(env, seed=3)
-        env.close()
-        signals.append({name: np.array([o[name] for o in observations[1:]]) for name in observations[0]})
-    for name, limit in (("bicycle_imu/gyr", 0.02), ("trunk_imu/gyr", 0.02), ("bicycle_imu/acc", 0.1)):
-        assert np.sqrt(np.mean((signals[0][name] - signals[1][name]) ** 2)) < limit, name
 
 
 @pytest.mark.parametrize(

@@ -108,5 +108,5 @@ def test_gaps_from_the_truth_are_those_of_the_physics(fidelity):
     assert gaps.shape == (50, 4)
     assert gaps.max() < 1e-3
     # the only block of this short ride has just been computed: the world is in its last state
-    np.testing.assert_allclose(gaps[-1], env._ride.rider.gaps(), atol=1e-9)
+    np.testing.assert_allclose(gaps[-1], env.ride.rider.gaps(), atol=1e-9)
     env.close()
