@@ -70,3 +70,5 @@ EXTERNAL_ACCELERATION = Quantity("external_acceleration", "vector", 3, "m/s²")
 """Acceleration of the sensor without gravity, in sensor coordinates."""
 GYROSCOPE_BIAS = Quantity("gyroscope_bias", "vector", 3, "rad/s")
 """Constant part of the gyroscope's error, sensor coordinates."""
+ANGULAR_RATE = Quantity("angular_rate", "vector", 3, "rad/s")
+"""Angular velocity of the sensor relative to the world, sensor coordinates."""
