@@ -63,9 +63,12 @@ class Expression:
             return other
         return self.tape.constant(float(other)) if isinstance(other, int | float | np.number) else None
 
-    def _fold(self, function: Callable[..., float], *operands: Expression) -> Expression | None:
+    def _record(self, operation: str, function: Callable[..., float], *operands: Expression) -> Expression:
+        """The node of an operation, or its result where every operand is a number."""
         values = [operand.value for operand in operands]
-        return None if None in values else self.tape.constant(function(*values))
+        if None not in values:
+            return self.tape.constant(function(*values))
+        return self.tape.node(operation, *operands)
 
     def __add__(self, other: Any) -> Any:
         right = self._other(other)
@@ -75,7 +78,7 @@ class Expression:
             return self
         if self.value == 0.0:
             return right
-        return self._fold(lambda a, b: a + b, self, right) or self.tape.node("+", self, right)
+        return self._record("+", lambda a, b: a + b, self, right)
 
     def __radd__(self, other: Any) -> Any:
         left = self._other(other)
@@ -84,7 +87,7 @@ class Expression:
     def __neg__(self) -> Expression:
         if self.operation == "neg":
             return self.operands[0]
-        return self._fold(lambda a: -a, self) or self.tape.node("neg", self)
+        return self._record("neg", lambda a: -a, self)
 
     def __pos__(self) -> Expression:
         return self
@@ -97,7 +100,7 @@ class Expression:
             return self
         if self.value == 0.0:
             return -right
-        return self._fold(lambda a, b: a - b, self, right) or self.tape.node("-", self, right)
+        return self._record("-", lambda a, b: a - b, self, right)
 
     def __rsub__(self, other: Any) -> Any:
         left = self._other(other)
@@ -114,7 +117,7 @@ class Expression:
                 return two
             if one.value == -1.0:
                 return -two
-        return self._fold(lambda a, b: a * b, self, right) or self.tape.node("*", self, right)
+        return self._record("*", lambda a, b: a * b, self, right)
 
     def __rmul__(self, other: Any) -> Any:
         left = self._other(other)
@@ -128,7 +131,7 @@ class Expression:
             return self
         if right.value == 1.0:
             return self
-        return self._fold(lambda a, b: a / b, self, right) or self.tape.node("/", self, right)
+        return self._record("/", lambda a, b: a / b, self, right)
 
     def __rtruediv__(self, other: Any) -> Any:
         left = self._other(other)
@@ -140,7 +143,9 @@ class Expression:
         if isinstance(exponent, int) and exponent == 2:
             return self * self
         if isinstance(exponent, (int, float)):
-            return self._fold(lambda a: a**exponent, self) or self.tape.node("**", self, repr(exponent))
+            if self.value is not None:
+                return self.tape.constant(self.value**exponent)
+            return self.tape.node("**", self, repr(exponent))
         return NotImplemented
 
     def __getitem__(self, key: Any) -> np.ndarray:

@@ -70,6 +70,20 @@ def test_zeros_and_ones_are_folded_and_equal_operations_are_recorded_once():
     assert [entry.value for entry in np.diag(skew)] == [0.0, 0.0, 0.0]
 
 
+def test_numbers_that_meet_on_a_tape_are_computed_at_once():
+    tape = Tape()
+    two, three = tape.constant(2.0), tape.constant(3.0)
+    results = {
+        two + three: 5.0,
+        two - three: -1.0,
+        two * three: 6.0,
+        two / three: 2.0 / 3.0,
+        -two: -2.0,
+        three**3: 27.0,
+    }
+    assert [result.value for result in results] == list(results.values())
+
+
 def test_branching_on_values_is_refused_with_an_explanation():
     (x,) = Tape().inputs("x", 1)
     with pytest.raises(TypeError, match=r"xp\.where"):
