@@ -15,6 +15,7 @@ from ..filters.consistency import consistency
 from ..filters.estimator import Estimator, run
 from ..filters.metrics import score
 from ..filters.quantity import ORIENTATION, RELATIVE_ORIENTATION, UP, Estimate, Quantity
+from .rider_estimators import make_for, true_quantities
 from .zoo import make_estimator
 
 if TYPE_CHECKING:
@@ -38,7 +39,8 @@ def evaluate(
 
     Args:
         estimators: names (see :func:`poise.list_estimators`), estimators, or a mapping label → name or estimator.
-            Each is adjusted to the sampling interval of each trajectory.
+            Each is adjusted to the sampling interval of each trajectory; of a recorded ride, those that are named are
+            told rider and bicycle (:func:`poise.baselines.rider_estimators.make_for`).
         trajectories: trajectories, or paths of recordings.
         reference: estimator that stands in for the truth of trajectories that know none. Such rows name it in
             ``metric`` (``inclination to mekf-9``): they show agreement, not error.
@@ -71,11 +73,11 @@ def evaluate(
         if trajectory.name in seen:
             raise ValueError(f"two trajectories are named {trajectory.name!r}; give them different names")
         seen.add(trajectory.name)
-        stand_in = None if has_truth(trajectory) or reference is None else reference_truth(reference, trajectory)
+        stand_in = None if trajectory.truth or reference is None else reference_truth(reference, trajectory)
         for label, contender in contenders.items():
             bar.set_postfix_str(f"{label} on {trajectory.name}")
             try:
-                estimator = at_interval(contender, trajectory.dt)
+                estimator = fitted(contender, trajectory)
             except ImportError as reason:
                 skipped.append((label, trajectory.name, str(reason)))
                 bar.update()
@@ -118,6 +120,13 @@ def label_of(estimator: Estimator[Any]) -> str:
     return str(name) if name else type(getattr(estimator, "model", estimator)).__name__
 
 
+def fitted(contender: str | Estimator[Any], trajectory: Trajectory) -> Estimator[Any]:
+    """An estimator at the trajectory's sampling interval; one that is only named is told who rides, if it can be."""
+    if isinstance(contender, str):
+        return make_for(contender, trajectory)
+    return at_interval(contender, trajectory.dt)
+
+
 def at_interval(contender: str | Estimator[Any], dt: float) -> Estimator[Any]:
     """An estimator for samples ``dt`` seconds apart."""
     if isinstance(contender, str):
@@ -157,6 +166,9 @@ def errors(
 ) -> list[tuple[str, str, float, str]]:
     """Rows (quantity, metric, value, unit) of one run."""
     pose = with_up(estimate.pose)
+    derived = true_quantities(estimator, trajectory.truth)
+    if derived:
+        trajectory = trajectory.replace(truth={**derived, **trajectory.truth})
     outputs = {quantity.name: quantity for quantity in (UP, *estimator.outputs)}
     rows: list[tuple[str, str, float, str]] = []
     for name, quantity in outputs.items():
@@ -188,7 +200,7 @@ def summary(table: pandas.DataFrame, metric: str = "inclination", groups: Mappin
     """Means over trajectories as a wide table: a row an estimator, a column a group, best estimators first.
 
     Args:
-        table: from :func:`evaluate`.
+        table: from :func:`evaluate`, with one quantity that has this metric.
         metric: which metric.
         groups: trajectory → group; by default every trajectory is its own. The column ``mean`` is over trajectories.
     """

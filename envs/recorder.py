@@ -123,6 +123,8 @@ def describe(env: Any, seed: int) -> dict[str, Any]:
     spec = env.spec
     identity = type(env.unwrapped).__name__ if spec is None else spec.id
     suite = env.unwrapped.suite
+    geometry = getattr(env.unwrapped, "geometry", None)
+    told = {} if geometry is None else {"geometry": geometry.describe()}
     return {
         "name": f"{identity}-{seed}",
         "environment": {"id": identity, "kwargs": plain({} if spec is None else spec.kwargs)},
@@ -130,6 +132,7 @@ def describe(env: Any, seed: int) -> dict[str, Any]:
         "seed": seed,
         "version": package_version(),
         "source": "simulation",
+        **told,
     }
 
 

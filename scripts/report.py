@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import statistics
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from .experiment import Run
@@ -35,17 +35,30 @@ def kinds_of(labels: Any) -> dict[str, str]:
     return {label: known[name].kind for label in map(str, labels) if (name := label.split(" (")[0]) in known}
 
 
+def parts(table: pandas.DataFrame) -> Iterator[tuple[str, str, pandas.DataFrame]]:
+    """Title, metric and rows of each metric in deg; of each quantity apart where several have the metric."""
+    angles = table[table["unit"] == "deg"]
+    for metric in angles["metric"].unique():
+        title = TITLES.get(metric, f"RMS {metric}, deg")
+        if " to " in metric:
+            title += " (agreement, not error: these recordings have no truth)"
+        of_metric = angles[angles["metric"] == metric]
+        quantities = of_metric["quantity"].unique()
+        for quantity in quantities:
+            name = f"{quantity}: {title}" if len(quantities) > 1 else title
+            yield name, metric, of_metric[of_metric["quantity"] == quantity]
+
+
 def wide_tables(table: pandas.DataFrame, groups: Mapping[str, str] | None = None) -> dict[str, list[dict[str, Any]]]:
     """Title → rows (an estimator each, a column a group, then the mean over trajectories), for every metric in deg."""
     from ..baselines.evaluation import summary
 
     kinds = kinds_of(table["estimator"].unique())
     tables = {}
-    for metric in table.loc[table["unit"] == "deg", "metric"].unique():
-        wide = summary(table, metric, groups)
+    for title, metric, part in parts(table):
+        wide = summary(part, metric, groups)
         if len(wide.columns) == 2:  # of a single group the mean says it all again
             wide = wide.drop(columns="mean")
-        title = TITLES.get(metric, f"RMS {metric}, deg (agreement, not error: these recordings have no truth)")
         tables[title] = [
             {"estimator": name, "kind": kinds.get(str(name), "–"), **{str(key): value for key, value in row.items()}}
             for name, row in wide.iterrows()
@@ -100,9 +113,12 @@ def print_comparison(
         if not as_json:
             print_table([narrow(row) for row in rows], heading)
         sections[heading] = markdown_table(rows)
-    for metric in table.loc[table["unit"] == "deg", "metric"].unique():
-        figure = rms_bars(table, kinds_of(table["estimator"].unique()), metric, name)
-        words = f"{name} {metric}".strip().replace(" ", "-")
+    found = list(parts(table))
+    for _, metric, part in found:
+        several = sum(metric == other for _, other, _ in found) > 1
+        what = " ".join(word for word in (name, part["quantity"].iloc[0] if several else "") if word)
+        figure = rms_bars(part, kinds_of(part["estimator"].unique()), metric, what)
+        words = f"{what} {metric}".strip().replace(" ", "-").replace("/", "-")
         path = save(figure, run.figures / f"{words}.png")
         sections[f"Figure: {words}"] = f"![{words}]({path.relative_to(run.folder)})"
     skipped = skipped_text(table)
@@ -126,7 +142,7 @@ def draw_example(
     Returns:
         Heading → Markdown; empty if no trajectory has a truth.
     """
-    from ..baselines.evaluation import at_interval, has_truth, summary
+    from ..baselines.evaluation import fitted, has_truth, summary
     from ..baselines.plots import error_curves, save
     from ..filters.estimator import run as run_estimator
 
@@ -139,7 +155,7 @@ def draw_example(
     for label in summary(table).index:
         best.setdefault(kinds.get(str(label), ""), str(label))
     estimates = {
-        label: run_estimator(at_interval(contenders[label], trajectory.dt), trajectory.measurements)
+        label: run_estimator(fitted(contenders[label], trajectory), trajectory.measurements)
         for label in list(best.values())[:most]
     }
     figure = error_curves(trajectory, estimates, kinds, f"{name}: {trajectory.name}, best estimator of each kind")

@@ -10,13 +10,11 @@ import numpy as np
 from gymnasium import spaces
 
 from ...filters.bicycle.geometry import RiderGeometry
-from ...filters.bicycle.geometry import RiderGeometry
 from ...filters.quantity import Quantity
 from ..base import Block, Observation, PoseEnv, Scene, pose_error
 from ..sensors import STANDARD_GRAVITY, Sampling
 from .anthropometry import RiderBody, rider_body
 from .control import ControlSettings
-from .measured_geometry import rider_geometry
 from .measured_geometry import rider_geometry
 from .paper_sensors import CATALOGUE, rider_bicycle_suite, sensor_places, suite_channels
 from .parameters import BICYCLES, BicycleParameters
@@ -208,11 +206,6 @@ class RiderBicycleEnv(PoseEnv):
         """``(size,)`` float32: no rotations, zero angles."""
         parts = [np.eye(1, q.size, dtype=np.float32)[0] * (q.kind == "rotation") for q in self.quantities]
         return np.concatenate(parts).astype(np.float32)
-
-    @property
-    def geometry(self) -> RiderGeometry:
-        """Of the present rider on the bicycle: what a filter may be told."""
-        return rider_geometry(self._posture, self._places)
 
     def begin(self, motion: np.random.Generator, sensors: np.random.Generator, options: Mapping[str, Any]) -> int:
         """Draw rider, course and movements, and start the ride."""
