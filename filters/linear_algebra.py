@@ -1,4 +1,4 @@
-"""Small systems of equations in straight-line form, for model code that is traced and compiled."""
+"""Block matrices and small systems of equations in straight-line form, for model code that is traced and compiled."""
 
 from __future__ import annotations
 
@@ -43,3 +43,20 @@ def solve_positive(matrix: Array, right: Array) -> Array:
             value = value - factor[k, i] * x[k]
         x[i] = value
     return namespace(right).stack(x, axis=-1)
+
+
+def block_matrix(blocks: list[list[Array]]) -> Array:
+    """The matrix ``(..., rows, columns)`` of a table of blocks, which have one batch shape."""
+    xp = namespace(blocks[0][0])
+    return xp.concat([xp.concat(row, axis=-1) for row in blocks], axis=-2)
+
+
+def block_diagonal(blocks: list[Array]) -> Array:
+    """Square blocks ``(..., n, n)`` of one batch shape along the diagonal of a matrix, zeros elsewhere."""
+    xp = namespace(*blocks)
+    sizes = [block.shape[-1] for block in blocks]
+    rows = []
+    for index, block in enumerate(blocks):
+        column = 0.0 * block[..., :1]
+        rows.append(xp.concat([column] * sum(sizes[:index]) + [block] + [column] * sum(sizes[index + 1 :]), axis=-1))
+    return xp.concat(rows, axis=-2)
