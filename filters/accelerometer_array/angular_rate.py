@@ -24,7 +24,14 @@ floor. Weights are clipped to [0, 1]: above 1 do occur. Where |J| has no meaning
 K. Parsa's method (appendix A) corrects ω_TI by one Gauss–Newton step to ξ̂ and feeds that back; its normal matrix is
 singular at ω = 0 only, not, as (2.55) has it, wherever one component vanishes.
 
-Not in the model: biases, scale and alignment errors; they dominate real data. The first rate must be known.
+The thesis knows no biases, but they dominate real data: a constant error of α̂ is all that is integrated while the
+roots are blind. With ``bias_noise`` above 0 (ours, not the thesis') the weighted method estimates it too, by axis, as a
+Kalman filter of (ω, β) does whose variance of ω is that of Σ: with p = cov(ω, β), u = var β,
+
+    ω_TI ← ω_TI − Δt β̂,   Σ' ← Σ' + diag(Δt² u − 2 Δt p),   p ← p − Δt u,   u ← u + Δt σ_β²
+    β̂ ← β̂ + k (ω_PR − ω_TI),   k = p / (Σ' + T − M + C)_ii,   u ← u − k p,   p ← w p
+
+Scale and alignment errors remain. The first rate must be known.
 """
 
 from __future__ import annotations
@@ -36,7 +43,7 @@ import numpy as np
 
 from ..backend import Array, constant, expand, namespace
 from ..model import Recurrence
-from ..quantity import GYROSCOPE, Channel, Measurement, Quantity
+from ..quantity import ANGULAR_RATE, GYROSCOPE, Channel, Measurement, Quantity
 from .array import OCTA, AccelerometerArray
 from .products import product_jacobian, products, symmetric
 from .symmetric_matrix import diagonal, largest_eigenpair, solve_symmetric
@@ -44,8 +51,6 @@ from .symmetric_matrix import diagonal, largest_eigenpair, solve_symmetric
 Method = Literal["weighted", "time-integration", "polynomial-roots", "parsa"]
 Variant = Literal["sound", "corrected", "printed"]
 
-ANGULAR_RATE = Quantity("angular_rate", "vector", 3, "rad/s")
-"""Angular rate in body axes."""
 COVARIANCE = Quantity("angular_rate_covariance", "vector", 9, "rad²/s²")
 """Σ of the weighted method, row by row."""
 WEIGHTS = Quantity("array-rate/weights", "vector", 3, "1")
@@ -108,8 +113,8 @@ def parsa_step(rate: Array, xi: Array) -> Array:
 class ArrayRate(Recurrence):
     """The weighted method, and the three that it is compared with.
 
-    State: ω (3); for the weighted method also Σ/σ_a² (9), w (3) and (S + Sᵀ)/σ_a² (9). A tick on which a reading is
-    missing is integrated with the last readings.
+    State: ω (3); for the weighted method also Σ/σ_a² (9), w (3), (S + Sᵀ)/σ_a² (9), β̂ (3), p/σ_a² and u/σ_a² (3 each).
+    A tick on which a reading is missing is integrated with the last readings.
 
     Raises:
         ValueError: an unknown method, variant or start, or an array that does not determine α and ξ.
@@ -126,9 +131,13 @@ class ArrayRate(Recurrence):
     initial_rate: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """ω₀, rad/s, body axes; from rest by default"""
     initial_noise: float = 0.0
-    """standard deviation of ω₀, rad/s; at 0 (the thesis') σ_a does not matter for the rate"""
+    """standard deviation of ω₀, rad/s; with 0 for it and for ``bias_noise`` σ_a does not matter for the rate"""
     accelerometer_noise: float = 0.1
     """σ_a, m/s² per sample: scales the covariance; 0.022 is the data sheet's of OCTA, 0.1 covers calibration errors"""
+    bias_noise: float = 0.1
+    """standard deviation of the constant errors of the readings, m/s²; 0 is the thesis' method, without biases"""
+    bias_drift: float = 5e-4
+    """how fast they change, m/s²/√s"""
 
     full_outputs: ClassVar[tuple[Quantity, ...]] = (ANGULAR_RATE, COVARIANCE, WEIGHTS)
 
@@ -161,7 +170,7 @@ class ArrayRate(Recurrence):
     @property
     def state_size(self) -> int:  # type: ignore[override]
         """Numbers in the state."""
-        return 24 if self.method == "weighted" else 3
+        return 33 if self.method == "weighted" else 3
 
     def prior(self, z: Measurement) -> Array:
         """The known rate, w = 1, S = 0; nothing before the first complete readings."""
@@ -174,7 +183,8 @@ class ArrayRate(Recurrence):
             return start
         variance = expand(self.initial_noise**2 / self.accelerometer_noise**2, 1)
         flat = constant(UNIT.ravel(), a)
-        return xp.concat([start, complete + variance * flat, complete + 1.0 + 0.0 * start, complete + 0.0 * flat], -1)
+        zero, bias = complete + 0.0 * start, complete + expand(self._bias_ratio(self.bias_noise), 1) * self._spread(a)
+        return xp.concat([start, complete + variance * flat, zero + 1.0, zero, zero, zero, zero, zero, bias], axis=-1)
 
     def predict(self, x: Array, z: Measurement, previous: Measurement) -> Array:
         """ω_TI (2.15), and Σ' + T."""
@@ -185,7 +195,10 @@ class ArrayRate(Recurrence):
             return rate
         B, weights = constant(self.array.B_T, x), x[..., 12:15]
         T = 0.25 * dt**2 * _flat(2.0 * B + B * weights[..., None, :] + weights[..., :, None] * B)
-        return xp.concat([rate, x[..., 3:12] + T + 0.5 * dt * x[..., 15:], x[..., 12:]], axis=-1)
+        bias, shared, own = x[..., 24:27], x[..., 27:30], x[..., 30:]
+        known = x[..., 3:12] + T + 0.5 * dt * x[..., 15:24] + _flat(diagonal(dt**2 * own - 2.0 * dt * shared))
+        drift = dt * expand(self._bias_ratio(self.bias_drift), 1) * self._spread(x)
+        return xp.concat([rate - dt * bias, known, x[..., 12:27], shared - dt * own, own + drift], axis=-1)
 
     def finish(self, x: Array, z: Measurement) -> Array:
         """Polynomial roots join in; without readings the integrated rate stays."""
@@ -202,7 +215,7 @@ class ArrayRate(Recurrence):
         roots = xp.where(xp.less(xp.sum(roots * rate, axis=-1)[..., None], 0.0), -roots, roots)
         if self.method == "polynomial-roots":
             return xp.where(there, roots, x)
-        alone = xp.concat([x[..., :12], 1.0 + 0.0 * rate, 0.0 * x[..., 15:]], axis=-1)
+        alone = xp.concat([x[..., :12], 1.0 + 0.0 * rate, 0.0 * x[..., 15:24], x[..., 24:]], axis=-1)
         return xp.where(there, self._combine(x, xi, roots), alone)
 
     def pose(self, x: Array) -> dict[str, Array]:
@@ -232,7 +245,28 @@ class ArrayRate(Recurrence):
         covariance = w * known * w.mT + crossed + crossed.mT + v * C * v.mT
         S = 0.0 * JB if self.variant == "printed" else v * JB
         fused = weights * rate + (1.0 - weights) * roots
-        return xp.concat([fused, _flat(covariance), weights, _flat(S + S.mT)], axis=-1)
+        after = self._correct_bias(x, roots - rate, _diagonal_of(known), xp.where(usable, bottom, 0.0 * one), weights)
+        return xp.concat([fused, _flat(covariance), weights, _flat(S + S.mT), *after], axis=-1)
+
+    def _correct_bias(self, x: Array, r: Array, known: Array, bottom: Array, weights: Array) -> tuple[Array, ...]:
+        """β̂, p and u after the innovation r of variance ``bottom`` (0: none)."""
+        xp, bias, shared, own = namespace(x), x[..., 24:27], x[..., 27:30], x[..., 30:]
+        known = xp.maximum(known, 0.0 * known)
+        # M and S are first order in the errors: without these two bounds (p² ≤ Σ u, k p ≤ u) u may become negative.
+        some = xp.greater(known * own, 0.0)
+        largest = xp.where(some, xp.sqrt(xp.where(some, known * own, 1.0 + 0.0 * known)), 0.0 * known)
+        shared = xp.minimum(xp.maximum(shared, -largest), largest)
+        variance = xp.maximum(bottom, known)
+        usable = xp.logical_and(xp.greater(bottom, 0.0), xp.greater(variance, 0.0))
+        gain = xp.where(usable, shared / xp.where(usable, variance, 1.0 + 0.0 * variance), 0.0 * shared)
+        return bias + gain * r, weights * shared, own - gain * shared
+
+    def _bias_ratio(self, deviation: Array) -> Array:
+        return deviation**2 / self.accelerometer_noise**2
+
+    def _spread(self, like: Array) -> Array:
+        """Variances of α̂ per unit variance of the readings."""
+        return constant(np.diag(self.array.B_T), like)
 
 
 def _flat(matrix: Array) -> Array:
