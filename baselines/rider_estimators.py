@@ -1,14 +1,15 @@
 """Estimators that are told who rides: rider and bicycle in numbers, from the recording to the filter.
 
 A recorded ride says in ``metadata["geometry"]`` who rode what; a filter of a ride has a class method ``for_rider`` that
-takes it, and a function ``true_angles`` (of its class or module) that turns the truth of the ride into the filter's own
-quantities. Both meet here.
+takes it, and each paper a function ``true_angles`` that turns the truth of a ride into the paper's own quantities. All
+meet here.
 """
 
 from __future__ import annotations
 
 import importlib
-from collections.abc import Callable, Mapping
+import inspect
+from collections.abc import Mapping
 from dataclasses import fields
 from typing import Any
 
@@ -20,7 +21,11 @@ from ..filters.catalogue import CATALOGUE
 from ..filters.estimator import Estimator
 from .zoo import make_estimator
 
-TrueAngles = Callable[[Mapping[str, np.ndarray]], Mapping[str, np.ndarray]]
+TRUE_ANGLES = {
+    "two-gyro": "..filters.bicycle.two_gyro_truth",
+    "force-inertial": "..filters.bicycle.force_inertial_axes",
+}
+"""First word of a quantity's name → module whose ``true_angles`` makes it from the truth of a ride."""
 
 
 def geometry_of(trajectory: Trajectory) -> RiderGeometry | None:
@@ -64,30 +69,25 @@ def make_for(name: str, trajectory: Trajectory, **parameters: Any) -> Estimator[
 
 
 def true_quantities(estimator: Estimator[Any], truth: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """What the estimator's own ``true_angles`` makes of the truth of a ride.
+    """What is true of the paper's own quantities that an estimator gives.
+
+    Args:
+        estimator: parameters of its equations go into a ``true_angles`` that takes arguments of these names.
+        truth: of a ride.
 
     Returns:
-        Quantity → ``(T, size)``; empty if the estimator has no such function, or the truth lacks what it needs.
+        Quantity → ``(T, size)``; empty if it gives none, or the truth lacks what it takes.
     """
-    function = true_angles_of(estimator)
-    if function is None:
-        return {}
-    try:
-        return dict(function(truth))
-    except KeyError:
-        return {}
-
-
-def true_angles_of(estimator: Estimator[Any]) -> TrueAngles | None:
-    """``true_angles`` of the class or of the module of an estimator's equations; None if there is none."""
-    equations = type(equations_of(estimator))
-    for owner in equations.__mro__:
-        if "true_angles" in vars(owner):
-            return equations.true_angles
-        found = getattr(importlib.import_module(owner.__module__), "true_angles", None)
-        if found is not None:
-            return found
-    return None
+    found: dict[str, np.ndarray] = {}
+    equations = equations_of(estimator)
+    for paper in {quantity.name.split("/")[0] for quantity in estimator.outputs} & set(TRUE_ANGLES):
+        true_angles = importlib.import_module(TRUE_ANGLES[paper], __package__).true_angles
+        wanted = [name for name in inspect.signature(true_angles).parameters if hasattr(equations, name)]
+        try:
+            found |= true_angles(truth, **{name: getattr(equations, name) for name in wanted})
+        except (KeyError, ValueError):
+            continue  # a trajectory of something else
+    return found
 
 
 def equations_of(estimator: Any) -> Any:

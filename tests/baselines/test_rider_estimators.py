@@ -14,7 +14,7 @@ import pytest
 
 import poise
 from poise.baselines.evaluation import evaluate
-from poise.baselines.rider_estimators import equations_of, geometry_of, make_for, told, true_quantities
+from poise.baselines.rider_estimators import TRUE_ANGLES, equations_of, geometry_of, make_for, told, true_quantities
 from poise.envs.batch_recorder import record_episodes
 from poise.envs.bicycle.environment import RiderBicycleEnv
 from poise.envs.storage import load_trajectory
@@ -56,8 +56,8 @@ class Wheelbase(Recurrence):
         return {"bicycle/roll": 0.0 * x, "fake/wheelbase": x}
 
 
-def true_angles(truth: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-    return {"fake/wheelbase": 1.0 + 0.0 * truth["bicycle/roll"]}
+def true_angles(truth: Mapping[str, np.ndarray], scale: float = 5.0) -> dict[str, np.ndarray]:
+    return {"fake/wheelbase": scale + 0.0 * truth["bicycle/roll"]}
 
 
 @pytest.fixture
@@ -69,7 +69,7 @@ def _fake(monkeypatch):
     entry = Entry("fake:Wheelbase", "filter", "fake", ("bicycle_imu/gyr",), outputs, "Observer", {"scale": 1.0})
     monkeypatch.setitem(CATALOGUE, "fake", entry)
     monkeypatch.setitem(CATALOGUE, "fake-twice", replace(entry, fixed={"scale": 2.0}))
-    monkeypatch.setattr(Wheelbase, "__module__", module.__name__)
+    monkeypatch.setitem(TRUE_ANGLES, "fake", module.__name__)
 
 
 @pytest.fixture(scope="module")
@@ -128,7 +128,7 @@ def test_a_table_holds_the_filters_own_quantities(ride):
     table = evaluate(["fake", "fake-twice"], ride).set_index(["estimator", "quantity", "metric"])["value"]
     wheelbase = geometry_of(ride).wheelbase
     assert table["fake", "fake/wheelbase", "angle"] == pytest.approx(np.degrees(wheelbase - 1.0))
-    assert table["fake-twice", "fake/wheelbase", "angle"] == pytest.approx(np.degrees(2.0 * wheelbase - 1.0))
+    assert table["fake-twice", "fake/wheelbase", "angle"] == pytest.approx(np.degrees(2.0 * wheelbase - 2.0))
     roll = ride.truth["bicycle/roll"]
     assert table["fake", "bicycle/roll", "angle"] == pytest.approx(np.degrees(np.sqrt(np.mean(roll**2))))
     estimator = make_for("fake", ride)
