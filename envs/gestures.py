@@ -18,6 +18,7 @@ from typing import Protocol
 import numpy as np
 
 from ..filters import rotation
+from .controller_gestures import Infinity, Pointing, RateTable, Shaking, Walk
 from .hand_motion import Segment, SegmentedGesture, TurnGesture, match_levels
 from .sensors import BodyState
 
@@ -271,9 +272,22 @@ class Mixed:
 
 
 GESTURES: Mapping[str, GestureConfig] = MappingProxyType(
-    {"rest": Rest(), "slow": SLOW, "fast": FAST, "severe": SEVERE, "turn": Turn(), "mixed": Mixed()}
+    {
+        "rest": Rest(),
+        "slow": SLOW,
+        "fast": FAST,
+        "severe": SEVERE,
+        "turn": Turn(),
+        "mixed": Mixed(),
+        "walk": Walk(),
+        "pointing": Pointing(),
+        "shaking": Shaking(),
+        "rate-table": RateTable(),
+        "planar-walk": Walk(planar=True),
+        "infinity": Infinity(),
+    }
 )
-"""Name → configuration."""
+"""Name → configuration; the last two stay in the vertical plane."""
 
 
 def gesture_config(gesture: str | GestureConfig) -> GestureConfig:

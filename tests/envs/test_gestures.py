@@ -20,7 +20,7 @@ def draw(name, seed=0, duration=None):
 @pytest.mark.parametrize("seed", [0, 1])
 def test_derivatives_are_exact(name, seed):
     gesture = draw(name, seed, 12.0)
-    h = 1e-4
+    h = 2e-5
     middle = np.linspace(0.5, 11.5, 400)
     left, here, right = (gesture.sample(middle + shift) for shift in (-h, 0.0, h))
     np.testing.assert_allclose((right.position - left.position) / (2 * h), here.velocity, atol=1e-4)
@@ -82,6 +82,8 @@ def test_gestures_begin_at_rest_and_differ_by_seed(name):
     early = np.arange(0.0, 1.0, 0.01)
     assert np.abs(gesture.sample(early).velocity).max() == 0.0
     assert np.abs(gesture.sample(early).angular_velocity).max() == 0.0
+    if getattr(GESTURES[name], "planar", False):
+        return
     starts = [g.sample(np.zeros(1)).orientation[0] for g in (gesture, other)]
     assert rotation.angle(rotation.multiply(starts[0], rotation.conjugate(starts[1]))) > 0.05
 

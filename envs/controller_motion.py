@@ -1,0 +1,325 @@
+"""Analytic motions of a hand-held controller: walk, ∞, pointing at targets, shaking, rate table.
+
+The distributions they are drawn from are in :mod:`poise.envs.controller_gestures`. World: x east, y north, z up;
+quaternions w, x, y, z, body to world. All derivatives are exact.
+
+Motion in the vertical plane: the body's x and y axes stay in the plane of east and up, its z axis points south; at
+angle φ = 0 its y axis points up, and φ counts from east to up.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from ..filters import rotation
+from .hand_motion import euler_motion
+from .sensors import BodyState
+from .smooth import Jet, Series, column, product, smoothstep, smoothstep_integral
+
+ORIGIN = (0.0, 0.0, 1.2)
+"""Where a hand starts, m."""
+OUT_OF_PLANE = np.array([0.0, -1.0, 0.0])
+"""The axis of the angle φ in the world."""
+UPRIGHT = np.array([math.sqrt(0.5), math.sqrt(0.5), 0.0, 0.0])
+"""Attitude at φ = 0 in the vertical plane."""
+
+
+def spatial_state(times: np.ndarray, position: Jet, angles: Jet, heading: np.ndarray) -> BodyState:
+    """The state of a body at ``heading ⊗ Rz(yaw) Ry(pitch) Rx(roll)``.
+
+    Args:
+        times: ``(T,)`` s.
+        position: jet ``(T, 3)``, m.
+        angles: jet ``(T, 3)`` of yaw, pitch and roll, rad.
+        heading: ``(4,)`` quaternion.
+    """
+    orientation, *rates = euler_motion(angles)
+    turning, turning_faster = (rotation.rotate(heading, rate) for rate in rates)
+    attitude = rotation.multiply(heading, orientation)
+    return BodyState(times, position[0], attitude, position[1], turning, position[2], turning_faster)
+
+
+def planar_state(times: np.ndarray, place: Jet, angle: Jet) -> BodyState:
+    """The state of a body that moves in the vertical plane.
+
+    Args:
+        times: ``(T,)`` s.
+        place: jet ``(T, 2)``, east and up, m.
+        angle: jet ``(T,)`` of φ, rad.
+    """
+    position, velocity, acceleration = (
+        np.stack([part[:, 0], np.zeros(len(times)), part[:, 1]], axis=-1) for part in place
+    )
+    half = 0.5 * angle[0]
+    zero = np.zeros(len(times))
+    turned = np.stack([np.cos(half), zero, zero, np.sin(half)], axis=-1)
+    return BodyState(
+        times,
+        position,
+        rotation.multiply(UPRIGHT, turned),
+        velocity,
+        angle[1][:, None] * OUT_OF_PLANE,
+        acceleration,
+        angle[2][:, None] * OUT_OF_PLANE,
+    )
+
+
+def planar_angle(orientation: np.ndarray) -> np.ndarray:
+    """φ ``(...)`` in [−π, π] of attitudes ``(..., 4)`` in the vertical plane."""
+    along = rotation.rotate(orientation, np.array([1.0, 0.0, 0.0]))
+    return np.arctan2(along[..., 2], along[..., 0])
+
+
+@dataclass(frozen=True)
+class Knots:
+    """Coordinates whose acceleration is given at equally spaced times, with a smooth passage in between.
+
+    Between two knots the acceleration follows 3u² − 2u³; velocity and position are its integrals.
+
+    Attributes:
+        start: time of the first knot; before it nothing moves, s.
+        interval: between knots, s.
+        acceleration: ``(K, n)`` at the knots, the first one zero.
+    """
+
+    start: float
+    interval: float
+    acceleration: np.ndarray
+
+    @cached_property
+    def _integrals(self) -> tuple[np.ndarray, ...]:
+        """Position, velocity and acceleration at the knots, and what the acceleration gains until the next one."""
+        h, a = self.interval, np.concatenate([self.acceleration, self.acceleration[-1:]])
+        rise = np.diff(a, axis=0)
+        nothing = np.zeros((1, a.shape[1]))
+        v = np.concatenate([nothing, np.cumsum(h * (a[:-1] + 0.5 * rise), axis=0)])
+        x = np.concatenate([nothing, np.cumsum(h * v[:-1] + h * h * (0.5 * a[:-1] + 0.15 * rise), axis=0)])
+        return x, v, a, rise
+
+    def sample(self, times: np.ndarray) -> Jet:
+        """Values and derivatives ``(T, n)``, zero until ``start``; from the last knot on the acceleration stays."""
+        h = self.interval
+        x, v, a, rise = self._integrals
+        since = np.maximum((times - self.start) / h, 0.0)
+        k = np.minimum(np.floor(since).astype(int), len(rise) - 1)
+        u = (since - k)[:, None]
+        a, v, x, rise = a[k], v[k], x[k], rise[k]
+        return (
+            x + h * u * v + h * h * (0.5 * u**2 * a + (u**4 / 4.0 - u**5 / 10.0) * rise),
+            v + h * (u * a + (u**3 - u**4 / 2.0) * rise),
+            a + (3.0 * u**2 - 2.0 * u**3) * rise,
+        )
+
+
+@dataclass(frozen=True)
+class WalkGesture:
+    """Walk of all coordinates of the pose.
+
+    Attributes:
+        duration: length, s.
+        knots: of east, up and φ (planar, 3 columns), or of east, north, up, yaw, pitch and roll (6 columns).
+        heading: ``(4,)`` attitude at the start (spatial).
+    """
+
+    duration: float
+    knots: Knots
+    heading: np.ndarray
+
+    def sample(self, times: np.ndarray) -> BodyState:
+        """The motion at ``times`` ``(T,)``, s."""
+        times = np.asarray(times, dtype=float)
+        jet = self.knots.sample(times)
+        if jet[0].shape[1] == 3:
+            value, first, second = (part[:, :2] for part in jet)
+            place = (value + np.array([ORIGIN[0], ORIGIN[2]]), first, second)
+            return planar_state(times, place, (jet[0][:, 2], jet[1][:, 2], jet[2][:, 2]))
+        value, first, second = (part[:, :3] for part in jet)
+        angles = (jet[0][:, 3:], jet[1][:, 3:], jet[2][:, 3:])
+        return spatial_state(times, (value + np.array(ORIGIN), first, second), angles, self.heading)
+
+
+@dataclass(frozen=True)
+class InfinityGesture:
+    """The figure ∞ in the vertical plane, the body's x axis along the path.
+
+    Attributes:
+        duration: length, s.
+        width: half of the figure's width a, m.
+        height: half of its height b, m.
+        period: of one figure τ, s.
+        rest: time at rest, s.
+        ramp: time of getting under way, s.
+    """
+
+    duration: float
+    width: float
+    height: float
+    period: float
+    rest: float
+    ramp: float
+
+    def sample(self, times: np.ndarray) -> BodyState:
+        """The motion at ``times`` ``(T,)``, s."""
+        times = np.asarray(times, dtype=float)
+        if self.ramp > 0.0:
+            speed, rise, _ = smoothstep(times, self.rest, self.ramp)
+            s = smoothstep_integral(times, self.rest, self.ramp)
+        else:
+            s, speed, rise = (
+                np.maximum(times - self.rest, 0.0),
+                (times >= self.rest).astype(float),
+                np.zeros(len(times)),
+            )
+        a, b, c = self.width, self.height, 2.0 * math.pi / self.period
+        d = 2.0 * c
+        sc, cc, sd, cd = np.sin(c * s), np.cos(c * s), np.sin(d * s), np.cos(d * s)
+        # derivatives by the path's own time s
+        x, y = a * sc, b * sd
+        x1, y1 = a * c * cc, b * d * cd
+        x2, y2 = -c * c * x, -d * d * y
+        x3, y3 = -c * c * x1, -d * d * y1
+        square = x1 * x1 + y1 * y1
+        bend = x1 * y2 - y1 * x2
+        phi1 = bend / square
+        phi2 = (x1 * y3 - y1 * x3) / square - 2.0 * phi1 * (x1 * x2 + y1 * y2) / square
+        # the tangent swings about straight down by less than half a turn, so this branch never jumps
+        phi = rotation.wrap(np.arctan2(y1, x1) + 0.5 * math.pi) - 0.5 * math.pi
+        place = np.stack([ORIGIN[0] + x, ORIGIN[2] + y], axis=-1)
+        first, second = np.stack([x1, y1], axis=-1), np.stack([x2, y2], axis=-1)
+        along, curve = speed[:, None], rise[:, None]
+        jet = (place, first * along, second * along**2 + first * curve)
+        return planar_state(times, jet, (phi, phi1 * speed, phi2 * speed**2 + phi1 * rise))
+
+
+@dataclass(frozen=True)
+class PointingGesture:
+    """Turns from target to target, each the shortest one, along 6u⁵ − 15u⁴ + 10u³; the hand moves meanwhile.
+
+    Attributes:
+        duration: length, s.
+        starts: ``(K,)`` beginning of each turn, s.
+        length: time of a turn, s.
+        attitudes: ``(K, 4)`` at the beginning of each turn.
+        axes: ``(K, 3)`` unit vectors, world.
+        angles: ``(K,)`` of the turns, rad.
+        position: random function, m.
+        targets: ``(K + 1, 3)`` unit vectors along which it points, world; along the first one from the start.
+    """
+
+    duration: float
+    starts: np.ndarray
+    length: float
+    attitudes: np.ndarray
+    axes: np.ndarray
+    angles: np.ndarray
+    position: Series
+    targets: np.ndarray
+
+    def sample(self, times: np.ndarray) -> BodyState:
+        """The motion at ``times`` ``(T,)``, s."""
+        times = np.asarray(times, dtype=float)
+        k = np.maximum(np.searchsorted(self.starts, times, "right") - 1, 0)
+        turn, speed, rise = smoothstep(times - self.starts[k], 0.0, self.length)
+        axis, angle = self.axes[k], self.angles[k][:, None]
+        orientation = rotation.multiply(rotation.exp(axis * angle * turn[:, None]), self.attitudes[k])
+        begun = column(smoothstep(times, float(self.starts[0]), 1.0))
+        position, velocity, acceleration = product(begun, self.position.sample(times))
+        return BodyState(
+            times,
+            position + np.array(ORIGIN),
+            orientation,
+            velocity,
+            axis * angle * speed[:, None],
+            acceleration,
+            axis * angle * rise[:, None],
+        )
+
+
+@dataclass(frozen=True)
+class ShakingGesture:
+    """Turning and moving at random, more and less in turns.
+
+    Attributes:
+        duration: length, s.
+        heading: ``(4,)`` attitude at the start.
+        position: random function, m.
+        angles: random function of yaw, pitch and roll, rad.
+        rest: time at rest, s.
+        cycle: from one lull to the next, s.
+        lull: amplitude in a lull, relative to the largest.
+    """
+
+    duration: float
+    heading: np.ndarray
+    position: Series
+    angles: Series
+    rest: float
+    cycle: float
+    lull: float
+
+    def envelope(self, times: np.ndarray) -> Jet:
+        """Amplitude, ``(T, 1)``: it rises within a second after the rest and nearly vanishes every ``cycle``."""
+        w = 2.0 * math.pi / self.cycle
+        depth, phase = 0.5 * (1.0 - self.lull), w * (times - self.rest)
+        wave = (1.0 - depth - depth * np.cos(phase), depth * w * np.sin(phase), depth * w * w * np.cos(phase))
+        return column(product(smoothstep(times, self.rest, 1.0), wave))
+
+    def sample(self, times: np.ndarray) -> BodyState:
+        """The motion at ``times`` ``(T,)``, s."""
+        times = np.asarray(times, dtype=float)
+        envelope = self.envelope(times)
+        value, first, second = product(envelope, self.position.sample(times))
+        angles = product(envelope, self.angles.sample(times))
+        return spatial_state(times, (value + np.array(ORIGIN), first, second), angles, self.heading)
+
+
+@dataclass(frozen=True)
+class RateTableGesture:
+    """A table that turns about the vertical at one rate after the other; the device is fixed to it.
+
+    Attributes:
+        duration: length, s.
+        starts: ``(K,)`` when the table begins to go over to each rate, s.
+        rates: ``(K,)`` rad/s, counter-clockwise seen from above.
+        ramp: time of going over, s.
+        azimuth: of the table at the start, rad.
+        attitude: ``(4,)`` of the device on the table.
+        offset: ``(3,)`` of the device's origin from the axis, table axes (z up), m.
+    """
+
+    duration: float
+    starts: np.ndarray
+    rates: np.ndarray
+    ramp: float
+    azimuth: float
+    attitude: np.ndarray
+    offset: np.ndarray
+
+    def sample(self, times: np.ndarray) -> BodyState:
+        """The motion at ``times`` ``(T,)``, s."""
+        times = np.asarray(times, dtype=float)
+        steps = np.diff(self.rates, prepend=0.0)
+        rate, change, angle = np.zeros((3, len(times)))
+        for start, step in zip(self.starts, steps, strict=True):
+            value, first, _ = smoothstep(times, start, self.ramp)
+            rate, change = rate + step * value, change + step * first
+            angle = angle + step * smoothstep_integral(times, start, self.ramp)
+        zero = np.zeros(len(times))
+        table = rotation.from_euler_zyx(rotation.wrap(self.azimuth + angle), zero, zero)
+        arm = rotation.rotate(table, self.offset)
+        up = np.array([0.0, 0.0, 1.0])
+        turning, turning_faster = rate[:, None] * up, change[:, None] * up
+        velocity = rotation.cross(turning, arm)
+        return BodyState(
+            times,
+            arm + np.array(ORIGIN),
+            rotation.multiply(table, self.attitude),
+            velocity,
+            turning,
+            rotation.cross(turning_faster, arm) + rotation.cross(turning, velocity),
+            turning_faster,
+        )
