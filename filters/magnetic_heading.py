@@ -45,6 +45,19 @@ def align(specific_force: Array, field: Array, declination: Array) -> Array:
     return turn_heading(q, heading_error(q, field, declination))
 
 
+def field_direction(declination: Array, dip: Array, like: Array) -> Array:
+    """Unit vector of a magnetic field in the world (east, north, up), ``(..., 3)``.
+
+    Args:
+        declination: rad, positive east: number or ``(...)``.
+        dip: below the horizontal, rad: number or ``(...)``.
+        like: an array ``(..., n)`` of the batch shape that is wanted.
+    """
+    xp, zero = namespace(like), 0.0 * like[..., :1]
+    east, below = zero + expand(declination, 1), zero + expand(dip, 1)
+    return xp.concat([xp.cos(below) * xp.sin(east), xp.cos(below) * xp.cos(east), -xp.sin(below)], axis=-1)
+
+
 def norm_and_dip(q: Array, field: Array) -> Array:
     """Norm of the field, and its dip below the horizontal in rad, as ``(..., 2)``."""
     xp = namespace(q)

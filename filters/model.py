@@ -134,6 +134,28 @@ class Recurrence(Equations):
         raise NotImplementedError
 
 
+def check_choice(name: str, value: str, choices: tuple[str, ...]) -> None:
+    """Refuse a text that is none of ``choices``.
+
+    Raises:
+        ValueError: names the parameter, the value and the choices.
+    """
+    if value not in choices:
+        raise ValueError(f"{name} must be one of {choices}, got {value!r}")
+
+
+def checked_quaternion(name: str, value: Any) -> tuple[float, ...]:
+    """A unit quaternion as four floats.
+
+    Raises:
+        ValueError: it has not four numbers, or its length is not 1 within 1e-6.
+    """
+    numbers = tuple(float(number) for number in value)
+    if len(numbers) != 4 or not abs(math.hypot(*numbers) - 1.0) <= 1e-6:
+        raise ValueError(f"{name} must be a unit quaternion (w, x, y, z), got {value}")
+    return numbers
+
+
 def parameters_of(model: Equations) -> Mapping[str, float]:
     """The numbers a model is tuned by: every float of its fields, by a name such as ``lever_arm[0]``."""
     return _remembered(model)[0]

@@ -41,7 +41,6 @@ Not estimated: gyroscope bias and the biases of the accelerometers, which domina
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal
 
@@ -49,8 +48,8 @@ import numpy as np
 
 from ..backend import Array, constant, expand, namespace
 from ..linear_algebra import block_diagonal, block_matrix
-from ..magnetic_heading import align, known
-from ..model import Gain, Model
+from ..magnetic_heading import align, field_direction, known
+from ..model import Gain, Model, check_choice, checked_quaternion
 from ..quantity import (
     ACCELEROMETER,
     ANGULAR_RATE,
@@ -158,16 +157,13 @@ class ArrayOrientation(Model):
             object.__setattr__(self, "array", ARRAYS[self.array])
         if self.array.dimension != 3:
             raise ValueError(f"array must be spatial, got the planar array {self.array.name!r}")
-        _check_choice("method", self.method, ("fusion", "tilt", "integration"))
-        _check_choice("start", self.start, ("samples", "given"))
-        _check_choice("field", self.field, ("start", "given"))
+        check_choice("method", self.method, ("fusion", "tilt", "integration"))
+        check_choice("start", self.start, ("samples", "given"))
+        check_choice("field", self.field, ("start", "given"))
         if self.method == "integration" and not self.gyroscope:
             raise ValueError("gyroscope must be True where method is 'integration': nothing else is integrated")
         for name in ("start_orientation", "magnetometer_mounting"):
-            value = getattr(self, name)
-            if len(value) != 4 or abs(math.hypot(*value) - 1.0) > 1e-6:
-                raise ValueError(f"{name} must be a unit quaternion (w, x, y, z), got {value}")
-            object.__setattr__(self, name, tuple(map(float, value)))
+            object.__setattr__(self, name, checked_quaternion(name, getattr(self, name)))
         for name in ("position_damping", "velocity_damping"):
             if getattr(self, name) <= 0.0:
                 raise ValueError(f"{name} must be positive (1/s), got {getattr(self, name)}")
@@ -210,9 +206,7 @@ class ArrayOrientation(Model):
             q = 0.0 * q + self._vector(self.start_orientation, q)
         world = rotate(q, normalize(field))
         if self.field == "given":
-            dip, north = self.dip + zero[..., :1], self.declination + zero[..., :1]
-            horizontal = xp.cos(dip)
-            world = xp.concat([horizontal * xp.sin(north), horizontal * xp.cos(north), -xp.sin(dip)], axis=-1)
+            world = field_direction(self.declination, self.dip, q)
         rate = z["imu/gyr"] if self.has_rate_rows else zero
         matrix = to_matrix(q)
         rows = [matrix[..., index, :] + zero for index in range(3)]
@@ -340,11 +334,6 @@ class ArrayOrientation(Model):
         """Parameters as a vector of the batch shape of ``like``."""
         zero = 0.0 * like[..., :1]
         return namespace(like).concat([zero + expand(value, 1) for value in values], axis=-1)
-
-
-def _check_choice(name: str, value: str, choices: tuple[str, ...]) -> None:
-    if value not in choices:
-        raise ValueError(f"{name} must be one of {choices}, got {value!r}")
 
 
 def _orthogonality(xp: Any, x: Array) -> tuple[Array, Array]:
