@@ -223,6 +223,17 @@ def to_euler_zyx(q: Array) -> tuple[Array, Array, Array]:
     return wrap(half_sum + half_difference), 2.0 * ratio - 0.5 * math.pi, wrap(half_sum - half_difference)
 
 
+def from_euler_xyz(first: Array, second: Array, third: Array) -> Array:
+    """Unit quaternion of turns about x, then the turned y, then the turned z: ``Rx(first) Ry(second) Rz(third)``."""
+    return conjugate(from_euler_zyx(-third, -second, -first))
+
+
+def to_euler_xyz(q: Array) -> tuple[Array, Array, Array]:
+    """The angles ``(...)`` of :func:`from_euler_xyz`; the second in [-pi/2, pi/2]."""
+    third, second, first = to_euler_zyx(conjugate(q))
+    return -first, -second, -third
+
+
 def up_in_body(q: Array) -> Array:
     """The upward vertical in body coordinates ``(..., 3)``: third row of the rotation matrix."""
     xp = namespace(q)
@@ -268,3 +279,53 @@ def to_xyzw(q: Array) -> Array:
 def random(generator: object, shape: tuple[int, ...] = ()) -> Array:
     """Uniformly distributed unit quaternions ``(*shape, 4)`` from a :class:`numpy.random.Generator`."""
     return normalize(generator.standard_normal((*shape, 4)))  # type: ignore[attr-defined]
+
+
+def elementary_matrix(axis: int, angle: Array) -> Array:
+    """Rotation matrix ``(..., 3, 3)`` about coordinate axis 0, 1 or 2 by ``angle`` ``(...)``."""
+    xp = namespace(angle)
+    c, s = xp.cos(angle), xp.sin(angle)
+    if axis == 0:
+        return rows([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
+    if axis == 1:
+        return rows([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
+    return rows([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
+def euler_matrix(sequence: str, angles: Array) -> Array:
+    """Child-to-parent matrix ``(..., 3, 3)`` of turns about the new axes, e.g. ``"zxy"``: ``Rz(1) Rx(2) Ry(3)``.
+
+    Args:
+        sequence: three of the letters x, y, z.
+        angles: ``(..., 3)`` rad, in the order of the sequence.
+    """
+    first, second, third = (elementary_matrix("xyz".index(name), angles[..., i]) for i, name in enumerate(sequence))
+    return first @ second @ third
+
+
+def euler_axes(sequence: str, angles: Array) -> Array:
+    """Matrix ``(..., 3, 3)`` whose columns are the axes of :func:`euler_matrix`'s turns, in the parent's coordinates.
+
+    The child's rate relative to the parent is this matrix times the rates of the angles.
+    """
+    xp = namespace(angles)
+    a, b, c = ("xyz".index(name) for name in sequence)
+    first = elementary_matrix(a, angles[..., 0])
+    both = first @ elementary_matrix(b, angles[..., 1])
+    unit = 0.0 * first + rows([[1.0 + 0.0 * angles[..., 0], 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
+    return xp.stack([unit[..., a], first[..., b], both[..., c]], axis=-1)
+
+
+def euler_zxy(m: Array) -> Array:
+    """Angles ``(..., 3)`` of ``m = Rz(1) Rx(2) Ry(3)``; the second in [-pi/2, pi/2]."""
+    xp = namespace(m)
+    first = xp.atan2(-m[..., 0, 1], m[..., 1, 1])
+    return xp.stack([first, xp.asin(m[..., 2, 1]), xp.atan2(-m[..., 2, 0], m[..., 2, 2])], axis=-1)
+
+
+def euler_yxy(m: Array, sign: float = -1.0) -> Array:
+    """Angles ``(..., 3)`` of ``m = Ry(1) Rx(2) Ry(3)``; the second has the given sign."""
+    xp = namespace(m)
+    first = xp.atan2(sign * m[..., 0, 1], sign * m[..., 2, 1])
+    third = xp.atan2(sign * m[..., 1, 0], -sign * m[..., 1, 2])
+    return xp.stack([first, sign * xp.acos(m[..., 1, 1]), third], axis=-1)
