@@ -72,7 +72,7 @@ def constant(values: Any, like: Array) -> Array:
     if is_torch(like):
         import torch
 
-        return torch.as_tensor(np.asarray(values, dtype=float), dtype=like.dtype, device=like.device)
+        return torch.as_tensor(np.array(values, dtype=float), dtype=like.dtype, device=like.device)
     if is_traced(like):
         return np.asarray(values, dtype=object)
     return np.asarray(values, dtype=getattr(like, "dtype", float))

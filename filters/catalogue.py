@@ -18,6 +18,7 @@ SIX = ("imu/gyr", "imu/acc")
 NINE = (*SIX, "imu/mag")
 RELATIVE = ("up", "relative_orientation")
 WORLD = ("orientation", "up")
+ARRAY_ORIENTATION = (*WORLD, "angular_rate", "external_acceleration", "virtual_position")
 
 
 @dataclass(frozen=True)
@@ -83,6 +84,27 @@ CATALOGUE: dict[str, Entry] = {
         "the same with the heading of a magnetometer",
         NINE,
         (*WORLD, "gyroscope_bias", "external_acceleration"),
+    ),
+    "array-orientation": _filter(
+        "accelerometer_array.spatial:ArrayOrientation",
+        'He: orientation from an accelerometer array; array="controller", "octa" or your own',
+        ("imu/gyr", "array/acc", "imu/mag"),
+        ARRAY_ORIENTATION,
+    ),
+    "array-orientation-imu": Entry(
+        "accelerometer_array.spatial:ArrayOrientation",
+        "filter",
+        "the same with the accelerometer of one IMU",
+        NINE,
+        ARRAY_ORIENTATION,
+        "KalmanFilter",
+        {"array": "triaxial"},
+    ),
+    "marins": _filter(
+        "marins:Marins",
+        "Marins et al. 2001: quaternion by Gauss-Newton, then a Kalman filter",
+        NINE,
+        (*WORLD, "angular_rate"),
     ),
     "gyroscope-integration": _reference(
         "references:GyroscopeIntegration", "gyroscope alone, from the first inclination", SIX, RELATIVE

@@ -18,8 +18,9 @@ def test_every_entry_tells_what_it_is():
         assert info.name == name
         assert info.description
         assert "\n" not in info.description
-        assert {"imu/acc"} <= set(info.channels) <= {"imu/gyr", "imu/acc", "imu/mag"}
-        assert "up" in info.outputs or "orientation" in info.outputs
+        assert info.channels
+        assert all("/" in channel for channel in info.channels)
+        assert info.outputs
 
 
 @pytest.mark.parametrize("name", poise.list_estimators())
@@ -32,7 +33,8 @@ def test_every_estimator_is_what_the_list_says(name):
     assert estimator.dt == 0.02
     assert {channel.name for channel in estimator.channels} == set(info.channels)
     assert {quantity.name for quantity in estimator.outputs} == set(info.outputs)
-    assert ("orientation" in info.outputs) == ("imu/mag" in info.channels)
+    if "orientation" in info.outputs:
+        assert "imu/mag" in info.channels, "nothing else tells the heading"
 
 
 def test_unknown_names_list_the_valid_ones():
