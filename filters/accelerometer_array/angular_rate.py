@@ -19,7 +19,7 @@ Differs from print: J has the other sign (2.39), one ω throughout instead of ω
 not lost (2.27, 2.32, 2.34): the error of the last estimate holds that of the last ξ̂ too. ``variant`` chooses where J is
 formed: ``sound`` at ω_TI, ``corrected`` at ω_PR, as the thesis means it, ``printed`` is print with its slips. Near rest
 ω_PR never falls below √|δξ|, which makes J look small and the weight fall just when ω_PR is useless; ω_TI has no such
-floor. Weights are clipped to [0, 1]: above 1 do occur. Where |J| has no meaning (below :data:`SLOWEST`) the weight is 1.
+floor. Weights are clipped to [0, 1]: above 1 do occur. Where J has no meaning (below :data:`SLOWEST`) the weight is 1.
 
 K. Parsa's method (appendix A) corrects ω_TI by one Gauss–Newton step to ξ̂ and feeds that back; its normal matrix is
 singular at ω = 0 only, not, as (2.55) has it, wherever one component vanishes.
@@ -153,7 +153,7 @@ class ArrayRate(Recurrence):
             raise ValueError(f"accelerometer_noise must be positive, got {self.accelerometer_noise}")
         if self.array.dimension != 3 or self.array.rank < 12:
             raise ValueError(
-                f"array {self.array.name!r} must be spatial and of rank 12 to tell an angular rate without a gyroscope, "
+                f"array {self.array.name!r} must be spatial and of rank 12 to tell an angular rate by itself, "
                 f"got dimension {self.array.dimension}, rank {self.array.rank}"
             )
 
