@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Any
 
 import numpy as np
@@ -13,6 +13,9 @@ from .zoo import list_estimators, make_estimator
 
 GESTURES = ("slow", "fast", "severe", "mixed")
 """Gestures of the simulated part: tests A, B, C of the external-acceleration paper, and changing intensity."""
+
+HAND_CHANNELS = ("imu/gyr", "imu/acc", "imu/mag")
+"""What ``poise/HandMotion-v0`` measures."""
 
 PLAIN_PYTHON = ("ahrs-mahony", "ahrs-mahony-9", "ahrs-ekf", "ahrs-ekf-9")
 """Wrapped loops in plain Python that take minutes on recordings and add little: left out unless asked for."""
@@ -53,8 +56,12 @@ def groups_of(trajectories: Sequence[Trajectory]) -> dict[str, str]:
     return {trajectory.name: str(trajectory.metadata.get("group") or trajectory.name) for trajectory in trajectories}
 
 
-def contenders(names: Sequence[str] = ()) -> dict[str, str | Estimator[Any]]:
-    """Label → estimator: those that are named, or all that are installed, with the other modes of the paper.
+def contenders(names: Sequence[str] = (), channels: Collection[str] = HAND_CHANNELS) -> dict[str, str | Estimator[Any]]:
+    """Label → estimator: those that are named, or all that the data suit, with the other modes of the paper.
+
+    Args:
+        names: which ones; empty for all that are installed and read no other channels than those of the data.
+        channels: of the data.
 
     Raises:
         ValueError: an unknown name.
@@ -64,7 +71,11 @@ def contenders(names: Sequence[str] = ()) -> dict[str, str | Estimator[Any]]:
             if name not in list_estimators():
                 make_estimator(name)  # raises, with the names that there are
         return {name: name for name in names}
-    known = [name for name in list_estimators() if name not in PLAIN_PYTHON and is_available(name)]
+    known = [
+        name
+        for name, info in list_estimators().items()
+        if name not in PLAIN_PYTHON and set(info.channels) <= set(channels) and is_available(name)
+    ]
     chosen: dict[str, str | Estimator[Any]] = {name: name for name in known}
     for mode in (2, 3):
         chosen[f"external-acceleration (mode {mode})"] = make_estimator("external-acceleration", mode=mode)

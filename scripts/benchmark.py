@@ -37,22 +37,22 @@ def run(args: Args) -> int:
     import pandas
 
     from ..baselines.acceleration_tests import compare_modes
-    from ..baselines.benchmark import contenders, groups_of, simulated
+    from ..baselines.benchmark import HAND_CHANNELS, contenders, groups_of, simulated
     from ..baselines.evaluation import evaluate
     from ..envs.recordings import load_recording, recording_files
     from .experiment import start_run
     from .report import draw_example, print_comparison, print_progress, provenance
     from .tables import markdown_table, print_table
 
-    chosen = contenders(args.estimators)
-    paths = recording_files(args.recordings)
+    recorded = [load_recording(path) for path in recording_files(args.recordings)]
+    chosen = contenders(args.estimators, {*HAND_CHANNELS, *(name for each in recorded for name in each.measurements)})
     folder = start_run("benchmark", args, args.seed, args.runs)
     sections: dict[str, str] = {}
     tables = []
     print_progress(args.json, f"simulating {4 * args.episodes} episodes of poise/HandMotion-v0 in PyBullet")
     data = {"simulation": simulated(args.seed, args.episodes, sensors=args.sensors)}
-    if paths:
-        data["recordings"] = [load_recording(path) for path in paths]
+    if recorded:
+        data["recordings"] = recorded
     for name, trajectories in data.items():
         table = evaluate(chosen, trajectories, reference=args.reference, progress=not args.json)
         tables.append(table)

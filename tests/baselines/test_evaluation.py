@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import poise
+from poise.baselines.benchmark import HAND_CHANNELS, contenders
 from poise.baselines.evaluation import COLUMNS, evaluate, summary
 from poise.envs.hand_sensing import simulate_hand
 from poise.filters.metrics import DEGREES, direction_error, rms
@@ -89,3 +90,14 @@ def test_the_summary_averages_over_trajectories_not_groups(trajectory):
     assert wide.loc["tilt", "mean"] == pytest.approx(errors.mean())
     assert wide.loc["tilt", "b"] == pytest.approx(errors[1:].mean())
     assert np.isfinite(wide.to_numpy()).all()
+
+
+def test_the_benchmark_takes_what_the_data_suit():
+    hand = contenders()
+    assert {"mekf", "bounded-motion", "external-acceleration (mode 3)"} <= set(hand)
+    listed = poise.list_estimators()
+    assert all(set(listed[label.split(" (")[0]].channels) <= set(HAND_CHANNELS) for label in hand)
+    six = contenders(channels=("imu/gyr", "imu/acc"))
+    assert "mekf" in six
+    assert "mekf-9" not in six
+    assert set(contenders(["mekf-9"], channels=())) == {"mekf-9"}

@@ -1,4 +1,4 @@
-"""What every estimator of the catalogue promises, whatever its method."""
+"""What every estimator of the catalogue promises, whatever its method and whatever it reads."""
 
 from __future__ import annotations
 
@@ -17,29 +17,28 @@ from poise.filters.estimator import Estimator, run, run_by_steps
 from poise.filters.quantity import Estimate
 
 Data = dict[str, np.ndarray]
+Motion = Callable[..., Data]
 
 OWN = [name for name, entry in CATALOGUE.items() if entry.recursion]
-CHANNELS = {"imu/gyr": 3, "imu/acc": 3, "imu/mag": 3}
-FIELD = np.array([0.0, 20.0, -45.0])
+SINGLE_IMU = [
+    name
+    for name, entry in CATALOGUE.items()
+    if {"imu/acc"} <= set(entry.channels) <= {"imu/gyr", "imu/acc", "imu/mag"} and "up" in entry.outputs
+]
+STRAPDOWN = [
+    name
+    for name in SINGLE_IMU
+    # where the angular rate is a state, it follows the gyroscope with a lag
+    if "imu/gyr" in CATALOGUE[name].channels and "angular_rate" not in CATALOGUE[name].outputs
+]
+TURNED = [
+    name
+    for name in SINGLE_IMU
+    if "imu/gyr" in CATALOGUE[name].channels and "angular_rate" not in CATALOGUE[name].outputs
+]
+"""Methods whose attitude turns as the gyroscope says; others estimate the rate from it."""
 # Rounding is amplified by what a filter feeds back; the network of an external package computes in single precision.
 ROUNDING = 1e-8
-
-
-def motion(seed: int, length: int = 80, dt: float = 0.01) -> tuple[Data, np.ndarray]:
-    """Samples of a turning sensor that is shaken, and its orientation."""
-    rng = np.random.default_rng(seed)
-    rate = rng.normal(0.0, 1.0, 3) + np.cumsum(rng.normal(0.0, 0.2, (length, 3)), axis=0)
-    q = [rotation.exp(rng.normal(0.0, 0.5, 3))]
-    for omega in rate[1:]:
-        q.append(rotation.multiply(q[-1], rotation.exp(dt * omega)))
-    orientation = np.array(q)
-    force = rotation.rotate_back(orientation, np.array([0.0, 0.0, 9.81])[None])
-    force = force + np.sin(np.arange(length)[:, None] * 0.3 + rng.uniform(0, 6, 3))
-    return {
-        "imu/gyr": rate + rng.normal(0.0, 0.01, rate.shape),
-        "imu/acc": force + rng.normal(0.0, 0.05, force.shape),
-        "imu/mag": rotation.rotate_back(orientation, FIELD[None]) + rng.normal(0.0, 0.3, force.shape),
-    }, orientation
 
 
 def with_gaps(data: Data, seed: int = 9) -> Data:
@@ -52,10 +51,6 @@ def with_gaps(data: Data, seed: int = 9) -> Data:
     return result
 
 
-def of_channels(estimator: Estimator[Any], data: Data) -> Data:
-    return {channel.name: data[channel.name] for channel in estimator.channels}
-
-
 def assert_same(first: Estimate, second: Estimate, tolerance: float = ROUNDING) -> None:
     assert first.pose.keys() == second.pose.keys()
     for name in first.pose:
@@ -66,25 +61,30 @@ def assert_same(first: Estimate, second: Estimate, tolerance: float = ROUNDING) 
             np.testing.assert_allclose(one, other, atol=tolerance, rtol=tolerance)
 
 
-@pytest.fixture(params=list(CATALOGUE))
-def name(request: pytest.FixtureRequest) -> str:
-    entry = CATALOGUE[request.param]
+def made(name: str, **parameters: Any) -> Estimator[Any]:
+    """An estimator, or a skipped test where the package that it wraps is missing."""
+    entry = CATALOGUE[name]
     if entry.kind == "external":
         pytest.importorskip(entry.load().package)  # type: ignore[attr-defined]
+    return make(name, **parameters)
+
+
+@pytest.fixture(params=list(CATALOGUE))
+def name(request: pytest.FixtureRequest) -> str:
     return str(request.param)
 
 
 @pytest.fixture
 def estimator(name: str) -> Estimator[Any]:
-    return make(name, dt=0.01)
+    return made(name, dt=0.01)
 
 
-def test_catalogue_tells_the_truth(name: str, estimator: Estimator[Any]) -> None:
+def test_catalogue_tells_the_truth(name: str, estimator: Estimator[Any], motion: Motion) -> None:
     entry = CATALOGUE[name]
     assert isinstance(estimator, Estimator)
     assert entry.channels == tuple(channel.name for channel in estimator.channels)
     assert entry.outputs == tuple(quantity.name for quantity in estimator.outputs)
-    estimate = run(estimator, motion(0)[0])
+    estimate = run(estimator, motion(estimator, 0))
     assert set(estimate.pose) == set(entry.outputs)
     for quantity in estimator.outputs:
         assert estimate.pose[quantity.name].shape == (80, quantity.size)
@@ -93,16 +93,16 @@ def test_catalogue_tells_the_truth(name: str, estimator: Estimator[Any]) -> None
 
 
 @pytest.mark.parametrize("gaps", [False, True], ids=["complete", "gaps"])
-def test_run_is_stepping(estimator: Estimator[Any], gaps: bool) -> None:
-    data = of_channels(estimator, motion(1)[0])
+def test_run_is_stepping(estimator: Estimator[Any], gaps: bool, motion: Motion) -> None:
+    data = motion(estimator, 1)
     data = with_gaps(data) if gaps else data
     assert_same(run(estimator, data), run_by_steps(estimator, data), 1e-12)
 
 
-def test_a_batch_is_its_sequences(estimator: Estimator[Any]) -> None:
-    singles = [with_gaps(motion(seed)[0], seed) for seed in (2, 3, 4, 5)]
-    batch = {channel: np.stack([single[channel] for single in singles], axis=1) for channel in CHANNELS}
-    batch = {channel: array.reshape(80, 2, 2, 3) for channel, array in batch.items()}
+def test_a_batch_is_its_sequences(estimator: Estimator[Any], motion: Motion) -> None:
+    singles = [with_gaps(motion(estimator, seed), seed) for seed in (2, 3, 4, 5)]
+    batch = {channel: np.stack([single[channel] for single in singles], axis=1) for channel in singles[0]}
+    batch = {channel: array.reshape(80, 2, 2, array.shape[-1]) for channel, array in batch.items()}
     together = run(estimator, batch)
     for index, single in enumerate(singles):
         alone = run(estimator, single)
@@ -110,8 +110,8 @@ def test_a_batch_is_its_sequences(estimator: Estimator[Any]) -> None:
             np.testing.assert_allclose(together.pose[quantity][:, index // 2, index % 2], value, atol=1e-9)
 
 
-def test_input_and_state_are_left_alone(estimator: Estimator[Any]) -> None:
-    data = of_channels(estimator, motion(6)[0])
+def test_input_and_state_are_left_alone(estimator: Estimator[Any], motion: Motion) -> None:
+    data = motion(estimator, 6)
     copies = {channel: array.copy() for channel, array in data.items()}
     state = estimator.init({channel: array[0] for channel, array in data.items()})
     for t in range(10):
@@ -125,8 +125,8 @@ def test_input_and_state_are_left_alone(estimator: Estimator[Any]) -> None:
         np.testing.assert_array_equal(data[channel], array)
 
 
-def test_saving_midway_changes_nothing(estimator: Estimator[Any]) -> None:
-    data = with_gaps(of_channels(estimator, motion(7)[0]))
+def test_saving_midway_changes_nothing(estimator: Estimator[Any], motion: Motion) -> None:
+    data = with_gaps(motion(estimator, 7))
     whole = run_by_steps(estimator, data)
     state = estimator.init({channel: array[0] for channel, array in data.items()})
     for t in range(80):
@@ -137,70 +137,112 @@ def test_saving_midway_changes_nothing(estimator: Estimator[Any]) -> None:
         np.testing.assert_array_equal(value, whole.pose[quantity][-1])
 
 
-def test_nothing_is_said_before_every_channel_spoke(estimator: Estimator[Any]) -> None:
-    data = of_channels(estimator, motion(8)[0])
-    data["imu/acc"] = data["imu/acc"].copy()
+def test_nothing_is_said_before_anything_was_heard(estimator: Estimator[Any], motion: Motion) -> None:
+    data = {channel: array.copy() for channel, array in motion(estimator, 8).items()}
+    for array in data.values():
+        array[:12] = np.nan
+    for quantity, value in run(estimator, data).pose.items():
+        assert np.isnan(value[:12]).all(), quantity
+        assert np.isfinite(value[12:]).all(), quantity
+
+
+@pytest.mark.parametrize("name", SINGLE_IMU)
+def test_without_accelerometer_there_is_no_start(estimator: Estimator[Any], motion: Motion) -> None:
+    data = motion(estimator, 8)
     data["imu/acc"][:12] = np.nan
-    pose = run(estimator, data).pose
-    for value in pose.values():
+    for value in run(estimator, data).pose.values():
         assert np.isnan(value[:12]).all()
         assert np.isfinite(value[12:]).all()
 
 
-def test_another_interval(name: str, estimator: Estimator[Any]) -> None:
+@pytest.mark.parametrize("late", [True, False], ids=["late", "every other"])
+def test_a_channel_that_is_late_or_loses_samples_leaves_estimates_finite(
+    estimator: Estimator[Any], motion: Motion, late: bool
+) -> None:
+    whole, rng = motion(estimator, 14), np.random.default_rng(14)
+    for channel in whole:
+        data = whole | {channel: whole[channel].copy()}
+        if late:
+            data[channel][:12] = np.nan
+        else:
+            data[channel][20:60][rng.random(40) < 0.5] = np.nan
+        estimate = run(estimator, data)
+        for quantity, value in estimate.pose.items():
+            assert np.isfinite(value[12:]).all(), (channel, quantity)
+        if estimate.covariance is not None:
+            assert np.isfinite(estimate.covariance[12:]).all(), channel
+
+
+def test_another_interval(name: str, estimator: Estimator[Any], motion: Motion) -> None:
     other = estimator.with_dt(0.02)
     assert (estimator.dt, other.dt) == (0.01, 0.02)
-    data = motion(9, dt=0.02)[0]
+    data = motion(estimator, 9, dt=0.02)
     assert_same(run(other, data), run(make(name, dt=0.02), data), 0.0)
 
 
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (lambda data: {channel: array for channel, array in data.items() if channel != "imu/acc"}, "lack the channels"),
-        (lambda data: data | {"imu/acc": data["imu/acc"][:, :2]}, "must have shape"),
-        (lambda data: {channel: array[:0] for channel, array in data.items()}, "empty"),
-        (lambda data: data | {"imu/acc": np.full((80, 3), "x")}, "real numbers"),
+        (lambda data, channel: data | {channel: data[channel][:, :-1]}, "must have shape"),
+        (lambda data, channel: data | {channel: data[channel][:-1]}, "leading shape"),
+        (lambda data, channel: {other: array[:0] for other, array in data.items()}, "empty"),
+        (lambda data, channel: data | {channel: np.full(data[channel].shape, "x")}, "real numbers"),
     ],
-    ids=["missing", "width", "empty", "text"],
+    ids=["width", "length", "empty", "text"],
 )
-def test_wrong_input_is_refused(estimator: Estimator[Any], change: Callable[[Data], Data], message: str) -> None:
-    with pytest.raises(ValueError, match=message):
-        run(estimator, change(motion(0)[0]))
+def test_wrong_input_is_refused(
+    estimator: Estimator[Any], change: Callable[[Data, str], Data], message: str, motion: Motion
+) -> None:
+    data = motion(estimator, 0)
+    for channel in data:
+        if message != "leading shape" or len(data) > 1:
+            with pytest.raises(ValueError, match=message):
+                run(estimator, change(data, channel))
+
+
+def test_a_missing_channel_is_named(estimator: Estimator[Any], motion: Motion) -> None:
+    data = motion(estimator, 0)
+    for channel in data:
+        rest = {other: array for other, array in data.items() if other != channel}
+        with pytest.raises(ValueError, match=f"lack the channels .'{channel}'."):
+            run(estimator, rest)
+        with pytest.raises(ValueError, match=f"lack the channels .'{channel}'."):
+            estimator.init({other: array[0] for other, array in rest.items()})
 
 
 @pytest.mark.parametrize("own", OWN)
-def test_arrays_torch_and_compiled_agree(own: str) -> None:
-    singles = [with_gaps(motion(seed, 60)[0], seed) for seed in (10, 11)]
-    data = {channel: np.stack([single[channel] for single in singles], axis=1) for channel in CHANNELS}
-    compiled, arrays = run(make(own), data), run(make(own, compiled=False), data)
+def test_arrays_torch_and_compiled_agree(own: str, motion: Motion) -> None:
+    estimator = make(own)
+    singles = [with_gaps(motion(estimator, seed, 60), seed) for seed in (10, 11)]
+    data = {channel: np.stack([single[channel] for single in singles], axis=1) for channel in singles[0]}
+    compiled, arrays = run(estimator, data), run(make(own, compiled=False), data)
     assert_same(compiled, arrays)
-    tensors = run(make(own), {channel: torch.from_numpy(array) for channel, array in data.items()})
+    tensors = run(estimator, {channel: torch.from_numpy(array) for channel, array in data.items()})
     assert all(isinstance(value, torch.Tensor) for value in tensors.pose.values())
     assert_same(arrays, Estimate(*(None if part is None else part for part in tensors)))
 
 
-@pytest.mark.parametrize("own", [name for name in OWN if name != "tilt"])
-def test_gradients_flow(own: str) -> None:
-    data = {channel: torch.from_numpy(array[:20]) for channel, array in with_gaps(motion(12)[0]).items()}
-    data["imu/gyr"].nan_to_num_(0.0).requires_grad_()
-    run(make(own), data).pose["up"][-1].sum().backward()
-    gradient = data["imu/gyr"].grad
+@pytest.mark.parametrize("own", OWN)
+def test_gradients_flow(own: str, motion: Motion) -> None:
+    estimator = make(own)
+    whole = motion(estimator, 12, 20)
+    channel = next((name for name in whole if name.endswith("/gyr")), next(iter(whole)))
+    data = {name: torch.from_numpy(array) for name, array in (with_gaps(whole) | {channel: whole[channel]}).items()}
+    data[channel].requires_grad_()
+    run(estimator, data).pose[estimator.outputs[0].name][-1].sum().backward()
+    gradient = data[channel].grad
     assert gradient is not None
     assert bool(torch.isfinite(gradient).all())
     assert bool((gradient.abs() > 0).any())
 
 
-def test_a_drop_out_leaves_the_gyroscope(name: str) -> None:
+@pytest.mark.parametrize("name", STRAPDOWN)
+def test_a_drop_out_leaves_the_gyroscope(name: str, motion: Motion) -> None:
     """Without accelerometer and magnetometer every method turns as the gyroscope says, less the bias that it knows."""
-    if name == "tilt":
-        pytest.skip("has no gyroscope")
-    estimator = make(name)
-    data, _ = motion(13, 120)
-    data = of_channels(estimator, data)
+    estimator = made(name)
+    data = motion(estimator, 13, 120)
     for channel in data:
         if channel != "imu/gyr":
-            data[channel] = data[channel].copy()
             data[channel][60:] = np.nan
     pose = run(estimator, data).pose
     bias = pose.get("gyroscope_bias", np.zeros((120, 3)))
