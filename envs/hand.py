@@ -7,11 +7,14 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
+from ..filters.accelerometer_array.array import AccelerometerArray
 from ..filters.quantity import ORIENTATION, RELATIVE_ORIENTATION
 from .base import Block, PoseEnv, Scene, choose_quantity
+from .device_sensing import check_planar
+from .devices import HandDevice, hand_device
 from .drives import Device, Drive, DynamicDrive, KinematicDrive
 from .gestures import GestureConfig, gesture_config, make_gesture
-from .hand_sensing import HandVariation, check_duration, hand_suite, sense, ticks_of
+from .hand_sensing import HandVariation, built_array, check_duration, hand_gesture, hand_suite, sense, ticks_of
 from .sensor_presets import SensorPreset
 from .sensors import BodyState, Mounting, Sampling, vector
 from .suite import SensorSuite
@@ -51,8 +54,12 @@ class HandMotionEnv(PoseEnv):
     | ``imu/mag`` | (3,) float32 | µT, magnetic field; only with ``magnetometer`` | ``rate`` |
     | ``fresh`` | (channels,) int8 | 1 for a new sample, 0 where the last value is repeated | ``rate`` |
 
+    A device with an array of m uniaxial accelerometers has ``array/acc`` (m,), m/s² along each axis, in place of
+    ``imu/acc``, and ``imu/gyr`` and ``imu/mag`` if it has these sensors; a planar one ``planar/gyr`` (1,), rad/s, about
+    its z axis, in place of ``imu/gyr``.
+
     The sample of a tick describes the interval that ends there: with ``sampling="interval"`` the rotation vector and
-    the velocity increment over the interval, divided by its length.
+    the velocity increment over the interval, divided by its length; with ``sampling="instant"`` the values at its end.
 
     ## Rewards
 
@@ -62,7 +69,8 @@ class HandMotionEnv(PoseEnv):
 
     ## Starting State
 
-    At rest for a second at least, with a random heading and attitude (``rest`` and ``mixed``: any attitude).
+    At rest for a second at least, with a random heading and attitude (``rest``, ``mixed``, ``walk`` and ``shaking``:
+    any attitude; ``pointing``: at a target; ``planar-walk`` and ``infinity``: the same attitude every time).
 
     ## Episode End
 
@@ -80,24 +88,35 @@ class HandMotionEnv(PoseEnv):
     | ``truth/position``, ``truth/velocity`` | (3,) | of the sensor, world, m and m/s |
     | ``truth/angular_rate`` | (3,) | rad/s, sensor axes: what an ideal gyroscope reports |
     | ``truth/external_acceleration`` | (3,) | m/s², sensor axes: what an ideal accelerometer reports without gravity |
+    | ``truth/acceleration`` | (3,) | m/s², world; only with an array, as the following |
+    | ``truth/angular_acceleration`` | (3,) | rad/s², sensor axes |
+    | ``truth/planar/angle`` | (1,) | φ in [−π, π], rad, from east to up; planar devices only, as the following |
+    | ``truth/planar/angular_rate``, ``truth/planar/angular_acceleration`` | (1,) | of φ, rad/s and rad/s² |
+    | ``truth/planar/position``, ``truth/planar/velocity``, ``truth/planar/acceleration`` | (2,) | east and up |
     | ``truth/gyroscope_bias``, ``truth/accelerometer_bias``, … | (3,) | bias of the last sample of each sensor |
     | ``scored`` | bool | always True |
 
     ## Arguments
 
     Args:
-        gesture: ``rest``, ``slow``, ``fast``, ``severe``, ``turn``, ``mixed``, or a configuration from
-            :mod:`poise.envs.gestures`. ``reset(options={"gesture": …})`` replaces it for one episode.
+        gesture: a name of :data:`poise.envs.gestures.GESTURES` (``rest``, ``slow``, ``fast``, ``severe``, ``turn``,
+            ``mixed``, ``walk``, ``pointing``, ``shaking``, ``rate-table``; in the plane ``planar-walk``, ``infinity``)
+            or a configuration; None for ``slow``, with a planar device for ``infinity``.
+            ``reset(options={"gesture": …})`` replaces it for one episode.
         drive: ``dynamic`` or ``kinematic``.
         sensors: name of a preset (:func:`poise.envs.sensor_presets.list_sensor_presets`), a preset, or a whole
             :class:`poise.envs.suite.SensorSuite` on one body; its mountings count from the place that ``lever_arm`` and
-            ``mounting`` describe, and that place is the one whose pose is asked for.
+            ``mounting`` describe, and that place is the one whose pose is asked for. None for ``xsens-mtw-awinda``, or
+            for the errors of the device (:data:`poise.envs.devices.ARRAY_PRESETS`).
         rate: Hz; None for 100, or for the rate of the suite.
         duration: length of an episode, s; None for that of the gesture.
         lever_arm: ``(3,)`` from the centre of the device to the sensor, m, device axes.
         mounting: ``(4,)`` quaternion that turns sensor axes to device axes.
-        magnetometer: False, True or its rate in Hz; None for True if the preset has one.
-        sampling: ``interval`` or ``instant``.
+        device: ``imu`` (one IMU), ``controller``, ``octa``, ``octa-gyroscope`` or ``planar``, a JSON file that
+            describes an array, or a :class:`poise.envs.devices.HandDevice`. A planar device moves in the vertical plane
+            of east and up only.
+        magnetometer: False, True or its rate in Hz; None for True if the preset (the device) has one.
+        sampling: ``interval`` or ``instant``; None for ``interval``, with an array for ``instant``.
         randomise: True or a :class:`HandVariation` varies mounting and mass from episode to episode.
         score: ``orientation`` or ``relative_orientation``.
         render_mode: ``human`` (a window), ``rgb_array`` or None.
@@ -114,25 +133,28 @@ class HandMotionEnv(PoseEnv):
 
     def __init__(
         self,
-        gesture: str | GestureConfig = "slow",
+        gesture: str | GestureConfig | None = None,
         drive: DriveKind = "dynamic",
-        sensors: str | SensorPreset | SensorSuite = "xsens-mtw-awinda",
+        sensors: str | SensorPreset | SensorSuite | None = None,
         rate: float | None = None,
         duration: float | None = None,
         lever_arm: Sequence[float] = (0.0, 0.0, 0.0),
         mounting: Sequence[float] = (1.0, 0.0, 0.0, 0.0),
         *,
+        device: str | HandDevice = "imu",
         magnetometer: bool | float | None = None,
-        sampling: Sampling = "interval",
+        sampling: Sampling | None = None,
         randomise: bool | HandVariation = False,
         score: str = "orientation",
         render_mode: str | None = None,
     ) -> None:
-        gesture_config(gesture)
+        held = hand_device(device)
+        gesture = hand_gesture(gesture, held)
+        config = gesture_config(gesture)
         check_duration(duration)
         if drive not in ("dynamic", "kinematic"):
             raise ValueError(f"drive must be 'dynamic' or 'kinematic', got {drive!r}")
-        suite = hand_suite(sensors, rate, magnetometer, sampling)
+        suite = hand_suite(sensors, rate, magnetometer, sampling, held)
         quantity = choose_quantity(score, (ORIENTATION, RELATIVE_ORIENTATION))
         super().__init__(suite, quantity, suite.rate, render_mode)
         self._suite = suite
@@ -140,7 +162,12 @@ class HandMotionEnv(PoseEnv):
         self.mounting = Mounting(vector("lever_arm", lever_arm, 3), vector("mounting", mounting, 4))
         variation = HandVariation() if randomise is True else randomise
         self.variation = variation or HandVariation(0.0, 0.0, 0.0)
-        self.device = Device()
+        self.hand_device, self.device, self._sensors = held, Device() if held is None else held.body, sensors
+        if held is not None:
+            check_planar(held, config, self.mounting)
+            if held.planar and self.variation.mounting:
+                raise ValueError("randomise must leave the mounting of a planar device as it is (mounting=0)")
+        self._array: AccelerometerArray | None = None
         self._drive: Drive | None = None
         self._episode_mounting = self.mounting
         self._before: BodyState | None = None
@@ -148,6 +175,8 @@ class HandMotionEnv(PoseEnv):
     def begin(self, motion: np.random.Generator, sensors: np.random.Generator, options: Mapping[str, Any]) -> int:
         """Draw gesture, mounting and sensor errors."""
         config = gesture_config(options.get("gesture", self.gesture))
+        if self.hand_device is not None:
+            check_planar(self.hand_device, config, self.mounting)
         duration = config.duration if self.duration is None else self.duration
         # a child of its own, so that the variation does not change the gesture
         setting = motion.spawn(1)[0]
@@ -155,6 +184,7 @@ class HandMotionEnv(PoseEnv):
         self._episode_mounting, mass_factor = self.variation.draw(self.mounting, setting)
         self._ready_drive().start(gesture, mass_factor)
         self._suite.reset(sensors)
+        self._array = built_array(self.hand_device, self._sensors, sensors)
         self._before = None
         return ticks_of(duration, self.rate) - 1
 
@@ -171,16 +201,16 @@ class HandMotionEnv(PoseEnv):
         """Move the device on and let the sensors see it."""
         drive = self._ready_drive()
         states = drive.advance(min(most, drive.block))
-        block, self._before = sense(self._suite, states, self._episode_mounting, self._before)
+        block, self._before = sense(self._suite, states, self._episode_mounting, self._before, self._array)
         return block
 
     def save_source(self) -> Any:
-        """Drive, mounting and the last state."""
-        return self._ready_drive().save(), self._episode_mounting, self._before
+        """Drive, mounting, the last state, and the array as it is built."""
+        return self._ready_drive().save(), self._episode_mounting, self._before, self._array
 
     def restore_source(self, saved: Any) -> None:
         """Undo :meth:`save_source`."""
-        drive, self._episode_mounting, self._before = saved
+        drive, self._episode_mounting, self._before, self._array = saved
         self._ready_drive().restore(drive)
 
     def make_scene(self, gui: bool) -> Scene:
