@@ -50,17 +50,29 @@ def load_array(source: str | Path) -> AccelerometerArray:
     return read_array({"name": path.stem} | described)
 
 
-def describe_array(array: AccelerometerArray) -> list[dict[str, Any]]:
-    """What the readings of an array determine: a row for each entry of z, for :mod:`poise.scripts.tables`.
+UNITS = {"P": "m/s²", "T": "rad/s²", "C": "rad²/s²"}
+"""Of the entries of z, by block."""
+
+
+def describe_array(array: AccelerometerArray, deviation: float = 1.0) -> list[dict[str, Any]]:
+    """What the readings of an array determine: a row for each entry of z.
+
+    Args:
+        array: which.
+        deviation: σ_a of one accelerometer, m/s².
 
     Returns:
-        Rows with ``quantity``, ``unit`` of its standard deviation per m/s² of noise, ``determined`` and ``noise gain``
-        (None where it is not determined).
+        Rows with ``quantity``, ``determined``, ``deviation`` (of its estimate; None where it is not determined) and its
+        ``unit``.
     """
-    units = {"P": "1", "T": "1/m", "C": "1/m"}
-    unit_of = [units[block] for block, part in array.blocks.items() for _ in range(part.stop - part.start)]
-    columns = zip(array.components, unit_of, array.determined, array.noise_gains, strict=True)
+    unit_of = [UNITS[block] for block, part in array.blocks.items() for _ in range(part.stop - part.start)]
+    columns = zip(array.components, array.determined, array.noise_gains, unit_of, strict=True)
     return [
-        {"quantity": name, "determined": bool(known), "noise gain": float(gain) if known else None, "unit": unit}
-        for name, unit, known, gain in columns
+        {
+            "quantity": name,
+            "determined": bool(known),
+            "deviation": float(deviation * gain) if known else None,
+            "unit": unit,
+        }
+        for name, known, gain, unit in columns
     ]

@@ -174,8 +174,8 @@ def test_arrays_are_values_and_travel_as_json(tmp_path):
     assert (mine.name, mine.size, mine.rank) == ("mine", 2, 2)
     report = {row["quantity"]: row for row in describe_array(mine)}
     assert report["force_x"]["determined"]
-    assert report["force_x"]["noise gain"] == pytest.approx(math.sqrt(0.5))
-    assert report["alpha_y"]["noise gain"] is None
+    assert report["force_x"]["deviation"] == pytest.approx(math.sqrt(0.5))
+    assert report["alpha_y"]["deviation"] is None
     assert not OCTA.A.flags.writeable
 
 

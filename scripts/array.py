@@ -1,0 +1,58 @@
+"""What an array of accelerometers can tell: rank, condition number and noise gains of each quantity."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import dataclass
+
+import tyro
+
+from .main import run_command
+
+
+@dataclass
+class Args:
+    """Arguments of ``poise array``."""
+
+    array: tyro.conf.Positional[str]
+    """octa, controller, planar or triaxial; or a JSON file with positions (m) and axes (unit vectors), a row for each
+    accelerometer, and if wanted name and reference (the point whose acceleration is meant)"""
+    deviation: float = 1.0
+    """σ_a of one accelerometer, m/s² per sample; gains are multiplied by it"""
+    json: bool = False
+    """print machine-readable text instead of tables"""
+
+
+def run(args: Args) -> int:
+    """Print the report."""
+    from ..filters.accelerometer_array.array_files import describe_array, load_array
+    from .tables import print_table
+
+    if not 0.0 < args.deviation < math.inf:
+        raise ValueError(f"deviation must be positive and finite (m/s²), got {args.deviation}")
+    array = load_array(args.array)
+    rows = describe_array(array, args.deviation)
+    condition = array.condition_number
+    summary = {
+        "array": array.name,
+        "accelerometers": array.size,
+        "rank": array.rank,
+        "of": array.A.shape[1],
+        "condition number": condition if math.isfinite(condition) else None,
+        "redundancy": array.redundancy,
+    }
+    if args.json:
+        print(json.dumps(summary | {"quantities": rows}))
+        return 0
+    print_table([summary], f"{array.name}: {array.size} accelerometers", digits=4)
+    print_table(rows, f"standard deviations for {args.deviation:g} m/s² of noise a sample")
+    if array.rank < array.A.shape[1]:
+        print("What is not determined needs other sensors (a gyroscope) or a model of the motion.")
+    if array.redundancy == 0:
+        print("No redundancy: the fault of an accelerometer cannot be told from motion.")
+    return 0
+
+
+if __name__ == "__main__":
+    run_command("array")
