@@ -16,6 +16,7 @@ from .estimator import Estimator
 
 SIX = ("imu/gyr", "imu/acc")
 NINE = (*SIX, "imu/mag")
+PLANAR = ("planar/gyr", "array/acc")
 RELATIVE = ("up", "relative_orientation")
 WORLD = ("orientation", "up")
 ARRAY_ORIENTATION = (*WORLD, "angular_rate", "external_acceleration", "virtual_position")
@@ -99,6 +100,41 @@ CATALOGUE: dict[str, Entry] = {
         ARRAY_ORIENTATION,
         "KalmanFilter",
         {"array": "triaxial"},
+    ),
+    "array-rate": Entry(
+        "accelerometer_array.angular_rate:ArrayRate",
+        "filter",
+        "He: angular rate from twelve accelerometers; method=weighted, time-integration, polynomial-roots or parsa",
+        ("array/acc",),
+        ("angular_rate", "angular_rate_covariance", "array-rate/weights"),
+        "Observer",
+    ),
+    "planar-orientation": _filter(
+        "accelerometer_array.planar:PlanarOrientation",
+        "He: angle in a vertical plane; method=extended (on the specific force) or linear (on the tilt angle)",
+        PLANAR,
+        ("planar/angle",),
+    ),
+    "planar-pose": _filter(
+        "accelerometer_array.planar_pose:PlanarPose",
+        "He: complete pose in a vertical plane, from accelerometers alone",
+        PLANAR[1:],
+        ("planar/angle", "planar/angular_rate"),
+    ),
+    "planar-unscented": Entry(
+        "accelerometer_array.planar_unscented:PlanarUnscented",
+        "filter",
+        "He: angle in a vertical plane by the unscented filter of the package filterpy",
+        PLANAR,
+        ("planar/angle",),
+    ),
+    "planar-mean": Entry(
+        "accelerometer_array.planar_mean:PlanarMean",
+        "filter",
+        "He: angle in a vertical plane; method=weighted mean of the other two, integration or tilt",
+        PLANAR,
+        ("planar/angle",),
+        "Observer",
     ),
     "marins": _filter(
         "marins:Marins",

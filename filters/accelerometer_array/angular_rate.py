@@ -175,16 +175,16 @@ class ArrayRate(Recurrence):
     def prior(self, z: Measurement) -> Array:
         """The known rate, w = 1, S = 0; nothing before the first complete readings."""
         a = z[self.array.channel.name]
-        xp = namespace(a)
-        complete = 0.0 * xp.sum(a, axis=-1, keepdims=True)
-        rate = [complete + expand(value, 1) for value in self.initial_rate]
-        start = complete + (z[GYROSCOPE.name] if self.start == "gyroscope" else xp.concat(rate, axis=-1))
+        xp, zero = namespace(a), 0.0 * a[..., :3]
+        start = [zero[..., :1] + expand(value, 1) for value in self.initial_rate]
+        rate = z[GYROSCOPE.name] if self.start == "gyroscope" else xp.concat(start, axis=-1)
+        rate = xp.where(xp.all(xp.isfinite(a), axis=-1)[..., None], rate, xp.nan)
         if self.method != "weighted":
-            return start
-        variance = expand(self.initial_noise**2 / self.accelerometer_noise**2, 1)
-        flat = constant(UNIT.ravel(), a)
-        zero, bias = complete + 0.0 * start, complete + expand(self._bias_ratio(self.bias_noise), 1) * self._spread(a)
-        return xp.concat([start, complete + variance * flat, zero + 1.0, zero, zero, zero, zero, zero, bias], axis=-1)
+            return rate
+        variance = zero[..., :1] + expand(self.initial_noise**2 / self.accelerometer_noise**2, 1)
+        bias = zero + expand(self._bias_ratio(self.bias_noise), 1) * self._spread(a)
+        covariance = variance * constant(UNIT.ravel(), a)
+        return xp.concat([rate, covariance, zero + 1.0, *(zero,) * 5, bias], axis=-1)
 
     def predict(self, x: Array, z: Measurement, previous: Measurement) -> Array:
         """ω_TI (2.15), and Σ' + T."""

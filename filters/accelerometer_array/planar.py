@@ -35,7 +35,7 @@ from .array import PLANAR, AccelerometerArray
 
 PLANAR_GYROSCOPE = Channel("planar/gyr", 1, "rad/s")
 """Angular rate about the normal of the plane, counter-clockwise."""
-PLANAR_ANGLE = Quantity("planar_angle", "angle", 1, "rad")
+PLANAR_ANGLE = Quantity("planar/angle", "angle", 1, "rad")
 """Turn φ of the body's axes against x (right) and y (up) of the plane, counter-clockwise."""
 
 UNKNOWN_ANGLE = math.pi**2 / 3.0
@@ -104,11 +104,14 @@ class PlanarEquations(Equations):
 
     def first(self, z: Measurement) -> tuple[Array, Array]:
         """φ₀ and its variance ``(..., 1)``; NaN while a channel has not spoken."""
-        spoken = sum((0.0 * z[channel.name][..., :1] for channel in self.channels), start=0.0)
-        angle = self.tilt(z) + spoken
-        if self.start == "tilt":
-            return angle, self.tilt_variance(angle)
-        return 0.0 * angle + expand(self.initial_angle, 1), 0.0 * angle + expand(self.initial_noise**2, 1)
+        xp = namespace(*z.values())
+        spoken = xp.all(xp.isfinite(xp.concat([z[channel.name] for channel in self.channels], axis=-1)), axis=-1)
+        angle = self.tilt(z)
+        variance = self.tilt_variance(angle)
+        if self.start == "known":
+            angle = 0.0 * angle + expand(self.initial_angle, 1)
+            variance = 0.0 * variance + expand(self.initial_noise**2, 1)
+        return xp.where(spoken[..., None], angle, xp.nan), variance
 
     def integrated(self, x: Array, z: Measurement, previous: Measurement) -> Array:
         """φ ``(..., 1)`` one interval later, by the mean of two samples of the gyroscope."""

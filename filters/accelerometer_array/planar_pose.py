@@ -28,7 +28,7 @@ from .planar import PLANAR_ANGLE, PlanarEquations
 
 Form = Literal["corrected", "printed-noise", "printed-jacobian"]
 
-PLANAR_RATE = Quantity("planar_rate", "vector", 1, "rad/s")
+PLANAR_RATE = Quantity("planar/angular_rate", "vector", 1, "rad/s")
 """dφ/dt."""
 
 

@@ -70,6 +70,7 @@ def array_moved(estimator: Estimator[Any], seed: int, length: int, dt: float) ->
     return {
         array.channel.name: readings + rng.normal(0.0, 0.02, readings.shape),
         "imu/gyr": rate + rng.normal(0.0, 0.01, rate.shape),
+        "planar/gyr": rate[:, 2:] + rng.normal(0.0, 0.01, (length, 1)),
         "imu/acc": force + rng.normal(0.0, 0.02, force.shape),
         "imu/mag": rotation.rotate_back(orientation, FIELD[None]) + rng.normal(0.0, 0.3, force.shape),
     }
@@ -102,7 +103,7 @@ def ridden(estimator: Estimator[Any], seed: int, length: int, dt: float) -> Data
 
 FAMILIES: tuple[tuple[frozenset[str], Callable[..., Data]], ...] = (
     (frozenset(("imu/gyr", "imu/acc", "imu/mag")), shaken),
-    (frozenset(("array/acc", "imu/gyr", "imu/acc", "imu/mag")), array_moved),
+    (frozenset(("array/acc", "imu/gyr", "planar/gyr", "imu/acc", "imu/mag")), array_moved),
     (frozenset(BICYCLE_CHANNELS), ridden),
 )
 """Channels that a family has, and what makes an example of them; the first family that fits is taken."""
