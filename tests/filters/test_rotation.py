@@ -81,6 +81,12 @@ def test_yaw_pitch_roll_equal_scipy(q):
     same_rotation(rotation.from_euler_zyx(*found), q)
 
 
+def test_x_y_z_angles_equal_scipy(q):
+    found = rotation.to_euler_xyz(q)
+    np.testing.assert_allclose(np.stack(found, axis=-1), scipy_of(q).as_euler("XYZ"), atol=1e-10)
+    same_rotation(rotation.from_euler_xyz(*found), q)
+
+
 def test_slerp_by_exponential_equals_scipy(q):
     a, b = q[0], q[1]
     step = rotation.log(rotation.multiply(rotation.conjugate(a), b))

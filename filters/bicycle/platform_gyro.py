@@ -1,0 +1,156 @@
+r"""References for the two-gyroscope filter: roll from the platform's gyroscope alone, and integration alone.
+
+While a bicycle does not pitch, (5) of the paper (:mod:`.two_gyro`) ties two rates of its own gyroscope to its roll,
+
+    0 = cos φ δω_y − sin φ δω_z,    dφ/dt = δω_x
+
+The body and the camera are not needed for that: what the paper's filter gains by them shows against this one only.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, ClassVar, Self
+
+from ..backend import Array, constant, expand, namespace
+from ..model import Gain, Model, Recurrence
+from ..quantity import Channel, Measurement, Quantity
+from ..rotation import conjugate, exp, from_euler_xyz, multiply, normalize, to_euler_zyx
+from .geometry import RiderGeometry
+from .parameter_matrices import diagonal
+from .relative_sensor import relative_angles
+from .two_gyro_kinematics import SIGNS, platform_rate
+
+DEG = math.pi / 180.0
+ROLL = Quantity("bicycle/roll", "angle", 1, "rad")
+"""Right positive."""
+PLATFORM_GYROSCOPE = Channel("bicycle_imu/gyr", 3, "rad/s")
+
+
+@dataclass(frozen=True)
+class PlatformGyro(Model):
+    """Extended Kalman filter on (8) with (5) as pseudo-measurement: the platform's gyroscope alone.
+
+    State: φ, bias (3, paper's axes: x forward, y right, z down). The pseudo-measurement's noise is that of the
+    gyroscope and the pitch rate of the road; it is white here, so choose ``pitch_rate_noise`` large.
+    """
+
+    gyroscope_noise: float = 0.05 * DEG
+    """rad/s/√Hz (gyroscope 605)"""
+    bias_drift: float = 0.15 * DEG
+    """rad/s: standard deviation of the Markov process (2)"""
+    bias_time: float = 1800.0
+    """s"""
+    pitch_rate_noise: float = 1.0 * DEG
+    """rad/s/√Hz: pitch rate and what else violates (5)"""
+    roll_rate_noise: float = 0.0
+    """rad/s/√Hz on φ: the missing sin χ dψ/dt"""
+    process_scale: float = 1.0
+    """factor on all standard deviations of the process noise"""
+    roll_prior: float = 10.0 * DEG
+    """rad: standard deviation of φ at the start"""
+    initial_roll: float = 0.0
+    """rad"""
+    bias_prior: float = 0.15 * DEG
+    """rad/s: standard deviation at the start"""
+    imu_tilt: float = 10.0 * DEG
+    """rad: how far nose up the gyroscope is mounted"""
+
+    channels: ClassVar[tuple[Channel, ...]] = (PLATFORM_GYROSCOPE,)
+    outputs: ClassVar[tuple[Quantity, ...]] = (ROLL, Quantity("platform-gyro/bias", "vector", 3, "rad/s"))
+    state_size: ClassVar[int] = 4
+    error_size: ClassVar[int] = 4
+    residual_size: ClassVar[int] = 1
+    gains: ClassVar[dict[str, Gain]] = {
+        "process": Gain("process_scale", description="process variance"),
+        "measurement": Gain("pitch_rate_noise", description="variance of what violates the pseudo-measurement"),
+    }
+
+    @classmethod
+    def for_rider(cls, geometry: RiderGeometry, **parameters: Any) -> Self:
+        """The filter for a bicycle: how its sensor is mounted; ``parameters`` are other fields."""
+        return cls(**{"imu_tilt": geometry.bicycle_imu_tilt, **parameters})
+
+    def prior(self, z: Measurement) -> tuple[Array, Array]:
+        """Roll as told, no bias."""
+        known = 0.0 * z["bicycle_imu/gyr"][..., :1]
+        x = namespace(known).concat([expand(self.initial_roll, 1) + known, known, known, known], axis=-1)
+        return x, diagonal([self.roll_prior**2, *[self.bias_prior**2] * 3], known)
+
+    def predict(self, x: Array, z: Measurement, previous: Measurement) -> tuple[Array, Array, Array]:
+        """Equation (8); biases as in (2)."""
+        xp, dt, zero = namespace(x), expand(self.dt, 1), 0.0 * x[..., :1]
+        rate = platform_rate(z["bicycle_imu/gyr"], self.imu_tilt)[..., :1] - x[..., 1:2]
+        kept = 1.0 - self.dt / self.bias_time
+        moved = xp.concat([x[..., :1] + dt * rate, expand(kept, 1) * x[..., 1:]], axis=-1)
+        coupling = constant([[0.0, -1.0, 0.0, 0.0], *[[0.0] * 4] * 3], x) * expand(self.dt, 2)
+        F = diagonal([1.0, kept, kept, kept], zero) + coupling
+        angle = self.dt * (self.gyroscope_noise**2 + self.roll_rate_noise**2)
+        scale = self.process_scale**2
+        bias = 2.0 * self.dt * self.bias_drift**2 / self.bias_time
+        return moved, F, diagonal([scale * angle, *[scale * bias] * 3], zero)
+
+    def residual(self, x: Array, z: Measurement) -> tuple[Array, Array, Array]:
+        """0 − (cos φ δω_y − sin φ δω_z); without a sample it is NaN."""
+        xp = namespace(x)
+        rate = platform_rate(z["bicycle_imu/gyr"], self.imu_tilt) - x[..., 1:]
+        y, w, c, s = rate[..., 1:2], rate[..., 2:], xp.cos(x[..., :1]), xp.sin(x[..., :1])
+        H = xp.concat([-s * y - c * w, 0.0 * c, -c, s], axis=-1)[..., None, :]
+        variance = (self.gyroscope_noise**2 + self.pitch_rate_noise**2) / self.dt
+        return s * w - c * y, H, diagonal([variance], 0.0 * x[..., :1])
+
+    def pose(self, x: Array) -> dict[str, Array]:
+        """Roll; bias in bicycle axes (x forward, y left, z up)."""
+        return {"bicycle/roll": x[..., :1], "platform-gyro/bias": x[..., 1:] * constant(SIGNS, x)}
+
+
+@dataclass(frozen=True)
+class TwoGyroIntegration(Recurrence):
+    """Both gyroscopes integrated, from the first frame of the camera and a roll that is told; nothing corrects.
+
+    The rotation vector of each interval turns platform and body exactly if the axis stays within the interval.
+
+    State: quaternion of the bicycle to a frame that is level at the start (4), of the body to the bicycle (4).
+    """
+
+    initial_roll: float = 0.0
+    """rad: of the bicycle at the start"""
+    imu_tilt: float = 10.0 * DEG
+    """rad: how far nose up the platform's gyroscope is mounted"""
+
+    channels: ClassVar[tuple[Channel, ...]] = (
+        PLATFORM_GYROSCOPE,
+        Channel("trunk_imu/gyr", 3, "rad/s"),
+        Channel("relative/orientation", 4, "1"),
+    )
+    outputs: ClassVar[tuple[Quantity, ...]] = (ROLL, Quantity("two-gyro/relative_angles", "angle", 3, "rad"))
+    state_size: ClassVar[int] = 8
+
+    @classmethod
+    def for_rider(cls, geometry: RiderGeometry, **parameters: Any) -> Self:
+        """The integration for a bicycle: how its sensor is mounted; ``parameters`` are other fields."""
+        return cls(**{"imu_tilt": geometry.bicycle_imu_tilt, **parameters})
+
+    def prior(self, z: Measurement) -> Array:
+        """Roll as told, no pitch, and what the camera sees."""
+        camera = z["relative/orientation"]
+        known = 0.0 * (camera[..., 0] + z["bicycle_imu/gyr"][..., 0] + z["trunk_imu/gyr"][..., 0])
+        roll = from_euler_xyz(expand(self.initial_roll, 0) + known, known, known)
+        return namespace(camera).concat([roll, camera + known[..., None]], axis=-1)
+
+    def predict(self, x: Array, z: Measurement, previous: Measurement) -> Array:
+        """Both turn by the rotation vectors of the interval."""
+        dt = expand(self.dt, 1)
+        platform = platform_rate(z["bicycle_imu/gyr"], self.imu_tilt)
+        turn = exp(dt * platform * constant(SIGNS, x))
+        body = exp(dt * z["trunk_imu/gyr"])
+        relative = multiply(conjugate(turn), multiply(x[..., 4:], body))
+        return namespace(x).concat([normalize(multiply(x[..., :4], turn)), normalize(relative)], axis=-1)
+
+    def pose(self, x: Array) -> dict[str, Array]:
+        """Roll, and the relative angles in the paper's axes."""
+        return {
+            "bicycle/roll": to_euler_zyx(x[..., :4])[2][..., None],
+            "two-gyro/relative_angles": relative_angles(x[..., 4:]),
+        }
