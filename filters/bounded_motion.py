@@ -11,10 +11,9 @@ sample, which describe the interval that they end,
     q ← q ⊗ exp((ω − b) Δt),   v ← v + Δt (q_mid f q_mid* − g e₃)
 
 where q_mid is the attitude in the middle of the interval: integrating with that of its end instead costs half a degree
-at 48 Hz. ``accelerometer_lag`` moves it to where the accelerometer's own filter has the force. With the error
-[δθ (world), δb, δv] and R the matrix of q,
+at 48 Hz. ``accelerometer_lag`` moves it to where the accelerometer's own filter has the force. F and Q are those of
+:mod:`.strapdown`; what is measured is
 
-    F = [[1, −R Δt, 0], [0, 1, 0], [−[R f]× Δt, 0, 1]],   Q = Δt blkdiag(σ_g² 1, σ_b² 1, σ_a² 1)
     0 = v + n,   var n = σ_V² / τ   at every ``correction_interval`` τ
 
 Dividing by τ makes σ_V the same for every rate and interval; as velocity is correlated over time, σ_V is a tuning
@@ -50,9 +49,17 @@ from .quantity import (
     Measurement,
     Quantity,
 )
-from .rotation import exp, level, multiply, normalize, rotate, skew, to_matrix, up_in_body
-
-UNIT = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
+from .rotation import level, normalize, up_in_body
+from .strapdown import (
+    UNIT,
+    accelerated,
+    advance,
+    clipped_inflation,
+    corrected,
+    prior_covariance,
+    process_noise,
+    transition,
+)
 
 
 @dataclass(frozen=True)
@@ -109,45 +116,26 @@ class BoundedMotion(Model):
         xp, f = namespace(z["imu/acc"]), z["imu/acc"]
         q, zero = level(f), 0.0 * f
         x = xp.concat([q, zero, zero, self._external(q, f), zero[..., :2]], axis=-1)
-        one = 1.0 + zero[..., :1]
         deviations = [*[self.tilt_prior] * 3, *[self.bias_prior] * 3, *[self.velocity_prior] * 3]
-        diagonal = xp.concat([one * expand(value**2, 1) for value in deviations], axis=-1)
-        return x, diagonal[..., :, None] * constant([[float(i == j) for j in range(9)] for i in range(9)], f)
+        return x, prior_covariance(deviations, f)
 
     def predict(self, x: Array, z: Measurement, previous: Measurement) -> tuple[Array, Array, Array]:
-        """Strapdown integration in the attitude of the middle of the interval; F and Q as in the head of this file."""
+        """Strapdown integration in the attitude of the middle of the interval."""
         xp = namespace(x)
         q, b, v, f = x[..., :4], x[..., 4:7], x[..., 7:10], z["imu/acc"]
-        dt, dt3 = expand(self.dt, 1), expand(self.dt, 2)
-        turn = dt * (z["imu/gyr"] - b)
-        share = 0.5 - expand(self.accelerometer_lag / self.dt, 1)
-        force = rotate(multiply(q, exp(share * turn)), f)
+        dt = expand(self.dt, 1)
+        after, force = advance(q, dt * (z["imu/gyr"] - b), f, 0.5 - expand(self.accelerometer_lag / self.dt, 1))
         known = xp.less(x[..., 14:15], expand(self.hold, 1))
         one = xp.where(known, 1.0 + 0.0 * q[..., :1], 0.0 * q[..., :1])
-        v = one * (v + dt * (force - expand(self.gravity, 1) * constant([0.0, 0.0, 1.0], x)))
-        unit = constant(UNIT, x) + 0.0 * x[..., :3, None]
-        none = 0.0 * unit
+        v = one * accelerated(v, force, dt, self.gravity)
         keep = one[..., None]
-        F = xp.concat(
-            [
-                xp.concat([unit, -dt3 * to_matrix(q), none], axis=-1),
-                xp.concat([none, unit, none], axis=-1),
-                xp.concat([-keep * dt3 * skew(force), none, keep * unit], axis=-1),
-            ],
-            axis=-2,
-        )
-        spread = expand(self.acceleration_noise**2 * self.dt, 1) * self._inflation(f)
+        F = transition(q, force, expand(self.dt, 2), keep, keep)
+        inflation = clipped_inflation(f, self.accelerometer_range, self.clipped_inflation)
+        spread = expand(self.acceleration_noise**2 * self.dt, 1) * inflation
         lost = expand(self.velocity_prior**2, 1) + 0.0 * spread
-        Q = xp.concat(
-            [
-                xp.concat([expand(self.gyroscope_noise**2 * self.dt, 2) * unit, none, none], axis=-1),
-                xp.concat([none, expand(self.bias_noise**2 * self.dt, 2) * unit, none], axis=-1),
-                xp.concat([none, none, xp.where(known, spread, lost)[..., None] * unit], axis=-1),
-            ],
-            axis=-2,
-        )
-        q = normalize(multiply(q, exp(turn)))
-        return xp.concat([q, b, v, x[..., 10:13], x[..., 13:14] + dt, x[..., 14:]], axis=-1), F, Q
+        spread = xp.where(known, spread, lost)
+        Q = process_noise(self.gyroscope_noise**2 * self.dt, self.bias_noise**2 * self.dt, spread)
+        return xp.concat([after, b, v, x[..., 10:13], x[..., 13:14] + dt, x[..., 14:]], axis=-1), F, Q
 
     def residual(self, x: Array, z: Measurement) -> tuple[Array, Array, Array]:
         """0 = v + n, if the interval is over and there is a sample; else NaN, which corrects nothing."""
@@ -160,8 +148,7 @@ class BoundedMotion(Model):
 
     def retract(self, x: Array, dx: Array) -> Array:
         """The attitude is corrected by a turn in the world, the rest by sums."""
-        q = multiply(exp(dx[..., :3]), x[..., :4])
-        return namespace(x).concat([q, x[..., 4:10] + dx[..., 3:9], x[..., 10:]], axis=-1)
+        return corrected(x, dx)
 
     def finish(self, x: Array, z: Measurement) -> Array:
         """Normalise, remember the external acceleration, reset or advance the clocks."""
@@ -202,13 +189,6 @@ class BoundedMotion(Model):
         brought = xp.all(xp.isfinite(z["imu/acc"]), axis=-1)[..., None]
         over = xp.greater(x[..., 13:14], expand(self.correction_interval - 0.5 * self.dt, 1))
         return xp.logical_and(brought, over)
-
-    def _inflation(self, f: Array) -> Array:
-        """Factor on the variance of the velocity increment ``(..., 1)``."""
-        xp = namespace(f)
-        clipped = xp.any(xp.greater(xp.abs(f), expand(self.accelerometer_range, 1)), axis=-1)[..., None]
-        one = 1.0 + 0.0 * f[..., :1]
-        return xp.where(clipped, one * expand(self.clipped_inflation**2, 1), one)
 
 
 @dataclass(frozen=True)
