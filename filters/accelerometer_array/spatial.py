@@ -22,8 +22,8 @@ white noise that all accelerometers share, so the filter knows how little they s
 Differs from print:
 
 * (5.17), (5.25), (5.30): gravity has the wrong sign there, unless g is the *upward* vector as in the thesis'
-  experiments; ``printed_gravity`` is print, and tips over.
-* (5.29): the derivative of q_i⁺ by ω is +Δt [q_i]×, not −Δt [q_i]×; ``printed_jacobian`` is print, which a gyroscope
+  experiments; ``gravity_sign=-1`` is print, and tips over.
+* (5.29): the derivative of q_i⁺ by ω is +Δt [q_i]×, not −Δt [q_i]×; ``coupling_sign=-1`` is print, which a gyroscope
   hides and which is fatal without.
 * (5.25): R_BOᵀ, as (5.23) and (5.30) have it.
 * ``exact_rotation`` and ``orthonormalise`` (both on by default) are ours: the printed first-order Φ = 1 − Δt [ω]×
@@ -97,10 +97,6 @@ class ArrayOrientation(Model):
     """propagate by the exponential instead of the printed first order (5.26)"""
     orthonormalise: bool = True
     """take the nearest rotation matrix after every correction"""
-    printed_gravity: bool = False
-    """the sign of gravity as printed in (5.17), (5.25), (5.30); for tests of the erratum"""
-    printed_jacobian: bool = False
-    """the sign of ∂q⁺/∂ω as printed in (5.29); for tests of the erratum"""
     start: Literal["samples", "given"] = "samples"
     """``samples``: at rest, from the first readings and field; ``given``: :attr:`start_orientation`"""
     field: Literal["start", "given"] = "start"
@@ -138,6 +134,10 @@ class ArrayOrientation(Model):
     """K_d,v of the virtual controller, 1/s; our choice"""
     gravity: float = 9.81
     """g, m/s²"""
+    gravity_sign: float = 1.0
+    """−1 expects gravity of the readings as (5.17), (5.25), (5.30) print it; to show the erratum"""
+    coupling_sign: float = 1.0
+    """−1 takes ∂q⁺/∂ω as (5.29) prints it; to show the erratum"""
 
     outputs: ClassVar[tuple[Quantity, ...]] = (ORIENTATION, UP, ANGULAR_RATE, EXTERNAL_ACCELERATION, VIRTUAL_POSITION)
     state_size: ClassVar[int] = 27
@@ -226,11 +226,14 @@ class ArrayOrientation(Model):
         turn = dt * rate
         back = exp_matrix(-turn) if self.exact_rotation else unit - skew(turn)
         turned = Q @ back.mT
-        # a row after the turn depends on ω as if it had been turned by the middle of the interval
-        half = exp_matrix(0.5 * turn) if self.exact_rotation else unit
-        lever = [dt2 * skew(Q[..., index, :]) for index in range(3)]
-        lever = [back @ block @ half for block in lever] if self.exact_rotation else lever
-        lever = [-block for block in lever] if self.printed_jacobian else lever
+        # a row after the turn depends on ω by its place in the middle of the interval, turned on
+        if self.exact_rotation:
+            half = exp_matrix(-0.5 * turn)
+            middle = Q @ half.mT
+            lever = [half @ skew(middle[..., row, :]) for row in range(3)]
+        else:
+            lever = [skew(Q[..., row, :]) for row in range(3)]
+        lever = [expand(self.coupling_sign * self.dt, 2) * block for block in lever]
         F = block_matrix(
             [[*(back if row == column else none for column in range(3)), none, lever[row]] for row in range(3)]
             + [[none, none, none, unit, none], [none, none, none, dt2 * unit, unit]],
@@ -250,7 +253,7 @@ class ArrayOrientation(Model):
         if self.method != "integration":
             # in place order: array, gyroscope, magnetometer, zeros
             P, T, C = (constant(matrix, x) for matrix in (self.geometry.A_P, self.geometry.A_T, self.geometry.A_C))
-            gravity = expand(-self.gravity if self.printed_gravity else self.gravity, 2)
+            gravity = expand(self.gravity_sign * self.gravity, 2)
             rate = x[..., 12:15]
             expected = P @ (gravity * x[..., 6:9, None]) + T @ x[..., 9:12, None] + C @ products(rate)[..., None]
             r.append(z[self.readings.name] - expected[..., 0])
