@@ -18,6 +18,8 @@ SIX = ("imu/gyr", "imu/acc")
 NINE = (*SIX, "imu/mag")
 PLANAR = ("planar/gyr", "array/acc")
 RELATIVE = ("up", "relative_orientation")
+TWO_GYRO = ("bicycle_imu/gyr", "trunk_imu/gyr", "relative/orientation")
+TWO_GYRO_ANGLES = ("bicycle/roll", "two-gyro/relative_angles")
 WORLD = ("orientation", "up")
 ARRAY_ORIENTATION = (*WORLD, "angular_rate", "external_acceleration", "virtual_position")
 
@@ -141,6 +143,26 @@ CATALOGUE: dict[str, Entry] = {
         "Marins et al. 2001: quaternion by Gauss-Newton, then a Kalman filter",
         NINE,
         (*WORLD, "angular_rate"),
+    ),
+    "two-gyro": _filter(
+        "bicycle.two_gyro:TwoGyro",
+        "Zhang et al.: roll of a bicycle, attitude of the trunk; two gyroscopes and a camera; model=sigma1 or sigma2",
+        TWO_GYRO,
+        (*TWO_GYRO_ANGLES, "two-gyro/body_up", "trunk_imu/gyroscope_bias", "two-gyro/platform_bias"),
+    ),
+    "two-gyro-integration": _reference(
+        "bicycle.platform_gyro:TwoGyroIntegration",
+        "both gyroscopes integrated, nothing else",
+        TWO_GYRO,
+        TWO_GYRO_ANGLES,
+    ),
+    "platform-gyro": Entry(
+        "bicycle.platform_gyro:PlatformGyro",
+        "reference",
+        "roll from the bicycle's gyroscope alone: pitch rate near zero as pseudo-measurement",
+        TWO_GYRO[:1],
+        ("bicycle/roll", "platform-gyro/bias"),
+        "KalmanFilter",
     ),
     "gyroscope-integration": _reference(
         "references:GyroscopeIntegration", "gyroscope alone, from the first inclination", SIX, RELATIVE

@@ -28,3 +28,11 @@ def diagonal(entries: Sequence[Any], zero: Array) -> Array:
     size = len(entries)
     unit = constant([[float(row == column) for column in range(size)] for row in range(size)], zero)
     return values(entries, zero)[..., None] * unit
+
+
+def zero_where_known(*samples: Array) -> Array:
+    """Zeros ``(*batch, 1)`` where all of the samples ``(*batch, n)`` are there, else NaN: a prior waits for them."""
+    xp = namespace(*samples)
+    joined = xp.concat(samples, axis=-1)
+    found = xp.all(xp.isfinite(joined), axis=-1)[..., None]
+    return xp.where(found, xp.zeros_like(joined[..., :1]), xp.nan)

@@ -18,7 +18,7 @@ from ..model import Gain, Model, Recurrence
 from ..quantity import Channel, Measurement, Quantity
 from ..rotation import conjugate, exp, from_euler_xyz, multiply, normalize, to_euler_zyx
 from .geometry import RiderGeometry
-from .parameter_matrices import diagonal
+from .parameter_matrices import diagonal, zero_where_known
 from .relative_sensor import relative_angles
 from .two_gyro_kinematics import SIGNS, platform_rate
 
@@ -74,7 +74,7 @@ class PlatformGyro(Model):
 
     def prior(self, z: Measurement) -> tuple[Array, Array]:
         """Roll as told, no bias."""
-        known = 0.0 * z["bicycle_imu/gyr"][..., :1]
+        known = zero_where_known(z["bicycle_imu/gyr"])
         x = namespace(known).concat([expand(self.initial_roll, 1) + known, known, known, known], axis=-1)
         return x, diagonal([self.roll_prior**2, *[self.bias_prior**2] * 3], known)
 
@@ -135,9 +135,9 @@ class TwoGyroIntegration(Recurrence):
     def prior(self, z: Measurement) -> Array:
         """Roll as told, no pitch, and what the camera sees."""
         camera = z["relative/orientation"]
-        known = 0.0 * (camera[..., 0] + z["bicycle_imu/gyr"][..., 0] + z["trunk_imu/gyr"][..., 0])
-        roll = from_euler_xyz(expand(self.initial_roll, 0) + known, known, known)
-        return namespace(camera).concat([roll, camera + known[..., None]], axis=-1)
+        known = zero_where_known(*(z[channel.name] for channel in self.channels))
+        roll = from_euler_xyz(expand(self.initial_roll, 0) + known[..., 0], known[..., 0], known[..., 0])
+        return namespace(camera).concat([roll, camera + known], axis=-1)
 
     def predict(self, x: Array, z: Measurement, previous: Measurement) -> Array:
         """Both turn by the rotation vectors of the interval."""

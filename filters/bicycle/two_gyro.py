@@ -32,7 +32,7 @@ from ..model import Gain, Model
 from ..quantity import Channel, Measurement, Quantity
 from ..rotation import rotate_back, wrap
 from .geometry import Point, RiderGeometry
-from .parameter_matrices import diagonal, times, values, zeros
+from .parameter_matrices import diagonal, times, values, zero_where_known, zeros
 from .platform_gyro import ROLL
 from .relative_sensor import MarkerPlaces, marker_distances, relative_angles, relative_orientation
 from .two_gyro_kinematics import (
@@ -228,7 +228,7 @@ class TwoGyro(Model):
         """θ of the first frame (or the usual posture, if distances are measured), everything else as told."""
         xp = namespace(*z.values())
         camera, count = z[self.channels[2].name], self.platform_rates
-        known = 0.0 * (camera[..., :1] + sum(z[channel.name][..., :1] for channel in self.channels[:2]))
+        known = zero_where_known(*(z[channel.name] for channel in self.channels))
         if self.sensor == "orientation":
             theta, spread = relative_angles(camera), self.orientation_noise
         else:
@@ -253,7 +253,10 @@ class TwoGyro(Model):
         """Measured less expected, y − h(θ), wrapped if it is an angle (16); H = [0 ∂h/∂θ 0]."""
         xp, y = namespace(x), z[self.channels[2].name]
         if self.sensor == "orientation":
-            r = wrap(relative_angles(y) - x[..., 1:4])
+            # what is missing is replaced before the angles are formed: a NaN in them would make gradients NaN
+            seen = xp.all(xp.isfinite(y), axis=-1)[..., None]
+            angles = relative_angles(xp.where(seen, y, constant([1.0, 0.0, 0.0, 0.0], x)))
+            r = xp.where(seen, wrap(angles - x[..., 1:4]), xp.nan)
             slope, spread = diagonal([1.0] * 3, 0.0 * x[..., :1]), self.orientation_noise
         else:
             distances, slope = marker_distances(x[..., 1:4], MarkerPlaces(self.pivot, self.markers, self.viewpoints))
