@@ -133,9 +133,10 @@ class Marins(Model):
         turned = multiply(q, exp(turn))
         zero = 0.0 * x[..., :1]
         decay = xp.exp(zero - expand(self.dt / self.rate_time, 1))
-        # the quaternion of half the turn stands in for the derivative of the exponential: exact to third order
-        half = multiply(q, exp(0.5 * turn))
-        lever = _columns([0.5 * expand(self.dt, 1) * multiply(half, _basis(index, half)) for index in (1, 2, 3)])
+        # a change of ω acts in the middle of the turn: exact to second order in Δt ω
+        half = exp(0.5 * turn)
+        axes = (multiply(multiply(multiply(q, half), _basis(index, q)), half) for index in (1, 2, 3))
+        lever = _columns([0.5 * expand(self.dt, 1) * axis for axis in axes])
         right = _columns([multiply(_basis(index, q), exp(turn)) for index in range(4)])
         three, none = _unit(3, x) + 0.0 * zero[..., None], 0.0 * lever
         F = block_matrix([[decay[..., None] * three, none.mT], [lever, right]])
