@@ -42,11 +42,12 @@ from typing import ClassVar, Literal, get_args
 import numpy as np
 
 from ..backend import Array, constant, expand, namespace
+from ..linear_algebra import solve_positive
 from ..model import Recurrence
 from ..quantity import ANGULAR_RATE, GYROSCOPE, Channel, Measurement, Quantity
 from .array import OCTA, AccelerometerArray
 from .products import product_jacobian, products, symmetric
-from .symmetric_matrix import diagonal, largest_eigenpair, solve_symmetric
+from .symmetric_matrix import diagonal, largest_eigenpair
 
 Method = Literal["weighted", "time-integration", "polynomial-roots", "parsa"]
 Variant = Literal["sound", "corrected", "printed"]
@@ -106,7 +107,7 @@ def parsa_step(rate: Array, xi: Array) -> Array:
     """ω + (∂ξ/∂ω)⁺ (ξ̂ − ξ(ω)) ``(..., 3)``, equation (A.4)."""
     K = product_jacobian(rate)
     right = K.mT @ (xi - products(rate))[..., None]
-    return rate + solve_symmetric(K.mT @ K + RIDGE * constant(UNIT, rate), right[..., 0])
+    return rate + solve_positive(K.mT @ K + RIDGE * constant(UNIT, rate), right[..., 0])
 
 
 @dataclass(frozen=True)

@@ -1,9 +1,8 @@
-r"""Symmetric 3 × 3 matrices without branches: largest eigenvalue with its vector, and linear systems.
+r"""Largest eigenvalue of a symmetric 3 × 3 matrix with its vector, without branches and for every array namespace.
 
-Array namespaces differ in what linear algebra they have (the tracer has none), so that what the methods of this folder
-need is written out. Eigenvalues come from a fixed number of sweeps of Jacobi rotations: unlike the trigonometric
-formula, whose vectors are lost where two eigenvalues meet, they are exact to rounding for every matrix, and straight
-code all the same. Each rotation makes one element zero with
+It comes from a fixed number of sweeps of Jacobi rotations: unlike the trigonometric formula, whose vectors are lost
+where two eigenvalues meet, these are exact to rounding for every matrix, and straight code all the same. Each rotation
+makes one element zero with
 
     t = 2 a_pq / (d + sign(d) √(d² + 4 a_pq²)),   d = a_qq − a_pp,   c = 1/√(1 + t²),   s = t c
 
@@ -66,26 +65,6 @@ def _rotate(
     new[p] = [c * one - s * other for one, other in zip(vectors[p], vectors[q], strict=True)]
     new[q] = [s * one + c * other for one, other in zip(vectors[p], vectors[q], strict=True)]
     return turned, new
-
-
-def solve_symmetric(matrix: Array, vector: Array) -> Array:
-    """Solution ``(..., 3)`` of ``matrix @ x = vector`` for positive definite ``(..., 3, 3)``, by L D Lᵀ.
-
-    Only the lower triangle is read. A matrix that is not positive definite gives numbers without meaning or NaN.
-    """
-    xp = namespace(matrix, vector)
-    d0 = matrix[..., 0, 0]
-    l10, l20 = matrix[..., 1, 0] / d0, matrix[..., 2, 0] / d0
-    d1 = matrix[..., 1, 1] - l10 * matrix[..., 1, 0]
-    e21 = matrix[..., 2, 1] - l10 * matrix[..., 2, 0]
-    l21 = e21 / d1
-    d2 = matrix[..., 2, 2] - l20 * matrix[..., 2, 0] - l21 * e21
-    y0 = vector[..., 0]
-    y1 = vector[..., 1] - l10 * y0
-    y2 = vector[..., 2] - l20 * y0 - l21 * y1
-    x2 = y2 / d2
-    x1 = y1 / d1 - l21 * x2
-    return xp.stack([y0 / d0 - l10 * x1 - l20 * x2, x1, x2], axis=-1)
 
 
 def diagonal(vector: Array) -> Array:

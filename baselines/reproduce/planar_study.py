@@ -1,0 +1,158 @@
+"""Orientation in a vertical plane: the comparison of chapter 3 of the thesis, on the environment's planar controller.
+
+P. He, "Estimating the orientation of a game controller from inertial and magnetic measurements", thesis, Université
+Laval. Motions are ``planar-walk`` and ``infinity``, noises the thesis'; functions return rows that JSON can hold, for
+:class:`~poise.baselines.reproduce.study.Study`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from ...envs.controller_gestures import Walk
+from ...envs.hand_sensing import simulate_hand
+from ...envs.trajectory import Trajectory
+from ...filters import metrics
+from ...filters.accelerometer_array.planar import PLANAR_ANGLE
+from ...filters.accelerometer_array.planar_pose import PLANAR_RATE
+from ...filters.catalogue import make
+from ...filters.estimator import run
+from ...filters.rotation import wrap
+
+RATE = 100.0
+"""Hz"""
+DURATION = 100.0
+"""s of a run, as in the thesis"""
+DROPPED = 5.0
+"""s at the start that are not scored"""
+WITHIN = np.deg2rad(10.0)
+"""the share of samples whose error is below is reported"""
+
+MOTIONS: Mapping[str, float] = {
+    "planar-walk": float(np.sqrt(Walk(planar=True).acceleration_variance)),
+    "infinity": 10.0,
+}
+"""Gesture → σ_b̈ that filters are told, m/s² per axis: the walk's is white and of this size (3.58); that of the ∞ is
+correlated (3.5 and 7 m/s² rms), so it is told to be larger"""
+
+
+@dataclass(frozen=True)
+class Way:
+    """One way of estimating: a name for tables, a name of the zoo, and parameters."""
+
+    name: str
+    estimator: str
+    parameters: Mapping[str, Any] = field(default_factory=dict)
+
+
+WAYS = (
+    Way("time integration", "planar-mean", {"method": "integration"}),
+    Way("tilt", "planar-mean", {"method": "tilt"}),
+    Way("mean, literal", "planar-mean", {"wrapped": False}),
+    Way("mean, wrapped difference", "planar-mean"),
+    Way("linear filter, literal", "planar-orientation", {"method": "linear", "wrapped": False}),
+    Way("linear filter, wrapped difference", "planar-orientation", {"method": "linear"}),
+    Way("extended filter", "planar-orientation"),
+    Way("unscented filter", "planar-unscented"),
+    Way("complete pose", "planar-pose"),
+    Way("complete pose, jerks of 10", "planar-pose", {"angular_jerk": 10.0, "jerk": 10.0}),
+    Way("complete pose, printed R", "planar-pose", {"form": "printed-noise"}),
+    Way("complete pose, printed H", "planar-pose", {"form": "printed-jacobian"}),
+)
+"""What is compared"""
+INFLATIONS = (10.0, 30.0, 100.0, 300.0, 1000.0)
+"""(m/s²)²: values of R on the ∞"""
+
+
+def moved(seed: int, motion: str, duration: float = DURATION) -> Trajectory:
+    """The planar controller on a motion, from a second at rest."""
+    return simulate_hand(motion, seed, rate=RATE, duration=duration, device="planar")
+
+
+def planar_errors(seed: int, motion: str, duration: float = DURATION) -> list[dict[str, Any]]:
+    """Errors of every way on one motion.
+
+    Returns:
+        A row for each of :data:`WAYS`: ``way``, ``motion``, ``seed``; ``rms`` and ``largest`` in degrees, ``within``,
+        the share of samples within 10°; ``rate``, the rms error of ω in rad/s (None if it is not estimated).
+    """
+    trajectory = moved(seed, motion, duration)
+    return [_row(trajectory, way, motion, seed) | {"way": way.name} for way in WAYS]
+
+
+def _row(trajectory: Trajectory, way: Way, motion: str, seed: int, **parameters: Any) -> dict[str, Any]:
+    told = {"inertial_acceleration": MOTIONS[motion]} | dict(way.parameters) | parameters
+    pose = run(make(way.estimator, dt=1.0 / RATE, **told), trajectory.measurements).pose
+    scored = trajectory.time >= DROPPED
+    truth = trajectory.truth
+    error = metrics.error(PLANAR_ANGLE, pose[PLANAR_ANGLE.name], truth[PLANAR_ANGLE.name])[scored]
+    rate = None
+    if PLANAR_RATE.name in pose:
+        rate_error = metrics.error(PLANAR_RATE, pose[PLANAR_RATE.name], truth[PLANAR_RATE.name])[scored]
+        rate = float(metrics.rms(rate_error))
+    return {
+        "motion": motion,
+        "seed": seed,
+        "rms": float(np.rad2deg(metrics.rms(error))),
+        "largest": float(np.rad2deg(error.max())),
+        "within": float(np.mean(error < WITHIN)),
+        "rate": rate,
+    }
+
+
+def inflation_errors(seed: int, duration: float = DURATION) -> list[dict[str, Any]]:
+    """Rows as above of the extended filter on the ∞, for each value of R in :data:`INFLATIONS` (``R``)."""
+    trajectory, way = moved(seed, "infinity", duration), WAYS[6]
+    row = partial(_row, trajectory, way, "infinity", seed)
+    return [row(inertial_acceleration=float(np.sqrt(R))) | {"R": R} for R in INFLATIONS]
+
+
+def unscented_difference(seed: int, motion: str, duration: float = 20.0) -> float:
+    """Largest difference between the unscented and the extended filter, degrees."""
+    trajectory = moved(seed, motion, duration)
+    told = {"dt": 1.0 / RATE, "inertial_acceleration": MOTIONS[motion]}
+    angles = [
+        run(make(name, **told), trajectory.measurements).pose[PLANAR_ANGLE.name]
+        for name in ("planar-orientation", "planar-unscented")
+    ]
+    return float(np.rad2deg(np.abs(wrap(angles[0] - angles[1])).max()))
+
+
+def planar_table(rows: Iterable[dict[str, Any]], key: str = "way") -> list[dict[str, Any]]:
+    """Means over the seeds, a row for each motion and each way (or another ``key`` of the rows)."""
+    rows = list(rows)
+    table = []
+    for motion in MOTIONS:
+        for name in dict.fromkeys(row[key] for row in rows):
+            found = [row for row in rows if row["motion"] == motion and row[key] == name]
+            if found:
+                rates = [row["rate"] for row in found if row["rate"] is not None]
+                table.append(
+                    {
+                        "motion": motion,
+                        "method" if key == "way" else key: name,
+                        "rms (°)": float(np.mean([row["rms"] for row in found])),
+                        "largest rms of a seed (°)": max(row["rms"] for row in found),
+                        "largest error (°)": float(np.mean([row["largest"] for row in found])),
+                        "within 10°": float(np.mean([row["within"] for row in found])),
+                        "ω (rad/s)": float(np.mean(rates)) if rates else None,
+                    }
+                )
+    return table
+
+
+def planar_curves(seed: int, motion: str, duration: float = DURATION, every: int = 10) -> dict[str, Any]:
+    """Errors over time as in Figures 3.5, 3.6, 3.9, 3.10 and 3.12: name → list in degrees, for a figure."""
+    trajectory = moved(seed, motion, duration)
+    curves: dict[str, Any] = {"time": trajectory.time[::every].tolist()}
+    for way in WAYS:
+        told = {"inertial_acceleration": MOTIONS[motion]} | dict(way.parameters)
+        angle = run(make(way.estimator, dt=1.0 / RATE, **told), trajectory.measurements).pose[PLANAR_ANGLE.name]
+        error = wrap(angle - trajectory.truth[PLANAR_ANGLE.name])
+        curves[way.name] = np.rad2deg(error[::every, 0]).tolist()
+    return curves
