@@ -56,19 +56,10 @@ from .rider_linkage import (
     paper_axes,
     seat_moments,
 )
+from .whole_body_blocks import BLOCKS, assemble, row_of, unit
 
 RATE, ACCELERATION_OF_RATE, SEAT_FORCE = slice(22, 25), slice(25, 28), slice(28, 31)
 SPEED, SHOCK = slice(31, 32), slice(32, 33)
-BLOCKS = (
-    ROLL,
-    YAW_ACCELERATION,
-    TRUNK,
-    RELATIVE_ACCELERATION,
-    SHOULDER["right"],
-    HIP["right"],
-    SHOULDER["left"],
-    HIP["left"],
-)
 CONSTRAINTS = ("C1", "C2", "C3", "C5", "C6", "C7")
 TURNING, SITTING = seat_moments(USUAL)
 
@@ -197,8 +188,7 @@ class WholeBody(RiderLinkage, Model):
         deviations = [self.roll_prior, self.yaw_acceleration_deviation, *[self.trunk_prior] * 3]
         deviations += [*[self.relative_acceleration_deviation] * 3, *[self.limb_prior] * 12]
         diagonal = xp.concat([1.0 + zero * 0.0 + expand(value**2 - 1.0, 1) for value in deviations], axis=-1)
-        unit = constant([[float(i == j) for j in range(ERROR_SIZE)] for i in range(ERROR_SIZE)], zero)
-        return x, diagonal[..., :, None] * unit
+        return x, diagonal[..., :, None] * unit(zero, ERROR_SIZE)
 
     def _seat_force(self, z: Measurement, rate: Array, change: Array) -> Array:
         """f: specific force at the trunk's pivot ``(..., 3)``, from the bicycle's accelerometer."""
@@ -225,9 +215,9 @@ class WholeBody(RiderLinkage, Model):
         for index, part, time, deviation in memories:
             keep = xp.exp(-(dt / time) * one)
             parts[index] = keep * x[..., part]
-            unit = _unit(x, part.stop - part.start)
-            F[index, index] = keep[..., None] * unit
-            Q[index, index] = expand(deviation**2, 2) * (1.0 - keep * keep)[..., None] * unit
+            F[index, index] = keep[..., None] * unit(x, part.stop - part.start)
+            spread = expand(deviation**2, 2) * (1.0 - keep * keep)[..., None]
+            Q[index, index] = spread * unit(x, part.stop - part.start)
         steps: dict[int, Rates] = {}
         joints = [(2, "zxy", TRUNK, trunk, bicycle)]
         for side, (arm, leg) in zip(SIDES, ((4, 5), (6, 7)), strict=True):
@@ -247,7 +237,7 @@ class WholeBody(RiderLinkage, Model):
             Q[column, row] = Q[row, column].mT
         angles = xp.concat([parts[index] for index in range(len(BLOCKS))], axis=-1)
         memory = self._remember(x, z, now["bicycle_imu/gyr"])
-        return xp.concat([angles, memory], axis=-1), _assemble(F, x), _assemble(Q, x)
+        return xp.concat([angles, memory], axis=-1), assemble(F, x), assemble(Q, x)
 
     def _remember(self, x: Array, z: Measurement, rate: Array) -> Array:
         """Encoders, rate and its derivative, f, speed, shock: what the measurement equations need of held samples."""
@@ -301,10 +291,9 @@ class WholeBody(RiderLinkage, Model):
         )
         rows += self._held(x, z)
         r = xp.concat([row[0] for row in rows], axis=-1)
-        H = xp.concat([_row(row[1], x) for row in rows], axis=-2)
+        H = xp.concat([row_of(row[1], x) for row in rows], axis=-2)
         variances = xp.concat([row[2] + zero for row in rows], axis=-1)
-        unit = constant([[float(i == j) for j in range(len(rows))] for i in range(len(rows))], x)
-        return r, H, variances[..., :, None] * unit
+        return r, H, variances[..., :, None] * unit(x, len(rows))
 
     def _calm(self, x: Array) -> Array:
         """Factor ``(..., 1)`` on variances: 1, more during a shock."""
@@ -374,31 +363,3 @@ class WholeBody(RiderLinkage, Model):
     def retract(self, x: Array, dx: Array) -> Array:
         """Angles and accelerations are corrected by a sum; what is remembered stays."""
         return namespace(x).concat([x[..., :ERROR_SIZE] + dx, x[..., ERROR_SIZE:]], axis=-1)
-
-
-def _unit(x: Array, size: int) -> Array:
-    return constant([[float(i == j) for j in range(size)] for i in range(size)], x) + 0.0 * x[..., :1, None]
-
-
-def _assemble(blocks: dict[tuple[int, int], Array], x: Array) -> Array:
-    """A matrix ``(..., 20, 20)`` from blocks by index of row and column; the rest is zero."""
-    xp = namespace(x)
-    bands = []
-    for i, row in enumerate(BLOCKS):
-        height = 0.0 * x[..., row, None]
-        band = [
-            blocks[i, j] if (i, j) in blocks else height + constant([[0.0] * (column.stop - column.start)], x)
-            for j, column in enumerate(BLOCKS)
-        ]
-        bands.append(xp.concat(band, axis=-1))
-    return xp.concat(bands, axis=-2)
-
-
-def _row(by: dict[int, Array], x: Array) -> Array:
-    """A row ``(..., 1, 20)`` of H from its parts by block."""
-    zero = 0.0 * x[..., :1, None]
-    parts = [
-        by[i] + zero if i in by else zero + constant([[0.0] * (block.stop - block.start)], x)
-        for i, block in enumerate(BLOCKS)
-    ]
-    return namespace(x).concat(parts, axis=-1)
