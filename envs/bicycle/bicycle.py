@@ -26,6 +26,10 @@ from .urdf import Tree
 
 AIR_DENSITY = 1.2
 """kg/m³"""
+BRAKED_SHARE = 0.7
+"""1: part of the friction limit that a brake uses at most"""
+BRAKE_FADE = 0.1
+"""m/s at which a brake has lost a quarter of its force"""
 WHEELS = ("rear_wheel", "front_wheel")
 BICYCLE_LINKS = ("rear_frame", "rear_wheel", "front_assembly", "front_wheel", "crank")
 
@@ -135,6 +139,7 @@ class Bicycle:
         self._wheels = self.body.index(WHEELS)
         self._driven = [self.links[name] for name in ("rear_wheel", "crank") if name in self.links]
         self._joints = [self.links["front_assembly"], *self._driven]
+        self._turned = [self.links["front_assembly"], *self._wheels, *self._driven[1:]]
         self.own_links = [self.links[name] for name in BICYCLE_LINKS if name in self.links]
         own = [name for name in BICYCLE_LINKS if name in self.links]
         self.own_masses = np.array([self.body.masses[name] for name in own])
@@ -229,8 +234,9 @@ class Bicycle:
         crank_torque: float = 0.0,
         joints: Sequence[int] = (),
         torques: Sequence[float] = (),
+        brake: float = 0.0,
     ) -> None:
-        """Apply tyre forces, chain, air drag and joint torques for the next step.
+        """Apply tyre forces, chain, brakes, air drag and joint torques for the next step.
 
         Args:
             steer_torque: N·m between rear frame and front assembly, left positive.
@@ -238,6 +244,7 @@ class Bicycle:
             crank_torque: N·m between rear frame and crank, forward positive, besides the chain's.
             joints: further joints to drive (a rider's), by the links below them.
             torques: N·m on these.
+            brake: wanted force (N, not negative) of both brakes at the ground, see :meth:`brake_torques`.
         """
         body = self.body
         for number, (link, state) in enumerate(zip(self._wheels, body.link_tuples(self._wheels), strict=True)):
@@ -253,13 +260,36 @@ class Bicycle:
             speed = math.sqrt(velocity[0] ** 2 + velocity[1] ** 2 + velocity[2] ** 2)
             factor = -0.5 * AIR_DENSITY * self.parameters.drag_area * speed
             body.push(BASE, [factor * part for part in velocity], position)
-        if self.drivetrain is None:
-            body.drive_joints([*self._joints, *joints], [steer_torque, wheel_torque, *torques])
-            return
-        (wheel, wheel_rate), (crank, crank_rate) = body.joint_tuples(self._driven)
-        pull = self.drivetrain.torque(crank, crank_rate, wheel, wheel_rate)
-        own = (steer_torque, wheel_torque + pull, crank_torque - self.ratio * pull)
-        body.drive_joints([*self._joints, *joints], [*own, *torques])
+        rear, front = self.brake_torques(brake) if brake > 0.0 else (0.0, 0.0)
+        own = [steer_torque, wheel_torque + rear, front]
+        if self.drivetrain is not None:
+            (wheel, wheel_rate), (crank, crank_rate) = body.joint_tuples(self._driven)
+            pull = self.drivetrain.torque(crank, crank_rate, wheel, wheel_rate)
+            own[1] += pull
+            own.append(crank_torque - self.ratio * pull)
+        body.drive_joints([*self._turned, *joints], [*own, *torques])
+
+    def brake_torques(self, force: float) -> tuple[float, float]:
+        """Torques (N·m, not positive) of the brakes on rear and front wheel that together brake with a force (N).
+
+        They share it as the wheels share the weight while slowing down. Each lets go before its wheel would skid, and
+        fades below walking pace: brakes hold wheels, they do not turn them back.
+        """
+        wheels = (self.parameters.rear_wheel, self.parameters.front_wheel)
+        height, wheelbase = self._centre[2], self.parameters.wheelbase
+        ahead = (self._centre[0] + force / (self._total_mass * self.physics.gravity) * height) / wheelbase
+        found = []
+        for part, wheel, tyre, state, (_, rate) in zip(
+            (1.0 - ahead, ahead),
+            wheels,
+            self.tyres,
+            self.tyre_forces,
+            self.body.joint_tuples(self._wheels),
+            strict=True,
+        ):
+            held = min(max(0.0, part) * force, BRAKED_SHARE * tyre.parameters.friction * state.load)
+            found.append(-held * wheel.radius * max(0.0, math.tanh(rate * wheel.radius / BRAKE_FADE)))
+        return found[0], found[1]
 
     def shift(self) -> None:
         """Let the rider change the gear where the cadence asks for it."""

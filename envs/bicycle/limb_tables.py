@@ -16,7 +16,7 @@ STEERS = np.linspace(-0.6, 0.6, POINTS)
 """rad at which the arms' posture is tabulated"""
 CRANKS = np.linspace(0.0, 2.0 * math.pi, POINTS)
 """rad at which that of the legs is"""
-SHOULDERS_FOLLOW = 0.25
+SHOULDERS_FOLLOW = 0.45
 """part of the steering angle by which the trunk twists, so that the outer hand stays within reach"""
 STRAIGHTEST = 0.985
 """part of the straight arm's length that an arm is stretched to"""

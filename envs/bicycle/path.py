@@ -119,6 +119,9 @@ def wandering_path(
     size: tuple[float, float] = (50.0, 40.0),
     smallest_radius: float = 4.0,
     start: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    *,
+    widest_radius: float | None = None,
+    shortest_leg: float = 0.0,
 ) -> Path:
     """A random ride inside a rectangle around the origin, from one random goal to the next.
 
@@ -128,25 +131,47 @@ def wandering_path(
         size: of the rectangle, m.
         smallest_radius: of the turns, m.
         start: x, y (m) and heading (rad) of the first point.
+        widest_radius: the radius of each turn is drawn between both, and less wide where a wall is near, m; None for
+            the smallest always.
+        shortest_leg: from one goal to the next, m.
 
     Raises:
-        ValueError: a rectangle narrower than four turns.
+        ValueError: a rectangle narrower than four turns or half a leg, or radii that are not ordered.
     """
-    if not 4.0 * smallest_radius <= min(size) and smallest_radius > 0.0:
+    if not (4.0 * smallest_radius <= min(size) and smallest_radius > 0.0):
         raise ValueError(f"a rectangle of {size} m has no room for turns of {smallest_radius} m")
+    widest = smallest_radius if widest_radius is None else widest_radius
+    if not smallest_radius <= widest < math.inf:
+        raise ValueError(f"widest_radius must be at least {smallest_radius} m and finite, got {widest_radius}")
+    inner = 0.5 * np.array(size) - 1.3 * smallest_radius
+    # from everywhere a corner of the inner rectangle is at least this far away
+    if not 0.0 <= shortest_leg <= 0.95 * math.hypot(*inner):
+        raise ValueError(f"shortest_leg must lie in [0, {0.95 * math.hypot(*inner):.0f}] m, got {shortest_leg}")
     x, y, heading = start
-    inner = 0.5 * np.array(size) - 1.2 * smallest_radius
-    goal = rng.uniform(-inner, inner)
-    largest, curvature = 1.0 / smallest_radius, 0.0
+
+    def next_goal() -> tuple[np.ndarray, float]:
+        goal = rng.uniform(-inner, inner)
+        while math.hypot(goal[0] - x, goal[1] - y) < shortest_leg:
+            goal = rng.uniform(-inner, inner)
+        room = float((0.5 * np.array(size) - np.abs([x, y])).min())
+        if widest == smallest_radius:
+            return goal, smallest_radius
+        return goal, max(smallest_radius, min(float(rng.uniform(smallest_radius, widest)), 0.4 * room))
+
+    # the run-up has taken room already
+    goal, radius, curvature = next_goal()[0], smallest_radius, 0.0
     values = np.empty(max(2, math.ceil(length / SPACING) + 1))
     for index in range(len(values)):
         values[index] = curvature
         dx, dy = float(goal[0]) - x, float(goal[1]) - y
         if dx * dx + dy * dy < (1.2 * smallest_radius) ** 2:
-            goal = rng.uniform(-inner, inner)
+            goal, radius = next_goal()
         bearing = math.remainder(math.atan2(dy, dx) - heading, 2.0 * math.pi)
         # a ride begins straight
-        sharpest = largest * min(1.0, index * SPACING / RUN_UP)
+        sharpest = min(1.0, index * SPACING / RUN_UP) / radius
+        # near a wall, or to a goal inside the circle of the present turn, only turning more helps
+        if dx * dx + dy * dy < (2.0 * radius) ** 2 or abs(x) > inner[0] or abs(y) > inner[1]:
+            sharpest = max(sharpest, min(1.0, index * SPACING / RUN_UP) / smallest_radius)
         wanted = max(-sharpest, min(sharpest, 0.5 * bearing))
         # a rider turns the bar over a metre or two
         curvature += (wanted - curvature) * SPACING / 1.2

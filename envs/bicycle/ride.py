@@ -127,8 +127,8 @@ class Ride:
             self._control()
         self._count += 1
         torques, crank = rider.act()
-        brake = min(0.0, self.pilot.command[1] + COASTING) * bicycle.parameters.rear_wheel.radius
-        bicycle.act(0.0, brake, crank, rider.joints, torques)
+        brake = max(0.0, -self.pilot.command[1] - COASTING)
+        bicycle.act(0.0, 0.0, crank, rider.joints, torques, brake)
         self.physics.step()
 
     def _control(self) -> None:

@@ -40,10 +40,13 @@ MEAN_STROKE = 2.0 * (1.0 / math.pi + DOWNSTROKE)
 """mean of both legs' strength over a turn"""
 KEEPING_UP = 4.0
 """N·m/(rad/s) on the crank, towards the wheel's pace"""
-LEAN_SUPPORT, LEAST_PRESS = 1.0, 0.2
-"""1: part of the leaning trunk's weight moment that the inner hand props; part of the load that the outer one keeps"""
+LEAN_SUPPORT, LEAST_PRESS, MOST_PRESS = 1.0, 0.2, 3.0
+"""1: part of the leaning trunk's weight moment that the hands prop; parts of the load that the outer hand keeps, and that
+the inner one takes at most"""
 LARGEST_PEDAL_FORCE = 450.0
 """N"""
+USUAL_MASS = 68.0
+"""kg: of the rider for whom a style's load of the hands is meant; others lean on them in proportion"""
 
 
 @dataclass(frozen=True)
@@ -57,6 +60,7 @@ class RiderMemory:
     applied: tuple[float, ...]
     crank_torque: float
     hands: tuple[tuple[float, float, float], ...]
+    braced: float
 
 
 def _into_trunk(angles, force):  # type: ignore[no-untyped-def]
@@ -101,8 +105,9 @@ class Rider:
         self._elbow_weight = STANDARD_GRAVITY * float(share)
         self._trunk_moment = trunk.mass * float(trunk.centre[2])
         self._axis = axis.tolist()
-        # N along the steering axis, on one hand and off the other, that carry the trunk's moment lying on its side
-        self._prop = LEAN_SUPPORT * STANDARD_GRAVITY * self._trunk_moment / (2.0 * abs(float(arm[1])) * float(axis[2]))
+        # N along the steering axis, on one hand or off the other, that carry the trunk's moment lying on its side
+        self._prop = LEAN_SUPPORT * STANDARD_GRAVITY * self._trunk_moment / (abs(float(arm[1])) * float(axis[2]))
+        self._load_scale = posture.body.mass / USUAL_MASS
         # how far ahead of the lumbar joint the hands press down
         self._press_arm = float(posture.bicycle.grip[0] - posture.lumbar[0])
         self.constraints: list[int] = []
@@ -153,6 +158,7 @@ class Rider:
         self._applied = list(self._torques)
         self._crank_torque = 0.0
         self._hands = [(0.0, 0.0, 0.0), (0.0, 0.0, 0.0)]
+        self._braced = 0.0
         if not self.full:
             return
         step = 1e-5
@@ -191,15 +197,17 @@ class Rider:
         self._trunk_target = [self.posture.flexion + float(change[0]), float(change[1]), float(change[2]) + follow]
         steer_torque += unsteady
         c, s = math.cos(state.steer), math.sin(state.steer)
-        strength, load = 0.5 * steer_torque / self._grip_arm, self.motion.style.hand_load
-        # a rider who leans props on the inner hand, along the steering axis so that the bar does not turn
+        strength, load = 0.5 * steer_torque / self._grip_arm, self._load_scale * self.motion.style.hand_load
+        # a rider who leans props on the inner hand and eases the outer one, along the steering axis: no turn of the bar
         prop = self._prop * math.sin(self._trunk_target[1])
-        most = (1.0 - LEAST_PRESS) * load
-        prop = max(-most, min(most, prop))
+        eased = min(0.5 * abs(prop), (1.0 - LEAST_PRESS) * load)
+        pressed = min(abs(prop) - eased, (MOST_PRESS - 1.0) * load)
+        props = (pressed, -eased) if prop < 0.0 else (-eased, pressed)
+        self._braced = self._press_arm * (len(SIDES) * load + (pressed - eased) * self._axis[2])
         hands = []
-        for (pull, turned), side in zip(self._pulls, SIDES, strict=True):
+        for (pull, turned), on in zip(self._pulls, props, strict=True):
             x, y, z = (strength * (c * a + s * b) for a, b in zip(pull, turned, strict=True))
-            ax, ay, az = (SIGNS[side] * prop * a for a in self._axis)
+            ax, ay, az = (-on * a for a in self._axis)
             hands.append((x + ax, y + ay, z + az - load))
         self._hands = hands
         ratio = self.bicycle.ratio
@@ -244,7 +252,7 @@ class Rider:
             torques[index] += TRUNK_STIFFNESS * (self._trunk_target[index] - angle) - TRUNK_DAMPING * rate
         # a rider knows the weight of the own trunk, and braces against what the hands press
         torques[0] -= gravity * self._trunk_moment * math.sin(felt[0][0])
-        torques[0] += len(SIDES) * self.motion.style.hand_load * self._press_arm
+        torques[0] += self._braced
         for index, target in enumerate(self._swivel):
             if self.full:
                 angle, rate = felt[3 + index]
@@ -351,6 +359,7 @@ class Rider:
             tuple(self._applied),
             self._crank_torque,
             tuple(self._hands),
+            self._braced,
         )
 
     def restore(self, memory: RiderMemory) -> None:
@@ -358,4 +367,4 @@ class Rider:
         self._torques, self._trunk_target = list(memory.torques), list(memory.trunk)
         self._swivel, self._crank_torque = list(memory.swivel), memory.crank_torque
         self._wanted_swivel, self._applied = list(memory.wanted_swivel), list(memory.applied)
-        self._hands = list(memory.hands)
+        self._hands, self._braced = list(memory.hands), memory.braced

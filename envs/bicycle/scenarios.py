@@ -21,10 +21,11 @@ class SpeedProfile:
     Args:
         levels: m/s, one every ``hold`` seconds.
         hold: s.
+        dwell: part of ``hold`` in which a level stays before the next begins.
     """
 
-    def __init__(self, levels: np.ndarray, hold: float = 10.0) -> None:
-        self.levels, self.hold = np.atleast_1d(levels).astype(float), hold
+    def __init__(self, levels: np.ndarray, hold: float = 10.0, dwell: float = 0.0) -> None:
+        self.levels, self.hold, self.dwell = np.atleast_1d(levels).astype(float), hold, dwell
 
     @property
     def mean(self) -> float:
@@ -36,7 +37,7 @@ class SpeedProfile:
         place = max(0.0, time / self.hold)
         index = min(int(place), len(self.levels) - 1)
         following = min(index + 1, len(self.levels) - 1)
-        part = min(1.0, place - index)
+        part = max(0.0, min(1.0, (place - index - self.dwell) / (1.0 - self.dwell)))
         blend = 0.5 - 0.5 * math.cos(math.pi * part)
         return float(self.levels[index] + blend * (self.levels[following] - self.levels[index]))
 
@@ -79,7 +80,10 @@ def _steady_speed(rng: np.random.Generator, duration: float, low: float, high: f
 
 
 def _varied_speed(rng: np.random.Generator, duration: float, low: float, high: float, hold: float) -> SpeedProfile:
-    return SpeedProfile(rng.uniform(low, high, max(2, math.ceil(duration / hold) + 1)), hold)
+    """Levels from the whole range, each part of it once, in random order."""
+    size = max(2, math.ceil(duration / hold) + 1)
+    parts = (rng.permutation(size) + rng.uniform(size=size)) / size
+    return SpeedProfile(low + (high - low) * parts, hold, dwell=0.5)
 
 
 def _flat(rng: np.random.Generator, path: Path, speed: SpeedProfile) -> Ground:
@@ -123,7 +127,8 @@ def _circle(rng: np.random.Generator, length: float) -> Path:
 
 
 def _wander(rng: np.random.Generator, length: float) -> Path:
-    return wandering_path(rng, length, start=(0.0, 0.0, float(rng.uniform(-math.pi, math.pi))))
+    start = (0.0, 0.0, float(rng.uniform(-math.pi, math.pi)))
+    return wandering_path(rng, length, start=start, widest_radius=12.0, shortest_leg=20.0)
 
 
 def _nudged(rng: np.random.Generator, length: float) -> Path:
@@ -159,7 +164,7 @@ SCENARIOS = {
         Scenario(
             "outdoor",
             "an arbitrary path in 50 × 40 m at 0.5 to 6 m/s on uneven paving",
-            partial(_varied_speed, low=0.7, high=6.0, hold=12.0),
+            partial(_varied_speed, low=0.5, high=6.2, hold=10.0),
             _wander,
             partial(_paving, deviation=0.0015),
         ),
