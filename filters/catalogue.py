@@ -20,6 +20,17 @@ PLANAR = ("planar/gyr", "array/acc")
 RELATIVE = ("up", "relative_orientation")
 TWO_GYRO = ("bicycle_imu/gyr", "trunk_imu/gyr", "relative/orientation")
 TWO_GYRO_ANGLES = ("bicycle/roll", "two-gyro/relative_angles")
+LIMBS = tuple(f"{part}_{side}" for part in ("upper_arm", "thigh") for side in ("right", "left"))
+WHOLE_BODY = (
+    *(f"{place}/gyr" for place in ("bicycle_imu", "trunk_imu", *LIMBS)),
+    *("bicycle_imu/acc", "trunk_imu/acc", "seat/load_cells", "wheel/speed", "steer/angle", "crank/angle"),
+)
+WHOLE_BODY_ANGLES = (
+    "bicycle/roll",
+    "trunk/angles",
+    *(f"{joint}_{side}/angles" for side in ("right", "left") for joint in ("shoulder", "hip")),
+    *(f"{joint}_{side}/flexion" for side in ("right", "left") for joint in ("elbow", "knee")),
+)
 WORLD = ("orientation", "up")
 ARRAY_ORIENTATION = (*WORLD, "angular_rate", "external_acceleration", "virtual_position")
 
@@ -163,6 +174,18 @@ CATALOGUE: dict[str, Entry] = {
         TWO_GYRO[:1],
         ("bicycle/roll", "platform-gyro/bias"),
         "KalmanFilter",
+    ),
+    "whole-body": _filter(
+        "bicycle.whole_body:WholeBody",
+        "Liu, Pan et al.: a rider's trunk, arms and legs from six gyroscopes and what hands and feet hold",
+        WHOLE_BODY,
+        WHOLE_BODY_ANGLES,
+    ),
+    "whole-body-integration": _reference(
+        "bicycle.whole_body_integration:WholeBodyIntegration",
+        "the same gyroscopes integrated, nothing else",
+        WHOLE_BODY,
+        WHOLE_BODY_ANGLES,
     ),
     "gyroscope-integration": _reference(
         "references:GyroscopeIntegration", "gyroscope alone, from the first inclination", SIX, RELATIVE
