@@ -14,15 +14,19 @@ from .two_gyro_kinematics import in_paper_axes, platform_rate
 
 
 def true_angles(
-    truth: Mapping[str, np.ndarray], body: Literal["trunk", "disk"] = "trunk", imu_tilt: float = 10.0 * DEG
+    truth: Mapping[str, np.ndarray],
+    body: Literal["trunk", "disk"] = "trunk",
+    imu_tilt: float = 10.0 * DEG,
+    used_axes: tuple[int, ...] = (0, 2),
 ) -> dict[str, np.ndarray]:
     """Quantity of :class:`.two_gyro.TwoGyro` → ``(T, size)``.
 
     Args:
         truth: ``bicycle/orientation`` and ``<body>/orientation`` ``(T, 4)``, body to world; with
-            ``bicycle_imu/gyroscope_bias`` ``(T, 3)`` the platform's biases (of Σ2) are given too.
+            ``bicycle_imu/gyroscope_bias`` ``(T, 3)`` the platform's biases are given too.
         body: what the second gyroscope is on.
         imu_tilt: rad, how far nose up the platform's gyroscope is mounted.
+        used_axes: of the platform's biases, :attr:`.two_gyro.TwoGyro.used_axes`.
 
     Raises:
         ValueError: an orientation is missing.
@@ -41,7 +45,7 @@ def true_angles(
     }
     if "bicycle_imu/gyroscope_bias" in truth:
         bias = in_paper_axes(platform_rate(np.asarray(truth["bicycle_imu/gyroscope_bias"], dtype=float), imu_tilt))
-        angles["two-gyro/platform_bias"] = bias[..., [0, 2]]
+        angles["two-gyro/platform_bias"] = bias[..., list(used_axes)]
     return angles
 
 

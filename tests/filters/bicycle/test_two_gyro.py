@@ -234,6 +234,9 @@ def test_the_vertical_and_the_biases_are_in_the_axes_of_the_sensors():
         ("trunk_imu/gyroscope_bias", [0, 1, 2], "trunk_imu/gyroscope_bias"),
         ("two-gyro/platform_bias", [0, 2], "bicycle_imu/gyroscope_bias"),
     ):
+        np.testing.assert_allclose(
+            true_angles(ride.truth, imu_tilt=0.0).get(name, ride.truth[truth]), ride.truth[truth][:, axes], atol=1e-12
+        )
         error = estimate.pose[name][-1] - ride.truth[truth][-1][axes]
         np.testing.assert_allclose(error, 0.0, atol=0.15 * DEG)
 
