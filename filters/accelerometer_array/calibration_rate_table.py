@@ -1,0 +1,192 @@
+r"""Scale and offset of accelerometers and gyroscopes from a one-axis rate table.
+
+P. He, "Estimating the orientation of a game controller from inertial and magnetic measurements", thesis, Université
+Laval; chapter 4. The table turns at constant rates ω about the vertical. An accelerometer with the raw reading v,
+sensitive axis e and place r from the axis of the table obeys
+
+    μ v + η = eᵀ Ω² r − eᵀ Qᵀ g,   Ω² = diag(−ω², −ω², 0)          ⇒          μ v + η + ω² ρ = g e_up
+
+e_up is the part of e that points up: 0 with a horizontal axis, 1 with an upright one. Of r only ρ, the coordinate along
+the horizontal part of e, can be observed. So the unknowns are μ, η and one ρ for each way of mounting the device: four
+with the thesis' two directions and one upright pose.
+
+Differs from print: (4.1), (4.2) have the sign of gravity of an axis that points down; (4.5) takes all of r for unknown,
+which makes the normal matrix singular (rank 3 of 5); in (4.6) the sign of the second position is that of the opposite
+coordinate. Without an upright pose only ratios are determined; the columns are scaled before they are solved for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+SINGULAR = 1e-5
+"""Smallest singular value, relative to the largest, of columns of unit length that are still told apart."""
+UPRIGHT = 0.999
+"""An axis whose upward part is at least that is upright: it has no horizontal part, and no position is seen."""
+
+
+@dataclass(frozen=True)
+class AxisCalibration:
+    """One sensitive axis: calibrated value = scale · raw + offset."""
+
+    scale: float
+    """μ, m/s² (gyroscope: rad/s) per unit of the raw reading"""
+    offset: float
+    """η, m/s² (rad/s)"""
+    positions: Mapping[str, float]
+    """mounting → ρ, m along the sensor's axis from the axis of the table, signed; empty for gyroscopes"""
+    residual: float
+    """root mean square of what is left, m/s² (rad/s)"""
+    largest: float
+    """its largest value, m/s² (rad/s)"""
+    samples: int
+    """how many were used"""
+    discarded: int
+    """how many were saturated"""
+
+
+def calibrate_accelerometer(
+    raw: np.ndarray,
+    rate: np.ndarray,
+    mounting: np.ndarray,
+    upward: Mapping[str, float],
+    *,
+    gravity: float = 9.80665,
+    saturation: float | None = None,
+) -> AxisCalibration:
+    """Calibrate one accelerometer.
+
+    Args:
+        raw: ``(T,)`` readings at constant rates, any unit; NaN is left out.
+        rate: ``(T,)`` rate of the table, rad/s.
+        mounting: ``(T,)`` name of the way in which the device was fixed to the table.
+        upward: mounting → part of the sensitive axis that pointed up, −1 to 1.
+        gravity: m/s².
+        saturation: magnitude of raw readings from which on they are discarded; None: only those that stick to the end
+            of the range (constant, and equal at different rates) are.
+
+    Raises:
+        ValueError: shapes that differ, a mounting that ``upward`` does not know, too few samples, or poses that do not
+            determine scale, offset and positions; the message says which are missing.
+    """
+    raw, rate, mounting = _columns(raw, rate, mounting)
+    names = sorted(set(mounting.tolist()))
+    unknown = [name for name in names if name not in upward]
+    if unknown:
+        raise ValueError(f"upward must name every mounting, it lacks {unknown}")
+    kept = np.isfinite(raw)
+    lost = saturated(raw, rate, mounting, saturation) & kept
+    kept &= ~lost
+    if not kept.any():
+        raise ValueError("every sample is saturated or missing: repeat with lower rates or a smaller radius")
+    raw, rate, mounting = raw[kept], rate[kept], mounting[kept]
+    up = np.array([upward[name] for name in mounting.tolist()])
+    horizontal = [name for name in names if (mounting == name).any() and abs(upward[name]) < UPRIGHT]
+    if not (np.abs(up) > 0.05).any():
+        raise ValueError(
+            "no pose in which the axis points up (or down): without one only ratios of scale, offset and position are "
+            "determined"
+        )
+    for name in horizontal:
+        speeds = np.unique(np.round(rate[mounting == name] ** 2, 6))
+        if len(speeds) < 2:
+            raise ValueError(f"mounting {name!r} needs at least two different rates to tell its position, got 1")
+    columns = [raw, np.ones_like(raw), *(rate**2 * (mounting == name) for name in horizontal)]
+    labels = ["scale", "offset", *(f"position {name}" for name in horizontal)]
+    solution = _least_squares(np.stack(columns, axis=-1), gravity * up, labels)
+    left = np.stack(columns, axis=-1) @ solution - gravity * up
+    return AxisCalibration(
+        float(solution[0]),
+        float(solution[1]),
+        dict(zip(horizontal, solution[2:].tolist(), strict=True)),
+        float(np.sqrt(np.mean(left**2))),
+        float(np.abs(left).max()),
+        len(raw),
+        int(lost.sum()),
+    )
+
+
+def calibrate_gyroscope(raw: np.ndarray, rate: np.ndarray, *, saturation: float | None = None) -> AxisCalibration:
+    """Calibrate one axis of a gyroscope that stands upright on the table: ω = μ v + η by linear least squares.
+
+    Args:
+        raw: ``(T,)`` readings at constant rates, any unit; NaN is left out.
+        rate: ``(T,)`` rate of the table about the sensitive axis, rad/s.
+        saturation: as of :func:`calibrate_accelerometer`; the thesis discards what lies beyond ±275 °/s.
+
+    Raises:
+        ValueError: shapes that differ, or fewer than three different rates that are not saturated.
+    """
+    everywhere = np.full(np.shape(raw), "")
+    raw, rate, everywhere = _columns(raw, rate, everywhere)
+    kept = np.isfinite(raw)
+    lost = saturated(raw, rate, everywhere, saturation) & kept
+    kept &= ~lost
+    raw, rate = raw[kept], rate[kept]
+    rates = np.unique(np.round(rate, 6))
+    if len(rates) < 3:
+        raise ValueError(f"at least three different rates that are not saturated are needed, got {len(rates)}")
+    columns = np.stack([raw, np.ones_like(raw)], axis=-1)
+    solution = _least_squares(columns, rate, ["scale", "offset"])
+    left = columns @ solution - rate
+    return AxisCalibration(
+        float(solution[0]),
+        float(solution[1]),
+        {},
+        float(np.sqrt(np.mean(left**2))),
+        float(np.abs(left).max()),
+        len(raw),
+        int(lost.sum()),
+    )
+
+
+def saturated(raw: np.ndarray, rate: np.ndarray, mounting: np.ndarray, limit: float | None) -> np.ndarray:
+    """Which readings ``(T,)`` are at the end of the range: beyond ``limit``, or stuck.
+
+    Stuck is a rate of the table at which every reading is the largest (or smallest) one of the mounting, where another
+    rate gives that as well, or where the readings of other rates show noise.
+    """
+    if limit is not None:
+        return np.abs(raw) >= limit
+    result = np.zeros(len(raw), bool)
+    for name in set(mounting.tolist()):
+        here = np.isfinite(raw) & (mounting == name)
+        steps = [here & (rate == one) for one in np.unique(rate[here])]
+        noisy = np.mean([np.ptp(raw[step]) > 0.0 for step in steps]) > 0.5 if steps else False
+        for end in (np.max, np.min):
+            stuck = [step for step in steps if (raw[step] == end(raw[here])).all()]
+            speeds = {abs(float(rate[step][0])) for step in stuck}
+            several = len(speeds) > 1 or (noisy and all(step.sum() >= 5 for step in stuck))
+            if stuck and several and len(stuck) < len(steps):
+                limit_reached = end(raw[here])
+                # a rate that touches the end now and then has a mean that is cut off as well
+                result |= np.any([step for step in steps if (raw[step] == limit_reached).any()], axis=0)
+    return result
+
+
+def _columns(raw: np.ndarray, rate: np.ndarray, mounting: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    raw, rate, mounting = np.asarray(raw, dtype=float), np.asarray(rate, dtype=float), np.asarray(mounting)
+    if raw.ndim != 1 or rate.shape != raw.shape or mounting.shape != raw.shape:
+        raise ValueError(
+            f"raw, rate and mounting must be columns of one length, got {raw.shape}, {rate.shape}, {mounting.shape}"
+        )
+    if not np.isfinite(rate).all():
+        raise ValueError("rate must be finite in every row")
+    return raw, rate, mounting
+
+
+def _least_squares(columns: np.ndarray, right: np.ndarray, labels: list[str]) -> np.ndarray:
+    """Solve with columns of unit length; refuse what is not determined."""
+    if len(columns) < len(labels):
+        raise ValueError(f"{len(labels)} unknowns need at least as many samples, got {len(columns)}")
+    lengths = np.linalg.norm(columns, axis=0)
+    if not (lengths > 0.0).all():
+        nothing = [label for label, length in zip(labels, lengths, strict=True) if not length > 0.0]
+        raise ValueError(f"the data say nothing about {nothing}")
+    values = np.linalg.svd(columns / lengths, compute_uv=False)
+    if values[-1] < SINGULAR * values[0]:
+        raise ValueError(f"the data do not tell {', '.join(labels)} apart (singular normal matrix): add rates or poses")
+    return np.linalg.lstsq(columns / lengths, right, rcond=None)[0] / lengths
