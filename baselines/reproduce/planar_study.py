@@ -21,7 +21,7 @@ from ...filters import metrics
 from ...filters.accelerometer_array.planar import PLANAR_ANGLE
 from ...filters.accelerometer_array.planar_pose import PLANAR_RATE
 from ...filters.catalogue import make
-from ...filters.estimator import run
+from ...filters.estimator import Estimator, run
 from ...filters.rotation import wrap
 
 RATE = 100.0
@@ -33,12 +33,21 @@ DROPPED = 5.0
 WITHIN = np.deg2rad(10.0)
 """the share of samples whose error is below is reported"""
 
-MOTIONS: Mapping[str, float] = {
-    "planar-walk": float(np.sqrt(Walk(planar=True).acceleration_variance)),
-    "infinity": 10.0,
+WALK_ACCELERATION = float(np.sqrt(Walk(planar=True).acceleration_variance))
+"""m/s² per axis (3.58)"""
+MOTIONS: Mapping[str, Mapping[str, Mapping[str, float]]] = {
+    "planar-walk": {
+        "planar-mean": {"inertial_acceleration": WALK_ACCELERATION},
+        "planar-orientation": {"inertial_acceleration": WALK_ACCELERATION},
+        "planar-unscented": {"inertial_acceleration": WALK_ACCELERATION},
+        "planar-pose": {"jerk": WALK_ACCELERATION * RATE, "acceleration_decay": 3.0 * RATE},
+    },
+    "infinity": {"planar-mean": {"inertial_acceleration": 30.0}},
 }
-"""Gesture → σ_b̈ that filters are told, m/s² per axis: the walk's is white and of this size (3.58); that of the ∞ is
-correlated (3.5 and 7 m/s² rms), so it is told to be larger"""
+"""Gesture → name of the zoo → what a filter is told of the motion. The walk's acceleration is white. That of the ∞ is
+correlated (3.5 and 7 m/s² rms), so what takes it for white is told more: by default 10 m/s²; the mean 30."""
+THESIS_POSE = {"angular_jerk": 100.0, "jerk": 1000.0, "acceleration_decay": 0.0}
+"""The thesis' model of the complete pose, with jerks of our choice: it gives none"""
 
 
 @dataclass(frozen=True)
@@ -48,6 +57,13 @@ class Way:
     name: str
     estimator: str
     parameters: Mapping[str, Any] = field(default_factory=dict)
+    told_as: str = ""
+    """of which name of the zoo it takes what it is told of the motion; empty for its own"""
+
+    def estimator_for(self, motion: str, **parameters: Any) -> Estimator[Any]:
+        """The estimator, told what :data:`MOTIONS` says unless told otherwise."""
+        told = dict(MOTIONS[motion].get(self.told_as or self.estimator, {})) | dict(self.parameters) | parameters
+        return make(self.estimator, dt=1.0 / RATE, **told)
 
 
 WAYS = (
@@ -55,14 +71,15 @@ WAYS = (
     Way("tilt", "planar-mean", {"method": "tilt"}),
     Way("mean, literal", "planar-mean", {"wrapped": False}),
     Way("mean, wrapped difference", "planar-mean"),
-    Way("linear filter, literal", "planar-orientation", {"method": "linear", "wrapped": False}),
-    Way("linear filter, wrapped difference", "planar-orientation", {"method": "linear"}),
+    Way("linear filter, literal", "planar-orientation", {"method": "linear", "wrapped": False}, "planar-mean"),
+    Way("linear filter, wrapped difference", "planar-orientation", {"method": "linear"}, "planar-mean"),
     Way("extended filter", "planar-orientation"),
     Way("unscented filter", "planar-unscented"),
-    Way("complete pose", "planar-pose"),
-    Way("complete pose, jerks of 10", "planar-pose", {"angular_jerk": 10.0, "jerk": 10.0}),
-    Way("complete pose, printed R", "planar-pose", {"form": "printed-noise"}),
-    Way("complete pose, printed H", "planar-pose", {"form": "printed-jacobian"}),
+    Way("complete pose, thesis", "planar-pose", THESIS_POSE),
+    Way("complete pose, thesis, jerks of 10", "planar-pose", THESIS_POSE | {"angular_jerk": 10.0, "jerk": 10.0}),
+    Way("complete pose, thesis, printed R", "planar-pose", THESIS_POSE | {"form": "printed-noise"}),
+    Way("complete pose, thesis, printed H", "planar-pose", THESIS_POSE | {"form": "printed-jacobian"}),
+    Way("complete pose, acceleration returns to zero", "planar-pose"),
 )
 """What is compared"""
 INFLATIONS = (10.0, 30.0, 100.0, 300.0, 1000.0)
@@ -86,8 +103,7 @@ def planar_errors(seed: int, motion: str, duration: float = DURATION) -> list[di
 
 
 def _row(trajectory: Trajectory, way: Way, motion: str, seed: int, **parameters: Any) -> dict[str, Any]:
-    told = {"inertial_acceleration": MOTIONS[motion]} | dict(way.parameters) | parameters
-    pose = run(make(way.estimator, dt=1.0 / RATE, **told), trajectory.measurements).pose
+    pose = run(way.estimator_for(motion, **parameters), trajectory.measurements).pose
     scored = trajectory.time >= DROPPED
     truth = trajectory.truth
     error = metrics.error(PLANAR_ANGLE, pose[PLANAR_ANGLE.name], truth[PLANAR_ANGLE.name])[scored]
@@ -115,9 +131,8 @@ def inflation_errors(seed: int, duration: float = DURATION) -> list[dict[str, An
 def unscented_difference(seed: int, motion: str, duration: float = 20.0) -> float:
     """Largest difference between the unscented and the extended filter, degrees."""
     trajectory = moved(seed, motion, duration)
-    told = {"dt": 1.0 / RATE, "inertial_acceleration": MOTIONS[motion]}
     angles = [
-        run(make(name, **told), trajectory.measurements).pose[PLANAR_ANGLE.name]
+        run(Way(name, name).estimator_for(motion), trajectory.measurements).pose[PLANAR_ANGLE.name]
         for name in ("planar-orientation", "planar-unscented")
     ]
     return float(np.rad2deg(np.abs(wrap(angles[0] - angles[1])).max()))
@@ -151,8 +166,7 @@ def planar_curves(seed: int, motion: str, duration: float = DURATION, every: int
     trajectory = moved(seed, motion, duration)
     curves: dict[str, Any] = {"time": trajectory.time[::every].tolist()}
     for way in WAYS:
-        told = {"inertial_acceleration": MOTIONS[motion]} | dict(way.parameters)
-        angle = run(make(way.estimator, dt=1.0 / RATE, **told), trajectory.measurements).pose[PLANAR_ANGLE.name]
+        angle = run(way.estimator_for(motion), trajectory.measurements).pose[PLANAR_ANGLE.name]
         error = wrap(angle - trajectory.truth[PLANAR_ANGLE.name])
         curves[way.name] = np.rad2deg(error[::every, 0]).tolist()
     return curves

@@ -10,8 +10,12 @@ x = [φ, ω, α, p, v, b̈] (p, v, b̈ in the plane's axes) is driven by white j
 
 Differs from print: R is printed as σ_a² (AᵀA)⁻¹ (3.44), the covariance of ẑ, though raw readings are compared; the last
 block of H as A_P (3.45). ``form`` brings either back: on smooth motion both are worse by far. p and v cannot be seen in
-accelerations; the sign of ω only through α and φ. White acceleration (a random walk of 30 m/s²) is no motion of this
-model, and the filter is lost on it.
+accelerations; the sign of ω only through α and φ.
+
+In the thesis' model b̈ walks at random, so that nothing ever tells gravity from it: after the start the angle is
+integrated, and drifts; white acceleration of 30 m/s² is no motion of that model at all. Here b̈ returns to zero,
+b̈ ← e^{−λΔt} b̈ (``acceleration_decay`` λ; 0 is the thesis'), which holds the angle. Its standard deviation is then
+σ_β Δt / √(1 − e^{−2λΔt}): 5 m/s² for the defaults.
 """
 
 from __future__ import annotations
@@ -22,7 +26,7 @@ from typing import ClassVar, Literal, get_args
 import numpy as np
 
 from ..backend import Array, constant, expand, namespace, rows
-from ..model import Gain, Model
+from ..model import Gain, Model, with_parameters
 from ..quantity import Channel, Measurement, Quantity
 from .planar import PLANAR_ANGLE, PlanarEquations
 
@@ -41,16 +45,18 @@ class PlanarPose(PlanarEquations, Model):
 
     form: Form = "corrected"
     """``printed-noise``: R of (3.44); ``printed-jacobian``: H of (3.45)"""
-    angular_jerk: float = 100.0
-    """σ_γ, rad/s³ (the thesis gives none)"""
-    jerk: float = 1000.0
-    """σ_β, m/s³ per axis (the thesis gives none)"""
+    angular_jerk: float = 300.0
+    """σ_γ, rad/s³ per sample (the thesis gives none)"""
+    jerk: float = 300.0
+    """σ_β, m/s³ per axis and sample (the thesis gives none)"""
+    acceleration_decay: float = 20.0
+    """λ, 1/s: how fast b̈ is expected to return to zero; 0 is the thesis' model, in which nothing holds the angle"""
     rate_prior: float = 1.0
     """standard deviation of the first ω, rad/s"""
     angular_acceleration_prior: float = 10.0
     """standard deviation of the first α, rad/s²"""
-    acceleration_prior: float = 10.0
-    """standard deviation of the first b̈, m/s² per axis"""
+    acceleration_prior: float = 1.0
+    """standard deviation of the first b̈, m/s² per axis; the first tilt is as wrong"""
 
     outputs: ClassVar[tuple[Quantity, ...]] = (PLANAR_ANGLE, PLANAR_RATE)
     state_size: ClassVar[int] = 9
@@ -82,7 +88,7 @@ class PlanarPose(PlanarEquations, Model):
 
     def prior(self, z: Measurement) -> tuple[Array, Array]:
         """Angle of the start, everything else zero; position and velocity are known to 1 m and 1 m/s."""
-        angle, variance = self.first(z)
+        angle, variance = with_parameters(self, {"inertial_acceleration": self.acceleration_prior}).first(z)
         xp, zero = namespace(angle), 0.0 * angle
         rest = [self.rate_prior, self.angular_acceleration_prior, 1.0, 1.0, 1.0, 1.0, *(self.acceleration_prior,) * 2]
         diagonal = xp.concat([variance, *(zero + expand(value**2, 1) for value in rest)], axis=-1)
@@ -91,12 +97,13 @@ class PlanarPose(PlanarEquations, Model):
     def predict(self, x: Array, z: Measurement, previous: Measurement) -> tuple[Array, Array, Array]:
         """Equations (3.40), (3.41), (3.43)."""
         dt = expand(self.dt, 2)
-        chain = [[1.0, dt, 0.5 * dt**2], [0.0, 1.0, dt], [0.0, 0.0, 1.0]]
+        one = 1.0 + 0.0 * x[..., :1, None]
+        kept = namespace(x).exp(-dt * expand(self.acceleration_decay, 2) * one)
         held = [dt**3 / 6.0, 0.5 * dt**2, dt]
         turn, move = expand(self.angular_jerk**2, 2), expand(self.jerk**2, 2)
-        one = 1.0 + 0.0 * x[..., :1, None]
         F, Q = 0.0, 0.0
-        for offset, stride, variance in ((0, 1, turn), (3, 2, move), (4, 2, move)):
+        for offset, stride, variance, last in ((0, 1, turn, one), (3, 2, move, kept), (4, 2, move, kept)):
+            chain = [[one, dt, 0.5 * dt**2], [0.0, one, dt], [0.0, 0.0, last]]
             for i in range(3):
                 for j in range(3):
                     place = np.zeros((9, 9))
