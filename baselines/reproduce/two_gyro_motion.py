@@ -156,11 +156,12 @@ IDEAL = Errors(0.0, 0.0, 0.0, 0.0, 0.0)
 def filter_of(
     errors: Errors, dt: float, model: Literal["sigma1", "sigma2"] = "sigma2", roll_prior: float = 5.0 * DEG
 ) -> TwoGyro:
-    """The filter that knows these errors; its densities are the deviations of a sample times √dt."""
+    """The filter that knows these errors, with the printed Euler step; densities are a sample's deviations times √dt."""
     root = math.sqrt(dt)
     return TwoGyro(
         dt=dt,
         model=model,
+        integration="euler",
         body_gyroscope_noise=(errors.body_gyroscope * root,) * 3,
         platform_gyroscope_noise=(errors.platform_gyroscope * root,) * 3,
         body_bias_drift=errors.bias_drift,

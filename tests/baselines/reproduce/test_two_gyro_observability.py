@@ -46,7 +46,7 @@ def test_roll_is_never_in_the_first_model_and_needs_a_turning_platform_in_the_se
 def test_fields_are_those_of_the_filter(name):
     rng = np.random.default_rng(0)
     fields, _, state = study.equations(name)
-    model = TwoGyro(dt=1.0, model=name, imu_tilt=0.0, body_bias_time=11.0, platform_bias_time=13.0)
+    model = TwoGyro(dt=1.0, model=name, integration="euler", imu_tilt=0.0, body_bias_time=11.0, platform_bias_time=13.0)
     x, body, platform = rng.uniform(-0.6, 0.6, len(state)), rng.normal(size=3), rng.normal(size=3)
     inputs = {"f0": 1.0, "f1": body[0], "f2": body[1], "f3": body[2], "f4": platform[0], "f5": platform[2]}
     inputs |= {"f6": platform[1]} if name == "sigma1" else {}

@@ -21,13 +21,13 @@ from poise.filters.kalman import KalmanFilter
 from poise.filters.observer import Observer
 
 VARIANTS = [
+    TwoGyro(dt=0.02, integration="euler"),
+    TwoGyro(dt=0.02, integration="euler", model="sigma1"),
+    TwoGyro(dt=0.02, integration="euler", sensor="distances", gyroscope_sample="midpoint"),
+    TwoGyro(dt=0.02, platform="segway"),
+    TwoGyro(dt=0.02, platform="segway", model="sigma1", sensor="distances", integration="euler"),
     TwoGyro(dt=0.02),
-    TwoGyro(dt=0.02, model="sigma1"),
-    TwoGyro(dt=0.02, sensor="distances", gyroscope_sample="midpoint"),
-    TwoGyro(dt=0.02, platform="segway", integration="midpoint"),
-    TwoGyro(dt=0.02, platform="segway", model="sigma1", sensor="distances"),
-    TwoGyro(dt=0.02, integration="midpoint"),
-    TwoGyro.for_disk(dt=0.02, integration="midpoint"),
+    TwoGyro.for_disk(dt=0.02),
     PlatformGyro(dt=0.02),
 ]
 
@@ -66,7 +66,10 @@ def test_process_covariance():
     dt, theta, phi = 0.02, np.array([0.3, -0.5, 0.7]), 0.2
     vh, vp = np.array([0.011, 0.013, 0.017]), np.array([0.019, 0.5, 0.023])
     model = TwoGyro(
-        dt=dt, body_gyroscope_noise=tuple(vh * math.sqrt(dt)), platform_gyroscope_noise=tuple(vp * math.sqrt(dt))
+        dt=dt,
+        integration="euler",
+        body_gyroscope_noise=tuple(vh * math.sqrt(dt)),
+        platform_gyroscope_noise=tuple(vp * math.sqrt(dt)),
     )
     A = np.vstack([np.zeros(3), body_rate_matrix(theta)])
     D = np.vstack([[1.0, 0.0], platform_rate_matrix(theta) @ substitution(np.array(phi), "bicycle")])
@@ -106,7 +109,7 @@ def test_inflation_and_guard():
     """Extra noise goes along M_:2 / cos φ and on φ; the guard takes the roll's column out of F, and only that."""
     rng = np.random.default_rng(2)
     x, z = rng.uniform(-0.5, 0.5, 9), random_sample(rng)
-    plain = TwoGyro(dt=0.02)
+    plain = TwoGyro(dt=0.02, integration="euler")
     _, F, Q = plain.predict(x, z, z)
     inflated = replace(plain, pitch_rate_noise=0.1, roll_rate_noise=0.2).predict(x, z, z)[2]
     direction = np.concatenate([[0.0], platform_rate_matrix(x[1:4])[:, 1] / math.cos(x[0]), np.zeros(5)])
