@@ -156,7 +156,7 @@ IDEAL = Errors(0.0, 0.0, 0.0, 0.0, 0.0)
 def filter_of(
     errors: Errors, dt: float, model: Literal["sigma1", "sigma2"] = "sigma2", roll_prior: float = 5.0 * DEG
 ) -> TwoGyro:
-    """The filter that knows these errors, with the printed Euler step; densities are a sample's deviations times √dt."""
+    """The filter that knows these errors, with the printed Euler step; densities are deviations times √dt."""
     root = math.sqrt(dt)
     return TwoGyro(
         dt=dt,

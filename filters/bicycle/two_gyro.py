@@ -77,8 +77,8 @@ class TwoGyro(Model):
     """which sample turns k−1 into k: ``current`` for a mean over the interval that it ends, ``midpoint`` (mean of both)
     for instantaneous samples, ``previous`` is printed"""
     integration: Literal["euler", "midpoint"] = "midpoint"
-    """``euler`` is printed (23); ``midpoint`` takes the kinematics in the middle of the interval: with ``euler`` the roll
-    of a rider who moves is 1.3 times its standard deviation wrong at 100 Hz"""
+    """``euler`` is printed (23); ``midpoint`` takes the kinematics in the middle of the interval: with ``euler`` the
+    roll of a rider who moves is 1.3 times its standard deviation wrong at 100 Hz"""
     body_gyroscope_noise: Point = (0.05 * DEG, 0.05 * DEG, 0.05 * DEG)
     """σ_vh √T, rad/s/√Hz, of each axis (gyroscope 605; the paper gives none)"""
     platform_gyroscope_noise: Point = (0.05 * DEG, 0.05 * DEG, 0.05 * DEG)
