@@ -25,6 +25,7 @@ from .envs import register_environments
 if TYPE_CHECKING:
     from .baselines.evaluation import evaluate
     from .baselines.zoo import EstimatorInfo, list_estimators, make_estimator
+    from .envs.calibration import apply_calibration, load_calibration
     from .envs.recorder import record
     from .envs.recordings import load_recording
     from .envs.trajectory import Trajectory
@@ -37,8 +38,10 @@ __all__ = [
     "EstimatorInfo",
     "Trajectory",
     "__version__",
+    "apply_calibration",
     "evaluate",
     "list_estimators",
+    "load_calibration",
     "load_recording",
     "make_estimator",
     "record",
@@ -50,8 +53,10 @@ _HOMES = {
     "Estimator": ".filters.estimator",
     "EstimatorInfo": ".baselines.zoo",
     "Trajectory": ".envs.trajectory",
+    "apply_calibration": ".envs.calibration",
     "evaluate": ".baselines.evaluation",
     "list_estimators": ".baselines.zoo",
+    "load_calibration": ".envs.calibration",
     "load_recording": ".envs.recordings",
     "make_estimator": ".baselines.zoo",
     "record": ".envs.recorder",

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
+from .calibration import CalibrationRecord, apply_calibration
 from .recordings_broad import is_broad, load_broad
 from .recordings_dot import is_dot, load_dot
 from .storage import FORMAT, is_trajectory_file, load_trajectory
@@ -37,7 +38,7 @@ FORMATS: tuple[RecordingFormat, ...] = (
 )
 
 
-def load_recording(path: str | Path) -> Trajectory:
+def load_recording(path: str | Path, calibration: CalibrationRecord | str | Path | None = None) -> Trajectory:
     """Read a recording.
 
     Accepted are trajectories saved by this package, trials of BROAD (MATLAB 5, MATLAB 7.3 and HDF5 files), and CSV
@@ -45,6 +46,8 @@ def load_recording(path: str | Path) -> Trajectory:
 
     Args:
         path: the file; its extension does not matter.
+        calibration: record (or its file) that turns raw readings into SI units, see ``poise calibrate``; None where
+            the readings are calibrated.
 
     Returns:
         The recording in SI units, with the truth ``orientation`` and ``position`` if it brings an optical reference.
@@ -52,7 +55,7 @@ def load_recording(path: str | Path) -> Trajectory:
     Raises:
         FileNotFoundError: there is no such file.
         ValueError: the file is empty, truncated, of another format, or has contents that contradict its format; the
-            message names the file and what is accepted.
+            message names the file and what is accepted. Or the calibration does not fit its channels.
     """
     path = Path(path)
     if not path.is_file():
@@ -64,7 +67,8 @@ def load_recording(path: str | Path) -> Trajectory:
         accepted = ", ".join(known.name for known in FORMATS)
         state = "is empty" if path.stat().st_size == 0 else "is of no known format, or truncated"
         raise ValueError(f"{path} {state}; accepted are {accepted}")
-    return recording_format.load(path)
+    trajectory = recording_format.load(path)
+    return trajectory if calibration is None else apply_calibration(trajectory, calibration)
 
 
 def recognise(path: Path) -> RecordingFormat | None:

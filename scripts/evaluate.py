@@ -22,6 +22,8 @@ class Args:
     """estimator that stands in for the truth of recordings without one (agreement, not error)"""
     place: str | None = None
     """in recorded rides of a bicycle, the IMU to look at: bicycle_imu or trunk_imu"""
+    calibration: Path | None = None
+    """record of `poise calibrate` that turns raw readings of the recordings into SI units"""
     seed: int = 0
     """names the run folder; evaluation draws no random numbers"""
     runs: Path = Path("runs")
@@ -42,7 +44,7 @@ def run(args: Args) -> int:
     paths = recording_files(args.recordings)
     if not paths:
         raise ValueError(f"no recording in {', '.join(map(str, args.recordings))}")
-    trajectories = [load_recording(path) for path in paths]
+    trajectories = [load_recording(path, args.calibration) for path in paths]
     if args.place is not None:
         from ..envs.bicycle.single_imu import imu_of
 

@@ -45,6 +45,7 @@ COMMANDS: dict[str, Command] = {
     "train": Command(".train", "train a learned estimator"),
     "tune": Command(".tune", "fit the gains of a filter: constant ones, or a policy that sets them"),
     "evaluate": Command(".evaluate", "measure estimators on recorded trajectories"),
+    "calibrate": Command(".calibrate", "scale, offset and axes of raw sensors, from rate-table and tumbling runs"),
     "array": Command(".array", "what an array of accelerometers can tell: rank and noise gains"),
     "benchmark": Command(".benchmark", "compare all estimators on simulated motion and on recordings"),
     "reproduce": Command(".reproduce", "do the study of a paper again: its tables and figures beside ours"),

@@ -1,0 +1,86 @@
+"""``poise calibrate`` end to end: simulated runs, their files, the record, and a recording that it is applied to."""
+
+import json
+
+import numpy as np
+import pytest
+
+from poise.envs.calibration import CalibrationRecord, load_calibration, undo_calibration
+from poise.envs.calibration_runs import nominal_calibration
+from poise.envs.devices import HandDevice
+from poise.envs.hand_sensing import simulate_hand
+from poise.filters.accelerometer_array.array import TRIAXIAL
+from poise.scripts.main import main
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    place = tmp_path_factory.mktemp("calibration")
+    common = ["--simulate", "--seed", "2", "--raw", str(place / "raw"), "--record", str(place / "record.json")]
+    for sensor in ("accelerometer", "gyroscope", "magnetometer"):
+        assert main(["calibrate", sensor, "--hold", "0.5", *common]) == 0
+    return place
+
+
+def test_one_record_gathers_all_sensors(folder):
+    record, truth = load_calibration(folder / "record.json"), load_calibration(folder / "raw" / "true-calibration.json")
+    assert list(record.channels) == ["imu/acc", "imu/gyr", "imu/mag"]
+    for name, one in record.channels.items():
+        right = np.array(truth.channels[name].matrix)
+        np.testing.assert_allclose(np.array(one.matrix) @ np.linalg.inv(right), np.eye(len(right)), atol=2e-3)
+
+
+def test_files_give_what_the_simulation_gave(folder, tmp_path, capsys):
+    words = ["calibrate", "accelerometer", str(folder / "raw" / "accelerometer.csv")]
+    assert main([*words, "--record", str(tmp_path / "a.json"), "--json"]) == 0
+    printed = json.loads(capsys.readouterr().out)
+    assert printed["channels"]["imu/acc"] == load_calibration(folder / "record.json").describe()["channels"]["imu/acc"]
+    words = ["calibrate", "gyroscope", str(folder / "raw" / "gyroscope.csv"), "--record", str(tmp_path / "a.json")]
+    assert main(words) == 0
+    assert "discarded" in capsys.readouterr().out
+    assert set(load_calibration(tmp_path / "a.json").channels) == {"imu/acc", "imu/gyr"}
+
+
+def test_evaluate_applies_a_record(folder, tmp_path, capsys):
+    motion = simulate_hand("fast", 0, "array-data-sheet", duration=5.0, device=HandDevice("imu", TRIAXIAL))
+    measurements = {"imu/acc": motion.measurements["array/acc"], "imu/gyr": motion.measurements["imu/gyr"]}
+    truth = load_calibration(folder / "raw" / "true-calibration.json")
+    truth = CalibrationRecord({name: truth.channels[name] for name in measurements})
+    undo_calibration(motion.replace(measurements=measurements), truth).save(tmp_path / "raw.h5")
+    part = load_calibration(folder / "record.json")
+    found = CalibrationRecord({name: part.channels[name] for name in measurements})
+    by_name = nominal_calibration(TRIAXIAL)
+    nominal = CalibrationRecord({name: by_name.channels[name] for name in measurements})
+    errors = {}
+    for name, record in (("found", found), ("nominal", nominal)):
+        path = record.save(tmp_path / f"{name}.json")
+        words = ["evaluate", str(tmp_path / "raw.h5"), "--estimators", "mekf", "--json"]
+        capsys.readouterr()
+        assert main([*words, "--runs", str(tmp_path / "runs"), "--calibration", str(path)]) == 0
+        rows = [json.loads(line) for line in capsys.readouterr().out.splitlines() if line.startswith("{")]
+        errors[name] = rows[0]["value"]
+    assert errors["found"] < 0.3 * errors["nominal"]
+
+
+def test_frame(tmp_path, capsys):
+    path = tmp_path / "axes.csv"
+    path.write_text("bx,by,bz,ox,oy,oz\n1,0,0,0,1,0\n0,1,0,-1,0,0\n0,0,1,0,0,1\n")
+    assert main(["calibrate", "frame", str(path), "--record", str(tmp_path / "f.json"), "--json"]) == 0
+    printed = json.loads(capsys.readouterr().out)
+    np.testing.assert_allclose(printed["tracker_to_device"], [np.sqrt(0.5), 0, 0, -np.sqrt(0.5)], atol=1e-12)
+    path.write_text("bx,by,bz,ox,oy,oz\n1,0,0,0,1,0\n0,1,0,1,0,0\n0,0,1,0,0,1\n")
+    assert main(["calibrate", "frame", str(path), "--record", str(tmp_path / "f.json")]) == 2
+    assert "mirror" in capsys.readouterr().err
+
+
+def test_wrong_words_are_explained(folder, tmp_path, capsys):
+    record, table = ["--record", str(tmp_path / "r.json")], str(folder / "raw" / "accelerometer.csv")
+    for words, message in (
+        ([], "name CSV files, or --simulate"),
+        ([str(tmp_path / "none.csv")], "no file at"),
+        ([table, "--array", "controller"], "'controller' has 6 accelerometers, but the runs have 3 columns"),
+        ([table, "--array", "okta"], "octa, controller, planar, triaxial"),
+    ):
+        assert main(["calibrate", "accelerometer", *words, *record]) == 2
+        assert message in capsys.readouterr().err
+    assert not (tmp_path / "r.json").exists()
