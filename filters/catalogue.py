@@ -187,6 +187,12 @@ CATALOGUE: dict[str, Entry] = {
         WHOLE_BODY,
         WHOLE_BODY_ANGLES,
     ),
+    "odometry-aided": _filter(
+        "bicycle.odometry_aided:OdometryAided",
+        "roll and pitch of a bicycle from its IMU and the wheel's speed: the wheel rolls and does not slide",
+        ("bicycle_imu/gyr", "bicycle_imu/acc", "wheel/speed"),
+        ("bicycle/roll", "bicycle/pitch", "bicycle_imu/gyroscope_bias"),
+    ),
     "gyroscope-integration": _reference(
         "references:GyroscopeIntegration", "gyroscope alone, from the first inclination", SIX, RELATIVE
     ),

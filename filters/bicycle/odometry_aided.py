@@ -1,0 +1,225 @@
+r"""Roll and pitch of a bicycle from one IMU on its frame and the wheel's speed: the wheel neither slides nor lifts.
+
+A filter of this package, not of a paper. The accelerometer sees gravity plus whatever the bicycle does, and in a curve
+that is just what hides the roll. But the velocity of a bicycle is known: its rear wheel rolls. With the velocity v of
+the IMU and the rate ω of the frame (both as below), the point of the frame at the contact of the rear wheel, which is c
+from the IMU, moves as a wheel does that rolls without slip,
+
+    Rᵀv + ω × c = [v_w, 0, 0] + n                                           (1)
+
+in bicycle axes, whatever the roll: a thin wheel that turns by Ω in its frame has v_hub = −(ω + Ω e₂) × (−r e₃), so that
+the frame's point −r e₃ below the hub moves by r Ω e₁. What v integrates to with a wrong tilt δ, g δ t, (1) does not
+bear; steady curves are no exception, since nothing of (1) refers to the accelerometer.
+
+Bicycle axes are x forward, y left, z up; the sensor is mounted nose up by α, and its samples are turned at the door.
+The state is q (bicycle to a level frame), gyroscope bias b (bicycle axes), v (level frame), integrated as
+:mod:`..strapdown` says. With the error [δθ (level frame), δb, δv], c× as a matrix [c]×,
+
+    H = [Rᵀ[v]×, [c]×, Rᵀ],   n: σ_w² = (s/Δt)²/12,  σ_y²/Δt,  σ_z²/Δt
+
+with s the way between two counts of the wheel's encoder. Slip and the bumps of the ground are correlated over time;
+dividing by Δt makes σ_y and σ_z the same at every rate, and tuning constants rather than noises. The start is not at
+rest: gravity is the first force less ω × v, that of steady riding.
+
+Not estimated: the heading (it starts at zero and drifts), the wheel's radius, the accelerometer's bias (5 mg across are
+0.3° of roll). Where the ground bends under the wheels (a kerb, the foot of a ramp), (1) fails upwards.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, ClassVar, Self
+
+from ..backend import Array, constant, expand, namespace
+from ..model import Gain, Model
+from ..quantity import Channel, Measurement, Quantity
+from ..rotation import cross, level, normalize, roll_pitch, rotate, rotate_back, skew, to_matrix, up_in_body
+from ..strapdown import (
+    UNIT,
+    accelerated,
+    advance,
+    clipped_inflation,
+    corrected,
+    prior_covariance,
+    process_noise,
+    transition,
+)
+from .geometry import RiderGeometry
+
+COUNTS = 1024
+"""a turn of the wheel's encoder (256 lines, quadrature)"""
+ROLL = Quantity("bicycle/roll", "angle", 1, "rad")
+PITCH = Quantity("bicycle/pitch", "angle", 1, "rad")
+BIAS = Quantity("bicycle_imu/gyroscope_bias", "vector", 3, "rad/s")
+
+
+@dataclass(frozen=True)
+class OdometryAided(Model):
+    """Roll (to the right positive) and pitch (nose down positive) of the bicycle, and the bias of its gyroscope.
+
+    State: q (4), b (3), v (3), seconds since the last accelerometer sample.
+
+    Without accelerometer samples for longer than ``hold`` the velocity is taken as constant but for ``lost_noise``;
+    (1) then keeps it, and the attitude is that of the gyroscope. Without the wheel, the two other rows of (1) remain.
+    """
+
+    gyroscope_noise: float = 2e-3
+    """σ_g, rad/s/√Hz; larger than a data sheet's, since it stands for scale and alignment errors too"""
+    bias_noise: float = 5e-5
+    """σ_b, rad/s²/√Hz"""
+    acceleration_noise: float = 0.02
+    """σ_a, m/s²/√Hz"""
+    wheel_step: float = 2.0 * math.pi * 0.335 / COUNTS
+    """s, m: way between two counts of the wheel's encoder"""
+    lateral_slip: float = 0.01
+    """σ_y, m/s·√s"""
+    vertical_slip: float = 0.02
+    """σ_z, m/s·√s: bumps and bends of the ground"""
+    jump: float = 0.2
+    """m/s: residuals r beyond this (and a count of the wheel) count less, their variances times (1 + (r/jump)²)²: a
+    wheel in the air tells nothing"""
+    imu_forward: float = 0.37
+    """m, of the IMU from the rear contact"""
+    imu_height: float = 0.71
+    """m, above the rear contact"""
+    imu_tilt: float = math.radians(10.0)
+    """α, rad, nose up"""
+    accelerometer_range: float = 19.5
+    """m/s²: samples with a component beyond this are taken as clipped (range 2 g)"""
+    clipped_inflation: float = 300.0
+    """factor on σ_a for clipped samples"""
+    tilt_prior: float = 0.1
+    """rad"""
+    bias_prior: float = 5e-3
+    """rad/s (0.3 °/s)"""
+    velocity_prior: float = 0.1
+    """m/s, in bicycle axes"""
+    hold: float = 0.05
+    """s: for how long the last accelerometer sample stands in for missing ones"""
+    lost_noise: float = 2.0
+    """m/s²/√Hz: of the velocity beyond that"""
+    gravity: float = 9.81
+    """g, m/s²"""
+
+    channels: ClassVar[tuple[Channel, ...]] = (
+        Channel("bicycle_imu/gyr", 3, "rad/s"),
+        Channel("bicycle_imu/acc", 3, "m/s²"),
+        Channel("wheel/speed", 1, "m/s"),
+    )
+    outputs: ClassVar[tuple[Quantity, ...]] = (ROLL, PITCH, BIAS)
+    state_size: ClassVar[int] = 11
+    error_size: ClassVar[int] = 9
+    residual_size: ClassVar[int] = 3
+    gains: ClassVar[dict[str, Gain]] = {
+        "process": Gain("gyroscope_noise", description="process variance σ_g² of the attitude"),
+        "bias": Gain("bias_noise", description="process variance σ_b² of the gyroscope bias"),
+        "wheel": Gain("wheel_step", description="variance of the wheel's speed"),
+        "lateral": Gain("lateral_slip", description="variance σ_y² of the slip to the side"),
+        "vertical": Gain("vertical_slip", description="variance σ_z² of the motion upwards"),
+    }
+
+    @classmethod
+    def for_rider(cls, geometry: RiderGeometry, **parameters: Any) -> Self:
+        """The filter on a bicycle: places of its sensors; ``parameters`` win."""
+        forward, _, height = geometry.bicycle_imu
+        told = {
+            "imu_forward": forward,
+            "imu_height": height,
+            "imu_tilt": geometry.bicycle_imu_tilt,
+            "wheel_step": 2.0 * math.pi * geometry.wheel_radius / COUNTS,
+        }
+        return cls(**{**told, **parameters})
+
+    def prior(self, z: Measurement) -> tuple[Array, Array]:
+        """Steady riding along the wheel: what is felt less ω × v is gravity; heading and bias zero."""
+        xp = namespace(z["bicycle_imu/acc"])
+        rate, f = self._bicycle_axes(z["bicycle_imu/gyr"]), self._bicycle_axes(z["bicycle_imu/acc"])
+        wheel, zero = z["wheel/speed"], 0.0 * f
+        along = xp.concat([wheel, zero[..., :2]], axis=-1) - cross(rate, self._lever(f))
+        q = level(f - cross(rate, along))
+        v = rotate(q, along)
+        none = 0.0 * self.tilt_prior
+        tilt = [self.tilt_prior, self.tilt_prior, none]
+        D = prior_covariance([*tilt, *[self.bias_prior] * 3, *[self.velocity_prior] * 3], f)
+        # the velocity is known in bicycle axes, so an error of the tilt turns it
+        unit = constant(UNIT, f) + zero[..., None]
+        J = xp.concat(
+            [
+                xp.concat([unit, 0.0 * unit, 0.0 * unit], axis=-1),
+                xp.concat([0.0 * unit, unit, 0.0 * unit], axis=-1),
+                xp.concat([-skew(v), 0.0 * unit, to_matrix(q)], axis=-1),
+            ],
+            axis=-2,
+        )
+        return xp.concat([q, zero, v, zero[..., :1]], axis=-1), J @ D @ J.mT
+
+    def predict(self, x: Array, z: Measurement, previous: Measurement) -> tuple[Array, Array, Array]:
+        """Strapdown integration; F and Q of :mod:`..strapdown`."""
+        xp = namespace(x)
+        q, b, v, sample = x[..., :4], x[..., 4:7], x[..., 7:10], z["bicycle_imu/acc"]
+        dt = expand(self.dt, 1)
+        rate, f = self._bicycle_axes(z["bicycle_imu/gyr"]), self._bicycle_axes(sample)
+        after, force = advance(q, dt * (rate - b), f)
+        known = xp.less(x[..., 10:11], expand(self.hold, 1))
+        one = 1.0 + 0.0 * q[..., :1]
+        felt = xp.where(known, one, 0.0 * one)
+        F = transition(q, force, expand(self.dt, 2), felt[..., None], one[..., None])
+        inflation = clipped_inflation(sample, self.accelerometer_range, self.clipped_inflation)
+        spread = expand(self.acceleration_noise**2 * self.dt, 1) * inflation
+        spread = xp.where(known, spread, expand(self.lost_noise**2 * self.dt, 1) + 0.0 * spread)
+        Q = process_noise(self.gyroscope_noise**2 * self.dt, self.bias_noise**2 * self.dt, spread)
+        v = xp.where(known, accelerated(v, force, dt, self.gravity), v)
+        return xp.concat([after, b, v, x[..., 10:]], axis=-1), F, Q
+
+    def residual(self, x: Array, z: Measurement) -> tuple[Array, Array, Array]:
+        """Equation (1): the wheel's speed and no slip, less what the state says of the contact."""
+        xp = namespace(x)
+        q, b, v, wheel = x[..., :4], x[..., 4:7], x[..., 7:10], z["wheel/speed"]
+        c = self._lever(x)
+        contact = rotate_back(q, v) + cross(self._bicycle_axes(z["bicycle_imu/gyr"]) - b, c)
+        r = xp.concat([wheel - contact[..., :1], -contact[..., 1:]], axis=-1)
+        turned = to_matrix(q).mT
+        H = xp.concat([turned @ skew(v), skew(c), turned], axis=-1)
+        one = 1.0 + 0.0 * x[..., :1]
+        variances = [(self.wheel_step / self.dt) ** 2 / 12.0, self.lateral_slip**2 / self.dt]
+        variances.append(self.vertical_slip**2 / self.dt)
+        usual = xp.concat([one * expand(self.wheel_step / self.dt, 1), 0.0 * one, 0.0 * one], axis=-1)
+        far = xp.where(xp.isfinite(r), r, 0.0 * usual) / (usual + expand(self.jump, 1))
+        weight = 1.0 + far * far
+        diagonal = xp.concat([one * expand(value, 1) for value in variances], axis=-1) * weight * weight
+        return r, H, diagonal[..., :, None] * constant(UNIT, x)
+
+    def retract(self, x: Array, dx: Array) -> Array:
+        """The attitude is corrected by a turn in the level frame, the rest by sums."""
+        return corrected(x, dx)
+
+    def finish(self, x: Array, z: Measurement) -> Array:
+        """Normalise; advance or reset the clock of the accelerometer."""
+        xp = namespace(x)
+        brought = xp.all(xp.isfinite(z["bicycle_imu/acc"]), axis=-1)[..., None]
+        age = xp.where(brought, 0.0 * x[..., 10:11], x[..., 10:11] + expand(self.dt, 1))
+        return xp.concat([normalize(x[..., :4]), x[..., 4:10], age], axis=-1)
+
+    def pose(self, x: Array) -> dict[str, Array]:
+        """Roll, pitch (rad) and the bias in the sensor's axes (rad/s)."""
+        roll, pitch = roll_pitch(up_in_body(x[..., :4]))
+        bias = rotate_back(self._mounting(x), x[..., 4:7])
+        return {"bicycle/roll": roll[..., None], "bicycle/pitch": pitch[..., None], BIAS.name: bias}
+
+    def _mounting(self, like: Array) -> Array:
+        """Quaternion ``(..., 4)`` from the sensor's axes to the bicycle's: nose up by α."""
+        xp = namespace(like)
+        half = expand(0.5 * self.imu_tilt, 1) + 0.0 * like[..., :1]
+        return xp.concat([xp.cos(half), 0.0 * half, -xp.sin(half), 0.0 * half], axis=-1)
+
+    def _bicycle_axes(self, sample: Array) -> Array:
+        """A sample of the IMU ``(..., 3)`` in bicycle axes."""
+        return rotate(self._mounting(sample), sample)
+
+    def _lever(self, like: Array) -> Array:
+        """Lever c ``(..., 3)`` from the IMU to the contact, bicycle axes."""
+        zero = 0.0 * like[..., :1]
+        return namespace(like).concat(
+            [zero - expand(self.imu_forward, 1), zero, zero - expand(self.imu_height, 1)], axis=-1
+        )
