@@ -16,10 +16,11 @@ of least variance (2.48). With σ_a² taken out, J = ∂ω_PR/∂ξ and primes f
     Σ = D (Σ' + T) D + ½ (1 − D) M D + ½ D Mᵀ (1 − D) + (1 − D) C (1 − D)                                        (2.44)
 
 Differs from print: J has the other sign (2.39), one ω throughout instead of ω_TI and ω_PR mixed in Ψ (2.41), and S is
-not lost (2.27, 2.32, 2.34): the error of the last estimate holds that of the last ξ̂ too. ``variant`` chooses where J is
-formed: ``sound`` at ω_TI, ``corrected`` at ω_PR, as the thesis means it, ``printed`` is print with its slips. Near rest
-ω_PR never falls below √|δξ|, which makes J look small and the weight fall just when ω_PR is useless; ω_TI has no such
-floor. Weights are clipped to [0, 1]: above 1 do occur. Where J has no meaning (below :data:`SLOWEST`) the weight is 1.
+not lost (2.27, 2.32, 2.34): the error of the last estimate holds that of the last ξ̂ too. Only the first one, which is
+known, holds no error of α̂ (w₀ = 1 says it does). ``variant`` chooses where J is formed: ``sound`` at ω_TI,
+``corrected`` at ω_PR, as the thesis means it; ``printed`` is print with its slips. Near rest ω_PR never falls below
+√|δξ|, which makes J look small and the weight fall just when ω_PR is useless; ω_TI has no such floor. Weights are
+clipped to [0, 1]: above 1 do occur. Where J has no meaning (below :data:`SLOWEST`) the weight is 1.
 
 K. Parsa's method (appendix A) corrects ω_TI by one Gauss–Newton step to ξ̂ and feeds that back; its normal matrix is
 singular at ω = 0 only, not, as (2.55) has it, wherever one component vanishes.
@@ -28,7 +29,7 @@ The thesis knows no biases, but they dominate real data: a constant error of α�
 roots are blind. With ``bias_noise`` above 0 (ours, not the thesis') the weighted method estimates it too, by axis, as a
 Kalman filter of (ω, β) does whose variance of ω is that of Σ: with p = cov(ω, β), u = var β,
 
-    ω_TI ← ω_TI − Δt β̂,   Σ' ← Σ' + diag(Δt² u − 2 Δt p),   p ← p − Δt u,   u ← u + Δt σ_β²
+    ω_TI ← ω_TI − Δt β̂,   Σ' ← Σ' + diag(Δt² u − 2 Δt p),   p ← p − Δt u,   u ← u + Δt u₀/τ
     β̂ ← β̂ + k (ω_PR − ω_TI),   k = p / (Σ' + T − M + C)_ii,   u ← u − k p,   p ← w p
 
 Scale and alignment errors remain. The first rate must be known.
@@ -137,8 +138,8 @@ class ArrayRate(Recurrence):
     """σ_a, m/s² per sample: scales the covariance; 0.022 is the data sheet's of OCTA, 0.1 covers calibration errors"""
     bias_noise: float = 0.1
     """standard deviation of the constant errors of the readings, m/s²; 0 is the thesis' method, without biases"""
-    bias_drift: float = 5e-4
-    """how fast they change, m/s²/√s"""
+    bias_time: float = 4e4
+    """s: in this time the biases may change by ``bias_noise``"""
 
     full_outputs: ClassVar[tuple[Quantity, ...]] = (ANGULAR_RATE, COVARIANCE, WEIGHTS)
 
@@ -150,8 +151,9 @@ class ArrayRate(Recurrence):
             raise ValueError(f"variant must be one of {get_args(Variant)}, got {self.variant!r}")
         if self.start not in ("known", "gyroscope"):
             raise ValueError(f"start must be 'known' or 'gyroscope', got {self.start!r}")
-        if self.accelerometer_noise <= 0.0:
-            raise ValueError(f"accelerometer_noise must be positive, got {self.accelerometer_noise}")
+        for name in ("accelerometer_noise", "bias_time"):
+            if getattr(self, name) <= 0.0:
+                raise ValueError(f"{name} must be positive, got {getattr(self, name)}")
         if self.array.dimension != 3 or self.array.rank < 12:
             raise ValueError(
                 f"array {self.array.name!r} must be spatial and of rank 12 to tell an angular rate by itself, "
@@ -185,7 +187,10 @@ class ArrayRate(Recurrence):
         variance = zero[..., :1] + expand(self.initial_noise**2 / self.accelerometer_noise**2, 1)
         bias = zero + expand(self._bias_ratio(self.bias_noise), 1) * self._spread(a)
         covariance = variance * constant(UNIT.ravel(), a)
-        return xp.concat([rate, covariance, zero + 1.0, *(zero,) * 5, bias], axis=-1)
+        # (2.32) takes w₀ = 1 for an error of ω₀ that holds that of α̂₀, but ω₀ is known apart from it: S₀ undoes this
+        none = 0.0 if self.variant == "printed" else -expand(self.dt, 1)
+        shared = zero[..., :1] + none * constant(self.array.B_T.ravel(), a)
+        return xp.concat([rate, covariance, zero + 1.0, shared, zero, zero, bias], axis=-1)
 
     def predict(self, x: Array, z: Measurement, previous: Measurement) -> Array:
         """ω_TI (2.15), and Σ' + T."""
@@ -198,7 +203,7 @@ class ArrayRate(Recurrence):
         T = 0.25 * dt**2 * _flat(2.0 * B + B * weights[..., None, :] + weights[..., :, None] * B)
         bias, shared, own = x[..., 24:27], x[..., 27:30], x[..., 30:]
         known = x[..., 3:12] + T + 0.5 * dt * x[..., 15:24] + _flat(diagonal(dt**2 * own - 2.0 * dt * shared))
-        drift = dt * expand(self._bias_ratio(self.bias_drift), 1) * self._spread(x)
+        drift = dt * expand(self._bias_ratio(self.bias_noise) / self.bias_time, 1) * self._spread(x)
         return xp.concat([rate - dt * bias, known, x[..., 12:27], shared - dt * own, own + drift], axis=-1)
 
     def finish(self, x: Array, z: Measurement) -> Array:
