@@ -98,17 +98,22 @@ def error_curves(
     """What the motion was and how wrong the inclination of some estimators was, over time.
 
     Args:
-        trajectory: with truth; its specific force and angular rate are drawn above.
+        trajectory: with truth; its specific force and angular rate (true ones without an IMU) are drawn above.
         estimates: label → estimate over the whole trajectory.
         kinds: label → kind, for the colours.
         title: above the figure.
     """
     figure, (motion, errors) = new_figure(8.5, 4.6, rows=2)
     time = trajectory.time - trajectory.time[0]
-    force = np.linalg.norm(trajectory.measurements["imu/acc"], axis=-1)
-    rate = np.linalg.norm(trajectory.measurements["imu/gyr"], axis=-1)
-    motion.plot(time, force, color="#3b3f46", linewidth=0.6, label="specific force, m/s²")
-    motion.plot(time, rate, color="#9a6fb0", linewidth=0.6, label="angular rate, rad/s")
+    # a device with an array of accelerometers has no such channels: its true motion is drawn
+    for channel, quantity, colour, read, true in (
+        ("imu/acc", "external_acceleration", "#3b3f46", "specific force, m/s²", "true acceleration, m/s²"),
+        ("imu/gyr", "angular_rate", "#9a6fb0", "angular rate, rad/s", "true angular rate, rad/s"),
+    ):
+        values = trajectory.measurements.get(channel, trajectory.truth.get(quantity))
+        if values is not None:
+            length, label = np.linalg.norm(values, axis=-1), read if channel in trajectory.measurements else true
+            motion.plot(time, length, color=colour, linewidth=0.6, label=label)
     motion.legend(loc="upper left", frameon=False, fontsize=8, ncols=2)
     truth = trajectory.truth_of(UP.name)
     styles: Sequence[str] = ("-", "--", ":", "-.")

@@ -8,7 +8,7 @@ no number the default is a choice of this project and says so.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -22,6 +22,7 @@ from .controller_motion import (
     ShakingGesture,
     WalkGesture,
 )
+from .hand_motion import euler_motion
 from .smooth import Series
 
 SHAKING_DRAWS = 20
@@ -211,18 +212,19 @@ class Shaking:
         times = np.arange(min(self.rest, 0.5 * duration), duration, 0.02)
         best: tuple[float, ShakingGesture] | None = None
         for _ in range(SHAKING_DRAWS):
-            angles = Series.draw(generator, self.band, 3, components=20, slope=-1.0).scaled(0.5)
+            angles = Series.draw(generator, self.band, 3, components=20, slope=-1.0)
+            gesture = ShakingGesture(duration, heading, position, angles, self.rest, self.cycle, self.lull)
+            jet, factor = gesture.turning(times), 0.5
             for _ in range(8):
-                gesture = ShakingGesture(duration, heading, position, angles, self.rest, self.cycle, self.lull)
-                rates = rotation.norm(gesture.sample(times).angular_velocity)[:, 0]
+                rates = rotation.norm(euler_motion(tuple(factor * part for part in jet))[1])[:, 0]  # type: ignore[arg-type]
                 length = math.sqrt(float(np.mean(rates**2)))
                 # too short to have begun
                 if length == 0.0 or abs(length / self.rate - 1.0) < 1e-3:
                     break
-                angles = angles.scaled(self.rate / length)
+                factor *= self.rate / length
             distance = abs(float(rates.max()) - self.peak)
             if best is None or distance < best[0]:
-                best = distance, gesture
+                best = distance, replace(gesture, angles=angles.scaled(factor))
         assert best is not None
         return best[1]
 

@@ -268,12 +268,16 @@ class ShakingGesture:
         wave = (1.0 - depth - depth * np.cos(phase), depth * w * np.sin(phase), depth * w * w * np.cos(phase))
         return column(product(smoothstep(times, self.rest, 1.0), wave))
 
+    def turning(self, times: np.ndarray) -> Jet:
+        """Yaw, pitch and roll at ``times`` ``(T,)``: a jet ``(T, 3)``, linear in :attr:`angles`."""
+        return product(self.envelope(times), self.angles.sample(times))
+
     def sample(self, times: np.ndarray) -> BodyState:
         """The motion at ``times`` ``(T,)``, s."""
         times = np.asarray(times, dtype=float)
         envelope = self.envelope(times)
         value, first, second = product(envelope, self.position.sample(times))
-        angles = product(envelope, self.angles.sample(times))
+        angles = self.turning(times)
         return spatial_state(times, (value + np.array(ORIGIN), first, second), angles, self.heading)
 
 
