@@ -13,21 +13,30 @@ from .main import run_command
 class Args:
     """Arguments of ``poise speed``."""
 
-    what: tuple[Literal["filters", "latency", "environments"], ...] = ("filters", "latency", "environments")
-    """parts to measure"""
+    what: tuple[Literal["filters", "bicycle", "arrays", "latency", "environments"], ...] = (
+        "filters",
+        "bicycle",
+        "arrays",
+        "latency",
+        "environments",
+    )
+    """parts to measure; bicycle and arrays are families of filters"""
     json: bool = False
     """print machine-readable rows instead of tables"""
 
 
 def run(args: Args) -> int:
     """Measure and print every group as soon as it is complete."""
+    from functools import partial
     from itertools import groupby
 
     from ..baselines.speed_environments import environment_speeds
+    from ..baselines.speed_families import FAMILIES, family_speeds
     from ..baselines.speed_filters import filter_speeds, latencies
     from .tables import print_table
 
     parts = {"filters": filter_speeds, "latency": latencies, "environments": environment_speeds}
+    parts |= {family: partial(family_speeds, family) for family in FAMILIES}
     for name in args.what:
         for group, rows in groupby(parts[name](), key=lambda speed: speed.group):
             table = [asdict(row) for row in rows]
