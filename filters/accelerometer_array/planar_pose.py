@@ -21,6 +21,7 @@ b̈ ← e^{−λΔt} b̈ (``acceleration_decay`` λ; 0 is the thesis'), which ho
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import ClassVar, Literal, get_args
 
 import numpy as np
@@ -34,6 +35,13 @@ Form = Literal["corrected", "printed-noise", "printed-jacobian"]
 
 PLANAR_RATE = Quantity("planar/angular_rate", "vector", 1, "rad/s")
 """dφ/dt."""
+
+
+CHAINS = ((0, 1, 2), (3, 5, 7), (4, 6, 8))
+"""places in the state of a coordinate, its first and its second derivative: of φ, and of p by axis"""
+ONCE = sum(np.outer(np.eye(9)[low], np.eye(9)[high]) for chain in CHAINS for low, high in pairwise(chain))
+TWICE = sum(np.outer(np.eye(9)[chain[0]], np.eye(9)[chain[2]]) for chain in CHAINS)
+PUSHES = [[np.eye(9)[:, [place]] for place in chain] for chain in CHAINS]
 
 
 @dataclass(frozen=True)
@@ -96,20 +104,16 @@ class PlanarPose(PlanarEquations, Model):
 
     def predict(self, x: Array, z: Measurement, previous: Measurement) -> tuple[Array, Array, Array]:
         """Equations (3.40), (3.41), (3.43)."""
-        dt = expand(self.dt, 2)
-        one = 1.0 + 0.0 * x[..., :1, None]
+        dt, one = expand(self.dt, 2), 1.0 + 0.0 * x[..., :1, None]
         kept = namespace(x).exp(-dt * expand(self.acceleration_decay, 2) * one)
-        held = [dt**3 / 6.0, 0.5 * dt**2, dt]
-        turn, move = expand(self.angular_jerk**2, 2), expand(self.jerk**2, 2)
-        F, Q = 0.0, 0.0
-        for offset, stride, variance, last in ((0, 1, turn, one), (3, 2, move, kept), (4, 2, move, kept)):
-            chain = [[one, dt, 0.5 * dt**2], [0.0, one, dt], [0.0, 0.0, last]]
-            for i in range(3):
-                for j in range(3):
-                    place = np.zeros((9, 9))
-                    place[offset + stride * i, offset + stride * j] = 1.0
-                    F = F + one * chain[i][j] * constant(place, x)
-                    Q = Q + one * variance * held[i] * held[j] * constant(place, x)
+        chain = one * constant(np.eye(9), x) + dt * constant(ONCE, x) + 0.5 * dt**2 * constant(TWICE, x)
+        F = chain - (1.0 - kept) * constant(np.diag([0.0] * 7 + [1.0] * 2), x)
+        G = [
+            dt**3 / 6.0 * constant(place[0], x) + 0.5 * dt**2 * constant(place[1], x) + dt * constant(place[2], x)
+            for place in PUSHES
+        ]
+        variances = (self.angular_jerk, self.jerk, self.jerk)
+        Q = sum(expand(s**2, 2) * g * g.mT for s, g in zip(variances, G, strict=True)) + 0.0 * F
         return (F @ x[..., None])[..., 0], F, Q
 
     def residual(self, x: Array, z: Measurement) -> tuple[Array, Array, Array]:
