@@ -10,6 +10,7 @@ A. Griewank, A. Walther, "Evaluating Derivatives", SIAM 2008, chapter 3.
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from .backend import Array, constant, namespace
@@ -20,7 +21,7 @@ Scalar = Any
 
 def _column(value: Any) -> Any:
     """A factor ``(...)`` made to scale a gradient ``(..., n)``."""
-    return value[..., None] if hasattr(value, "dtype") else value
+    return value[..., None] if getattr(value, "ndim", 0) > 0 else value
 
 
 class Dual:
@@ -93,7 +94,7 @@ def sin(x: Scalar) -> Scalar:
     if isinstance(x, Dual):
         xp = namespace(x.value)
         return Dual(xp.sin(x.value), _column(xp.cos(x.value)) * x.gradient)
-    return namespace(x).sin(x)
+    return math.sin(x) if isinstance(x, float) else namespace(x).sin(x)
 
 
 def cos(x: Scalar) -> Scalar:
@@ -101,7 +102,7 @@ def cos(x: Scalar) -> Scalar:
     if isinstance(x, Dual):
         xp = namespace(x.value)
         return Dual(xp.cos(x.value), _column(-xp.sin(x.value)) * x.gradient)
-    return namespace(x).cos(x)
+    return math.cos(x) if isinstance(x, float) else namespace(x).cos(x)
 
 
 def atan2(y: Scalar, x: Scalar) -> Scalar:

@@ -35,7 +35,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, Literal, Self
 
 from ..backend import Array, constant, namespace, rows
-from ..forward_mode import atan2, cos, gradient, sin, value, variables
+from ..forward_mode import Scalar, atan2, cos, gradient, sin, value, variables
 from ..model import Gain, Model
 from ..quantity import Channel, Measurement, Quantity
 from ..rotation import wrap
@@ -184,7 +184,7 @@ class ForceInertial(ForceInertialParameters, Model):
         whole = self.jacobian == "full"
         rate, acceleration, axial = self._motion(x, angles if whole else Angles(*map(value, angles)), parts[4:7], whole)
         needed = self._needed(x, angles, rate, acceleration, axial)
-        read = self._readings(z, steering(self, x[..., 13], value(rate.psi)))
+        read = self._readings(z, steering(self, x[..., 13], rate.psi))
         delta = angles.phi_b - angles.phi_h
         if not whole:
             delta = value(delta)
@@ -237,7 +237,7 @@ class ForceInertial(ForceInertialParameters, Model):
     def _without_bias(self, omega: Triple, bias: Any) -> Triple:
         return omega[0] - bias[0], omega[1] - bias[1], omega[2] - bias[2]
 
-    def _readings(self, z: Measurement, steer: Array) -> Readings:
+    def _readings(self, z: Measurement, steer: Scalar) -> Readings:
         return readings(self, z, steer, self.handlebar_load, printed=self.torque_reading == "printed")
 
     def _remember(self, x: Array, z: Measurement, previous: Measurement) -> Array:
@@ -339,6 +339,8 @@ PUBLISHED: dict[str, float] = {
     "carried_forward": 0.0,
     "carried_up": 0.0,
     "pedal_share": 0.0,
+    "pedal_down": 0.0,
+    "pedal_back": 0.0,
     "ahead_share": 0.0,
     "wheelbase": 0.0,
 }

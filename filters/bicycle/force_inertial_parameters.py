@@ -81,11 +81,11 @@ class ForceInertialParameters(Equations):
     """I_a, along the trunk, kg·m²; zero in the paper"""
     trunk_imu_height: float = 0.2729
     """h, of the trunk's IMU up the trunk from the pivot; needed by ``acceleration="accelerometer"`` only"""
-    carried_mass: float = 0.0
+    carried_mass: float = 38.166
     """m_c: what else is carried and turns with the bicycle, kg; zero in the paper"""
-    carried_forward: float = 0.0
+    carried_forward: float = 0.15545
     """of its centre from the pivot"""
-    carried_up: float = 0.0
+    carried_up: float = -0.19145
     """of its centre above the pivot"""
     pedal_share: float = 1.0
     """1: the pedals carry what seat and hands do not; 0: there are none, as in the paper"""
@@ -93,9 +93,9 @@ class ForceInertialParameters(Equations):
     """of the crank's axle from the pivot"""
     axle_up: float = -0.757
     """of the crank's axle above the pivot: negative"""
-    pedal_down: float = 0.0
+    pedal_down: float = 138.177
     """force of both resting legs down on the pedals, mean of a turn, N"""
-    pedal_back: float = 0.0
+    pedal_back: float = 24.3313
     """likewise, backwards"""
     drive_forward: float = 0.3832
     """of where a driving force acts, from the pivot: ahead of the axle by 4/π crank lengths, the mean moment of a half

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from ..backend import Array, namespace
-from ..forward_mode import cos, sin
+from ..forward_mode import Scalar, atan2, cos, sin
 from ..quantity import Measurement
 from .force_inertial_axes import down
 from .force_inertial_forces import centre_of_pressure, pedal_moment, seat_load, trunk_moment
@@ -25,7 +25,7 @@ class Readings(NamedTuple):
 
 
 def readings(
-    parameters: ForceInertialParameters, z: Measurement, steer: Array, hands: str, printed: bool = False
+    parameters: ForceInertialParameters, z: Measurement, steer: Scalar, hands: str, printed: bool = False
 ) -> Readings:
     """Equations (10)–(12) and the centre of pressure below (10).
 
@@ -65,7 +65,7 @@ def readings(
     return Readings(N, R, whole)
 
 
-def steering(parameters: ForceInertialParameters, speed: Array, yaw: Array) -> Array:
+def steering(parameters: ForceInertialParameters, speed: Array, yaw: Scalar) -> Scalar:
     """Angle of the handlebar to the right, rad, at which the wheels roll along the path of this yaw rate.
 
     Args:
@@ -76,7 +76,7 @@ def steering(parameters: ForceInertialParameters, speed: Array, yaw: Array) -> A
     xp = namespace(speed)
     slow = xp.less(speed, 0.3)
     speed = xp.where(slow, 0.3 + 0.0 * speed, speed)
-    return xp.atan2(parameters.wheelbase * yaw, speed) / cos(parameters.caster)
+    return atan2(parameters.wheelbase * yaw, speed) / cos(parameters.caster)
 
 
 def static_angles(

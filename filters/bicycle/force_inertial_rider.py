@@ -96,9 +96,32 @@ class RestingLegs(NamedTuple):
     back: float
 
 
+class Leg(NamedTuple):
+    """One leg at crank angles ``(n,)``, in the plane forward and up ``(n, 2)``."""
+
+    pedal: np.ndarray
+    """m"""
+    centre: np.ndarray
+    """of the leg's mass, m"""
+    push: np.ndarray
+    """of the pedal on the foot that holds the leg, N"""
+
+
 def resting_legs(geometry: RiderGeometry, gravity: float = 9.81) -> RestingLegs:
     """Statics of two legs whose hips, knees and pedals are hinges without friction, over a turn of the cranks."""
-    crank = np.linspace(0.0, 2.0 * np.pi, 72, endpoint=False)
+    leg = resting_leg(geometry, np.linspace(0.0, 2.0 * np.pi, 72, endpoint=False), gravity)
+    (forward, up), (back, down) = leg.centre.mean(axis=0), 2.0 * leg.push.mean(axis=0)
+    return RestingLegs(float(forward), float(up), float(down), float(back))
+
+
+def resting_leg(geometry: RiderGeometry, crank: np.ndarray, gravity: float = 9.81) -> Leg:
+    """Statics of one leg.
+
+    Args:
+        geometry: of the person.
+        crank: ``(n,)`` angle of this leg's crank, 0 in front, forward positive, rad.
+        gravity: m/s².
+    """
     hip, axle = np.array(geometry.hip)[[0, 2]], np.array(geometry.crank_axle)[[0, 2]]
     pedal = axle + geometry.crank_length * np.stack([np.cos(crank), -np.sin(crank)], axis=-1)
     reach = pedal - hip
@@ -121,7 +144,7 @@ def resting_legs(geometry: RiderGeometry, gravity: float = 9.81) -> RestingLegs:
     thigh = hip + THIGH_CENTRE * (knee - hip)
     thigh_weight = gravity * THIGH_MASS * geometry.rider_mass
     shank_weight = gravity * (SHANK_MASS + FOOT_MASS) * geometry.rider_mass
-    centre = (thigh_weight * thigh + shank_weight * shank).mean(axis=0) / (thigh_weight + shank_weight)
+    centre = (thigh_weight * thigh + shank_weight * shank) / (thigh_weight + shank_weight)
     # moments about the knee (of the shank) and about the hip (of both) vanish: the pedal's force on the leg
     arms = np.stack([pedal - knee, pedal - hip], axis=1)
     cross = np.stack([-arms[..., 1], arms[..., 0]], axis=-1)
@@ -132,5 +155,4 @@ def resting_legs(geometry: RiderGeometry, gravity: float = 9.81) -> RestingLegs:
         ],
         axis=-1,
     )
-    push = np.linalg.solve(cross, known[..., None])[..., 0].mean(axis=0)
-    return RestingLegs(float(centre[0]), float(centre[1]), float(2.0 * push[1]), float(2.0 * push[0]))
+    return Leg(pedal, centre, np.linalg.solve(cross, known[..., None])[..., 0])
