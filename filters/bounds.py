@@ -60,15 +60,11 @@ def linearise(model: Model, states: np.ndarray, measurements: Mapping[str, Any])
     Raises:
         ValueError: shapes do not fit.
     """
-    arrays = check_measurements(model.channels, measurements, time_axis=True)
+    samples, held = samples_of(model, measurements)
     states = np.asarray(states, dtype=float)
-    samples = np.asarray(join(arrays, model.channels), dtype=float)
     if states.shape != (len(samples), model.state_size):
         raise ValueError(f"states must have shape {(len(samples), model.state_size)}, got {states.shape}")
-    held = [samples[0]]
-    for sample in samples[1:]:
-        held.append(hold(sample, held[-1]))
-    inputs = split(filled(np.array(held)), model.channels)
+    inputs = split(filled(held), model.channels)
     now = {name: array[1:] for name, array in inputs.items()}
     before = {name: array[:-1] for name, array in inputs.items()}
     _, F, Q = model.predict(states[:-1], now, before)
@@ -79,37 +75,51 @@ def linearise(model: Model, states: np.ndarray, measurements: Mapping[str, Any])
     return Linearisation(F, Q, np.broadcast_to(H, (ticks, m, e)), np.broadcast_to(R, (ticks, m, m)), usable)
 
 
-def prior_covariance(model: Model, measurements: Mapping[str, Any]) -> np.ndarray:
-    """Covariance ``(e, e)`` with which a filter of this model starts.
+def samples_of(model: Model, measurements: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray]:
+    """All channels of a model side by side ``(T, d)``: as they are, and with missing samples held."""
+    arrays = check_measurements(model.channels, measurements, time_axis=True)
+    samples = np.asarray(join(arrays, model.channels), dtype=float)
+    held = [samples[0]]
+    for sample in samples[1:]:
+        held.append(hold(sample, held[-1]))
+    return samples, np.array(held)
+
+
+def start_of(model: Model, measurements: Mapping[str, Any]) -> tuple[int, np.ndarray]:
+    """First tick at which a filter of this model can start, and the covariance ``(e, e)`` with which it does.
 
     Raises:
-        ValueError: the first samples do not suffice for it.
+        ValueError: it never can.
     """
-    first = {name: np.asarray(array, dtype=float)[0] for name, array in measurements.items()}
-    covariance = np.asarray(model.prior(first)[1], dtype=float)
-    if not np.isfinite(covariance).all():
-        raise ValueError("the first samples must suffice for the model's prior; cut the trajectory or give a prior")
-    return covariance
+    _, held = samples_of(model, measurements)
+    x, P = (np.asarray(part, dtype=float) for part in model.prior(split(held, model.channels)))
+    P = np.broadcast_to(P, (len(held), *P.shape[-2:]))
+    ready = np.isfinite(x).all(axis=-1) & np.isfinite(P).all(axis=(-2, -1))
+    if not ready.any():
+        raise ValueError(f"measurements never suffice for the prior of {type(model).__name__}: a channel has no sample")
+    first = int(np.argmax(ready))
+    return first, P[first]
 
 
 def posterior_bound(
     model: Model, states: np.ndarray, measurements: Mapping[str, Any], prior: np.ndarray | None = None
 ) -> np.ndarray:
-    """Bound ``(T, e, e)`` on the covariance of any estimate at each tick, by the Riccati form.
+    """Bound ``(T, e, e)`` on the covariance of any estimate at each tick, by the Riccati form; NaN before the start.
 
     Args:
         model: the equations, with the noises that the sensors truly have.
         states: ``(T, n)`` true states.
         measurements: as for :func:`linearise`.
-        prior: ``(e, e)`` covariance at the first tick, whose measurement is counted in it; None for the model's.
+        prior: ``(e, e)`` covariance at the first tick, whose measurement is counted in it; None for the model's, at the
+            tick at which a filter can start.
 
     Raises:
-        ValueError: shapes do not fit, or the first samples do not suffice for the model's prior.
+        ValueError: shapes do not fit, or the samples never suffice for the model's prior.
     """
     F, Q, H, R, usable = linearise(model, states, measurements)
-    P = prior_covariance(model, measurements) if prior is None else np.asarray(prior, dtype=float)
-    bounds = [P]
-    for k in range(len(F)):
+    first, P = start_of(model, measurements) if prior is None else (0, np.asarray(prior, dtype=float))
+    bounds = [np.full_like(P, np.nan)] * first + [P]
+    for k in range(first, len(F)):
         P = F[k] @ P @ F[k].T + Q[k]
         if usable[k + 1].any():
             P = correct(P, np.where(usable[k + 1], 0.0, np.nan), H[k + 1], R[k + 1])[1]

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .bounds import linearise
+from .bounds import linearise, start_of
 from .model import Model
 
 if TYPE_CHECKING:
@@ -69,8 +69,7 @@ def trajectory_observability(
     """
     F, _, H, R, usable = linearise(model, states, measurements)
     if scale is None:
-        first = {name: np.asarray(array, dtype=float)[0] for name, array in measurements.items()}
-        scale = np.sqrt(np.diagonal(np.asarray(model.prior(first)[1], dtype=float)))
+        scale = np.sqrt(np.diagonal(start_of(model, measurements)[1]))
     scale = np.asarray(scale, dtype=float)
     if scale.shape != (model.error_size,) or not np.all(scale > 0.0):
         raise ValueError(f"scale must be {model.error_size} positive numbers, got {scale}")

@@ -16,6 +16,7 @@ import numpy as np
 
 from ...envs.trajectory import Trajectory
 from ...filters import rotation
+from ...filters.bicycle.geometry import RiderGeometry
 from ...filters.bicycle.relative_sensor import relative_orientation
 from ...filters.bicycle.two_gyro import TwoGyro
 
@@ -218,7 +219,9 @@ def simulate(
     frames = relative_orientation(theta + errors.camera * rng.standard_normal(theta.shape))
     frames[np.arange(len(time)) % errors.camera_interval != 0] = np.nan
     measurements["relative/orientation"] = frames
-    return Trajectory(time, measurements, truth, np.ones(len(time), bool), {"name": "exact"})
+    geometry = replace(RiderGeometry(), bicycle_imu_tilt=0.0)
+    metadata = {"name": "exact", "geometry": geometry.describe()}
+    return Trajectory(time, measurements, truth, np.ones(len(time), bool), metadata)
 
 
 def markov(length: int, dt: float, errors: Errors, rng: np.random.Generator) -> np.ndarray:

@@ -84,11 +84,19 @@ def test_missing_samples_tell_nothing():
     full, fewer = (posterior_bound(model, states, part) for part in (ride.measurements, sparse))
     assert np.all(np.linalg.eigvalsh(fewer[1:] - full[1:]).min(axis=-1) > -1e-12)
     assert fewer[-1, 0, 0] > 1.5 * full[-1, 0, 0]
+    late = sparse | {"relative/orientation": sparse["relative/orientation"].copy()}
+    late["relative/orientation"][:9] = np.nan
+    bound = posterior_bound(model, states, late)
+    assert np.isnan(bound[:9]).all()
+    filtered = KalmanFilter(model).run(late).covariance
+    np.testing.assert_allclose(bound[9], filtered[9], atol=1e-15)
     gaps = with_gaps(ride.measurements, sparse)
     for name, array in sparse.items():
         np.testing.assert_array_equal(gaps[name], array)
     with pytest.raises(ValueError, match="must have shape"):
         with_gaps({}, sparse)
+    with pytest.raises(ValueError, match="never suffice"):
+        posterior_bound(model, states, late | {"trunk_imu/gyr": np.full((201, 3), np.nan)})
     with pytest.raises(ValueError, match="states must have shape"):
         posterior_bound(model, states[:, :8], ride.measurements)
 
