@@ -13,6 +13,7 @@ from ..filters.accelerometer_array.calibration_magnetometer import align_magneto
 from ..filters.accelerometer_array.calibration_rate_table import (
     AxisCalibration,
     calibrate_accelerometer,
+    calibrate_direction,
     calibrate_gyroscope,
 )
 from .calibration import CalibrationRecord, ChannelCalibration
@@ -37,8 +38,12 @@ def accelerometer_record(
     *,
     gravity: float = STANDARD_GRAVITY,
     saturation: float | None = None,
+    estimate_axes: bool = False,
 ) -> CalibrationRecord:
     """Calibrate every accelerometer of an array.
+
+    The details hold the ``array`` with which filters should be made: the nominal one, or with ``estimate_axes`` one
+    with the axes found, and positions shifted along them.
 
     Args:
         data: runs on a rate table.
@@ -46,6 +51,8 @@ def accelerometer_record(
         channel: name for the record; None for that of the array.
         gravity: m/s².
         saturation: magnitude of raw readings that are discarded.
+        estimate_axes: find the directions of the sensitive axes too; needs mountings with upward directions that span
+            space, one of them opposite to another.
 
     Raises:
         ValueError: another number of columns than accelerometers, or poses that do not determine one of them.
@@ -56,38 +63,65 @@ def accelerometer_record(
             "raw readings"
         )
     found, rows = [], []
-    for number, axis in enumerate(spatial_axes(array)):
-        upward = {
-            name: float(AXES[up] @ axis) for name, up in set(zip(data.mounting.tolist(), data.up.tolist(), strict=True))
-        }
+    up_of = {name: AXES[up] for name, up in zip(data.mounting.tolist(), data.up.tolist(), strict=True)}
+    positions, axes = np.pad(np.array(array.positions), ((0, 0), (0, 3 - array.dimension))), spatial_axes(array)
+    limits = {"gravity": gravity, "saturation": saturation}
+    for number, axis in enumerate(axes):
+        columns = (data.raw[:, number], data.rate, data.mounting)
         try:
-            one = calibrate_accelerometer(
-                data.raw[:, number], data.rate, data.mounting, upward, gravity=gravity, saturation=saturation
-            )
+            if estimate_axes:
+                one = calibrate_direction(*columns, up_of, **limits)
+                axis = np.array(one.axis)
+            else:
+                upward = {name: float(up @ axis) for name, up in up_of.items()}
+                one = calibrate_accelerometer(*columns, upward, **limits)
         except ValueError as reason:
             raise ValueError(f"accelerometer {number + 1} of {array.name!r}: {reason}") from None
+        place = along(one, data, axis, positions[number])
+        if estimate_axes:
+            axes[number] = axis
+            positions[number] += 0.0 if place is None else (place - axis @ positions[number]) * axis
         found.append(one)
-        rows.append(_described(one) | {"positions": dict(one.positions), "along": along(one, data, axis)})
-    name = channel or accelerometer_channel(array)
-    return _record(name, found, "m/s²", {"array": array.describe(), "gravity": gravity, "axes": rows})
+        rows.append(_described(one) | {"positions": dict(one.positions), "along": place, "axis": axis.tolist()})
+    n = array.dimension
+    if n == 2:
+        axes = rotation.normalize(axes[:, :2])
+    built = type(array)(positions[:, :n].tolist(), axes[:, :n].tolist(), array.name, array.reference)
+    details = {"array": built.describe(), "estimated_axes": estimate_axes, "gravity": gravity, "axes": rows}
+    return _record(channel or accelerometer_channel(array), found, "m/s²", details)
 
 
-def along(one: AxisCalibration, data: RateTableData, axis: np.ndarray) -> float | None:
-    """eᵀr from the device's origin, m: mountings whose origin lies at one distance d outwards have ρ = eᵀr + d eᵀo.
+def along(one: AxisCalibration, data: RateTableData, axis: np.ndarray, nominal: np.ndarray) -> float | None:
+    """eᵀr, m: the coordinate of a sensor along its axis, from the device's origin.
 
-    None where they do not tell the two apart (only one direction).
+    With u up and the origin at one distance d outwards (o) a mounting gives ρ = (e − u uᵀe)ᵀr + d eᵀo. Of r only the
+    part along e can be told; the rest is taken from the nominal position.
+
+    Args:
+        one: with the positions ρ.
+        data: which axes pointed up and outwards.
+        axis: e, ``(3,)``.
+        nominal: r, ``(3,)`` m.
+
+    Returns:
+        None where the mountings do not tell it from d.
     """
-    names = dict(zip(data.mounting.tolist(), data.out.tolist(), strict=True))
-    rows = [[1.0, float(AXES[names[name]] @ axis)] for name in one.positions if names[name]]
-    values = [value for name, value in one.positions.items() if names[name]]
-    if not rows:
-        return None
-    columns = np.array(rows)
-    if not columns[:, 1].any():
-        return float(np.mean(values))
-    if np.linalg.matrix_rank(columns) < 2:
-        return None
-    return float(np.linalg.lstsq(columns, np.array(values), rcond=None)[0][0])
+    names = data.mounting.tolist()
+    up_of, out_of = (dict(zip(names, column.tolist(), strict=True)) for column in (data.up, data.out))
+    rows, right = [], []
+    for name, value in one.positions.items():
+        if out_of[name]:
+            level = axis - AXES[up_of[name]] * (AXES[up_of[name]] @ axis)
+            rows.append([level @ level, float(AXES[out_of[name]] @ axis)])
+            right.append(value - level @ nominal)
+    columns = np.array(rows).reshape(-1, 2)
+    if np.linalg.matrix_rank(columns, tol=1e-3) < 2:
+        known = columns[:, 0] > 0.5
+        if not known.any() or np.abs(columns[known, 1]).max() > 1e-3:
+            return None
+        return float(axis @ nominal + np.mean(np.array(right)[known]))
+    shift = np.linalg.lstsq(columns, np.array(right), rcond=None)[0][0]
+    return float(axis @ nominal + shift)
 
 
 def gyroscope_record(

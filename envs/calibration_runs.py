@@ -18,7 +18,7 @@ from .calibration import CalibrationRecord, ChannelCalibration
 from .calibration_channels import accelerometer_channel, spatial_axes
 from .calibration_data import MagnetometerData, RateTableData, mounting_matrix
 from .controller_gestures import BOTH_WAYS, DOWNWARDS, UPWARDS, RateTable
-from .devices import HandDevice
+from .devices import HandDevice, actual_array, array_preset
 from .hand_sensing import simulate_hand
 from .sensors import STANDARD_GRAVITY, magnetic_field
 
@@ -33,11 +33,11 @@ MAGNETOMETER_SCALE = 1.0 / 300.0
 """of a unit field, per count"""
 
 ACCELEROMETER_MOUNTINGS = (
-    *(("+z", "+x"), ("+z", "-x")),
-    *(("+x", "+y"), ("+x", "-y")),
-    *(("+y", "+z"), ("+y", "-z")),
+    *(("+z", "+x"), ("-z", "-x")),
+    *(("+x", "+y"), ("-x", "-y")),
+    *(("+y", "+z"), ("-y", "-z")),
 )
-"""(up, out): each axis outwards, inwards, and upright."""
+"""(up, out): each axis outwards, inwards, upright and upside down."""
 GYROSCOPE_MOUNTINGS = (("+x", "+y"), ("+y", "+z"), ("+z", "+x"))
 
 
@@ -78,6 +78,12 @@ def random_calibration(array: AccelerometerArray, seed: int) -> CalibrationRecor
             "imu/mag": ChannelCalibration(matrix.tolist(), (-matrix @ mag.normal(0.0, 100.0, 3)).tolist(), "1"),
         }
     )
+
+
+def built_with(array: AccelerometerArray, axis_error: float, seed: int) -> AccelerometerArray:
+    """The array with axes turned by random angles of standard deviation ``axis_error``, rad, about each normal."""
+    errors = replace(array_preset("array-calibrated"), axis_error=axis_error, position_error=0.0)
+    return actual_array(array, errors, np.random.default_rng(np.random.SeedSequence(seed).spawn(4)[3]))
 
 
 def counts(channel: ChannelCalibration, readings: np.ndarray, largest: float = math.inf) -> np.ndarray:

@@ -11,6 +11,7 @@ frame: rotation between a tracker's frame and the device; columns bx, by, bz (ax
 from __future__ import annotations
 
 import json
+import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -42,12 +43,16 @@ class Args:
     """local gravity, m/s²"""
     saturation: float | None = None
     """raw readings of at least this magnitude are discarded; by default those that stick to the end of the range"""
+    estimate_axes: bool = False
+    """accelerometers: find the directions of their axes too; needs runs with each axis up, and one upside down"""
     simulate: bool = False
     """no files: simulate the runs of a device with drawn scales and offsets, and compare with the truth"""
     hold: float = 3.0
     """of simulated runs: time at each rate of the table, s"""
     seed: int = 0
     """of simulated runs"""
+    axis_error: float = 0.0
+    """of simulated runs: standard deviation of the directions of the accelerometers' axes, deg"""
     raw: Path | None = None
     """folder for the simulated runs as CSV files, with their true record: examples of the format"""
     json: bool = False
@@ -90,13 +95,18 @@ def calibrate(args: Args) -> tuple[CalibrationRecord, CalibrationRecord | None]:
         data = read_rate_table(files) if truth is None else runs.gyroscope_runs(truth, args.seed, hold=args.hold)
         found = channels.gyroscope_record(data, args.channel or "imu/gyr", saturation=args.saturation)
     else:
-        data = (
-            read_rate_table(files)
-            if truth is None
-            else runs.accelerometer_runs(array, truth, args.seed, hold=args.hold)
-        )
+        if truth is None:
+            data = read_rate_table(files)
+        else:
+            built = runs.built_with(array, math.radians(args.axis_error), args.seed)
+            data = runs.accelerometer_runs(built, truth, args.seed, hold=args.hold)
         found = channels.accelerometer_record(
-            data, array, args.channel, gravity=args.gravity, saturation=args.saturation
+            data,
+            array,
+            args.channel,
+            gravity=args.gravity,
+            saturation=args.saturation,
+            estimate_axes=args.estimate_axes,
         )
     if truth is not None and args.raw is not None:
         data.save(args.raw / f"{args.sensor}.csv")

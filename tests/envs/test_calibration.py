@@ -19,6 +19,7 @@ from poise.envs.calibration_channels import accelerometer_record, gyroscope_reco
 from poise.envs.calibration_data import RateTableData, mounting_matrix, read_magnetometer, read_rate_table
 from poise.envs.calibration_runs import (
     accelerometer_runs,
+    built_with,
     gyroscope_runs,
     magnetometer_run,
     nominal_calibration,
@@ -28,6 +29,7 @@ from poise.envs.hand_sensing import simulate_hand
 from poise.envs.trajectory import Trajectory
 from poise.filters import metrics, rotation
 from poise.filters.accelerometer_array.array import CONTROLLER, OCTA, PLANAR, TRIAXIAL
+from poise.filters.accelerometer_array.array_files import read_array
 from poise.filters.accelerometer_array.spatial import ArrayOrientation
 from poise.filters.kalman import KalmanFilter
 from poise.filters.quantity import ORIENTATION
@@ -50,7 +52,26 @@ def test_accelerometers_are_calibrated(array, seed):
     first = found.details[name]["axes"][0]["positions"]
     sign = float(array.e[0][0])
     assert first["+z up, out +x"] == pytest.approx(places[0] + 0.1 * sign, abs=5e-4)
-    assert first["+z up, out -x"] == pytest.approx(places[0] - 0.1 * sign, abs=5e-4)
+    assert first["-z up, out -x"] == pytest.approx(places[0] - 0.1 * sign, abs=5e-4)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_axes_that_are_not_as_drawn_are_found(seed):
+    truth, built = random_calibration(OCTA, seed), built_with(OCTA, math.radians(0.5), seed)
+    runs = accelerometer_runs(built, truth, seed, hold=1.0)
+    found, nominal = accelerometer_record(runs, OCTA, estimate_axes=True), accelerometer_record(runs, OCTA)
+    details, true = found.details["array/acc"], truth.channels["array/acc"]
+    array = read_array(details["array"])
+    turned, left = (np.degrees(np.arccos(np.sum(one.e * built.e, axis=1))) for one in (OCTA, array))
+    assert np.sqrt(np.mean(turned**2)) > 0.4
+    assert left.max() < 0.05
+    np.testing.assert_allclose(np.diag(found.channels["array/acc"].matrix), np.diag(true.matrix), rtol=1e-3)
+    np.testing.assert_allclose(found.channels["array/acc"].offset, true.offset, atol=5e-3)
+    places = [axis["along"] for axis in details["axes"]]
+    np.testing.assert_allclose(places, np.sum(built.e * built.r, axis=1), atol=5e-4)
+    # taken for granted, the same axes spoil scale and offset
+    assert np.abs(np.array(nominal.channels["array/acc"].offset) - true.offset).max() > 0.03
+    assert np.mean([axis["residual"] for axis in details["axes"]]) < 0.03
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -214,10 +235,17 @@ def test_wrong_counts_and_missing_poses_are_refused():
     data = accelerometer_runs(TRIAXIAL, truth, 0, hold=0.2)
     with pytest.raises(ValueError, match="'controller' has 6 accelerometers, but the runs have 3 columns"):
         accelerometer_record(data, CONTROLLER)
-    keep = data.up != "+z"
+    keep = np.char.find(data.up.astype(str), "z") < 0
     part = RateTableData(data.time[keep], data.up[keep], data.out[keep], data.rate[keep], data.raw[keep])
     with pytest.raises(ValueError, match="accelerometer 3 of 'triaxial': no pose in which the axis points up"):
         accelerometer_record(part, TRIAXIAL)
+    with pytest.raises(ValueError, match=r"the data say nothing about \['axis z'\]"):
+        accelerometer_record(part, TRIAXIAL, estimate_axes=True)
+    three = np.char.startswith(data.up.astype(str), "+")
+    upright = RateTableData(data.time[three], data.up[three], data.out[three], data.rate[three], data.raw[three])
+    assert accelerometer_record(upright, TRIAXIAL).channels
+    with pytest.raises(ValueError, match="do not tell axis x, axis y, axis z, offset"):
+        accelerometer_record(upright, TRIAXIAL, estimate_axes=True)
     with pytest.raises(ValueError, match="gyroscope axis z: no run in which it stood upright"):
         gyroscope_record(part)
     with pytest.raises(ValueError, match="a gyroscope has 3 axes, but the runs have 6"):
