@@ -57,19 +57,19 @@ class ControlSettings:
     """cost of a squared N·m"""
     largest_torque: float = 40.0
     """N·m"""
-    speed_gain: float = 250.0
+    speed_gain: float = 150.0
     """N/(m/s)"""
-    speed_integral: float = 60.0
+    speed_integral: float = 40.0
     """N/m"""
     largest_drive: float = 250.0
     """N at the wheel"""
-    largest_power: float = 700.0
-    """W at the wheel: a sprint of some seconds"""
+    largest_power: float = 450.0
+    """W at the wheel: a sprint of some seconds, in the saddle"""
     largest_brake: float = 4.2
     """m/s² by both brakes together, slope included; the rear wheel would lift off at 5"""
     lateral_acceleration: float = 2.0
     """m/s²: the pilot slows down before turns that would need more"""
-    forward_acceleration: float = 1.0
+    forward_acceleration: float = 0.7
     """m/s²: how fast the wanted speed rises"""
     braking: float = 1.5
     """m/s²: how fast it falls, and what is reckoned with before a turn"""

@@ -26,14 +26,17 @@ def loop_gaps(truth: Mapping[str, np.ndarray], posture: Posture) -> np.ndarray:
     frame, trunk = truth["bicycle/orientation"], truth["trunk/orientation"]
     steer, crank = truth["bicycle/steer"][:, 0], truth["bicycle/crank"][:, 0]
     turn = rotation.multiply(rotation.conjugate(frame), trunk)
+    # the pelvis with shoulders and hips bounces on the saddle
+    bounce = rotation.rotate_back(frame, truth["trunk/position"] - truth["bicycle/position"]) - posture.lumbar
     gaps = []
     for name in LIMBS:
         kind, side = name.split("_")
         limb = posture.limb(name)
         if kind == "arm":
-            root, parts, target = trunk, ("upper_arm", "forearm"), posture.arm_target(side, steer, turn)
+            root, parts = trunk, ("upper_arm", "forearm")
+            target = posture.arm_target(side, steer, turn) - rotation.rotate_back(turn, bounce)
         else:
-            root, parts, target = frame, ("thigh", "shank"), posture.leg_target(side, crank)
+            root, parts, target = frame, ("thigh", "shank"), posture.leg_target(side, crank) - bounce
         upper, lower = (truth[f"{part}_{side}/orientation"] for part in parts)
         reached = rotation.rotate(upper, np.array([0.0, 0.0, -limb.upper]))
         reached = reached + rotation.rotate(lower, np.array([limb.tip[0], 0.0, limb.tip[1]]))

@@ -128,7 +128,7 @@ class Ride:
         self._count += 1
         torques, crank = rider.act()
         brake = max(0.0, -self.pilot.command[1] - COASTING)
-        bicycle.act(0.0, 0.0, crank, rider.joints, torques, brake)
+        bicycle.act(0.0, 0.0, crank, rider.driven, torques, brake)
         self.physics.step()
 
     def _control(self) -> None:

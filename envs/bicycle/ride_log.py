@@ -59,7 +59,7 @@ class RideRecorder:
         if rider.full:
             kinds = {"arm": ("upper_arm", "forearm"), "leg": ("thigh", "shank")}
             self._names += [f"{part}_{limb[4:]}" for limb in LIMBS for part in kinds[limb[:3]]]
-        self._joints = [links["front_assembly"], links["crank"], links["rear_wheel"], *rider.joints]
+        self._joints = [links["front_assembly"], links["crank"], links["rear_wheel"], *rider.joints, rider.seat]
 
     def _look(self) -> list[LinkState]:
         body = self.ride.bicycle.body
@@ -144,17 +144,24 @@ class RideRecorder:
                 hinge = rotation.rotate(upper_turn, np.array([0.0, 0.0, -rider.posture.limb(name).upper]))
                 limbs[name] = LimbPosture(upper_turn, lower_turn, angles[:, 6 + 4 * index : 10 + 4 * index], hinge)
             else:
-                limbs[name] = self._solve(name, steer, crank, trunk_turn, swivels[:, index])
+                limbs[name] = self._solve(name, steer, crank, trunk_turn, swivels[:, index], angles[:, -1])
         return RideLog(time, frames, contact, limbs, trunk, steer, crank, angles[:, 2], rates[:, :3], torques, fallen)
 
     def _solve(
-        self, name: str, steer: np.ndarray, crank: np.ndarray, trunk: np.ndarray, swivel: np.ndarray
+        self,
+        name: str,
+        steer: np.ndarray,
+        crank: np.ndarray,
+        trunk: np.ndarray,
+        swivel: np.ndarray,
+        bounce: np.ndarray,
     ) -> LimbPosture:
-        """Posture of a limb by inverse kinematics."""
+        """Posture of a limb by inverse kinematics; ``bounce``: height of the pelvis above its place at rest, m."""
         posture, side = self.ride.rider.posture, name[4:]
+        up = bounce[:, None] * np.array([0.0, 0.0, 1.0])
         if name.startswith("leg"):
-            return reach_to(posture.leg, posture.leg_target(side, crank), KNEE_OUT, swivel)
-        target = posture.arm_target(side, steer, trunk)
+            return reach_to(posture.leg, posture.leg_target(side, crank) - up, KNEE_OUT, swivel)
+        target = posture.arm_target(side, steer, trunk) - rotation.rotate_back(trunk, up)
         # a lumped trunk may carry the shoulder a little too far: the arm is then straight
         length = rotation.norm(target)
         target = target * np.minimum(1.0, 0.9999 * posture.arm.reach / length)

@@ -24,6 +24,7 @@ from .limb_tables import SHOULDERS_FOLLOW, LimbTables
 from .limbs import tip_torques
 from .posture import LIMBS, SIDES, SIGNS, Posture
 from .rider_links import LUMPED_MASSES, TRUNK_JOINTS, add_full_rider, add_lumped_rider, limb_joints, segment_links
+from .saddle import Saddle, balanced_hand_load, resting_load
 from .style import RiderMotion
 from .urdf import Tree
 
@@ -34,19 +35,21 @@ LIMB_DAMPING = 0.3
 """N·m·s/rad of every joint of a limb"""
 SWIVEL_STIFFNESS, SWIVEL_DAMPING = 60.0, 2.0
 """N·m/rad, N·m·s/rad: hold elbows and knees in their plane"""
-DOWNSTROKE = 0.3
-"""the pedal force is this plus the cosine of the crank angle where that is positive"""
-MEAN_STROKE = 2.0 * (1.0 / math.pi + DOWNSTROKE)
-"""mean of both legs' strength over a turn"""
+AROUND = 0.2
+"""a foot pushes down with the cosine of the crank angle, where that is positive, and along its circle with this"""
+MEAN_STROKE = 2.0 * (0.25 + AROUND)
+"""mean of both feet's turning force over a turn"""
+PUSHED_BACK, STRONGEST_PULL = 15.0, 150.0
+"""N·m by which the pedals may tilt the rider backwards before the hands pull against it; N of each hand at most"""
 KEEPING_UP = 4.0
 """N·m/(rad/s) on the crank, towards the wheel's pace"""
 LEAN_SUPPORT, LEAST_PRESS, MOST_PRESS = 1.0, 0.2, 3.0
-"""1: part of the leaning trunk's weight moment that the hands prop; parts of the load that the outer hand keeps, and that
-the inner one takes at most"""
-LARGEST_PEDAL_FORCE = 450.0
-"""N"""
-USUAL_MASS = 68.0
-"""kg: of the rider for whom a style's load of the hands is meant; others lean on them in proportion"""
+"""1: part of the leaning trunk's weight moment that the hands prop; parts of their load that the outer hand keeps, and
+that the inner one takes at most"""
+LARGEST_PEDAL_FORCE = 400.0
+"""N downwards: more would lift the rider off the saddle"""
+USUAL_HAND_LOAD = 60.0
+"""N: with it a rider of 1.76 m and 68 kg is balanced on the saddle; other loads of a style are meant relative to it"""
 
 
 @dataclass(frozen=True)
@@ -107,9 +110,11 @@ class Rider:
         self._axis = axis.tolist()
         # N along the steering axis, on one hand or off the other, that carry the trunk's moment lying on its side
         self._prop = LEAN_SUPPORT * STANDARD_GRAVITY * self._trunk_moment / (abs(float(arm[1])) * float(axis[2]))
-        self._load_scale = posture.body.mass / USUAL_MASS
+        self._load_scale = balanced_hand_load(posture) / USUAL_HAND_LOAD
         # how far ahead of the lumbar joint the hands press down
         self._press_arm = float(posture.bicycle.grip[0] - posture.lumbar[0])
+        assert posture.bicycle.drive is not None
+        self._axle_arm = float(posture.bicycle.drive.axle[0] - posture.bicycle.saddle[0])
         self.constraints: list[int] = []
 
     def extend(self, tree: Tree) -> None:
@@ -122,13 +127,15 @@ class Rider:
         self.trunk_links = body.index(TRUNK_JOINTS)
         self.limb_links = [body.index(limb_joints(name)) for name in LIMBS] if self.full else []
         self.joints = [*self.trunk_links, *(link for links in self.limb_links for link in links)]
+        self.seat = body.links["pelvis"]
+        self.driven = [*self.joints, self.seat]
         names = segment_links() if self.full else LUMPED_MASSES
         self.mass_links = body.index(names)
         self.masses = np.array([body.masses[name] for name in names])
         self.moments = np.array([body.moments[name] for name in names])
         self._pressing = self._pressing_lines()
         # abduction holds the swivel
-        self._felt = [*self.trunk_links, *(links[1] for links in self.limb_links)]
+        self._felt = [*self.trunk_links, *(links[1] for links in self.limb_links), self.seat]
         for links in self.limb_links:
             for link in links:
                 body.set_joint_damping(link, LIMB_DAMPING)
@@ -143,6 +150,8 @@ class Rider:
         """
         self.motion, self._began = motion, self.bicycle.physics.time
         body, physics = self.bicycle.body, self.bicycle.physics
+        self._hand_load = self._load_scale * motion.style.hand_load
+        self.saddle = Saddle(resting_load(self.posture, self._hand_load, self.full))
         trunk, _, _ = motion.at(0.0, 0.0, 0.0)
         self._trunk_target = [self.posture.flexion + float(trunk[0]), float(trunk[1]), float(trunk[2])]
         for link, angle in zip(self.trunk_links, self._trunk_target, strict=True):
@@ -197,35 +206,38 @@ class Rider:
         self._trunk_target = [self.posture.flexion + float(change[0]), float(change[1]), float(change[2]) + follow]
         steer_torque += unsteady
         c, s = math.cos(state.steer), math.sin(state.steer)
-        strength, load = 0.5 * steer_torque / self._grip_arm, self._load_scale * self.motion.style.hand_load
+        ratio, bicycle = self.bicycle.ratio, self.posture.bicycle
+        assert bicycle.drive is not None
+        length = bicycle.drive.crank_length
+        wanted = max(0.0, drive) * bicycle.rear_wheel.radius * ratio
+        push = min(LARGEST_PEDAL_FORCE, wanted / (length * MEAN_STROKE)) if self.full else 0.0
+        phases = [state.crank, state.crank + math.pi]
+        downwards = [push * max(0.0, math.cos(phase)) for phase in phases]
+        # who pushes hard on the pedals pulls at the handlebar
+        back = sum(down * (self._axle_arm + length * math.cos(a)) for down, a in zip(downwards, phases, strict=True))
+        pulled = min(STRONGEST_PULL, max(0.0, back - PUSHED_BACK) / (len(SIDES) * self._press_arm))
+        strength, load = 0.5 * steer_torque / self._grip_arm, self._hand_load
         # a rider who leans props on the inner hand and eases the outer one, along the steering axis: no turn of the bar
         prop = self._prop * math.sin(self._trunk_target[1])
         eased = min(0.5 * abs(prop), (1.0 - LEAST_PRESS) * load)
         pressed = min(abs(prop) - eased, (MOST_PRESS - 1.0) * load)
         props = (pressed, -eased) if prop < 0.0 else (-eased, pressed)
-        self._braced = self._press_arm * (len(SIDES) * load + (pressed - eased) * self._axis[2])
+        self._braced = self._press_arm * (len(SIDES) * (load - pulled) + (pressed - eased) * self._axis[2])
         hands = []
         for (pull, turned), on in zip(self._pulls, props, strict=True):
             x, y, z = (strength * (c * a + s * b) for a, b in zip(pull, turned, strict=True))
             ax, ay, az = (-on * a for a in self._axis)
-            hands.append((x + ax, y + ay, z + az - load))
+            hands.append((x + ax, y + ay, z + az + pulled - load))
         self._hands = hands
-        ratio = self.bicycle.ratio
-        bicycle = self.posture.bicycle
-        assert bicycle.drive is not None
-        length = bicycle.drive.crank_length
-        wanted = max(0.0, drive) * bicycle.rear_wheel.radius * ratio
-        phases = [state.crank, state.crank + math.pi]
         self._wanted_swivel = swivel.tolist()
         if not self.full:
-            self._crank_torque = wanted * sum(max(0.0, math.cos(a)) + DOWNSTROKE for a in phases) / MEAN_STROKE
+            self._crank_torque = wanted * sum(max(0.0, math.cos(a)) ** 2 + AROUND for a in phases) / MEAN_STROKE
             return
         moved = (swivel - self._first_swivel).tolist()
         self._swivel = self._tables.abductions(state.steer, state.crank, self._trunk_target, moved)
         angles = [pair[0] for pair in self.bicycle.body.joint_tuples(self.joints)]
         trunk = angles[:3]
         torques = [0.0, 0.0, 0.0]
-        push = min(LARGEST_PEDAL_FORCE, wanted / (length * MEAN_STROKE))
         # muscles also carry the legs' weight around, half of it each
         lift = self._tables.leg_weight(state.crank)
         # and keep the feet up with the wheel, so that the chain stays nearly taut
@@ -235,15 +247,17 @@ class Rider:
             if index < 2:
                 force = self._into_trunk(trunk, list(hands[index]))[0]
             else:
-                phase = phases[index - 2]
-                strength = push * (max(0.0, math.cos(phase)) + DOWNSTROKE) + 0.5 * lift / length
-                force = [-strength * math.sin(phase), 0.0, -strength * math.cos(phase)]
+                phase, around = phases[index - 2], push * AROUND + 0.5 * lift / length
+                force = [-around * math.sin(phase), 0.0, -around * math.cos(phase) - downwards[index - 2]]
             held = up if index < 2 else [0.0, 0.0, 0.0]
             torques += compute(angles[3 + 4 * index : 7 + 4 * index], force, held)[0]
         self._torques = torques
 
     def act(self) -> tuple[list[float], float]:
-        """Torques of all joints of the rider and of the crank for the next step, after :meth:`plan`."""
+        """Torques of the joints in :attr:`driven`, the saddle's force last, and of the crank, for the next step.
+
+        To be called after :meth:`plan`.
+        """
         felt = self.bicycle.body.joint_tuples(self._felt)
         torques = list(self._torques) if self.full else [0.0, 0.0, 0.0]
         gravity = self.bicycle.physics.gravity
@@ -260,7 +274,7 @@ class Rider:
         if not self.full:
             self._press()
         self._applied = torques
-        return torques, self._crank_torque
+        return [*torques, self.saddle.force(*felt[-1])], self._crank_torque
 
     def _press(self) -> None:
         """Hands of the lumped rider: the same force on the handlebar and, oppositely, on the trunk."""

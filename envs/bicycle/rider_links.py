@@ -40,10 +40,10 @@ def _three_joints(tree: Tree, parent: str, child: str, origin: np.ndarray, mass:
 
 
 def add_full_rider(tree: Tree, posture: Posture) -> None:
-    """Pelvis fixed to the frame, trunk, and four limbs whose ends are still free."""
+    """Pelvis that slides on the saddle, trunk, and four limbs whose ends are still free."""
     pelvis, segments = posture.pelvis(), posture.segments()
     tree.link("pelvis", pelvis.mass, pelvis.tensor, pelvis.centre - posture.lumbar, pelvis_shapes(posture))
-    tree.joint("rear_frame", "pelvis", posture.lumbar)
+    tree.joint("rear_frame", "pelvis", posture.lumbar, AXES["z"], slides=True)
     _three_joints(tree, "pelvis", "trunk", np.zeros(3), posture.trunk(), trunk_shapes(posture))
     shapes = limb_shapes(posture)
     for name in LIMBS:
@@ -59,7 +59,7 @@ def add_full_rider(tree: Tree, posture: Posture) -> None:
 
 
 def add_lumped_rider(tree: Tree, posture: Posture) -> None:
-    """Pelvis with the legs at rest, fixed to the frame, and trunk with the arms at rest."""
+    """Pelvis with the legs at rest, sliding on the saddle, and trunk with the arms at rest."""
     limbs = [posture.limbs_at(crank) for crank in (0.0, np.pi)]
 
     def mean(kind: str) -> list[Mass]:
@@ -68,7 +68,7 @@ def add_lumped_rider(tree: Tree, posture: Posture) -> None:
 
     pelvis = join([posture.pelvis(), *mean("leg")])
     tree.link("pelvis", pelvis.mass, pelvis.tensor, pelvis.centre - posture.lumbar, pelvis_shapes(posture))
-    tree.joint("rear_frame", "pelvis", posture.lumbar)
+    tree.joint("rear_frame", "pelvis", posture.lumbar, AXES["z"], slides=True)
     trunk = join([posture.trunk(), *mean("arm")])
     _three_joints(tree, "pelvis", "trunk", np.zeros(3), trunk, trunk_shapes(posture))
 

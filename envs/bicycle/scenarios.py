@@ -164,7 +164,7 @@ SCENARIOS = {
         Scenario(
             "outdoor",
             "an arbitrary path in 50 × 40 m at 0.5 to 6 m/s on uneven paving",
-            partial(_varied_speed, low=0.5, high=6.2, hold=10.0),
+            partial(_varied_speed, low=0.6, high=6.4, hold=10.0),
             _wander,
             partial(_paving, deviation=0.0015),
         ),

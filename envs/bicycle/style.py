@@ -35,9 +35,9 @@ class RiderStyle:
     """1: part of the bicycle's roll that the trunk takes back, so that the shoulders stay level"""
     swivel: float = math.radians(3.0)
     """rad: standard deviation of how far elbows and knees stand off their usual plane, and of their slow wander"""
-    hand_load: float = 65.0
+    hand_load: float = 60.0
     """N that each hand leans on the handlebar, besides the arm's weight: about a fifth of the rider's weight in all.
-    Of a rider of 68 kg; a lighter one leans less.
+    Of a rider of 1.76 m and 68 kg; others lean so that their weight rests on the same part of the saddle.
 
     The papers report no handlebar forces; with less, a trunk bent as far forward as theirs lifts the saddle's rear.
     """

@@ -83,10 +83,18 @@ class Tree:
         )
         self._links.append("\n".join([head, *shapes, "</link>"]))
 
-    def joint(self, parent: str, child: str, origin: Vector, axis: Vector | None = None) -> None:
-        """Hang ``child`` on ``parent`` at ``origin`` (m, parent frame), turning about ``axis``; None fixes it."""
-        kind = "fixed" if axis is None else "continuous"
+    def joint(
+        self, parent: str, child: str, origin: Vector, axis: Vector | None = None, *, slides: bool = False
+    ) -> None:
+        """Hang ``child`` on ``parent`` at ``origin`` (m, parent frame); it turns about ``axis`` or slides along it.
+
+        Without an axis it is fixed.
+        """
+        kind = "fixed" if axis is None else "prismatic" if slides else "continuous"
         turn = "" if axis is None else f'<axis xyz="{_row(axis)}"/>'
+        if slides:
+            # PyBullet takes a lower limit above the upper one for none
+            turn += '<limit lower="1" upper="-1" effort="1e9" velocity="1e9"/>'
         self._joints.append(
             f'<joint name="{child}_joint" type="{kind}"><parent link="{parent}"/><child link="{child}"/>'
             f'<origin xyz="{_row(origin)}"/>{turn}</joint>'
