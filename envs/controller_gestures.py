@@ -118,9 +118,9 @@ class Infinity:
 class Pointing:
     """Pointing with the body's y axis at targets around north that come one after the other.
 
-    A target at azimuth ψ (from north to east) and elevation θ is pointed at by Q = R_z(−ψ) R_x(θ) (5.50). The turn to
-    the next one is about the normal of both directions, along 6u⁵ − 15u⁴ + 10u³ (fifth order), so the body gathers some
-    roll from target to target. (5.52) is the transpose of that turn.
+    A target at azimuth ψ (from north to east) and elevation θ is pointed at by Q = R_z(−ψ) R_x(θ) (5.48, with the sign
+    corrected). The turn to the next one is about the normal of both directions, along 6u⁵ − 15u⁴ + 10u³ (fifth order),
+    so the body gathers some roll from target to target. (5.52) is the transpose of that turn.
 
     Attributes:
         duration: length, s.
@@ -169,7 +169,7 @@ def pointing_attitude(azimuth: np.ndarray, elevation: np.ndarray) -> np.ndarray:
 
 
 def target_position(azimuth: np.ndarray, elevation: np.ndarray, distance: float = 10.0) -> np.ndarray:
-    """Place of a target ``(..., 3)`` on a wall ``distance`` m north of the hand: d [tan ψ, 1, tan θ sec ψ] (5.51)."""
+    """Place of a target ``(..., 3)`` on a wall ``distance`` m north of the hand: d [tan ψ, 1, tan θ sec ψ] (5.50)."""
     return distance * np.stack([np.tan(azimuth), np.ones_like(azimuth), np.tan(elevation) / np.cos(azimuth)], axis=-1)
 
 
