@@ -11,6 +11,7 @@ from __future__ import annotations
 import hashlib
 import importlib.util
 import inspect
+import itertools
 import os
 import sys
 import tempfile
@@ -22,6 +23,7 @@ import numpy as np
 from . import kernel
 from .model import Equations, Model, Recurrence, parameters_of, with_parameters
 from .sampling import split
+from .sparsity import Part, can_differ_from_zero, find_parts, whole
 from .tracing import Tape, print_code
 
 _TICK = '''
@@ -58,11 +60,11 @@ _KALMAN = {
     "scratch": """e, m = P.shape[1], whites.shape[2]
     P0, F, Q, work, dx = np.zeros((e, e)), np.zeros((e, e)), np.zeros((e, e)), np.empty((e, e)), np.empty(e)
     r, H, R = np.zeros(m), np.zeros((m, e)), np.zeros((m, m))
-    rows, S, HP, K = np.empty(m, np.int64), np.empty((m, m)), np.empty((m, e)), np.empty((m, e))""",
+    rows, S, HP, K = np.empty(m, np.int64), np.empty((m, m)), np.empty((m, e)), np.empty((m, e))
+    {parts}""",
     "advance": """predict(x[b], present, before, p, x1, F, Q)
-                propagate(F, P[b], Q, work)
                 residual(x1, z, p, r, H, R)
-                nis[t, b] = correct(r, H, R, P[b], dx, whites[t, b], rows, S, HP, K)
+                {update}
                 retract(x1, dx, p, x0)
                 finish(x0, z, p, x[b])""",
     "begin": """prior(current, p, x0, P0)
@@ -79,6 +81,12 @@ _KALMAN = {
                         covariances[t, b, i, j] = P[b, i, j] if started[b] else np.nan""",
 }
 
+_UPDATE = """propagate(F, {P}, Q, work, s{k}, ff{k}, fc{k})
+{indent}{total} correct(r, H, R, {P}, dx, whites[t, b], rows, S, HP, K, s{k}, r{k}, hf{k}, hc{k}, {uncorrelated})"""
+
+_WHOLE = """propagate(F, P[b], Q, work, None, None, None)
+                nis[t, b] = correct(r, H, R, P[b], dx, whites[t, b], rows, S, HP, K, None, None, None, None, False)"""
+
 _RECURRENCE = {
     "state": "",
     "outputs": "",
@@ -91,6 +99,35 @@ _RECURRENCE = {
                     copy(x0, x[b])""",
     "keep": "",
 }
+
+
+def _print_parts(parts: list[Part], everything: Part) -> tuple[list[str], dict[str, str]]:
+    """Index lists of the parts (module constants), and what the recursion of a tick does with each part.
+
+    A covariance that links parts (one that the user made) is treated as a whole.
+    """
+    several = len(parts) > 1
+    constants = []
+    for k, part in enumerate(parts if several else []):
+        lists = {"s": part.states, "r": part.rows}
+        for name, lines in (("f", part.transition), ("h", part.jacobian)):
+            lists[f"{name}f"] = (0, *itertools.accumulate(len(line) for line in lines))
+            lists[f"{name}c"] = tuple(itertools.chain.from_iterable(lines))
+        constants += [f"{name}{k} = np.array({list(values)}, dtype=np.int64)" for name, values in lists.items()]
+    if not several:
+        return [], {"parts": "", "update": _WHOLE}
+    owner = [next(k for k, part in enumerate(parts) if i in part.states) for i in everything.states]
+    constants.append(f"owner = np.array({owner}, dtype=np.int64)")
+    lines = ["nis[t, b] = 0.0", "if linked[b]:"]
+    lines += [f"    {line.strip()}" for line in _WHOLE.splitlines()] + ["else:"]
+    for k, part in enumerate(parts):
+        text = _UPDATE.format(k=k, P="local", total="nis[t, b] +=", uncorrelated=part.uncorrelated, indent=" " * 20)
+        lines += [f"    gather(P[b], s{k}, local)", f"    {text}", f"    scatter(local, s{k}, P[b])"]
+    largest = max(len(part.states) for part in parts)
+    scratch = f"""local, linked = np.empty(({largest}, {largest})), np.zeros(B, np.bool_)
+    for b in range(B):
+        linked[b] = coupled(P[b], owner)"""
+    return [*constants, ""], {"parts": scratch, "update": ("\n" + " " * 16).join(lines)}
 
 
 def cache_folder() -> Path:
@@ -113,7 +150,7 @@ def print_model(model: Equations) -> str:
         ValueError: an equation returns another shape than the model's sizes say.
         TypeError: an equation branches on values.
     """
-    tape = Tape()
+    tape, template = Tape(), _RECURRENCE
     names = list(parameters_of(model))
     traced = with_parameters(model, dict(zip(names, tape.inputs("p", len(names)), strict=True)))
     width, n = sum(channel.size for channel in model.channels), model.state_size
@@ -129,11 +166,9 @@ def print_model(model: Equations) -> str:
         functions["predict(x, z, previous, p, xn, F, Q)"] = dict(zip(("xn", "F", "Q"), predicted, strict=True))
         functions["residual(x, z, p, r, H, R)"] = dict(zip(("r", "H", "R"), traced.residual(x, z), strict=True))
         functions["retract(x, dx, p, xn)"] = {"xn": traced.retract(x, tape.inputs("dx", e))}
-        template = _KALMAN
     elif isinstance(traced, Recurrence):
         functions["prior(z, p, xn)"] = {"xn": traced.prior(z)}
         functions["predict(x, z, previous, p, xn)"] = {"xn": traced.predict(x, z, previous)}
-        template = _RECURRENCE
     else:
         raise TypeError(f"{type(model).__name__} is neither a Model nor a Recurrence")
     functions["finish(x, z, p, xn)"] = {"xn": traced.finish(x, z)}
@@ -142,15 +177,22 @@ def print_model(model: Equations) -> str:
     functions["pose(x, p, out)"] = {"out": np.concatenate([pose[quantity.name] for quantity in model.outputs])}
     head = inspect.getsource(kernel).replace("\ndef ", '\n@njit(error_model="numpy")\ndef ')
     lines = ["from math import *", "from numba import njit", head, "inf, nan = np.inf, np.nan", ""]
+    matrices: dict[str, np.ndarray] = {}
     for signature, outputs in functions.items():
         for name, array in outputs.items():
             if np.shape(array) != shapes[name]:
                 where = f"{type(model).__name__}.{signature.split('(')[0]}"
                 raise ValueError(f"{where}: {name} must have shape {shapes[name]}, got {np.shape(array)}")
+            matrices[name] = np.asarray(array, dtype=object)
         # Zeros are not printed; matrices keep theirs between calls, vectors share their memory and are cleared.
         clear = [f"    fill({name}, 0.0)" for name in outputs if name in ("xn", "out", "r")]
         code = print_code({name: np.asarray(array, dtype=object) for name, array in outputs.items()})
         lines += ['@njit(error_model="numpy")', f"def {signature}:", *clear, *code, "    return", ""]
+    if isinstance(traced, Model):
+        F, Q, P0, H, R = (can_differ_from_zero(matrices[name]) for name in ("F", "Q", "P", "H", "R"))
+        constants, texts = _print_parts(find_parts(F, Q, P0, H, R), whole(F, H, R))
+        lines += constants
+        template = {name: text.format(**texts) for name, text in _KALMAN.items()}
     return "\n".join([*lines, _TICK.format(**template)])
 
 

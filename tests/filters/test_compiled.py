@@ -68,7 +68,9 @@ def test_the_kernel_is_the_array_form_also_with_rows_left_out():
         outputs = np.empty(e), np.empty(m)
         covariance = P.copy()
         scratch = np.empty(m, np.int64), np.empty((m, m)), np.empty((m, e)), np.empty((m, e))
-        nis = kernel.correct(r, H, R, covariance, *outputs, *scratch)
+        # every element of H and R counts: one part
+        part = np.arange(e), np.arange(m), e * np.arange(m + 1), np.tile(np.arange(e), m), False
+        nis = kernel.correct(r, H, R, covariance, *outputs, *scratch, *part)
         np.testing.assert_allclose(covariance, expected, rtol=0, atol=1e-12)
         np.testing.assert_allclose(outputs[0], dx, rtol=0, atol=1e-12)
         np.testing.assert_allclose(outputs[1], white, rtol=0, atol=1e-12)
