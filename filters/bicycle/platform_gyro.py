@@ -20,7 +20,7 @@ from ..rotation import conjugate, exp, from_euler_xyz, multiply, normalize, to_e
 from .geometry import RiderGeometry
 from .parameter_matrices import diagonal, zero_where_known
 from .relative_sensor import relative_angles
-from .two_gyro_kinematics import SIGNS, platform_rate
+from .two_gyro_kinematics import SIGNS, level_constraint, platform_rate
 
 DEG = math.pi / 180.0
 ROLL = Quantity("bicycle/roll", "angle", 1, "rad")
@@ -95,10 +95,10 @@ class PlatformGyro(Model):
         """0 − (cos φ δω_y − sin φ δω_z); without a sample it is NaN."""
         xp = namespace(x)
         rate = platform_rate(z["bicycle_imu/gyr"], self.imu_tilt) - x[..., 1:]
-        y, w, c, s = rate[..., 1:2], rate[..., 2:], xp.cos(x[..., :1]), xp.sin(x[..., :1])
-        H = xp.concat([-s * y - c * w, 0.0 * c, -c, s], axis=-1)[..., None, :]
+        value, by_angle, by_rate = level_constraint(x[..., :1], rate, "bicycle")
+        H = xp.concat([by_angle, -by_rate], axis=-1)[..., None, :]
         variance = (self.gyroscope_noise**2 + self.pitch_rate_noise**2) / self.dt
-        return s * w - c * y, H, diagonal([variance], 0.0 * x[..., :1])
+        return -value, H, diagonal([variance], 0.0 * x[..., :1])
 
     def pose(self, x: Array) -> dict[str, Array]:
         """Roll; bias in bicycle axes (x forward, y left, z up)."""

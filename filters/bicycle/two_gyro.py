@@ -41,6 +41,7 @@ from .two_gyro_kinematics import (
     body_rate_derivative,
     body_rate_matrix,
     in_paper_axes,
+    level_constraint,
     platform_rate,
     platform_rate_derivative,
     platform_rate_matrix,
@@ -79,6 +80,11 @@ class TwoGyro(Model):
     integration: Literal["euler", "midpoint"] = "midpoint"
     """``euler`` is printed (23); ``midpoint`` takes the kinematics in the middle of the interval: with ``euler`` the
     roll of a rider who moves is 1.3 times its standard deviation wrong at 100 Hz"""
+    constraint: bool = False
+    """Σ1 with (5) as pseudo-measurement, 0 = cos φ δω_y − sin φ δω_z: roll from the platform's gyroscope, whatever the
+    camera says; not in the paper. The samples' noise is taken as if Σ1 did not use it"""
+    constraint_noise: float = 1.0 * DEG
+    """rad/s/√Hz: pitch rate and what else violates (5)"""
     body_gyroscope_noise: Point = (0.05 * DEG, 0.05 * DEG, 0.05 * DEG)
     """σ_vh √T, rad/s/√Hz, of each axis (gyroscope 605; the paper gives none)"""
     platform_gyroscope_noise: Point = (0.05 * DEG, 0.05 * DEG, 0.05 * DEG)
@@ -125,8 +131,6 @@ class TwoGyro(Model):
     viewpoints: tuple[Point, Point, Point] = TRUNK.viewpoints
     """m in the bicycle frame: from where the markers are seen"""
 
-    residual_size = 3
-
     def __post_init__(self) -> None:
         """Refuse unknown words, and negative or vanishing standard deviations."""
         super().__post_init__()
@@ -140,6 +144,8 @@ class TwoGyro(Model):
         for name in NOT_NEGATIVE:
             if getattr(self, name) < 0.0:
                 raise ValueError(f"{name} must not be negative, got {getattr(self, name)}")
+        if self.constraint and self.model != "sigma1":
+            raise ValueError(f"constraint needs the bias of every axis, so model='sigma1', got {self.model!r}")
 
     @classmethod
     def for_rider(cls, geometry: RiderGeometry, **parameters: Any) -> Self:
@@ -222,6 +228,11 @@ class TwoGyro(Model):
         """As the state."""
         return self.state_size
 
+    @property
+    def residual_size(self) -> int:  # type: ignore[override]
+        """3, or 4 with the constraint."""
+        return 3 + self.constraint
+
     # ---- equations ---------------------------------------------------------------------------------------------------
 
     def prior(self, z: Measurement) -> tuple[Array, Array]:
@@ -262,7 +273,14 @@ class TwoGyro(Model):
             distances, slope = marker_distances(x[..., 1:4], MarkerPlaces(self.pivot, self.markers, self.viewpoints))
             r, spread = y - distances, self.distance_noise
         H = xp.concat([zeros(x, 3, 1), slope, zeros(x, 3, 3 + self.platform_rates)], axis=-1)
-        return r, H, diagonal([spread**2] * 3, 0.0 * x[..., :1])
+        variances = [spread**2] * 3
+        if self.constraint:
+            rate = platform_rate(z["bicycle_imu/gyr"], self.imu_tilt) - x[..., 7:]
+            value, by_angle, by_rate = level_constraint(x[..., :1], rate, self.platform)
+            row = block_matrix([[by_angle[..., None], zeros(x, 1, 6), -by_rate[..., None, :]]])
+            r, H = xp.concat([r, -value], axis=-1), xp.concat([H, row], axis=-2)
+            variances.append((self.platform_gyroscope_noise[1] ** 2 + self.constraint_noise**2) / self.dt)
+        return r, H, diagonal(variances, 0.0 * x[..., :1])
 
     def pose(self, x: Array) -> dict[str, Array]:
         """Roll right positive, θ in the paper's axes, vertical and biases in the sensors' axes."""
@@ -370,6 +388,7 @@ POSITIVE = (
     "angle_prior",
 )
 NOT_NEGATIVE = (
+    "constraint_noise",
     "body_bias_drift",
     "platform_bias_drift",
     "process_scale",

@@ -105,3 +105,21 @@ def substitution_derivative(angle: Array, rate: Array, platform: Platform) -> Ar
     if platform == "bicycle":
         return xp.stack([zero, slope, zero], axis=-1)
     return xp.stack([-slope, zero, zero], axis=-1)
+
+
+def level_constraint(angle: Array, rate: Array, platform: Platform) -> tuple[Array, Array, Array]:
+    """What (5) says is zero, cos φ δω_y − sin φ δω_z; of a segway (6), cos χ δω_x + sin χ δω_z.
+
+    Args:
+        angle: ``(*batch, 1)`` φ or χ.
+        rate: ``(*batch, 3)`` of the platform.
+        platform: which of the two.
+
+    Returns:
+        The value ``(*batch, 1)``, its derivative by the angle ``(*batch, 1)`` and by the rate ``(*batch, 3)``.
+    """
+    xp = namespace(angle)
+    c, s, x, y, z = xp.cos(angle), xp.sin(angle), rate[..., :1], rate[..., 1:2], rate[..., 2:]
+    if platform == "bicycle":
+        return c * y - s * z, -s * y - c * z, xp.concat([0.0 * c, c, -s], axis=-1)
+    return c * x + s * z, c * z - s * x, xp.concat([c, 0.0 * c, s], axis=-1)

@@ -28,6 +28,8 @@ VARIANTS = [
     TwoGyro(dt=0.02, platform="segway", model="sigma1", sensor="distances", integration="euler"),
     TwoGyro(dt=0.02),
     TwoGyro.for_disk(dt=0.02),
+    TwoGyro(dt=0.02, model="sigma1", constraint=True),
+    TwoGyro(dt=0.02, model="sigma1", constraint=True, platform="segway"),
     PlatformGyro(dt=0.02),
 ]
 
@@ -144,8 +146,8 @@ def test_filterpy_gives_the_same(model):
         np.testing.assert_allclose(ours.pose[name][-1], value, atol=1e-9)
 
 
-def run(model, ride):
-    estimate, truth = KalmanFilter(model).run(ride.measurements), true_angles(ride.truth)
+def run(model, ride, compiled=True):
+    estimate, truth = KalmanFilter(model, compiled=compiled).run(ride.measurements), true_angles(ride.truth)
     return estimate, {name: rotation.wrap(estimate.pose[name] - truth[name]) / DEG for name in ANGLES}
 
 
@@ -268,6 +270,18 @@ def test_the_platform_alone():
     error = KalmanFilter(model, compiled=False).run(ride.measurements).pose["bicycle/roll"] - ride.truth["bicycle/roll"]
     # the sample is a mean over the interval that it ends, the roll is that of its end: half a tick times the roll rate
     assert np.sqrt(np.mean(error[500:] ** 2)) / DEG < 0.15
+
+
+def test_the_constraint_holds_the_roll_whatever_the_camera_says():
+    """Σ1 with (5): a camera that is off by some degrees costs relative angles, not the roll."""
+    errors = replace(Errors(), camera_offset=3.0 * DEG)
+    ride = simulate(MOTIONS["frozen"], 40.0, 0.02, errors, np.random.default_rng(9))
+    plain = filter_of(Errors(bias=0.05 * DEG), 0.02)
+    held = replace(plain, model="sigma1", constraint=True, constraint_noise=0.1 * DEG)
+    rms = [np.sqrt(np.mean(run(model, ride, compiled=False)[1]["bicycle/roll"][500:] ** 2)) for model in (plain, held)]
+    assert rms[1] < 0.5 * rms[0]
+    with pytest.raises(ValueError, match="constraint needs"):
+        TwoGyro(constraint=True)
 
 
 def test_geometry_is_told():
