@@ -78,8 +78,8 @@ def propagate(F, P, Q, work, states, first, column):  # type: ignore[no-untyped-
     """P ← F P Fᵀ + Q in place, for the states of one part.
 
     F and Q are the whole matrices ``(e, e)``, P ``(n, n)`` is that of the part, ``states`` ``(n,)`` its place in them.
-    F can be other than zero in row i at the part's columns ``column[first[i]:first[i + 1]]``. ``work`` is scratch. None for
-    all three lists: one part, no zeros.
+    F can be other than zero in row i at the part's columns ``column[first[i]:first[i + 1]]``. ``work`` is scratch.
+    None for all three lists: one part, no zeros.
     """
     n = P.shape[0] if states is None else states.shape[0]
     for i in range(n):
