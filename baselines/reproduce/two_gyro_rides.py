@@ -253,9 +253,9 @@ def sources(report: Report, results: list[dict[str, Any]]) -> None:
     report.table(
         "Where the errors come from",
         rows,
-        "Mean RMS in deg of Σ2 on the same rides. *White noise only*: without the alignment error of the camera's marker "
-        "(1° fixed and 1° drifting with 60 s, which this environment assumes; the paper gives nothing). It passes to "
-        "the roll, since a rider's trunk hardly moves against the bicycle; no tuning tells the two apart.",
+        "Mean RMS in deg of Σ2 on the same rides. *White noise only*: without the alignment error of the camera's "
+        "marker (1° fixed and 1° drifting with 60 s, which this environment assumes; the paper gives nothing). It "
+        "passes to the roll, since a rider's trunk hardly moves against the bicycle; no tuning tells the two apart.",
     )
     achieved, bound = (np.mean([result["bound"][key] for result in results], axis=0) for key in ("achieved", "bound"))
     report.table(
