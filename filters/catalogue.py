@@ -20,6 +20,11 @@ PLANAR = ("planar/gyr", "array/acc")
 RELATIVE = ("up", "relative_orientation")
 TWO_GYRO = ("bicycle_imu/gyr", "trunk_imu/gyr", "relative/orientation")
 TWO_GYRO_ANGLES = ("bicycle/roll", "two-gyro/relative_angles")
+FORCE_INERTIAL = (
+    *("bicycle_imu/gyr", "bicycle_imu/acc", "trunk_imu/gyr", "trunk_imu/acc"),
+    *("seat/wrench", "seat/load_cells", "handlebar/force", "wheel/speed"),
+)
+FORCE_INERTIAL_ANGLES = ("bicycle/roll", "force-inertial/trunk_angles")
 LIMBS = tuple(f"{part}_{side}" for part in ("upper_arm", "thigh") for side in ("right", "left"))
 WHOLE_BODY = (
     *(f"{place}/gyr" for place in ("bicycle_imu", "trunk_imu", *LIMBS)),
@@ -174,6 +179,18 @@ CATALOGUE: dict[str, Entry] = {
         TWO_GYRO[:1],
         ("bicycle/roll", "platform-gyro/bias"),
         "KalmanFilter",
+    ),
+    "force-inertial": _filter(
+        "bicycle.force_inertial:ForceInertial",
+        "Zhang, Chen, Yi 2013: roll of a bicycle, angles of the trunk; two IMUs, forces at seat and handlebar",
+        FORCE_INERTIAL,
+        (*FORCE_INERTIAL_ANGLES, "trunk_imu/gyroscope_bias"),
+    ),
+    "force-inertial-integration": _reference(
+        "bicycle.force_inertial_integration:ForceInertialIntegration",
+        "the same gyroscopes integrated from the angles that the first forces tell",
+        FORCE_INERTIAL,
+        FORCE_INERTIAL_ANGLES,
     ),
     "whole-body": _filter(
         "bicycle.whole_body:WholeBody",

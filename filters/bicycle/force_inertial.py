@@ -184,6 +184,7 @@ class ForceInertial(ForceInertialParameters, Model):
         whole = self.jacobian == "full"
         rate, acceleration, axial = self._motion(x, angles if whole else Angles(*map(value, angles)), parts[4:7], whole)
         needed = self._needed(x, angles, rate, acceleration, axial)
+        known, z = self._known_forces(z)
         read = self._readings(z, steering(self, x[..., 13], rate.psi))
         delta = angles.phi_b - angles.phi_h
         if not whole:
@@ -205,9 +206,9 @@ class ForceInertial(ForceInertialParameters, Model):
         tilt, aside = s_h * c_p + c_h * c_t * s_p, cos(turn) * s_p - sin(turn) * c_t * c_p
         square = (1.0 - self.ahead_share) * tilt + self.ahead_share * aside
         residuals = [N_x - needed.tau_phi_h, tau_theta - needed.tau_theta, roll, -square]
-        r = xp.stack([value(each) for each in residuals], axis=-1)
-        if self.roll_model == "none":
-            r = xp.stack([r[..., 0], r[..., 1], r[..., 2] + xp.nan, r[..., 3]], axis=-1)
+        r = [value(each) for each in residuals]
+        lost = [known, known, known if self.roll_model != "none" else xp.logical_and(known, xp.logical_not(known))]
+        r = xp.stack([*(xp.where(row, part, part + xp.nan) for row, part in zip(lost, r, strict=False)), r[3]], axis=-1)
         H = xp.stack([-gradient(each, x[..., :7]) for each in residuals], axis=-2)
         if self.form == "printed" and not whole:
             H = self._with_printed_h14(H, x, rate)
@@ -239,6 +240,18 @@ class ForceInertial(ForceInertialParameters, Model):
 
     def _readings(self, z: Measurement, steer: Scalar) -> Readings:
         return readings(self, z, steer, self.handlebar_load, printed=self.torque_reading == "printed")
+
+    def _known_forces(self, z: Measurement) -> tuple[Any, Measurement]:
+        """Whether seat and hands brought samples, and the samples with something finite where they did not."""
+        xp = namespace(z["seat/wrench"])
+        names = ("seat/wrench", "handlebar/force")
+        known = [xp.all(xp.isfinite(z[name]), axis=-1) for name in names]
+        # a number that takes no part, so that derivatives stay finite
+        whole = {
+            name: xp.where(row[..., None], z[name], -1.0 + 0.0 * xp.zeros_like(z[name]))
+            for name, row in zip(names, known, strict=True)
+        }
+        return xp.logical_and(*known), {**z, **whole}
 
     def _remember(self, x: Array, z: Measurement, previous: Measurement) -> Array:
         """The inputs of this tick and their low-passed backward differences."""
@@ -335,16 +348,17 @@ PUBLISHED: dict[str, float] = {
     "trunk_across": 0.0,
     "trunk_along": 0.0,
     "trunk_imu_height": 0.42,
+    "torque_noise": 6.0,
+    "shoulder_noise": 0.05,
     "carried_mass": 0.0,
     "carried_forward": 0.0,
     "carried_up": 0.0,
     "pedal_share": 0.0,
     "pedal_down": 0.0,
     "pedal_back": 0.0,
-    "ahead_share": 0.0,
     "wheelbase": 0.0,
 }
-"""Table I of the paper; m_h, h_h and h are not published and assumed."""
+"""Table I of the paper; m_h, h_h, h and all noises are not published and assumed."""
 
 
 def _diagonal(entries: list[Any], like: Array) -> Array:

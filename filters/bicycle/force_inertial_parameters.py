@@ -106,13 +106,13 @@ class ForceInertialParameters(Equations):
     """σ of (15), rad/s; not published"""
     gyroscope_noise: float = 1.0 * DEG
     """standard deviation a sample, rad/s: stands for scale and alignment and for the Euler step too; not published"""
-    torque_noise: float = 6.0
-    """of τ̂_φh and τ̂_θ, N·m: stands for what legs and arms do besides; not published"""
+    torque_noise: float = 12.0
+    """of τ̂_φh and τ̂_θ, N·m: stands for what legs and arms do besides, which lasts; not published"""
     roll_noise: float = 2.0 * DEG
     """of φ̂_b, rad; not published"""
-    shoulder_noise: float = 0.05
+    shoulder_noise: float = 0.1
     """of the sine of the shoulders' tilt; not published. Too small a value pulls φ_h of an upright trunk"""
-    ahead_share: float = 0.5
+    ahead_share: float = 0.0
     """0: shoulders are level (17); 1: the chest faces ahead, to the bicycle; between: a weighted mean of the two"""
     gyroscope_filter: float = 0.04
     """s, time constant of the differentiated gyroscopes' low-pass"""
