@@ -70,6 +70,8 @@ class Args:
     """folder of a run that was interrupted; its finished rides are kept"""
     runs: Path = Path("runs")
     """where the run folder goes"""
+    checks: bool = False
+    """instead of riding, check the physics: linear theory, momentum, strapdown, ripple, leans, resets (minutes)"""
     json: bool = False
     """print machine-readable rows instead of tables"""
 
@@ -86,6 +88,8 @@ def run(args: Args) -> int:
     from .report import print_progress, provenance
     from .tables import markdown_table, print_table
 
+    if args.checks:
+        return checked(args)
     scenarios = args.scenarios or tuple(list_scenarios())
     for name in scenarios:
         known(name)
@@ -127,6 +131,26 @@ def run(args: Args) -> int:
     print_progress(args.json, f"{upright} of {total} rides upright")
     print_progress(args.json, f"report: {folder.write_report('poise rides', sections)}")
     return 0 if upright == total else 1
+
+
+def checked(args: Args) -> int:
+    """Print the physical checks as they are done, and leave a report."""
+    from tqdm import tqdm
+
+    from ..baselines.ride_checks import all_checks
+    from .experiment import start_run
+    from .report import print_progress, provenance
+    from .tables import markdown_table, print_table
+
+    folder = start_run("rides", args, args.seed, args.runs)
+    rows = [each._asdict() for each in tqdm(all_checks(), desc="physical checks", unit="check")]
+    if args.json:
+        print("\n".join(json.dumps(row) for row in rows))
+    else:
+        print_table(rows, "Physical checks", console=wide())
+    sections = {"Physical checks": markdown_table(rows), "Provenance": provenance(folder)}
+    print_progress(args.json, f"report: {folder.write_report('poise rides --checks', sections)}")
+    return 0
 
 
 def drawn(args: Args, folder: Run, scenarios: Sequence[str], seeds: Mapping[tuple[str, int], int]) -> dict[str, str]:

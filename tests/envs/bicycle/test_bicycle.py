@@ -7,45 +7,13 @@ import math
 import numpy as np
 import pytest
 
+from poise.baselines.ride_checks import GRAVITY, by_kind, measured_eigenvalues
 from poise.envs.bicycle.bicycle import Bicycle
 from poise.envs.bicycle.parameters import BENCHMARK, MOUNTAIN_BIKE, DriveParameters, RigidPart, WheelParameters, combine
 from poise.envs.bicycle.terrain import Bump, FlatGround, GroundSum, Ramp, RoughGround
 from poise.envs.bicycle.tyre import BENCHMARK_TYRE, Tyre, TyreParameters
 from poise.envs.bicycle.whipple import self_stable_range, whipple_model
 from poise.envs.physics import Physics
-
-GRAVITY = 9.81
-# state from which the four modes are excited: roll, roll rate, steer, steer rate
-STARTS = ({"roll_rate": 2e-3}, {"steer": 1e-3}, {"steer_rate": 5e-3}, {"roll": 1e-3})
-
-
-def measured_eigenvalues(speed, duration=1.6, settle=0.1, sample=0.01, tyre=BENCHMARK_TYRE):
-    """Eigenvalues of the linear map that best carries each sampled state of four passive rides to the next."""
-    before, after = [], []
-    with Physics(gravity=GRAVITY) as physics:
-        bicycle = Bicycle(physics, BENCHMARK, tyre=tyre)
-        for start in STARTS:
-            bicycle.start(speed, **start)
-            states = []
-            for _ in range(round(duration / sample)):
-                for _ in range(round(sample / physics.time_step)):
-                    bicycle.act()
-                    physics.step()
-                s = bicycle.state()
-                states.append((s.roll, -s.steer, s.roll_rate, -s.steer_rate))
-            states = np.array(states)[round(settle / sample) :]
-            scale = np.abs(states).max()
-            before.append(states[:-1] / scale)
-            after.append(states[1:] / scale)
-    matrix = np.linalg.lstsq(np.concatenate(before), np.concatenate(after), rcond=None)[0]
-    return np.log(np.linalg.eigvals(matrix).astype(complex)) / sample
-
-
-def by_kind(values):
-    """Weave eigenvalue (positive imaginary part) and the real ones, rising."""
-    real = np.sort(values[np.abs(values.imag) < 1e-2].real)
-    weave = values[np.argmax(values.imag)]
-    return weave, real
 
 
 def test_whipple_matrices_are_those_of_the_benchmark():

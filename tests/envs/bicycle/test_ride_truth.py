@@ -7,13 +7,15 @@ import math
 import numpy as np
 import pytest
 
+from poise.baselines.ride_checks import strapdown_errors
 from poise.envs.bicycle.anthropometry import SUBJECTS
 from poise.envs.bicycle.environment import RiderBicycleEnv
-from poise.envs.bicycle.paper_sensors import BICYCLE_IMU_PLACE, BICYCLE_IMU_TILT, pitched
 from poise.envs.bicycle.ride_truth import BODIES, ISB, continuous_pose, isb_yxy, isb_zxy
 from poise.envs.recorder import record
 from poise.envs.sensors import STANDARD_GRAVITY
 from poise.filters import rotation
+
+IMU = ["bicycle_imu/gyr", "bicycle_imu/acc"]
 
 
 def recorded(seed=0, **options):
@@ -24,27 +26,8 @@ def recorded(seed=0, **options):
     return trajectory
 
 
-def strapdown_errors(duration, **options):
-    """Position (m) and attitude (rad) error after integrating the bicycle's ideal IMU."""
-    ride = recorded(2, suite=["bicycle_imu/gyr", "bicycle_imu/acc"], sensors="ideal", duration=duration, **options)
-    mounting, lever, dt = np.array(pitched(BICYCLE_IMU_TILT)), np.array(BICYCLE_IMU_PLACE), ride.dt
-    frame, omega = ride.truth["bicycle/orientation"], ride.truth["bicycle/angular_rate"]
-    places = ride.truth["bicycle/position"] + rotation.rotate(frame, lever)
-    swing = rotation.rotate(frame, np.cross(omega, lever))
-    q, v, p = rotation.multiply(frame[0], mounting), ride.truth["bicycle/velocity"][0] + swing[0], places[0]
-    for rate, force in zip(*(ride.measurements[f"bicycle_imu/{kind}"][1:] for kind in ("gyr", "acc")), strict=True):
-        turn = rate * dt
-        middle = rotation.multiply(q, rotation.exp(0.5 * turn))
-        change = rotation.rotate(middle, force) - [0.0, 0.0, STANDARD_GRAVITY]
-        p = p + v * dt + 0.5 * change * dt**2
-        v = v + change * dt
-        q = rotation.multiply(q, rotation.exp(turn))
-    last = rotation.multiply(frame[-1], mounting)
-    return np.linalg.norm(p - places[-1]), rotation.angle(rotation.multiply(rotation.conjugate(last), q))
-
-
 def test_strapdown_returns_to_the_truth():
-    position, attitude = strapdown_errors(5.0, fidelity="full", scenario="straight")
+    position, attitude = strapdown_errors(recorded(2, scenario="straight", suite=IMU, sensors="ideal", duration=5.0))
     assert position < 0.01
     assert math.degrees(attitude) < 0.01
 
@@ -52,7 +35,7 @@ def test_strapdown_returns_to_the_truth():
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["indoor_circle", "outdoor"])
 def test_strapdown_over_thirty_seconds(name):
-    position, attitude = strapdown_errors(30.0, fidelity="full", scenario=name)
+    position, attitude = strapdown_errors(recorded(2, scenario=name, suite=IMU, sensors="ideal", duration=30.0))
     assert position < 0.01
     assert math.degrees(attitude) < 0.01
 
