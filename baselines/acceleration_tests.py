@@ -13,7 +13,8 @@ from typing import Literal
 
 import numpy as np
 
-from ..envs.gestures import make_gesture
+from ..envs.gestures import Trial as GestureTrial
+from ..envs.gestures import gesture_config
 from ..envs.suite import imu_suite
 from ..filters import rotation
 from ..filters.estimator import run
@@ -40,7 +41,7 @@ class Trial:
     Attributes:
         measurements: channel → ``(T, trials, 3)``.
         up: ``(T, trials, 3)`` reference, misaligned.
-        acceleration: ``(T, trials)`` size of the external acceleration, m/s².
+        acceleration: ``(T, trials, 3)`` true external acceleration, sensor axes, m/s².
     """
 
     measurements: dict[str, np.ndarray]
@@ -48,8 +49,24 @@ class Trial:
     acceleration: np.ndarray
 
 
-def simulate(test: str, seeds: Sequence[int]) -> Trial:
+def simulate(
+    test: str,
+    seeds: Sequence[int],
+    *,
+    motion_share: float = 1.0,
+    duration: float | None = None,
+    misalignment: tuple[float, float] | None = None,
+    gyroscope_bias: float = 0.0,
+) -> Trial:
     """Draw trials of test A, B or C: instantaneous samples with the noise of the study.
+
+    Args:
+        test: A, B or C.
+        seeds: one a trial.
+        motion_share: the levels of acceleration are those of the test times this.
+        duration: s; None for that of the test.
+        misalignment: of the reference in roll and pitch, rad; None draws it.
+        gyroscope_bias: added to every axis, rad/s.
 
     Raises:
         ValueError: unknown test.
@@ -59,15 +76,20 @@ def simulate(test: str, seeds: Sequence[int]) -> Trial:
     parts: list[tuple[dict[str, np.ndarray], np.ndarray, np.ndarray]] = []
     for seed in seeds:
         motion, noise, mounting = (np.random.default_rng(child) for child in np.random.SeedSequence(seed).spawn(3))
-        gesture = make_gesture(TESTS[test], motion)
+        config = gesture_config(TESTS[test])
+        assert isinstance(config, GestureTrial)
+        mean, peak = motion_share * config.mean_acceleration, motion_share * config.peak_acceleration
+        gesture = replace(config, mean_acceleration=mean, peak_acceleration=peak).draw(motion, duration)
         times = np.arange(round(gesture.duration * RATE) + 1) / RATE
         bodies = gesture.sample(np.minimum(times, gesture.duration))
         suite = imu_suite("paper-hand", RATE, sampling="instant")
         suite.reset(noise)
         measurements, _ = suite.simulate(bodies)
-        misaligned = rotation.exp(mounting.normal(0.0, MISALIGNMENT, 3))
+        turn = mounting.normal(0.0, MISALIGNMENT, 3) if misalignment is None else np.array([*misalignment, 0.0])
+        misaligned = rotation.exp(turn)
         up = rotation.rotate(misaligned, rotation.up_in_body(bodies.orientation))
-        acceleration = np.linalg.norm(np.asarray(bodies.acceleration), axis=-1)
+        acceleration = rotation.rotate_back(bodies.orientation, np.asarray(bodies.acceleration))
+        measurements["imu/gyr"] = measurements["imu/gyr"] + gyroscope_bias
         parts.append(({name: measurements[name] for name in ("imu/gyr", "imu/acc")}, up, acceleration))
     measured = {name: np.stack([part[0][name] for part in parts], axis=1) for name in parts[0][0]}
     return Trial(measured, np.stack([part[1] for part in parts], 1), np.stack([part[2] for part in parts], 1))
@@ -82,7 +104,8 @@ def compare_modes(seeds: Sequence[int]) -> list[dict[str, float | str | int]]:
     rows: list[dict[str, float | str | int]] = []
     for test in TESTS:
         trial = simulate(test, seeds)
-        level, peak = float(trial.acceleration.mean()), float(trial.acceleration.max(axis=0).mean())
+        size = np.linalg.norm(trial.acceleration, axis=-1)
+        level, peak = float(size.mean()), float(size.max(axis=0).mean())
         for rotated, exact in (("printed", False), ("exact", True)):
             for mode in MODES:
                 up = estimate_up(trial, ExternalAcceleration(mode=mode, exact_rotation=exact))
@@ -109,9 +132,14 @@ def sweep_c_a(seeds: Sequence[int], values: Sequence[float]) -> list[dict[str, f
 
 
 def estimate_up(trial: Trial, model: ExternalAcceleration) -> np.ndarray:
-    """The filter's upward vertical ``(T, trials, 3)``; each gyroscope sample holds until the next."""
+    """The filter's upward vertical ``(T, trials, 3)``."""
+    return estimate(trial, model)["up"]
+
+
+def estimate(trial: Trial, model: ExternalAcceleration) -> dict[str, np.ndarray]:
+    """What the filter says, quantity → ``(T, trials, 3)``; each gyroscope sample holds until the next."""
     model = replace(model, dt=1.0 / RATE, gyroscope_sample="previous")
-    return np.asarray(run(KalmanFilter(model, keep_covariance=False), trial.measurements).pose["up"])
+    return run(KalmanFilter(model, keep_covariance=False), trial.measurements).pose
 
 
 def inclination_rms(up: np.ndarray, truth: np.ndarray) -> float:

@@ -27,14 +27,14 @@ COLOURS = {
 """Kind of estimator → colour."""
 
 
-def new_figure(width: float, height: float, rows: int = 1) -> tuple[Figure, list[Any]]:
-    """A figure in inches with ``rows`` axes below each other, drawn without a screen."""
+def new_figure(width: float, height: float, rows: int = 1, columns: int = 1) -> tuple[Figure, list[Any]]:
+    """A figure in inches, drawn without a screen, with ``rows`` × ``columns`` axes, row by row."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(width, height), layout="constrained", dpi=140)
     FigureCanvasAgg(figure)
-    axes = figure.subplots(rows, 1, sharex=rows > 1, squeeze=False)[:, 0]
+    axes = figure.subplots(rows, columns, sharex="col", squeeze=False).ravel()
     for ax in axes:
         ax.spines[["top", "right"]].set_visible(False)
         ax.grid(axis="both", color="#e4e6ea", linewidth=0.7)
