@@ -36,7 +36,10 @@ def kinds_of(labels: Any) -> dict[str, str]:
 
 
 def parts(table: pandas.DataFrame) -> Iterator[tuple[str, str, pandas.DataFrame]]:
-    """Title, metric and rows of each metric in deg; of each quantity apart where several have the metric."""
+    """Title, metric and rows of each metric in deg; of each quantity apart where several have the metric.
+
+    Estimators that give no angle (the angular rate alone) come after these, with the quantities that they give.
+    """
     angles = table[table["unit"] == "deg"]
     for metric in angles["metric"].unique():
         title = TITLES.get(metric, f"RMS {metric}, deg")
@@ -47,6 +50,9 @@ def parts(table: pandas.DataFrame) -> Iterator[tuple[str, str, pandas.DataFrame]
         for quantity in quantities:
             name = f"{quantity}: {title}" if len(quantities) > 1 else title
             yield name, metric, of_metric[of_metric["quantity"] == quantity]
+    others = table[~table["estimator"].isin(angles["estimator"]) & (table["metric"] != "valid")]
+    for (quantity, metric, unit), part in others.groupby(["quantity", "metric", "unit"], sort=False):
+        yield f"{quantity}: RMS {metric}, {unit}", metric, part
 
 
 def wide_tables(table: pandas.DataFrame, groups: Mapping[str, str] | None = None) -> dict[str, list[dict[str, Any]]]:
@@ -116,7 +122,8 @@ def print_comparison(
     found = list(parts(table))
     for _, metric, part in found:
         several = sum(metric == other for _, other, _ in found) > 1
-        what = " ".join(word for word in (name, part["quantity"].iloc[0] if several else "") if word)
+        apart = several or part["unit"].iloc[0] != "deg"
+        what = " ".join(word for word in (name, part["quantity"].iloc[0] if apart else "") if word)
         figure = rms_bars(part, kinds_of(part["estimator"].unique()), metric, what)
         words = f"{what} {metric}".strip().replace(" ", "-").replace("/", "-")
         path = save(figure, run.figures / f"{words}.png")
@@ -140,7 +147,7 @@ def draw_example(
     """Draw the errors of the best estimator of each kind over time, on the last trajectory that has a truth.
 
     Returns:
-        Heading → Markdown; empty if no trajectory has a truth.
+        Heading → Markdown; empty if no trajectory has a truth, or no estimator an inclination.
     """
     from ..baselines.evaluation import fitted, has_truth, summary
     from ..baselines.plots import error_curves, save
@@ -154,6 +161,8 @@ def draw_example(
     best: dict[str, str] = {}
     for label in summary(table).index:
         best.setdefault(kinds.get(str(label), ""), str(label))
+    if not best:
+        return {}
     estimates = {
         label: run_estimator(fitted(contenders[label], trajectory), trajectory.measurements)
         for label in list(best.values())[:most]

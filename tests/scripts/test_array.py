@@ -1,9 +1,14 @@
-"""``poise array``: the printed report."""
+"""``poise array``: the printed report; and how evaluations show what arrays estimate."""
 
 import json
 
+import pandas
+
 from poise.filters.accelerometer_array.array import planar_controller
+from poise.scripts.array import Args
+from poise.scripts.experiment import start_run
 from poise.scripts.main import main
+from poise.scripts.report import print_comparison, wide_tables
 
 
 def test_report_of_a_preset(capsys):
@@ -33,3 +38,29 @@ def test_wrong_words_are_explained(capsys):
     assert "octa, controller, planar, triaxial or a JSON file" in capsys.readouterr().err
     assert main(["array", "octa", "--deviation", "0"]) == 2
     assert "deviation must be positive" in capsys.readouterr().err
+
+
+def test_evaluate_shows_estimators_that_give_no_angle(tmp_path, capsys):
+    rows = [
+        {
+            "estimator": "a",
+            "trajectory": "t",
+            "quantity": "angular_rate",
+            "metric": "distance",
+            "value": 0.8,
+            "unit": "rad/s",
+        },
+        {"estimator": "a", "trajectory": "t", "quantity": "angular_rate", "metric": "valid", "value": 1.0, "unit": "1"},
+        {"estimator": "b", "trajectory": "t", "quantity": "up", "metric": "inclination", "value": 2.0, "unit": "deg"},
+        {"estimator": "b", "trajectory": "t", "quantity": "bias", "metric": "distance", "value": 3.0, "unit": "rad/s"},
+    ]
+    tables = wide_tables(pandas.DataFrame(rows))
+    assert [len(part) for part in tables.values()] == [1, 1]
+    ((first, second),) = [tuple(tables)]
+    assert first.startswith("Inclination error")
+    assert second == "angular_rate: RMS distance, rad/s"
+    assert tables[second][0]["estimator"] == "a"
+    run = start_run("evaluate", Args("octa"), 0, tmp_path)
+    sections = print_comparison(pandas.DataFrame(rows), run)
+    assert "0.8" in capsys.readouterr().out
+    assert "Figure: angular_rate-distance" in sections
