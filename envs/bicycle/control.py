@@ -142,16 +142,14 @@ def regulator(
     return gains[0], kernel
 
 
-@lru_cache(maxsize=64)
-def gain_table(
-    bicycle: BicycleParameters, settings: ControlSettings, gravity: float, highest_speed: float
-) -> tuple[list[float], np.ndarray]:
-    """Speeds (m/s) and, for each, the gains on the state and on turns ahead ``(n, 7 + 2 · PREVIEW_BINS)``."""
-    model = whipple_model(bicycle, gravity)
-    slow, fast = np.arange(LOWEST_SPEED, 0.95, 0.1), np.arange(1.0, highest_speed + 0.25, 0.25)
-    speeds = [*slow.tolist(), *fast.tolist()]
-    rows = [regulator(model, bicycle, speed, settings) for speed in speeds]
-    return speeds, np.array([np.concatenate([gains, kernel.ravel()]) for gains, kernel in rows])
+@lru_cache(maxsize=4096)
+def gain_row(bicycle: BicycleParameters, settings: ControlSettings, gravity: float, speed: float) -> np.ndarray:
+    """Gains at one speed (m/s) on the state and on turns ahead ``(7 + 2 · PREVIEW_BINS,)``; computed when first needed.
+
+    A ride needs few speeds, and each costs some milliseconds.
+    """
+    gains, kernel = regulator(whipple_model(bicycle, gravity), bicycle, speed, settings)
+    return np.concatenate([gains, kernel.ravel()])
 
 
 class Pilot:
@@ -174,7 +172,8 @@ class Pilot:
         self.bicycle = bicycle
         self.settings = ControlSettings() if settings is None else settings
         self.model = whipple_model(bicycle, gravity)
-        self._grid, self._gains = gain_table(bicycle, self.settings, gravity, highest_speed)
+        slow, fast = np.arange(LOWEST_SPEED, 0.95, 0.1), np.arange(1.0, highest_speed + 0.25, 0.25)
+        self._grid = [*slow.tolist(), *fast.tolist()]
         self._ahead = PREVIEW_BIN * np.arange(PREVIEW_BINS + 1)
         self._mass, self._gravity = sum(part.mass for part in bicycle.parts), gravity
         # a steady turn's roll, a part of its steer that grows with the square of the speed
@@ -235,7 +234,8 @@ class Pilot:
         index = min(bisect_right(self._grid, speed), len(self._grid) - 1)
         low, high = self._grid[index - 1], self._grid[index]
         part = (speed - low) / (high - low)
-        return (1.0 - part) * self._gains[index - 1] + part * self._gains[index]
+        first, second = (gain_row(self.bicycle, self.settings, self._gravity, each) for each in (low, high))
+        return (1.0 - part) * first + part * second
 
     def update(self, state: BicycleState, speed: float, roll_bias: float = 0.0) -> tuple[float, float]:
         """Decide for the next control period.
