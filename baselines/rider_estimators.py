@@ -7,8 +7,6 @@ meet here.
 
 from __future__ import annotations
 
-import importlib
-import inspect
 from collections.abc import Mapping
 from dataclasses import fields
 from typing import Any
@@ -17,15 +15,10 @@ import numpy as np
 
 from ..envs.trajectory import Trajectory
 from ..filters.bicycle.geometry import RiderGeometry
+from ..filters.bicycle.told import true_quantities as true_outputs
 from ..filters.catalogue import CATALOGUE
 from ..filters.estimator import Estimator
 from .zoo import make_estimator
-
-TRUE_ANGLES = {
-    "two-gyro": "..filters.bicycle.two_gyro_truth",
-    "force-inertial": "..filters.bicycle.force_inertial_axes",
-}
-"""First word of a quantity's name → module whose ``true_angles`` makes it from the truth of a ride."""
 
 
 def geometry_of(trajectory: Trajectory) -> RiderGeometry | None:
@@ -78,16 +71,7 @@ def true_quantities(estimator: Estimator[Any], truth: Mapping[str, np.ndarray]) 
     Returns:
         Quantity → ``(T, size)``; empty if it gives none, or the truth lacks what it takes.
     """
-    found: dict[str, np.ndarray] = {}
-    equations = equations_of(estimator)
-    for paper in {quantity.name.split("/")[0] for quantity in estimator.outputs} & set(TRUE_ANGLES):
-        true_angles = importlib.import_module(TRUE_ANGLES[paper], __package__).true_angles
-        wanted = [name for name in inspect.signature(true_angles).parameters if hasattr(equations, name)]
-        try:
-            found |= true_angles(truth, **{name: getattr(equations, name) for name in wanted})
-        except (KeyError, ValueError):
-            continue  # a trajectory of something else
-    return found
+    return true_outputs(estimator.outputs, equations_of(estimator), truth)
 
 
 def equations_of(estimator: Any) -> Any:

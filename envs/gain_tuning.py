@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -12,6 +13,8 @@ import numpy as np
 from gymnasium import spaces
 
 from ..filters.adaptation import gain_sizes, tunable_filter
+from ..filters.bicycle.geometry import RiderGeometry
+from ..filters.bicycle.told import told, true_quantities
 from ..filters.innovation_features import InnovationFeatures
 from ..filters.kalman import KalmanFilter
 from ..filters.metrics import error
@@ -32,8 +35,8 @@ class GainTuningEnv(gymnasium.Env[np.ndarray, np.ndarray]):
     """What the gain-tuning environments share; subclasses say where trajectories come from.
 
     Args:
-        filter: name (``external-acceleration``, ``bounded-motion``) or a Kalman filter with gains that reads a
-            gyroscope and an accelerometer.
+        filter: name of a Kalman filter with gains (:func:`poise.list_estimators`), or such a filter; it must read a
+            gyroscope. A filter of rides is told who rides, where the trajectory says so.
         gains: names of the gains to be tuned, in the order of the action; None for all.
         quantity: output of the filter whose error counts; None for ``up``, or the filter's first output.
         interval: time from decision to decision, s, rounded to ticks.
@@ -65,6 +68,7 @@ class GainTuningEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             raise ValueError(f"render_mode must be None: there is nothing to see, got {render_mode!r}")
         names = None if gains is None else tuple(gains)
         self.tuned = TunedFilter.of(tunable_filter(filter), names, InnovationFeatures(interval))
+        self._untold = self.tuned.kalman
         self.quantity = scored_quantity(self.tuned.kalman, quantity)
         self.reward_kind, self.consistency, self.render_mode = reward, float(consistency), render_mode
         size, actions = self.tuned.observation_size, self.tuned.actions
@@ -87,9 +91,13 @@ class GainTuningEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         missing = [name for name in channels if name not in trajectory.measurements]
         if missing:
             raise ValueError(f"trajectory {trajectory.name!r} lacks the channels {missing} that the filter reads")
-        self.tuned = self.tuned.with_dt(trajectory.dt)
+        kalman = self._untold.with_dt(trajectory.dt)
+        described = trajectory.metadata.get("geometry")
+        if described is not None:
+            kalman = told(kalman, RiderGeometry.read(described))
+        self.tuned = replace(self.tuned, kalman=kalman)
         self._measurements = {name: trajectory.measurements[name] for name in channels}
-        self._truth = trajectory.truth_of(self.quantity.name)
+        self._truth = true_values(trajectory, self.quantity, kalman)
         self._reference = None
         if self.reward_kind == "improvement":
             estimate = self.tuned.kalman.run(self._measurements)
@@ -269,7 +277,7 @@ class ReplayGainEnv(GainTuningEnv):
             raise ValueError("trajectory must name at least one trajectory, got none")
         self.trajectories = tuple(item if isinstance(item, Trajectory) else load_recording(item) for item in items)
         for item in self.trajectories:
-            item.truth_of(self.quantity.name)
+            true_values(item, self.quantity, self.tuned.kalman)
             shortest = self.tuned.features.ticks(item.dt)
             length = len(item) if duration is None else math.floor(duration / item.dt + 1e-6)
             if min(length, len(item)) < shortest:
@@ -298,6 +306,19 @@ def scored_quantity(kalman: KalmanFilter, name: str | None) -> Quantity:
     if name not in outputs:
         raise ValueError(f"quantity must be one of {sorted(outputs)}, got {name!r}")
     return outputs[name]
+
+
+def true_values(trajectory: Trajectory, quantity: Quantity, kalman: KalmanFilter) -> np.ndarray:
+    """The truth ``(T, size)`` of an output: as recorded, or of a paper's own quantity derived from it.
+
+    Raises:
+        ValueError: the trajectory does not know it.
+    """
+    if quantity.name not in trajectory.truth:
+        derived = true_quantities((quantity,), kalman.model, trajectory.truth)
+        if quantity.name in derived:
+            return derived[quantity.name]
+    return trajectory.truth_of(quantity.name)
 
 
 def interval_mean(errors: np.ndarray, scored: np.ndarray) -> float:

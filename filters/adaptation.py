@@ -22,7 +22,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .bounded_motion import BoundedMotion
+from .catalogue import CATALOGUE, make
 from .external_acceleration import ExternalAcceleration
 from .kalman import KalmanFilter
 from .model import Model, parameters_of
@@ -38,9 +38,6 @@ SMALLEST_C_A = 1e-3
 """Lowest c_a that an action reaches; as good as none."""
 FOLLOWED_DRIFT = math.radians(1.0)
 """rad/s: gyroscope error that the external-acceleration filter must be able to follow at every action."""
-
-TUNABLE: Mapping[str, type[Model]] = {"external-acceleration": ExternalAcceleration, "bounded-motion": BoundedMotion}
-"""Filters that gain policies are shipped for, by name."""
 
 
 @dataclass(frozen=True)
@@ -66,24 +63,36 @@ class GainRange:
 
 
 def tunable_filter(filter: str | KalmanFilter) -> KalmanFilter:
-    """The filter of a name (see :data:`TUNABLE`), or the filter itself.
+    """The filter of a name, or the filter itself.
+
+    Args:
+        filter: a Kalman filter of :data:`poise.filters.catalogue.CATALOGUE` that has gains, by name or made.
 
     Raises:
         ValueError: unknown name, or something that is no filter with gains.
     """
+    names = [name for name, entry in CATALOGUE.items() if entry.recursion == "KalmanFilter"]
     if isinstance(filter, str):
-        if filter not in TUNABLE:
-            raise ValueError(f"unknown filter {filter!r}; known are {', '.join(TUNABLE)}, or give a KalmanFilter")
-        return KalmanFilter(TUNABLE[filter](), keep_covariance=False)
+        if filter not in names:
+            raise ValueError(f"unknown filter {filter!r}; known are {', '.join(names)}, or give a KalmanFilter")
+        made = make(filter, keep_covariance=False)
+        assert isinstance(made, KalmanFilter)
+        if not made.gains:
+            raise ValueError(f"filter must have gains to be tuned, {filter!r} has none")
+        return made
     if not isinstance(filter, KalmanFilter) or not filter.gains:
-        raise ValueError(f"filter must be one of {', '.join(TUNABLE)} or a KalmanFilter with gains, got {filter!r}")
+        raise ValueError(f"filter must be one of {', '.join(names)} or a KalmanFilter with gains, got {filter!r}")
     return filter
 
 
 def filter_name(filter: str | KalmanFilter) -> str:
     """Name by which a filter is known here, or the name of its model's class."""
+    if isinstance(filter, str):
+        tunable_filter(filter)
+        return filter
     model = type(tunable_filter(filter).model)
-    return next((name for name, known in TUNABLE.items() if known is model), model.__name__)
+    place = f"{model.__module__.partition('.filters.')[2]}:{model.__qualname__}"
+    return next((name for name, entry in CATALOGUE.items() if entry.factory == place), model.__name__)
 
 
 def gain_ranges(kalman: KalmanFilter, gains: Sequence[str] | None = None) -> tuple[GainRange, ...]:

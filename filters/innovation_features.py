@@ -1,10 +1,10 @@
 r"""What a gain policy sees: statistics of innovations and sensors over several times, no truth.
 
 Five streams of vectors are watched tick by tick: the whitened innovation of the filter, the gyroscope, the
-accelerometer, the external acceleration a that the filter believes in, and the lean u × a / g with its vertical u
-(both zero where a filter gives none). A steady tilt error τ (b × u), which a gyroscope bias b leaves at a time
-constant τ, is a lean whose mean in sensor axes points along b whatever the attitude, while true accelerations of a
-hand average out. Of each stream, running means of
+accelerometer (nothing for a filter that reads none), the external acceleration a that the filter believes in, and the
+lean u × a / g with its vertical u (both zero where a filter gives none). A steady tilt error τ (b × u), which a
+gyroscope bias b leaves at a time constant τ, is a lean whose mean in sensor axes points along b whatever the attitude,
+while true accelerations of a hand average out. Of each stream, running means of
 
     1,  v,  |v|²,  |v − v_previous|²        and, of the accelerometer,  ‖f‖ − g  and its square
 
@@ -111,7 +111,7 @@ class InnovationFeatures:
         """Empty memory for sequences of shape ``batch``.
 
         Raises:
-            ValueError: the filter does not read a gyroscope and an accelerometer.
+            ValueError: the filter reads no gyroscope.
         """
         stream_channels(kalman)
         width = max(3, kalman.model.residual_size)
@@ -182,13 +182,15 @@ class InnovationFeatures:
         self, memory: FeatureMemory, kalman: KalmanFilter, measurements: Mapping[str, np.ndarray], estimate: Estimate
     ) -> tuple[np.ndarray, np.ndarray]:
         """Moments ``(T, *batch, moments)`` of the ticks, and the last sample of every stream."""
-        gyr, acc = (np.asarray(measurements[name], dtype=float) for name in stream_channels(kalman))
+        gyroscope, accelerometer = stream_channels(kalman)
+        gyr = np.asarray(measurements[gyroscope], dtype=float)
+        acc = np.full_like(gyr, np.nan) if accelerometer is None else np.asarray(measurements[accelerometer], float)
         gravity = getattr(kalman.model, "gravity", 9.81)
         innovation = np.asarray(estimate.innovation)
         # A whitened innovation is exactly 0 where there was nothing to compare.
         innovation = np.where((innovation != 0.0).any(axis=-1, keepdims=True), innovation, np.nan)
-        external = np.asarray(estimate.pose.get("external_acceleration", np.zeros_like(acc)))
-        lean = cross(np.asarray(estimate.pose.get("up", np.zeros_like(acc))), external) / gravity
+        external = np.asarray(estimate.pose.get("external_acceleration", np.zeros_like(gyr)))
+        lean = cross(np.asarray(estimate.pose.get("up", np.zeros_like(gyr))), external) / gravity
         values = np.zeros((*acc.shape[:-1], *memory.previous.shape[-2:]))
         for index, stream in enumerate((innovation, gyr, acc, external, lean)):
             values[..., index, : stream.shape[-1]] = stream
@@ -204,16 +206,16 @@ class InnovationFeatures:
         return np.concatenate([flat, excess, excess * excess], axis=-1), last
 
 
-def stream_channels(kalman: KalmanFilter) -> tuple[str, str]:
-    """Names of the gyroscope and the accelerometer that a filter reads.
+def stream_channels(kalman: KalmanFilter) -> tuple[str, str | None]:
+    """Names of the first gyroscope and the first accelerometer that a filter reads; None if it reads no accelerometer.
 
     Raises:
-        ValueError: it reads none.
+        ValueError: it reads no gyroscope.
     """
     names = [channel.name for channel in kalman.channels if channel.size == 3]
     found = [next((name for name in names if name.endswith(kind)), None) for kind in ("/gyr", "/acc")]
-    if found[0] is None or found[1] is None:
-        raise ValueError(f"a tuned filter must read a gyroscope and an accelerometer, this one reads {names}")
+    if found[0] is None:
+        raise ValueError(f"a tuned filter must read a gyroscope, this one reads {names}")
     return found[0], found[1]
 
 

@@ -77,7 +77,7 @@ class TunedFilter:
         """Empty memory with the batch shape of ``measurement``; the action is neutral.
 
         Raises:
-            ValueError: the filter reads no gyroscope or no accelerometer, or a channel is missing.
+            ValueError: the filter reads no gyroscope, or a channel is missing.
         """
         state = self.kalman.init(measurement)
         batch = tuple(state.x.shape[:-1])

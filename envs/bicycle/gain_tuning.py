@@ -21,7 +21,7 @@ Scenarios = str | Scenario | Sequence[str | Scenario]
 
 
 class RiderBicycleGainEnv(GainTuningEnv):
-    """An agent tunes the gains of an attitude filter on the IMU of a bicycle, or of its rider's trunk.
+    """An agent tunes the gains of a filter on a ride: of one IMU's attitude, or of rider and bicycle.
 
     Every episode is a new ride of ``poise/RiderBicycle-v0`` with new sensor errors, simulated at reset and then
     filtered: a step runs the filter over ``interval`` seconds (several samples) with the gains of the action. A bicycle
@@ -38,6 +38,10 @@ class RiderBicycleGainEnv(GainTuningEnv):
     |---|---|
     | ``external-acceleration`` | ``process`` (σ_G), ``measurement`` (σ_A), ``c_a`` |
     | ``bounded-motion`` | ``process`` (σ_g), ``bias`` (σ_b), ``velocity`` (σ_V) |
+    | ``two-gyro``, ``force-inertial``, ``whole-body``, ``odometry-aided`` … | ``env.unwrapped.tuned.kalman.gains`` |
+
+    A filter of one IMU reads ``imu/gyr`` and ``imu/acc`` of the chosen ``place``. A filter of rides reads the channels
+    of the ride that it needs, and is told rider and bicycle of every episode.
 
     ## Observation Space
 
@@ -65,7 +69,8 @@ class RiderBicycleGainEnv(GainTuningEnv):
     ``truth`` (name → array: ``orientation`` of the sensor to the world, ``up``, ``angular_rate`` in rad/s,
     ``position`` in m, ``gyroscope_bias``, ``accelerometer_bias``; mounting included, see
     :func:`poise.envs.bicycle.single_imu.imu_of`), ``estimate`` (outputs of the filter; NaN before it started),
-    ``error_deg`` (mean over the interval; NaN at reset), ``gains`` (name → scaled constant).
+    ``error_deg`` (mean over the interval; NaN at reset), ``gains`` (name → scaled constant). With a filter of rides
+    ``truth`` is all that ``poise/RiderBicycle-v0`` knows.
 
     ## Cost
 
@@ -76,8 +81,8 @@ class RiderBicycleGainEnv(GainTuningEnv):
     ## Arguments
 
     Args:
-        filter: name (``external-acceleration``, ``bounded-motion``) or a Kalman filter with gains.
-        place: ``bicycle_imu`` or ``trunk_imu``.
+        filter: name of a Kalman filter with gains (:func:`poise.list_estimators`), or such a filter.
+        place: ``bicycle_imu`` or ``trunk_imu``; of no effect with a filter of rides.
         scenario: of the rides, one or several to draw from with equal probability.
         subject: 0…4, ``"random"`` for a new rider in every episode, or a rider.
         style: how the rider moves; None for that of the scenario.
@@ -121,7 +126,11 @@ class RiderBicycleGainEnv(GainTuningEnv):
         if place not in PLACES:
             raise ValueError(f"place must be one of {list(PLACES)}, got {place!r}")
         self.place = place
-        kinds = [channel.name.removeprefix("imu/") for channel in self.tuned.kalman.channels]
+        names = [channel.name for channel in self.tuned.kalman.channels]
+        self.of_rides = not all(name.startswith("imu/") for name in names)
+        if not self.of_rides:
+            kinds = dict.fromkeys((*(name.removeprefix("imu/") for name in names), "gyr", "acc"))
+            names = [f"{place}/{kind}" for kind in kinds]
         scenarios = [scenario] if isinstance(scenario, str | Scenario) else list(scenario)
         if not scenarios:
             raise ValueError("scenario must name at least one scenario, got none")
@@ -130,7 +139,7 @@ class RiderBicycleGainEnv(GainTuningEnv):
                 each,
                 subject,
                 style,
-                [f"{place}/{kind}" for kind in dict.fromkeys((*kinds, "gyr", "acc"))],
+                names,
                 sensors,
                 rate,
                 duration,
@@ -149,7 +158,8 @@ class RiderBicycleGainEnv(GainTuningEnv):
         """A new ride and new sensor errors."""
         generator = self.np_random.spawn(1)[0]
         ride = self.rides[int(generator.integers(len(self.rides)))]
-        return imu_of(record(ride, seed=int(generator.integers(2**32))), self.place)
+        ridden = record(ride, seed=int(generator.integers(2**32)))
+        return ridden if self.of_rides else imu_of(ridden, self.place)
 
     def close(self) -> None:
         """Close the worlds of the rides; may be called twice."""

@@ -14,11 +14,12 @@ import pytest
 
 import poise
 from poise.baselines.evaluation import evaluate
-from poise.baselines.rider_estimators import TRUE_ANGLES, equations_of, geometry_of, make_for, told, true_quantities
+from poise.baselines.rider_estimators import equations_of, geometry_of, make_for, told, true_quantities
 from poise.envs.batch_recorder import record_episodes
 from poise.envs.bicycle.environment import RiderBicycleEnv
 from poise.envs.storage import load_trajectory
 from poise.filters.bicycle.geometry import RiderGeometry
+from poise.filters.bicycle.told import TRUE_ANGLES
 from poise.filters.catalogue import CATALOGUE, Entry
 from poise.filters.model import Recurrence
 from poise.filters.quantity import Channel, Quantity

@@ -9,6 +9,7 @@ from poise.envs.bicycle.environment import RiderBicycleEnv
 from poise.envs.bicycle.gain_tuning import RiderBicycleGainEnv
 from poise.envs.bicycle.single_imu import PLACES, imu_of
 from poise.envs.gain_tuning import ReplayGainEnv
+from poise.filters.bicycle.geometry import RiderGeometry
 from poise.filters.bounded_motion import BoundedMotion
 from poise.filters.kalman import KalmanFilter
 
@@ -79,6 +80,31 @@ def test_a_filter_of_ones_own_and_the_full_rider():
     rewards, info = rewards_of(env)
     assert len(rewards) == 2
     assert set(info["gains"]) == {"velocity"}
+    env.close()
+
+
+@pytest.mark.parametrize("quantity", [None, "two-gyro/relative_angles"])
+def test_filters_of_rides_are_told_who_rides(quantity):
+    """Another rider in every episode: the filter gets the geometry of each, and its own quantities are scored."""
+    env = RiderBicycleGainEnv("two-gyro", scenario="slalom", duration=0.5, quantity=quantity)
+    rewards, info = rewards_of(env)
+    assert np.isfinite(rewards[1:]).all()
+    assert set(info["gains"]) == set(env.tuned.kalman.gains)
+    assert set(info["pose"]) == {quantity or "bicycle/roll"}
+    assert {"trunk_imu/gyr", "relative/orientation"} <= set(env.trajectory.measurements)
+    env.close()
+
+
+def test_the_geometry_of_the_episode_reaches_the_filter():
+    env = RiderBicycleGainEnv("odometry-aided", scenario="slow", duration=0.3)
+    told = []
+    for seed in (0, 1):
+        env.reset(seed=seed)
+        assert env.tuned.kalman.model == type(env.tuned.kalman.model).for_rider(
+            RiderGeometry.read(env.trajectory.metadata["geometry"]), dt=env.trajectory.dt
+        )
+        told.append(env.trajectory.metadata["geometry"]["rider_mass"])
+    assert told[0] != told[1]
     env.close()
 
 
