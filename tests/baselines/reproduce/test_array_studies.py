@@ -13,8 +13,9 @@ from poise.baselines.reproduce.angular_rate_study import CALIBRATED, ERRORS, PRI
 
 @pytest.fixture
 def few_ways(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(angular_rate_study, "WAYS", (WAYS[0], WAYS[1], WAYS[6]))
-    monkeypatch.setattr(planar_study, "WAYS", planar_study.WAYS[:2] + planar_study.WAYS[6:7])
+    """Those whose compiled forms other tests make too."""
+    monkeypatch.setattr(angular_rate_study, "WAYS", WAYS[5:])
+    monkeypatch.setattr(planar_study, "WAYS", (planar_study.WAYS[3], planar_study.WAYS[6]))
 
 
 def test_rows_and_tables_of_angular_rates(few_ways: None) -> None:
@@ -22,16 +23,17 @@ def test_rows_and_tables_of_angular_rates(few_ways: None) -> None:
     rows += angular_rate_study.rate_errors(2, CALIBRATED, 16.0)
     assert json.loads(json.dumps(rows)) == rows
     table = angular_rate_study.rate_table(rows)
-    assert [row["method"] for row in table] == ["time integration", "polynomial roots", WAYS[6].name] * 2
+    assert [row["method"] for row in table] == [WAYS[5].name, WAYS[6].name] * 2
     best = {row["errors"]: row["mean"] for row in table if row["method"] == WAYS[6].name}
-    assert best["white 0.1"] < 0.2 < best[CALIBRATED] < 1.0
+    assert best["white 0.1"] < 0.2
+    assert best[CALIBRATED] < 1.0
     assert all(row["least"] <= row["mean"] <= row["largest"] for row in table)
     for row in angular_rate_study.weight_table(rows):
         slow, *_, fast = [value for key, value in row.items() if key not in ("errors", "method")]
         assert slow > fast
 
 
-def test_curves_of_angular_rates() -> None:
+def test_curves_of_angular_rates(few_ways: None) -> None:
     curves = angular_rate_study.rate_curves(1, start=2.0, length=1.0)
     assert {len(values) for values in curves.values()} == {101}
     assert "true" in curves
@@ -42,9 +44,11 @@ def test_rows_and_tables_of_planar_angles(few_ways: None) -> None:
     rows = planar_study.planar_errors(0, "infinity", 12.0)
     assert json.loads(json.dumps(rows)) == rows
     table = {row["method"]: row for row in planar_study.planar_table(rows)}
-    assert table["extended filter"]["rms (°)"] < 6.0 < table["tilt"]["rms (°)"]
+    assert table["extended filter"]["rms (°)"] < 6.0
     assert table["extended filter"]["within 10°"] > 0.9
-    assert table["tilt"]["largest error (°)"] > 90.0
+    assert table["mean, wrapped difference"]["rms (°)"] < 8.0
+    curves = planar_study.planar_curves(0, "infinity", 12.0)
+    assert np.abs(curves["extended filter"]).max() < 30.0
 
 
 def test_unscented_and_extended_filter_are_one_on_both_motions() -> None:
