@@ -21,6 +21,7 @@ from .report import Report
 from .study import Study
 
 G = 9.80665
+OVER_DEVICES = "mean, smallest … largest over the devices"
 AXES = {"x": 0, "y": 1, "z": 2}
 PRINTED_ROTATION = ((0.6629, 0.7487, 0.0071), (-0.0044, -0.0056, 1.0000), (-0.7487, 0.6629, 0.0004))
 """(B.4)"""
@@ -101,6 +102,7 @@ def calibration(study: Study, report: Report) -> None:
         "cannot be simulated; that its fits leave 0.7 m/s² and 2.8 °/s, far more than noise, points to errors "
         "that a scale "
         "and an offset do not describe.",
+        interval=OVER_DEVICES,
     )
     determinant = float(np.linalg.det(np.array(PRINTED_ROTATION)))
     report.text(

@@ -7,7 +7,7 @@ from typing import Any
 from ..plots import new_figure
 from . import planar_study
 from .planar_study import MOTIONS, inflation_errors, planar_curves, planar_errors, planar_table, unscented_difference
-from .report import Report
+from .report import OVER_MOTIONS, Report
 from .study import Study
 
 PRINTED: tuple[tuple[str, str, str, str], ...] = (
@@ -36,6 +36,7 @@ def planar(study: Study, report: Report) -> None:
         "Figures 3.5 to 3.12: errors of the angle in the plane",
         compared,
         f"{seeds} motions of {duration:g} s. The extended filter stays within 10° in most samples, which is no bound.",
+        interval=OVER_MOTIONS,
     )
     report.table(
         "Planar methods",

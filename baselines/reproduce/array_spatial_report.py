@@ -9,7 +9,7 @@ import numpy as np
 
 from ..plots import new_figure
 from . import spatial_study
-from .report import Report
+from .report import OVER_MOTIONS, Report
 from .spatial_study import STEEP, attitude_curves, attitude_errors, attitude_table, cone, wrong_start
 from .study import Study
 
@@ -53,6 +53,7 @@ def spatial(study: Study, report: Report) -> None:
         "nearest "
         "rotation the ±3° of the figures come back for the controller and for OCTA with a gyroscope. OCTA without "
         "gyroscope does not reach ±3° at σ_a = 0.1 g, in any form and with any noise tried.",
+        interval=OVER_MOTIONS,
     )
     report.table(
         "Figures 5.6 to 5.10: every method",

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 RANGE = "mean, smallest … largest over riders and seeds"
+OVER_MOTIONS = "mean, smallest … largest over the motions"
 DEVIATION = "mean ± standard deviation over riders and seeds"
 
 
@@ -107,7 +108,8 @@ class Report:
                 ours: either ``values`` (one a ride; NaN are left out), or ``ours`` and ``interval`` ``(low, high)``
                 (for :data:`DEVIATION` the deviation). Further keys are columns before the quantity (``filter``, …).
             note: Markdown beneath.
-            interval: what stands behind our value: :data:`RANGE`, :data:`DEVIATION`, or a text of one's own for a pair.
+            interval: what stands behind our value: :data:`RANGE`, :data:`OVER_MOTIONS`, :data:`DEVIATION`, or a text of
+                one's own for a pair.
 
         Raises:
             ValueError: a row lacks one of these.
