@@ -92,7 +92,7 @@ def angular_rates(study: Study, report: Report) -> None:
         "angular-rate",
         figure,
         "Figures 2.9 to 2.12: angular rate and weights",
-        "Integration drifts, polynomial roots and Parsa take the wrong sign at times; the weighted method does neither.",
+        "Integration drifts, polynomial roots and Parsa take the wrong sign at times; the weighted method does not.",
     )
 
 
