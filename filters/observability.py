@@ -83,7 +83,7 @@ def trajectory_observability(
         if k < len(F):
             flow = F[k] @ flow
         if len(rows) >= BLOCK or k == len(H) - 1:
-            triangle = np.linalg.qr(np.concatenate([triangle, *rows]), mode="r")
+            triangle = np.asarray(np.linalg.qr(np.concatenate([triangle, *rows]), mode="r"))
             rows = []
     _, values, directions = np.linalg.svd(triangle)
     values = np.concatenate([values, np.zeros(model.error_size - len(values))])

@@ -181,7 +181,7 @@ class TwoGyro(Model):
             "markers": places.markers,
             "viewpoints": places.viewpoints,
         }
-        return cls(**{**told, **parameters})  # type: ignore[arg-type]
+        return cls(**{**told, **parameters})
 
     # ---- what depends on the options ---------------------------------------------------------------------------------
 
