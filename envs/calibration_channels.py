@@ -64,17 +64,16 @@ def accelerometer_record(
         )
     found, rows = [], []
     up_of = {name: AXES[up] for name, up in zip(data.mounting.tolist(), data.up.tolist(), strict=True)}
-    positions, axes = np.pad(np.array(array.positions), ((0, 0), (0, 3 - array.dimension))), spatial_axes(array)
-    limits = {"gravity": gravity, "saturation": saturation}
+    positions, axes = np.pad(array.r, ((0, 0), (0, 3 - array.dimension))), spatial_axes(array)
     for number, axis in enumerate(axes):
         columns = (data.raw[:, number], data.rate, data.mounting)
         try:
             if estimate_axes:
-                one = calibrate_direction(*columns, up_of, **limits)
+                one = calibrate_direction(*columns, up_of, gravity=gravity, saturation=saturation)
                 axis = np.array(one.axis)
             else:
                 upward = {name: float(up @ axis) for name, up in up_of.items()}
-                one = calibrate_accelerometer(*columns, upward, **limits)
+                one = calibrate_accelerometer(*columns, upward, gravity=gravity, saturation=saturation)
         except ValueError as reason:
             raise ValueError(f"accelerometer {number + 1} of {array.name!r}: {reason}") from None
         place = along(one, data, axis, positions[number])
@@ -86,15 +85,16 @@ def accelerometer_record(
     n = array.dimension
     if n == 2:
         axes = rotation.normalize(axes[:, :2])
-    built = type(array)(positions[:, :n].tolist(), axes[:, :n].tolist(), array.name, array.reference)
+    positions = positions[:, :n] + np.array(array.reference)
+    built = type(array)(positions.tolist(), axes[:, :n].tolist(), array.name, array.reference)
     details = {"array": built.describe(), "estimated_axes": estimate_axes, "gravity": gravity, "axes": rows}
     return _record(channel or accelerometer_channel(array), found, "m/s²", details)
 
 
 def along(one: AxisCalibration, data: RateTableData, axis: np.ndarray, nominal: np.ndarray) -> float | None:
-    """eᵀr, m: the coordinate of a sensor along its axis, from the device's origin.
+    """eᵀr, m: the coordinate of a sensor along its axis, from the array's reference point.
 
-    With u up and the origin at one distance d outwards (o) a mounting gives ρ = (e − u uᵀe)ᵀr + d eᵀo. Of r only the
+    With u up and that point at one distance d outwards (o) a mounting gives ρ = (e − u uᵀe)ᵀr + d eᵀo. Of r only the
     part along e can be told; the rest is taken from the nominal position.
 
     Args:

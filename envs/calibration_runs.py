@@ -18,8 +18,9 @@ from .calibration import CalibrationRecord, ChannelCalibration
 from .calibration_channels import accelerometer_channel, spatial_axes
 from .calibration_data import MagnetometerData, RateTableData, mounting_matrix
 from .controller_gestures import BOTH_WAYS, DOWNWARDS, UPWARDS, RateTable
-from .devices import HandDevice, actual_array, array_preset
+from .devices import ArrayPreset, HandDevice, actual_array
 from .hand_sensing import simulate_hand
+from .noise_model import NoiseModel
 from .sensors import STANDARD_GRAVITY, magnetic_field
 
 ACCELEROMETER_SCALE = 4e-3 * STANDARD_GRAVITY
@@ -82,7 +83,7 @@ def random_calibration(array: AccelerometerArray, seed: int) -> CalibrationRecor
 
 def built_with(array: AccelerometerArray, axis_error: float, seed: int) -> AccelerometerArray:
     """The array with axes turned by random angles of standard deviation ``axis_error``, rad, about each normal."""
-    errors = replace(array_preset("array-calibrated"), axis_error=axis_error, position_error=0.0)
+    errors = ArrayPreset("axes", "errors of the axes alone", NoiseModel(), NoiseModel(), axis_error=axis_error)
     return actual_array(array, errors, np.random.default_rng(np.random.SeedSequence(seed).spawn(4)[3]))
 
 
@@ -108,7 +109,7 @@ def accelerometer_runs(
         truth: its calibration.
         seed: of motion and noise.
         hold: time at each rate, s.
-        offset: distance of the device's origin from the axis of the table, m.
+        offset: distance of the array's reference point from the axis of the table, m.
         preset: noise.
         mountings: (up, out) of the runs.
     """

@@ -15,7 +15,6 @@ import numpy as np
 
 from ..filters import rotation
 from .controller_motion import (
-    InfinityGesture,
     Knots,
     PointingGesture,
     RateTableGesture,
@@ -23,6 +22,7 @@ from .controller_motion import (
     WalkGesture,
 )
 from .hand_motion import euler_motion
+from .planar_motion import InfinityGesture
 from .smooth import Series
 
 SHAKING_DRAWS = 20

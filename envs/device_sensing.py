@@ -10,10 +10,10 @@ import numpy as np
 from ..filters import rotation
 from ..filters.accelerometer_array.array import AccelerometerArray
 from ..filters.quantity import GYROSCOPE, Channel
-from .controller_motion import planar_angle
 from .devices import HandDevice, array_preset
 from .gestures import GestureConfig
 from .placed_sensor import Sensor
+from .planar_motion import planar_angle
 from .sensor_presets import SensorPreset
 from .sensors import BodyState, Mounting, Sampling, mounted
 from .suite import SensorSuite

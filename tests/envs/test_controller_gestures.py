@@ -20,8 +20,8 @@ from poise.envs.controller_gestures import (
     pointing_direction,
     target_position,
 )
-from poise.envs.controller_motion import planar_angle
 from poise.envs.gestures import make_gesture
+from poise.envs.planar_motion import planar_angle
 
 
 def draw(config, seed=0, duration=None):
