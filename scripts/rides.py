@@ -71,7 +71,7 @@ class Args:
     runs: Path = Path("runs")
     """where the run folder goes"""
     checks: bool = False
-    """instead of riding, check the physics: linear theory, momentum, strapdown, ripple, leans, resets (minutes)"""
+    """instead of the table of rides, check the physics and compare filters of one IMU on some rides (minutes)"""
     json: bool = False
     """print machine-readable rows instead of tables"""
 
@@ -134,21 +134,28 @@ def run(args: Args) -> int:
 
 
 def checked(args: Args) -> int:
-    """Print the physical checks as they are done, and leave a report."""
+    """Print physical checks and the errors of filters of one IMU, and leave a report."""
     from tqdm import tqdm
 
     from ..baselines.ride_checks import all_checks
+    from ..baselines.ride_inclinations import inclination_rows
     from .experiment import start_run
     from .report import print_progress, provenance
     from .tables import markdown_table, print_table
 
     folder = start_run("rides", args, args.seed, args.runs)
-    rows = [each._asdict() for each in tqdm(all_checks(), desc="physical checks", unit="check")]
-    if args.json:
-        print("\n".join(json.dumps(row) for row in rows))
-    else:
-        print_table(rows, "Physical checks", console=wide())
-    sections = {"Physical checks": markdown_table(rows), "Provenance": provenance(folder)}
+    tables = {
+        "Physical checks": [each._asdict() for each in tqdm(all_checks(), desc="physical checks", unit="check")],
+        "RMS errors of inclination, deg, of filters of one IMU": list(
+            tqdm(inclination_rows(), desc="filters of one IMU", unit="ride")
+        ),
+    }
+    for title, rows in tables.items():
+        if args.json:
+            print("\n".join(json.dumps(row) for row in rows))
+        else:
+            print_table(rows, title, console=wide())
+    sections = {title: markdown_table(rows) for title, rows in tables.items()} | {"Provenance": provenance(folder)}
     print_progress(args.json, f"report: {folder.write_report('poise rides --checks', sections)}")
     return 0
 
