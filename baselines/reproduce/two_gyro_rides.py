@@ -323,7 +323,7 @@ def agreements(report: Report, results: dict[str, list[dict[str, Any]]]) -> None
         "Consistency with the papers' sensors",
         rows,
         "Per degree of freedom; 1 if the filter's covariance is right. It knows 2° of white camera noise where there "
-        "is 1° of it and an alignment error: NIS is below 1, and NEES above it.",
+        "is 1° of it and an alignment error: on flat ground NIS is below 1, and NEES above it.",
     )
 
 

@@ -13,6 +13,7 @@ from poise.baselines.reproduce.two_gyro_motion import DEG, IDEAL, MOTIONS, Error
 from poise.filters import rotation
 from poise.filters.bicycle.geometry import RiderGeometry
 from poise.filters.bicycle.platform_gyro import PlatformGyro, TwoGyroIntegration
+from poise.filters.bicycle.relative_sensor import relative_orientation
 from poise.filters.bicycle.two_gyro import TwoGyro
 from poise.filters.bicycle.two_gyro_kinematics import body_rate_matrix, platform_rate_matrix, substitution
 from poise.filters.bicycle.two_gyro_truth import true_angles, true_states
@@ -61,6 +62,16 @@ def test_jacobians_are_central_differences(model):
             np.testing.assert_allclose(F[:, column], moved / (2.0 * step), atol=1e-6)
             seen = model.residual(back, z)[0] - model.residual(ahead, z)[0]
             np.testing.assert_allclose(H[:, column], seen / (2.0 * step), atol=1e-6)
+
+
+def test_innovations_are_wrapped():
+    """A disk that turns past half a turn: the short way, not 360° less."""
+    model = TwoGyro(dt=0.02)
+    ahead, behind = np.array([0.1, -0.2, -math.pi + 0.01]), np.array([0.1, -0.2, math.pi - 0.01])
+    x = np.concatenate([[0.0], behind, np.zeros(5)])
+    r, _, _ = model.residual(x, {"relative/orientation": relative_orientation(ahead)})
+    np.testing.assert_allclose(r, [0.0, 0.0, 0.02], atol=1e-12)
+    np.testing.assert_allclose(model.pose(x + 2.0 * math.pi)["two-gyro/relative_angles"], behind, atol=1e-12)
 
 
 def test_process_covariance():
