@@ -244,6 +244,21 @@ def test_known_start() -> None:
         assert estimate.covariance[0, 0, 0] == pytest.approx(0.09)
 
 
+def test_the_printed_prior_turns_the_angle_by_whole_turns() -> None:
+    """P₀ = 10³ rad² trusts the first specific force alone, 30 m/s² of which are acceleration; 10⁻² does not."""
+    rng = np.random.default_rng(0)
+    force = planar_force(np.zeros((2, 2000)), rng.normal(0.0, 30.1, (2, 2000, 2)))
+    still = np.zeros((2, 2000, 1))
+    data = {"planar/gyr": still, "array/acc": PLANAR.readings(force, still, still)}
+    shares = []
+    for deviation in (np.sqrt(1e3), 0.1):
+        model = PlanarOrientation(start="known", initial_noise=deviation, inertial_acceleration=30.1)
+        found = KalmanFilter(model, compiled=False).run(data).pose["planar/angle"][-1, :, 0]
+        shares.append(np.mean(np.abs(found) > np.pi))
+    assert 0.25 < shares[0] < 0.38
+    assert shares[1] == 0.0
+
+
 THREE = PlanarArray(((0.0, 0.1), (0.0, 0.1), (0.0, -0.1)), ((1.0, 0.0), (0.0, 1.0), (1.0, 0.0)))
 
 
