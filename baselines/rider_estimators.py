@@ -18,6 +18,7 @@ from ..filters.bicycle.geometry import RiderGeometry
 from ..filters.bicycle.told import true_quantities as true_outputs
 from ..filters.catalogue import CATALOGUE
 from ..filters.estimator import Estimator
+from .array_estimators import array_parameters
 from .zoo import make_estimator
 
 
@@ -37,7 +38,7 @@ def told(trajectory: Trajectory, geometry: RiderGeometry) -> Trajectory:
 
 
 def make_for(name: str, trajectory: Trajectory, **parameters: Any) -> Estimator[Any]:
-    """Make an estimator for a trajectory: at its sampling interval, and told who rides if it can be told.
+    """Make an estimator for a trajectory: at its sampling interval, told who rides or which array it is, if it can be.
 
     Args:
         name: see :func:`poise.list_estimators`.
@@ -48,8 +49,11 @@ def make_for(name: str, trajectory: Trajectory, **parameters: Any) -> Estimator[
         ValueError, ImportError: see :func:`poise.make_estimator`.
     """
     given = {"dt": trajectory.dt, **parameters}
+    if name not in CATALOGUE:
+        return make_estimator(name, **given)
+    given = array_parameters(CATALOGUE[name], trajectory) | given
     geometry = geometry_of(trajectory)
-    if geometry is None or name not in CATALOGUE:
+    if geometry is None:
         return make_estimator(name, **given)
     equations = CATALOGUE[name].load()
     for_rider = getattr(equations, "for_rider", None)

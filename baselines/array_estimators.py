@@ -1,0 +1,25 @@
+"""Filters for accelerometer arrays are told the array that a recording was made with."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from typing import Any
+
+from ..envs.trajectory import Trajectory
+from ..filters.accelerometer_array.array_files import read_array
+from ..filters.catalogue import Entry
+
+
+def array_parameters(entry: Entry, trajectory: Trajectory) -> dict[str, Any]:
+    """What an entry of the catalogue is told of the device in ``metadata["device"]``; empty where there is none.
+
+    ``array``, if the equations have such a field that the entry leaves open, and ``gyroscope``: whether there is one.
+    """
+    described = (trajectory.metadata.get("device") or {}).get("array")
+    own = {item.name for item in fields(entry.load()) if item.init} - set(entry.fixed)
+    if described is None or "array" not in own:
+        return {}
+    told: dict[str, Any] = {"array": read_array(described)}
+    if "gyroscope" in own:
+        told["gyroscope"] = "imu/gyr" in trajectory.measurements
+    return told
