@@ -9,6 +9,7 @@ import numpy as np
 
 from ..filters import rotation
 from ..filters.accelerometer_array.array import AccelerometerArray
+from ..filters.accelerometer_array.planar import PLANAR_GYROSCOPE
 from ..filters.quantity import GYROSCOPE, Channel
 from .devices import HandDevice, array_preset
 from .gestures import GestureConfig
@@ -17,9 +18,6 @@ from .planar_motion import planar_angle
 from .sensor_presets import SensorPreset
 from .sensors import BodyState, Mounting, Sampling, mounted
 from .suite import SensorSuite
-
-PLANAR_GYROSCOPE = Channel("planar/gyr", 1, "rad/s")
-"""Angular rate φ̇ in the vertical plane."""
 
 Force = Callable[[BodyState, BodyState, BodyState], np.ndarray]
 """States now, earlier, and the last one of the block before → specific force ``(n, 3)`` in sensor axes."""

@@ -43,10 +43,10 @@ def planar(study: Study, report: Report) -> None:
         planar_table(rows),
         "Mean and linear filter fail as in the thesis only where raw angles are averaged: with the wrapped "
         "difference they "
-        "come near the extended filter, so it is the wrap and not linearity. The complete pose is poor on the "
-        "walk, whose "
-        "acceleration is white. On the ∞ the thesis finds it poor too; that does **not** come back with the "
-        "corrected equations, but it does with the printed R (3.44) or H (3.45).",
+        "come near the extended filter, so it is the wrap and not linearity. The complete pose of the thesis is poor, "
+        "as it finds: nothing in its model tells acceleration from gravity, so the angle is integrated and drifts, on "
+        "the ∞ more so with the printed R (3.44) or H (3.45). Where the acceleration is expected to return to zero "
+        "(last row, ours) it is the best on the ∞, without a gyroscope.",
     )
     found = study.map("planar inflation", inflation_errors, [(seed, duration) for seed in roots])
     report.table(
