@@ -77,11 +77,13 @@ def accelerometer_record(
         except ValueError as reason:
             raise ValueError(f"accelerometer {number + 1} of {array.name!r}: {reason}") from None
         place = along(one, data, axis, positions[number])
+        turned = float(np.arctan2(np.linalg.norm(np.cross(axis, axes[number])), axis @ axes[number]))
         if estimate_axes:
             axes[number] = axis
             positions[number] += 0.0 if place is None else (place - axis @ positions[number]) * axis
         found.append(one)
-        rows.append(_described(one) | {"positions": dict(one.positions), "along": place, "axis": axis.tolist()})
+        where = {"positions": dict(one.positions), "along": place, "axis": axis.tolist(), "turned": turned}
+        rows.append(_described(one) | where)
     n = array.dimension
     if n == 2:
         axes = rotation.normalize(axes[:, :2])

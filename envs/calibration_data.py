@@ -206,7 +206,8 @@ def read_csv(path: Path, needed: tuple[str, ...]) -> dict[str, np.ndarray]:
         raise ValueError(f"{path} is no table of comma-separated values: {reason}") from None
     missing = [name for name in needed if name not in table.columns]
     if missing:
-        raise ValueError(f"{path} lacks the columns {missing}; it has {list(table.columns)}")
+        hint = " (columns must be separated by commas)" if len(table.columns) == 1 else ""
+        raise ValueError(f"{path} lacks the columns {missing}; it has {list(table.columns)}{hint}")
     if len(table) == 0:
         raise ValueError(f"{path} has no rows")
     return {str(name): table[name].to_numpy() for name in table.columns}

@@ -39,7 +39,7 @@ def run(args: Args) -> int:
         "accelerometers": array.size,
         "rank": array.rank,
         "of": array.A.shape[1],
-        "condition number": condition if math.isfinite(condition) else None,
+        "condition number": condition if math.isfinite(condition) else None if args.json else "infinite",
         "redundancy": array.redundancy,
     }
     if args.json:

@@ -65,6 +65,10 @@ def run(args: Args) -> int:
 
     if args.simulate == bool(args.files):
         raise ValueError("name CSV files, or --simulate runs instead of them")
+    if args.record.is_dir():
+        raise ValueError(f"record must be a file, {args.record} is a folder")
+    if args.seed < 0:
+        raise ValueError(f"seed must be 0 or more, got {args.seed}")
     if args.sensor == "frame":
         return run_frame(args)
     found, truth = calibrate(args)
@@ -149,6 +153,8 @@ def row(number: int, axis: dict[str, Any]) -> dict[str, Any]:
     shown = {"axis": number, "scale": axis["scale"], "offset": axis["offset"]}
     if "along" in axis:
         shown["place along it (m)"] = axis["along"]
+    if axis.get("turned"):
+        shown["turned (deg)"] = float(np.degrees(axis["turned"]))
     return shown | {name: axis[name] for name in ("residual", "largest", "samples", "discarded")}
 
 

@@ -20,14 +20,17 @@ def read_array(described: Mapping[str, Any]) -> AccelerometerArray:
     missing = sorted({"positions", "axes"} - set(described))
     if unknown or missing:
         raise ValueError(f"an array has positions and axes (and name, reference); missing {missing}, unknown {unknown}")
-    planar = all(len(row) == 2 for row in described["positions"])
-    kind = PlanarArray if planar else AccelerometerArray
-    return kind(
-        described["positions"],
-        described["axes"],
-        str(described.get("name", "array")),
-        tuple(described.get("reference", ())),
-    )
+    tables = {}
+    for name in ("positions", "axes", "reference"):
+        try:
+            rows = [described.get(name, [])] if name == "reference" else described[name]
+            tables[name] = tuple(tuple(float(number) for number in row) for row in rows)
+        except (TypeError, ValueError):
+            raise ValueError(
+                f"{name} of an array must be a list of numbers (a row for each sensor), got {rows}"
+            ) from None
+    kind = PlanarArray if all(len(row) == 2 for row in tables["positions"]) else AccelerometerArray
+    return kind(tables["positions"], tables["axes"], str(described.get("name", "array")), tables["reference"][0])
 
 
 def load_array(source: str | Path) -> AccelerometerArray:

@@ -65,6 +65,7 @@ def test_axes_that_are_not_as_drawn_are_found(seed):
     turned, left = (np.degrees(np.arccos(np.sum(one.e * built.e, axis=1))) for one in (OCTA, array))
     assert np.sqrt(np.mean(turned**2)) > 0.4
     assert left.max() < 0.05
+    np.testing.assert_allclose([np.degrees(axis["turned"]) for axis in details["axes"]], turned, atol=0.05)
     np.testing.assert_allclose(np.diag(found.channels["array/acc"].matrix), np.diag(true.matrix), rtol=1e-3)
     np.testing.assert_allclose(found.channels["array/acc"].offset, true.offset, atol=5e-3)
     places = [axis["along"] for axis in details["axes"]]
@@ -219,6 +220,7 @@ def test_a_table_in_degrees_with_names_of_ones_own(tmp_path):
         ("time,up,rate,a\n0,+z,1,three\n", "column 'a' must hold numbers"),
         ("time,up,rate,a\n0,+z,,3\n", "the rate must be known in every row"),
         ("time,up,rate,a\n", "has no rows"),
+        ("time;up;rate;a\n0;+z;1;3\n", "columns must be separated by commas"),
         ("", "is no table of comma-separated values"),
     ],
 )

@@ -84,3 +84,15 @@ def test_wrong_words_are_explained(folder, tmp_path, capsys):
         assert main(["calibrate", "accelerometer", *words, *record]) == 2
         assert message in capsys.readouterr().err
     assert not (tmp_path / "r.json").exists()
+    assert main(["calibrate", "gyroscope", "--simulate", "--record", str(tmp_path)]) == 2
+    assert "record must be a file" in capsys.readouterr().err
+    assert main(["calibrate", "gyroscope", "--simulate", "--seed", "-1", *record]) == 2
+    assert "seed must be 0 or more" in capsys.readouterr().err
+
+
+def test_directions_of_axes_are_shown(tmp_path, capsys):
+    words = ["calibrate", "accelerometer", "--simulate", "--hold", "0.3", "--axis-error", "1", "--estimate-axes"]
+    assert main([*words, "--record", str(tmp_path / "r.json")]) == 0
+    assert "turned (deg)" in capsys.readouterr().out
+    axes = load_calibration(tmp_path / "r.json").details["imu/acc"]["axes"]
+    assert 0.1 < np.degrees(max(axis["turned"] for axis in axes)) < 5.0

@@ -201,5 +201,9 @@ def test_bad_files_are_refused(tmp_path):
     with pytest.raises(ValueError, match="is not JSON"):
         load_array(tmp_path / "a.json")
     (tmp_path / "b.json").write_text('{"positions": [[0, 0, 0]], "direction": []}')
+    for positions in ("3", '[["a", 0, 0]]', "[1, 2]"):
+        (tmp_path / "c.json").write_text(f'{{"positions": {positions}, "axes": [[1, 0, 0]]}}')
+        with pytest.raises(ValueError, match="positions of an array must be a list of numbers"):
+            load_array(tmp_path / "c.json")
     with pytest.raises(ValueError, match=r"missing \['axes'\], unknown \['direction'\]"):
         load_array(tmp_path / "b.json")
