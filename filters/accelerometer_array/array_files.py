@@ -34,7 +34,7 @@ def read_array(described: Mapping[str, Any]) -> AccelerometerArray:
 
 
 def load_array(source: str | Path) -> AccelerometerArray:
-    """The array of a name (:data:`ARRAYS`) or of a JSON file with what :func:`read_array` takes.
+    """The array of a name (:data:`ARRAYS`) or of a JSON file: what :func:`read_array` takes, or a calibration record.
 
     Raises:
         ValueError: neither a known name nor a file, or a file that does not describe an array.
@@ -50,6 +50,11 @@ def load_array(source: str | Path) -> AccelerometerArray:
         raise ValueError(f"{path} is not JSON: {error}") from None
     if not isinstance(described, dict):
         raise ValueError(f"{path} must hold one object with positions and axes")
+    if described.get("format") == "poise-calibration":
+        found = [part["array"] for part in described.get("details", {}).values() if "array" in part]
+        if not found:
+            raise ValueError(f"{path} is a calibration record without accelerometers: it holds no array")
+        return read_array(found[0])
     return read_array({"name": path.stem} | described)
 
 
