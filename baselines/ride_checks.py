@@ -30,7 +30,7 @@ from ..filters import rotation
 
 GRAVITY = 9.81
 """m/s²: that of the published benchmark"""
-STARTS: tuple[dict[str, float], ...] = ({"roll_rate": 2e-3}, {"steer": 1e-3}, {"steer_rate": 5e-3}, {"roll": 1e-3})
+STARTS: tuple[dict[str, Any], ...] = ({"roll_rate": 2e-3}, {"steer": 1e-3}, {"steer_rate": 5e-3}, {"roll": 1e-3})
 """states from which the four modes are excited"""
 
 
@@ -222,7 +222,7 @@ def lean_checks(duration: float = 20.0) -> Iterator[Check]:
 def reset_checks(repeats: int = 3) -> Iterator[Check]:
     """CPU time of the three kinds of reset."""
     for fidelity in ("full", "lumped"):
-        env = RiderBicycleEnv(fidelity=fidelity, duration=1.0)  # type: ignore[arg-type]
+        env = RiderBicycleEnv(fidelity=fidelity, duration=1.0)
         try:
             env.reset(seed=0)
             times = {
