@@ -41,7 +41,7 @@ def held(gesture: str, sensors: str, seed: int, duration: float) -> Trajectory:
     return trajectory.replace(measurements={**trajectory.measurements, "imu/acc": force})
 
 
-def contenders(array: str, noise: Mapping[str, float]) -> dict[str, Any]:
+def contenders(array: str, noise: Mapping[str, Any]) -> dict[str, Any]:
     """Label → name or estimator, those of the thesis first.
 
     Args:
@@ -50,7 +50,7 @@ def contenders(array: str, noise: Mapping[str, float]) -> dict[str, Any]:
     """
     model = ArrayOrientation(array=array, **noise)
     printed = ArrayOrientation(array=array, exact_rotation=False, orthonormalise=False, **noise)
-    gyroscope = {name: value for name, value in noise.items() if name == "gyroscope_deviation"}
+    gyroscope: dict[str, Any] = {name: value for name, value in noise.items() if name == "gyroscope_deviation"}
     found: dict[str, Any] = {
         "array-orientation": KalmanFilter(model, keep_covariance=False),
         "array-orientation, first order": KalmanFilter(printed, keep_covariance=False),

@@ -155,8 +155,8 @@ class ArrayOrientation(Model):
             if self.array not in ARRAYS:
                 raise ValueError(f"array must be an AccelerometerArray or one of {sorted(ARRAYS)}, got {self.array!r}")
             object.__setattr__(self, "array", ARRAYS[self.array])
-        if self.array.dimension != 3:
-            raise ValueError(f"array must be spatial, got the planar array {self.array.name!r}")
+        if self.geometry.dimension != 3:
+            raise ValueError(f"array must be spatial, got the planar array {self.geometry.name!r}")
         check_choice("method", self.method, ("fusion", "tilt", "integration"))
         check_choice("start", self.start, ("samples", "given"))
         check_choice("field", self.field, ("start", "given"))
