@@ -55,6 +55,8 @@ def simulate(
         geometry,
         sampling="instant",
         shock_guard=False,
+        seat_share=1.0,
+        swivel_noise=0.3,
         bicycle_gyroscope_noise=math.radians(0.05),
         trunk_gyroscope_noise=math.radians(0.05),
         limb_gyroscope_noise=math.radians(0.05),

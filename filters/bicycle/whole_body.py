@@ -80,6 +80,9 @@ class WholeBody(RiderLinkage, Model):
     """(3): corrected, with the sign of gravity corrected only, as printed"""
     torque: Literal["seat_force", "printed"] = "seat_force"
     """(9): corrected, as printed"""
+    usual_twist: bool = False
+    """one more output, not the paper's: θ₃ is about ``twist_follow`` times the steering angle, as shoulders follow
+    hands. Where hands carry the trunk's lean, the seat torque does not tell how the trunk is turned about gravity"""
     shock_guard: bool = True
     """widen a_bz, a_t and τ during shocks"""
     sampling: Literal["interval", "instant"] = "interval"
@@ -88,13 +91,14 @@ class WholeBody(RiderLinkage, Model):
     """k_T, kg·m, trunk axes from the pivot"""
     sitting_moment: Point = SITTING
     """k_S, kg·m, bicycle axes from the saddle"""
-    seat_share: float = 1.0
-    """part of the trunk's sideways lean that the seat carries; the paper has all of it"""
+    seat_share: float = 0.0
+    """part of the trunk's sideways lean that the seat carries; 1 in the paper, 0 for riders who prop on the handlebar,
+    as the environment's do"""
     cells_wide: float = USUAL.cells_wide
     """m between the rear load cells"""
 
-    bicycle_gyroscope_noise: float = 5.2e-3
-    """rad/s/√Hz (0.3 °/s/√Hz): six times the device's, for biases and misalignment too"""
+    bicycle_gyroscope_noise: float = 1.0e-2
+    """rad/s/√Hz (0.6 °/s/√Hz): ten times the device's, so that roll forgets a bias within a second or two"""
     trunk_gyroscope_noise: float = 7.0e-3
     """rad/s/√Hz (0.4 °/s/√Hz)"""
     limb_gyroscope_noise: float = 7.0e-3
@@ -117,8 +121,13 @@ class WholeBody(RiderLinkage, Model):
     """of C1 and C5, pure number: 5 to 10 mm"""
     hinge_noise: float = 0.03
     """of C2 and C6, sine of an angle"""
-    swivel_noise: float = 0.3
-    """of C3 and C7, sine of an angle; larger than the spread of 0.1, since swivels wander slowly"""
+    swivel_noise: float = 3.0
+    """of C3 and C7, sine of an angle: elbows of riders who lean stand off by 0.27 rms for 0.6 s or so, which is white
+    noise of 0.27 √(2 · 0.6 s · 100 Hz)"""
+    twist_noise: float = 0.7
+    """rad, of ``usual_twist``; a sample's, at 100 Hz: corrects within some seconds"""
+    twist_follow: float = 0.3
+    """part of the steering angle by which shoulders turn with the handlebar; a guess"""
     roll_prior: float = 0.087
     """rad"""
     trunk_prior: float = 0.12
@@ -173,8 +182,8 @@ class WholeBody(RiderLinkage, Model):
 
     @property
     def residual_size(self) -> int:  # type: ignore[override]
-        """m: five accelerations and torques, and two rows a constraint."""
-        return 5 + 2 * len(self.constraints)
+        """m: five accelerations and torques, two rows a constraint, the twist."""
+        return 5 + 2 * len(self.constraints) + self.usual_twist
 
     def prior(self, z: Measurement) -> tuple[Array, Array]:
         """Upright, trunk as usual, limbs by inverse kinematics; P₀ diagonal."""
@@ -290,6 +299,10 @@ class WholeBody(RiderLinkage, Model):
             )
         )
         rows += self._held(x, z)
+        if self.usual_twist:
+            difference = expand(self.twist_follow, 1) * x[..., STEER] - x[..., TRUNK][..., 2:]
+            by_twist = constant([[0.0, 0.0, 1.0]], x) + 0.0 * x[..., :1, None]
+            rows.append((difference, {2: by_twist}, expand(self.twist_noise**2, 1)))
         r = xp.concat([row[0] for row in rows], axis=-1)
         H = xp.concat([row_of(row[1], x) for row in rows], axis=-2)
         variances = xp.concat([row[2] + zero for row in rows], axis=-1)
