@@ -42,7 +42,8 @@ POINT_MASS = {
 FILTERS: dict[str, dict[str, Any]] = {
     "this filter": {},
     "no bias model": {"bias_model": False},
-    "chest ahead counts 0.2": {"ahead_share": 0.2},
+    "level shoulders (17) alone": {"ahead_share": 0.0},
+    "chest ahead counts 0.4": {"ahead_share": 0.4},
     "static torque": {"torque_model": "static"},
     "raw (13)": {"roll_model": "printed"},
     "(12) without N_z": {"torque_reading": "without-z"},

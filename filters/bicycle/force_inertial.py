@@ -21,6 +21,8 @@ Differs from print, each with an option that brings the printed form back:
   φ_c ≈ atan(v_b ψ̇ / g); the printed (13) has φ_c = 0, true in straight riding only.
 * ``form``: F_17 has a minus, and H_14 is a derivative by φ_b (printed: by φ̇_b).
 * ``jacobian``: H is the whole derivative of the residual; (21) holds rates and accelerations fixed.
+* ``ahead_share``: level shoulders (17) count 0.8, a chest that faces ahead 0.2. A rider who leans tilts the shoulders,
+  and φ then is wrong by their tilt over cos θ.
 * the bias is the Gauss–Markov process that (15) writes, not the random walk that the text says.
 * a rider is no point mass on a seat: the seat also carries the pelvis and part of the legs, the pivot is above it, each
   hand pushes at its own grip (:mod:`.force_inertial_forces`). All of that vanishes in :meth:`ForceInertial.published`.
@@ -357,6 +359,7 @@ PUBLISHED: dict[str, float] = {
     "pedal_down": 0.0,
     "pedal_back": 0.0,
     "wheelbase": 0.0,
+    "ahead_share": 0.0,
 }
 """Table I of the paper; m_h, h_h, h and all noises are not published and assumed."""
 
