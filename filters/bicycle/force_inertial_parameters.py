@@ -113,8 +113,8 @@ class ForceInertialParameters(Equations):
     shoulder_noise: float = 0.1
     """of the sine of the shoulders' tilt; not published. Too small a value pulls φ_h of an upright trunk"""
     ahead_share: float = 0.2
-    """0: shoulders are level (17); 1: the chest faces ahead, to the bicycle; between: a weighted mean of the two. Riders
-    who lean tilt their shoulders"""
+    """0: shoulders are level (17); 1: the chest faces ahead, to the bicycle; between: a weighted mean of the two, since
+    riders who lean tilt their shoulders"""
     gyroscope_filter: float = 0.04
     """s, time constant of the differentiated gyroscopes' low-pass"""
     speed_filter: float = 0.2
