@@ -82,6 +82,7 @@ def equations_of(estimator: Any) -> Any:
     """The model inside a filter, an observer, or a filter with a policy; the estimator itself if it wraps nothing."""
     for wrapped in ("filter", "kalman", "model"):
         inner = getattr(estimator, wrapped, None)
-        if inner is not None:
+        # a filter's own parameter may have one of these names
+        if hasattr(inner, "channels"):
             return equations_of(inner)
     return estimator

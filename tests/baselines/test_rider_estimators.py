@@ -134,6 +134,8 @@ def test_a_table_holds_the_filters_own_quantities(ride):
     assert table["fake", "bicycle/roll", "angle"] == pytest.approx(np.degrees(np.sqrt(np.mean(roll**2))))
     estimator = make_for("fake", ride)
     assert isinstance(equations_of(estimator), Wheelbase)
+    assert type(equations_of(make_for("two-gyro", ride))).__name__ == "TwoGyro"
+    assert type(equations_of(make_for("bounded-motion+policy", ride))).__name__ == "BoundedMotion"
     assert true_quantities(estimator, {}) == {}
     assert true_quantities(make_for("mekf", ride), ride.truth) == {}
 
