@@ -60,9 +60,11 @@ def planar(study: Study, report: Report) -> None:
         curves = study.cached(f"planar curves {motion}", planar_curves, roots[0], motion, duration)
         figure, (ax,) = new_figure(7.5, 3.2)
         for name in SHOWN:
-            ax.plot(curves["time"], curves[name], linewidth=0.8, label=name)
+            faint = name == "tilt"
+            style: dict[str, Any] = {"linewidth": 0.5 if faint else 1.0, "alpha": 0.4 if faint else 1.0}
+            ax.plot(curves["time"], curves[name], label=name, zorder=1 if faint else 2, **style)
         ax.set_ylim(-60.0, 60.0)
         ax.set_xlabel("time, s")
         ax.set_ylabel("error of the angle, °")
-        ax.legend(fontsize=7, ncols=3, loc="lower left")
+        figure.legend(fontsize=7.5, ncols=3, loc="outside lower center")
         report.figure(f"planar-{motion}", figure, f"Figures {number}: errors on {motion}", "Errors beyond 60° are cut.")

@@ -49,7 +49,7 @@ def spatial(study: Study, report: Report) -> None:
     report.compare(
         "Figures 5.6 to 5.10 and Table 5.1, simulation: the proposed method",
         compared,
-        f"{seeds} motions of {duration:g} s; mean and range over the motions. With the exact transition and the "
+        f"{seeds} motions of {duration:g} s. With the exact transition and the "
         "nearest "
         "rotation the ±3° of the figures come back for the controller and for OCTA with a gyroscope. OCTA without "
         "gyroscope does not reach ±3° at σ_a = 0.1 g, in any form and with any noise tried.",
@@ -108,19 +108,22 @@ def _inclined(study: Study, report: Report, roots: list[int], duration: float) -
 
 def _figures(report: Report, device: str, curves: dict[str, Any]) -> None:
     errors_name, path_name = FIGURES[device]
-    figure, axes = new_figure(7.5, 6.5, 4)
+    figure, axes = new_figure(7.5, 7.0, 4)
     time = curves["time"]
     for row, (angle, true) in enumerate((("pitch", curves["pitch"]), ("azimuth", curves["azimuth"]))):
         top, below = axes[2 * row], axes[2 * row + 1]
         top.plot(time, true, color="black", linewidth=1.0, label="true")
         top.plot(time, curves["found"][row], color=LINES[0], linewidth=1.0, linestyle="--", label="proposed")
         top.set_ylabel(f"{angle}, °")
-        for colour, (name, both) in zip(LINES, curves["errors"].items(), strict=False):
-            below.plot(time, both[row], color=colour, linewidth=0.8, label=name)
+        drawn = list(zip(LINES, curves["errors"].items(), strict=False))
+        for place, (colour, (name, both)) in enumerate(drawn):
+            first = place == 0
+            style: dict[str, Any] = {"linewidth": 1.4 if first else 0.8, "alpha": 1.0 if first else 0.65}
+            below.plot(time, both[row], color=colour, label=name, zorder=3 if first else 2, **style)
         below.set_ylim(-30.0, 30.0)
         below.set_ylabel(f"error of {angle}, °")
     axes[0].legend(loc="upper right", fontsize=7, ncols=2)
-    axes[1].legend(loc="upper center", fontsize=6.5, ncols=3)
+    figure.legend(*axes[1].get_legend_handles_labels(), loc="outside lower center", fontsize=7.5, ncols=3)
     axes[-1].set_xlabel("time, s")
     report.figure(
         f"pointing-{device}",

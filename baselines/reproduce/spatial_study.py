@@ -224,19 +224,21 @@ def wrong_start(seed: int, angle: float = math.radians(40.0), duration: float = 
 
 
 def cone(seed: int, duration: float = DURATION) -> dict[str, float]:
-    """Share of samples whose pointing direction errs by more than (5.63) allows a tilt sensor, arcsine and arctangent.
+    """Share of samples whose pitch errs by more than (5.63) allows a tilt sensor, by its arcsine and its arctangent.
 
-    The filter has memory, so neither is a strict bound.
+    The filter has memory, so neither is a strict bound. The rest at the start, where both are zero, is left out.
     """
     trajectory = pointed("controller", seed, duration)
     truth, acceleration = trajectory.truth["orientation"], trajectory.truth["acceleration"]
     arcsine = tilt_error_bound(acceleration, STANDARD_GRAVITY)
     arctangent = np.arctan(np.linalg.norm(acceleration, axis=-1) / STANDARD_GRAVITY)
+    # the hand gets under way within a second after the rest
+    moving = trajectory.time > Pointing().rest + 1.0
     shares = {}
     for way in (CONTROLLER_WAYS[0], CONTROLLER_WAYS[4]):
         pitch = np.abs(pointing_errors(estimated(way, "controller", trajectory, 0.0), truth)[0])
-        shares[f"{way.name}, beyond the arcsine"] = float((pitch > arcsine).mean())
-        shares[f"{way.name}, beyond the arctangent"] = float((pitch > arctangent).mean())
+        shares[f"{way.name}, beyond the arcsine"] = float((pitch > arcsine)[moving].mean())
+        shares[f"{way.name}, beyond the arctangent"] = float((pitch > arctangent)[moving].mean())
     return shares
 
 
