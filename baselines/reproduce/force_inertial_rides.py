@@ -249,8 +249,9 @@ def _tables(report: Report, scenario: str, every: list[dict[str, Any]]) -> None:
     agree = {name: float(np.mean([each["consistency"][name] for each in every])) for name in ("NEES", "NIS")}
     report.text(
         f"{scenario}: a filter whose φ_h starts 35° off agrees for good within 1° with one that starts right after "
-        f"{starts.mean():.1f} s in the mean, {starts.max():.1f} s at most. NEES {agree['NEES']:.2f}, NIS {agree['NIS']:.2f} for each degree of freedom "
-        "(1 is consistent): errors of zeros, pedalling and tilted shoulders last, which the filter takes for white."
+        f"{starts.mean():.1f} s in the mean, {starts.max():.1f} s at most. NEES {agree['NEES']:.2f}, NIS "
+        f"{agree['NIS']:.2f} for each degree of freedom (1 is consistent): errors of zeros, pedalling and tilted "
+        "shoulders last, which the filter takes for white."
     )
 
 
@@ -269,7 +270,7 @@ def _figure(report: Report, scenario: str, path: Path) -> None:
             ax.plot(time, np.degrees(_column(pose, index)), color=colour, linewidth=1.0, label=label)
         ax.plot(time, np.degrees(_column(truth, index)), color="#c2571a", linewidth=1.0, linestyle="--", label="truth")
         ax.set_ylabel(f"{name}, deg")
-    axes[0].legend(loc="upper right", ncols=3, frameon=False)
+    axes[0].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3, frameon=False)
     axes[-1].set_xlabel("time, s")
     report.figure(f"angles-{scenario}", figure, f"Angles of one ride, {scenario}", "As the paper's figures 6 and 9.")
 
