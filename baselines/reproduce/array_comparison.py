@@ -13,6 +13,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ...envs.devices import DEVICES, array_preset
 from ...envs.hand_sensing import simulate_hand
 from ...envs.recordings import load_recording, recording_files
@@ -83,14 +85,19 @@ def gesture_errors(gesture: str, sensors: str, seed: int, duration: float) -> li
 
 
 def recording_errors(path: Path, seconds: float | None) -> list[dict[str, Any]]:
-    """Errors of every estimator on the first ``seconds`` (None: all) of a recording with a magnetometer and a truth.
+    """Errors of every estimator on a recording with a magnetometer and a truth.
+
+    Args:
+        path: file.
+        seconds: how much of the motion is taken, with the rest before it; None: all.
 
     Returns:
         A row for each estimator; none if the recording lacks what is needed.
     """
     trajectory = load_recording(path)
     if seconds is not None:
-        trajectory = trajectory[: max(2, round(seconds / trajectory.dt))]
+        begin = int(np.argmax(trajectory.mask))
+        trajectory = trajectory[: begin + max(2, round(seconds / trajectory.dt))]
     if "imu/mag" not in trajectory.measurements or "orientation" not in trajectory.truth:
         return []
     return [{"recording": trajectory.name, **row} for row in scores(trajectory, contenders("triaxial", {}))]
