@@ -41,7 +41,7 @@ LESSONS = """
 * **Zeros of the force sensors** are much of what is left of φ_h and θ: a moment that lasts cannot be told from a lean.
 * **Shoulders are not level.** (17) decides φ, so φ is wrong by what the shoulders really tilt, times 1/cos θ.
 * **Load cells add nothing**: the centre of pressure cancels in (10) to (12).
-* **The static torque underestimates** how much τ_φh fluctuates, as the paper says. Outdoors most of what is read in τ_φh
-  is the alternating push on the two pedals, which neither model knows.
+* **The static torque underestimates** how much τ_φh fluctuates, as the paper says. Outdoors most of what is read in
+  τ_φh is the alternating push on the two pedals, which neither model knows.
 * The bias model helps little, as in the paper: the forces hold the angles whatever the bias does.
 """
