@@ -121,7 +121,6 @@ CHANGES: dict[str, tuple[dict[str, Any], dict[str, Any], float, str]] = {
     ),
     "bicycle's gyroscope off by 0.2 °/s": ({}, {"bicycle_offset": 0.2 * DEG}, 60.0, "0.57 0.64 0.83 0.48"),
     "mean θ 75°": ({}, {}, 75.0, "φ 0.99"),
-    "mean θ 85°": ({}, {}, 85.0, "φ 1.15"),
 }
 """One change at a time: options of the filter, errors, mean θ (deg), what an independent simulation found."""
 
@@ -174,7 +173,11 @@ def simulations(study: Study, report: Report) -> None:
         }
         for name, values in zip(CHANGES, changed, strict=True)
     ]
-    report.table("One change at a time, indoors, 30 s, RMS in deg", rows)
+    report.table(
+        "One change at a time, indoors, 30 s, RMS in deg",
+        rows,
+        "Not further than θ = 75°: a trunk that leans 20° aside has level shoulders at 90° only if it faces sideways.",
+    )
     rows = []
     for label, loose in (("tuning of this table", False), ("torque 30 N·m, gyroscopes 0.3 °/s, prior 1°", True)):
         times = study.cached(f"convergence {int(loose)}", convergence, study.seed, seeds, loose)
