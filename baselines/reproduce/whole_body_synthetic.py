@@ -271,8 +271,8 @@ def synthetic(study: Study, report: Report) -> None:
         "Posterior Cramér–Rao bound",
         rows,
         "RMS over 5 to 15 s, deg, exact indoor rides without biases and swivel. The filter's noises are larger than "
-        "the sensors', to cover biases: errors lie below that bound, which is one for its own noises. With the noises that "
-        "the sensors have, accelerations of body and bicycle remain what the filter's processes only describe.",
+        "the sensors', to cover biases: errors lie below that bound, which is one for its own noises. With the noises "
+        "of the sensors, motions of body and bicycle remain what the filter's processes only describe.",
     )
     rows = study.cached("consistency", consistency_rows, 50, seeds[0])
     report.table("Consistency where the model is exact", rows, "50 runs: NEES at their ends, NIS over all ticks.")
