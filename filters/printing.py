@@ -118,16 +118,16 @@ def _print_parts(parts: list[Part], everything: Part) -> tuple[list[str], dict[s
         return [], {"parts": "", "update": _WHOLE}
     owner = [next(k for k, part in enumerate(parts) if i in part.states) for i in everything.states]
     constants.append(f"owner = np.array({owner}, dtype=np.int64)")
-    lines = ["nis[t, b] = 0.0", "if linked[b]:"]
-    lines += [f"    {line.strip()}" for line in _WHOLE.splitlines()] + ["else:"]
+    steps = ["nis[t, b] = 0.0", "if linked[b]:"]
+    steps += [f"    {line.strip()}" for line in _WHOLE.splitlines()] + ["else:"]
     for k, part in enumerate(parts):
         text = _UPDATE.format(k=k, P="local", total="nis[t, b] +=", uncorrelated=part.uncorrelated, indent=" " * 20)
-        lines += [f"    gather(P[b], s{k}, local)", f"    {text}", f"    scatter(local, s{k}, P[b])"]
+        steps += [f"    gather(P[b], s{k}, local)", f"    {text}", f"    scatter(local, s{k}, P[b])"]
     largest = max(len(part.states) for part in parts)
     scratch = f"""local, linked = np.empty(({largest}, {largest})), np.zeros(B, np.bool_)
     for b in range(B):
         linked[b] = coupled(P[b], owner)"""
-    return [*constants, ""], {"parts": scratch, "update": ("\n" + " " * 16).join(lines)}
+    return [*constants, ""], {"parts": scratch, "update": ("\n" + " " * 16).join(steps)}
 
 
 def cache_folder() -> Path:

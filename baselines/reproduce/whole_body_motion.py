@@ -263,10 +263,10 @@ class ExactRide:
             for at in (t - 0.5 * dt, t - dt):
                 there = self.forces(at)
                 parts.append((self.rates(at), there, self._on_trunk(at, there)))
-            weights = (1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0)
-            rates = {name: sum(w * part[0][name] for w, part in zip(weights, parts, strict=True)) for name in rates}
-            forces = {name: sum(w * part[1][name] for w, part in zip(weights, parts, strict=True)) for name in forces}
-            own = sum(w * part[2] for w, part in zip(weights, parts, strict=True))
+            first, middle, last = parts
+            rates = {name: _simpson(*(part[0][name] for part in parts)) for name in rates}
+            forces = {name: _simpson(*(part[1][name] for part in parts)) for name in forces}
+            own = _simpson(first[2], middle[2], last[2])
         R = rotation.euler_matrix("zxy", pose["trunk/angles"])
         if self.bumps is not None:
             shock = 40.0 * rng.uniform(-1.0, 1.0, (t.size, 3)) * ((t >= self.bumps[0]) & (t < self.bumps[1]))[:, None]
@@ -305,3 +305,8 @@ class ExactRide:
         measurements["wheel/speed"] = pose["bicycle/speed"]
         metadata: dict[str, Any] = {"name": f"exact-{self.course}-{self.seed}", "geometry": self.geometry.describe()}
         return Trajectory(t, measurements, pose, np.ones(t.size, dtype=bool), metadata)
+
+
+def _simpson(first: np.ndarray, middle: np.ndarray, last: np.ndarray) -> np.ndarray:
+    """Mean over an interval of what is given at its ends and in its middle."""
+    return (first + 4.0 * middle + last) / 6.0

@@ -18,7 +18,7 @@ def limb_frame(
     lower: float,
     outward: Array,
     kind: Literal["arm", "leg"],
-    swivel: float = 0.0,
+    swivel: Array = 0.0,
 ) -> tuple[Array, Array]:
     """Frame of the upper segment and place of the hinge between the segments.
 

@@ -154,7 +154,9 @@ def test_the_seat_moment_of_point_masses():
 
 
 def test_without_errors_of_sensors_the_truth_is_found(ideal):
-    estimate = KalmanFilter(replace(INSTANT, trunk_flexion=0.5, swivel_noise=0.3), compiled=False).run(samples(ideal, INSTANT))
+    estimate = KalmanFilter(replace(INSTANT, trunk_flexion=0.5, swivel_noise=0.3), compiled=False).run(
+        samples(ideal, INSTANT)
+    )
     assert max(errors(estimate, ideal, slice(300, None)).values()) < 0.7
     assert {name: value.shape for name, value in true_angles(ideal.truth).items()} == {
         name: value.shape for name, value in estimate.pose.items()
