@@ -15,11 +15,12 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
+from ...filters import rotation
 from ...filters.bicycle.force_inertial import ForceInertial
 from ...filters.bicycle.force_inertial_axes import DOWN, UP_THE_TRUNK
 
+X, Y, Z = np.eye(3)
 DEG = math.pi / 180.0
 WAVES = 4
 STEP = 1e-3
@@ -79,18 +80,18 @@ class Motion:
         a, b = np.sin(self.phi_h(t)), np.cos(self.phi_h(t)) * np.cos(self.theta(t))
         return np.arctan2(b, a) - np.arccos(np.clip(np.sin(self.tilt(t)) / np.hypot(a, b), -1.0, 1.0))
 
-    def yawed(self, t: np.ndarray) -> Rotation:
-        """R to ground."""
-        return Rotation.from_euler("Z", self.psi(t)[:, None])
+    def yawed(self, t: np.ndarray) -> np.ndarray:
+        """R to ground: quaternions ``(T, 4)``."""
+        return turn(Z, self.psi(t))
 
-    def bicycle(self, t: np.ndarray) -> Rotation:
-        """B to ground."""
-        return self.yawed(t) * Rotation.from_euler("X", self.phi_b(t)[:, None])
+    def bicycle(self, t: np.ndarray) -> np.ndarray:
+        """B to ground: quaternions ``(T, 4)``."""
+        return rotation.multiply(self.yawed(t), turn(X, self.phi_b(t)))
 
-    def trunk(self, t: np.ndarray) -> Rotation:
-        """Trunk to ground."""
-        angles = np.stack([self.phi_h(t), self.theta(t), self.phi(t)], axis=-1)
-        return self.yawed(t) * Rotation.from_euler("XYX", angles)
+    def trunk(self, t: np.ndarray) -> np.ndarray:
+        """Trunk to ground: quaternions ``(T, 4)``."""
+        leaning = rotation.multiply(self.yawed(t), turn(X, self.phi_h(t)))
+        return rotation.multiply(rotation.multiply(leaning, turn(Y, self.theta(t))), turn(X, self.phi(t)))
 
 
 def _waves(rng: np.random.Generator, deviation: float, low: float, high: float) -> tuple[Function, Function]:
@@ -160,11 +161,16 @@ def second_derivative(function: Function, t: np.ndarray) -> np.ndarray:
     return (16.0 * near - far - 30.0 * function(t)) / (12.0 * h * h)
 
 
-def angular_velocity(orientation: Callable[[np.ndarray], Rotation], t: np.ndarray) -> np.ndarray:
+def turn(axis: np.ndarray, angle: np.ndarray | float) -> np.ndarray:
+    """Quaternions ``(..., 4)`` of turns by ``angle`` ``(...)`` about a unit vector."""
+    return rotation.exp(np.asarray(angle, dtype=float)[..., None] * axis)
+
+
+def angular_velocity(orientation: Callable[[np.ndarray], np.ndarray], t: np.ndarray) -> np.ndarray:
     """Of a body, in its own axes, rad/s: rotation vectors of small steps."""
 
     def step(h: float) -> np.ndarray:
-        return (orientation(t - h).inv() * orientation(t + h)).as_rotvec() / (2.0 * h)
+        return rotation.log(rotation.multiply(rotation.conjugate(orientation(t - h)), orientation(t + h))) / (2.0 * h)
 
     return (4.0 * step(STEP) - step(2.0 * STEP)) / 3.0
 
@@ -197,36 +203,38 @@ def exact_readings(motion: Motion, t: np.ndarray, rider: ForceInertial, inertia:
     gravity = np.array([0.0, 0.0, rider.gravity])
 
     def contact(time: np.ndarray) -> np.ndarray:
-        return motion.yawed(time).apply([1.0, 0.0, 0.0]) * motion.speed(time)[:, None]
+        return rotation.rotate(motion.yawed(time), X) * motion.speed(time)[:, None]
 
     def carried(arm: tuple[float, float, float]) -> np.ndarray:
         """Acceleration of a point of the bicycle."""
-        return derivative(contact, t) + second_derivative(lambda time: motion.bicycle(time).apply(arm), t)
+        return derivative(contact, t) + second_derivative(
+            lambda time: rotation.rotate(motion.bicycle(time), np.array(arm)), t
+        )
 
     def up(height: float) -> np.ndarray:
-        return second_derivative(lambda time: motion.trunk(time).apply([height, 0.0, 0.0]), t)
+        return second_derivative(lambda time: rotation.rotate(motion.trunk(time), height * X), t)
 
     seat = carried((rider.pivot_forward, 0.0, -rider.pivot_height))
-    imu = Rotation.from_euler("Y", rider.imu_tilt)
+    imu = turn(Y, rider.imu_tilt)
     force = rider.trunk_mass * (seat + up(rider.trunk_height) - gravity)
-    arm = motion.trunk(t).apply([rider.trunk_height, 0.0, 0.0])
+    arm = rotation.rotate(motion.trunk(t), rider.trunk_height * X)
 
     def momentum(time: np.ndarray) -> np.ndarray:
         spin = angular_velocity(motion.trunk, time)
-        return motion.trunk(time).apply(np.array(inertia) * spin)
+        return rotation.rotate(motion.trunk(time), np.array(inertia) * spin)
 
     moment = np.cross(arm, force)
     if any(inertia):
         moment = moment + derivative(momentum, t)
-    back, bicycle, trunk = motion.bicycle(t).inv(), motion.bicycle(t), motion.trunk(t)
+    bicycle, trunk = motion.bicycle(t), motion.trunk(t)
     place = carried((rider.imu_forward, 0.0, -rider.imu_height))
     return Exact(
-        -back.apply(force),
-        -back.apply(moment),
+        -rotation.rotate_back(bicycle, force),
+        -rotation.rotate_back(bicycle, moment),
         angular_velocity(motion.trunk, t),
-        imu.inv().apply(angular_velocity(motion.bicycle, t)),
-        trunk.inv().apply(seat + up(rider.trunk_imu_height) - gravity),
-        (bicycle * imu).inv().apply(place - gravity),
+        rotation.rotate_back(imu, angular_velocity(motion.bicycle, t)),
+        rotation.rotate_back(trunk, seat + up(rider.trunk_imu_height) - gravity),
+        rotation.rotate_back(rotation.multiply(bicycle, imu), place - gravity),
     )
 
 
@@ -261,9 +269,9 @@ def simulate(
     def noisy(values: np.ndarray, deviation: float) -> np.ndarray:
         return values + deviation * rng.standard_normal(values.shape)
 
-    tilted = Rotation.from_euler("Y", rider.post_tilt).inv()
+    post = turn(Y, rider.post_tilt)
     sensor = rider.post_length * np.array([math.sin(rider.post_tilt), 0.0, math.cos(rider.post_tilt)])
-    wrench = [tilted.apply(exact.force), tilted.apply(moment - np.cross(sensor, exact.force))]
+    wrench = [rotation.rotate_back(post, part) for part in (exact.force, moment - np.cross(sensor, exact.force))]
     # three cells share the vertical force and the moments about the saddle point
     vertical, x_C, y_C = exact.force[:, 2], -moment[:, 1] / exact.force[:, 2], moment[:, 0] / exact.force[:, 2]
     front = vertical * (x_C + rider.cells_behind) / rider.cells_long

@@ -18,6 +18,7 @@ from poise.baselines.reproduce.force_inertial_motion import (
     second_derivative,
 )
 from poise.envs.bicycle.contact_forces import LoadCells
+from poise.filters import rotation
 from poise.filters.bicycle.force_inertial import ForceInertial
 from poise.filters.bicycle.force_inertial_accelerometer import accelerometer_accelerations
 from poise.filters.bicycle.force_inertial_forces import (
@@ -98,10 +99,12 @@ def test_needed_moments_are_those_of_newton_and_euler(course):
     place = np.array([L_S, 0.0, -1.0]) + arm
 
     def contact(time):
-        return motion.yawed(time).apply([1.0, 0.0, 0.0]) * motion.speed(time)[:, None]
+        return rotation.rotate(motion.yawed(time), np.array([1.0, 0.0, 0.0])) * motion.speed(time)[:, None]
 
-    acceleration = derivative(contact, t) + second_derivative(lambda time: motion.bicycle(time).apply(place), t)
-    load = carried * motion.bicycle(t).inv().apply(acceleration - [0.0, 0.0, G])
+    acceleration = derivative(contact, t) + second_derivative(
+        lambda time: rotation.rotate(motion.bicycle(time), np.array(place)), t
+    )
+    load = carried * rotation.rotate_back(motion.bicycle(t), acceleration - [0.0, 0.0, G])
     force, moment = load - exact.force, np.cross(arm, load) - exact.moment
     tilt = Rotation.from_euler("X", motion.phi_b(t)[:, None])
     force, moment = tilt.apply(force), tilt.apply(moment)
