@@ -3,7 +3,7 @@ r"""Angular rate from tracked orientations, to compare estimates with.
 P. He, thesis, Université Laval; sections 2.3.2 and 5.5. The entries of the rotation matrices Q (body to world) are
 smoothed by a first-order low-pass run forwards and backwards, then
 
-    Q̇_k = (Q_{k+1} − Q_{k−1}) / (2 Δt),   [ω]× = ½ (QᵀQ̇ − (QᵀQ̇)ᵀ)  in body axes                            (2.50), (5.61)
+    Q̇_k = (Q_{k+1} − Q_{k−1}) / (2 Δt),   [ω]× = ½ (QᵀQ̇ − (QᵀQ̇)ᵀ)  in body axes                  (2.50), (5.61)
 
 Differs from print: (2.51), (2.52) have Q Q̇ᵀ, which is −[ω]× in world axes; (5.61) agrees with the above.
 """
