@@ -227,12 +227,7 @@ class RiderBicycleEnv(PoseEnv):
 
     def _fit(self, posture: Posture) -> None:
         """Put the sensors on a person on the bicycle."""
-        load = posture.load()
-        whole = posture.bicycle.with_load(load).parts
-        mass = sum(part.mass for part in whole)
-        front = sum(part.mass * part.centre[0] for part in whole) / mass / posture.bicycle.wheelbase
-        sinking = STANDARD_GRAVITY * mass * (1.0 - front) / self.tyre.stiffness
-        self._posture, self._places = posture, sensor_places(posture, wheel_sinking=sinking)
+        self._posture, self._places = posture, sensor_places(posture)
         self._suite = rider_bicycle_suite(places=self._places, gravity=STANDARD_GRAVITY, **self._sensors)
 
     def next_block(self, most: int) -> Block:

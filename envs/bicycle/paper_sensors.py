@@ -92,14 +92,12 @@ class SensorPlaces:
 def sensor_places(
     posture: Posture,
     *,
-    wheel_sinking: float = 0.0,
     viewpoints: Sequence[Vector3] = (CAMERA_PLACE,) * 3,
 ) -> SensorPlaces:
     """Places on a person fitted to a bicycle.
 
     Args:
         posture: the person on the bicycle.
-        wheel_sinking: deflection of the rear tyre at rest, m, by which the rolling radius is smaller.
         viewpoints: three points of the bicycle frame from which markers are seen. From one point (the papers' camera)
             the distances do not change when the trunk turns about the line from its joint to the camera;
             :data:`SPREAD_VIEWPOINTS` do not have this blind direction.
@@ -115,7 +113,8 @@ def sensor_places(
         saddle=bicycle.saddle,
         seat_sensor=Mounting(seat, pitched(POST_TILT)),
         load_cells=LoadCells(),
-        wheel_radius=bicycle.rear_wheel.radius - wheel_sinking,
+        # our tyre touches the ground with its tread where it is lowest, so it rolls on its unloaded radius
+        wheel_radius=bicycle.rear_wheel.radius,
         markers=tuple(tuple((trunk + marker).tolist()) for marker in np.array(MARKERS)),  # type: ignore[arg-type]
         viewpoints=tuple(viewpoints),  # type: ignore[arg-type]
     )

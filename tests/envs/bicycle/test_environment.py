@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 
+import poise
 from poise.envs.bicycle.anthropometry import SUBJECTS, RiderBody
 from poise.envs.bicycle.environment import RiderBicycleEnv
 from poise.envs.bicycle.measured_geometry import rider_geometry
@@ -253,3 +254,12 @@ def test_pictures_show_something(fidelity):
 def test_bad_arguments_are_refused_at_construction(options, message):
     with pytest.raises(ValueError, match=message):
         make(**options)
+
+
+def test_an_ideal_wheel_tells_the_true_speed() -> None:
+    """The radius that the sensor is told is the one on which the tyre rolls, or speeds would be wrong by per cents."""
+    env = RiderBicycleEnv("straight", 2, suite=["wheel/speed"], sensors="ideal", fidelity="lumped", duration=3.0)
+    ride = poise.record(env, seed=0)
+    env.close()
+    told, true = ride.measurements["wheel/speed"].mean(), ride.truth["bicycle/speed"].mean()
+    assert told == pytest.approx(true, rel=2e-3)

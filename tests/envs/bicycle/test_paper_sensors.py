@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -294,6 +295,6 @@ def test_bad_input_is_refused(options, message):
 
 def test_impossible_places_are_refused():
     with pytest.raises(ValueError, match="wheel_radius must be positive"):
-        sensor_places(POSTURE, wheel_sinking=1.0)
+        replace(PLACES, wheel_radius=-0.1)
     with pytest.raises(ValueError, match="viewpoints must be three points"):
         sensor_places(POSTURE, viewpoints=[(0.0, 0.0, 1.0)])

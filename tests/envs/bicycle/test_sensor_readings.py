@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -83,7 +84,7 @@ def test_encoders():
     assert found["wheel/speed"] == pytest.approx([9.0 * 0.335])
     assert found["steer/angle"] == pytest.approx([-0.2])
     assert found["crank/angle"] == pytest.approx([15.0 - 4.0 * math.pi])
-    sunk = sensor_places(POSTURE, wheel_sinking=0.005)
+    sunk = replace(PLACES, wheel_radius=0.33)
     assert read(["wheel/speed"], sunk, wheel_rate=1.0)["wheel/speed"] == pytest.approx([0.33])
 
 
