@@ -194,7 +194,7 @@ CATALOGUE: dict[str, Entry] = {
     ),
     "whole-body": _filter(
         "bicycle.whole_body:WholeBody",
-        "Liu, Pan et al.: a rider's trunk, arms and legs from six gyroscopes and what hands and feet hold",
+        "Zhang et al. 2016: a rider's trunk, arms and legs from six gyroscopes and what hands and feet hold",
         WHOLE_BODY,
         WHOLE_BODY_ANGLES,
     ),
