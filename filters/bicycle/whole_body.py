@@ -1,8 +1,8 @@
 r"""Pose of a whole bicycle rider from few worn sensors and what hands and feet hold.
 
 Y. Zhang, K. Chen, J. Yi, T. Liu, Q. Pan, "Whole-Body Pose Estimation in Human Bicycle Riding Using a Small Set of
-Wearable Sensors", 2016; equation numbers are the paper's, * marks those that were corrected. Axes are the paper's inside
-(x forward, y up, z to the right) and the environment's at every door (:mod:`.rider_linkage`).
+Wearable Sensors", 2016; equation numbers are the paper's, * marks those that were corrected. Axes are the paper's
+inside (x forward, y up, z to the right) and the environment's at every door (:mod:`.rider_linkage`).
 
 State X = [φ, ϑ̈, Θ, a_ts, Φ_r, Ψ_r, Φ_l, Ψ_l] (20): roll, yaw acceleration, trunk, acceleration of the trunk's sensor
 against the seat, right shoulder and hip, left shoulder and hip. Six gyroscopes are inputs: with w the child's and q
