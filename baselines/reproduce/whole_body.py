@@ -13,8 +13,8 @@ def reproduce(study: Study, report: Report) -> None:
     report.text(
         "Y. Zhang, K. Chen, J. Yi, T. Liu, Q. Pan: whole-body pose of a bicycle rider from six gyroscopes, two "
         "accelerometers, load cells and encoders. The paper gives neither lengths nor noises nor priors; used instead "
-        "are the rider's own lengths and the defaults of `whole-body`. Its riders are people; these are simulated, lean "
-        "on their hands rather than on the saddle, and hold their elbows less strictly than C3 wants."
+        "are the rider's own lengths and the defaults of `whole-body`. Its riders are people; these are simulated, "
+        "lean on their hands rather than on the saddle, and hold their elbows less strictly than C3 wants."
     )
     rides(study, report)
     bumps(study, report)
