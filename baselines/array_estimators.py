@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import fields
 from typing import Any
 
@@ -15,7 +16,9 @@ def array_parameters(entry: Entry, trajectory: Trajectory) -> dict[str, Any]:
 
     ``array``, if the equations have such a field that the entry leaves open, and ``gyroscope``: whether there is one.
     """
-    described = (trajectory.metadata.get("device") or {}).get("array")
+    device = trajectory.metadata.get("device")
+    # recordings of one IMU may name their sensor here
+    described = device.get("array") if isinstance(device, Mapping) else None
     own = {item.name for item in fields(entry.load()) if item.init} - set(entry.fixed)
     if described is None or "array" not in own:
         return {}

@@ -27,6 +27,8 @@ def test_the_device_of_a_recording_is_told(device):
 def test_an_imu_and_a_fixed_array_are_told_nothing():
     trajectory = simulate_hand("slow", 1, duration=1.5)
     assert array_parameters(CATALOGUE["array-orientation"], trajectory) == {}
+    named = trajectory.replace(metadata={**trajectory.metadata, "device": "a sensor by name"})
+    assert array_parameters(CATALOGUE["array-orientation"], named) == {}
     assert (
         array_parameters(CATALOGUE["array-orientation-imu"], simulate_hand("slow", 1, duration=1.5, device="octa"))
         == {}
