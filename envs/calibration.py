@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-import math
+import secrets
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -82,10 +82,15 @@ class CalibrationRecord:
         return {"format": FORMAT, "version": FORMAT_VERSION, "channels": channels, "details": dict(self.details)}
 
     def save(self, path: str | Path) -> Path:
-        """Write the record as JSON."""
+        """Write the record as JSON; an earlier one in its place is lost only when the new one is complete."""
         path = Path(path)
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(json.dumps(self.describe(), indent=1) + "\n", encoding="utf-8")
+        part = path.with_name(f".{path.name}.{secrets.token_hex(4)}.part")
+        try:
+            part.write_text(json.dumps(self.describe(), indent=1) + "\n", encoding="utf-8")
+            part.replace(path)
+        finally:
+            part.unlink(missing_ok=True)
         return path
 
 
@@ -105,8 +110,11 @@ def load_calibration(path: str | Path) -> CalibrationRecord:
         raise ValueError(f"{path} is no calibration record: {reason}") from None
     if not isinstance(described, dict) or described.get("format") != FORMAT:
         raise ValueError(f"{path} is no calibration record: its format is not {FORMAT!r}")
-    if described.get("version", math.inf) > FORMAT_VERSION:
-        raise ValueError(f"{path} has version {described.get('version')}, this package reads up to {FORMAT_VERSION}")
+    version, details = described.get("version"), described.get("details", {})
+    if not isinstance(version, int) or version > FORMAT_VERSION:
+        raise ValueError(f"{path} has version {version!r}, this package reads up to {FORMAT_VERSION}")
+    if not isinstance(details, dict):
+        raise ValueError(f"{path} holds an unusable calibration: details must be an object, got {details!r}")
     try:
         channels = {
             name: ChannelCalibration(one["matrix"], one["offset"], one["unit"])
@@ -114,7 +122,7 @@ def load_calibration(path: str | Path) -> CalibrationRecord:
         }
     except (KeyError, TypeError, AttributeError, ValueError) as reason:
         raise ValueError(f"{path} holds an unusable calibration: {reason}") from None
-    return CalibrationRecord(channels, described.get("details", {}))
+    return CalibrationRecord(channels, details)
 
 
 def as_record(calibration: CalibrationRecord | str | Path) -> CalibrationRecord:

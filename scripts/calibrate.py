@@ -67,6 +67,8 @@ def run(args: Args) -> int:
         raise ValueError("name CSV files, or --simulate runs instead of them")
     if args.record.is_dir():
         raise ValueError(f"record must be a file, {args.record} is a folder")
+    if args.raw is not None and not args.simulate:
+        raise ValueError("raw is where --simulate leaves its runs: it needs --simulate")
     if args.seed < 0:
         raise ValueError(f"seed must be 0 or more, got {args.seed}")
     if args.sensor == "frame":
@@ -88,6 +90,7 @@ def calibrate(args: Args) -> tuple[CalibrationRecord, CalibrationRecord | None]:
     from ..envs import calibration_runs as runs
     from ..envs.calibration_data import MagnetometerData, RateTableData, read_magnetometer, read_rate_table
     from ..filters.accelerometer_array.array_files import load_array
+    from .report import print_progress
 
     array, files = load_array(args.array), list(args.files)
     truth = runs.random_calibration(array, args.seed) if args.simulate else None
@@ -115,7 +118,7 @@ def calibrate(args: Args) -> tuple[CalibrationRecord, CalibrationRecord | None]:
     if truth is not None and args.raw is not None:
         data.save(args.raw / f"{args.sensor}.csv")
         truth.save(args.raw / "true-calibration.json")
-        print(f"simulated runs: {args.raw / f'{args.sensor}.csv'}")
+        print_progress(args.json, f"simulated runs: {args.raw / f'{args.sensor}.csv'}")
     return found, truth
 
 

@@ -26,7 +26,10 @@ INTERRUPTED = 130
 BROKEN_PIPE = 141
 """128 + SIGPIPE: the reader of our output left (`poise … | head`)."""
 
-USER_ERRORS = (ValueError, FileNotFoundError, UnregisteredEnv)
+USER_ERRORS = (
+    *(ValueError, UnregisteredEnv),
+    *(FileNotFoundError, FileExistsError, NotADirectoryError, IsADirectoryError, PermissionError),
+)
 """What wrong input raises; shown as one line. Anything else is a defect and keeps its traceback."""
 
 

@@ -65,6 +65,9 @@ def run(args: Args) -> int:
     args = filled(args)
     if not all(0 <= subject < len(SUBJECTS) for subject in args.subjects or ()):
         raise ValueError(f"subjects must be numbers from 0 to {len(SUBJECTS) - 1}, got {list(args.subjects or ())}")
+    for path in args.recordings:
+        if not path.exists():
+            raise FileNotFoundError(f"no recording at {path}: there is no such file or folder")
     # Refuses wrong numbers before a folder is made.
     shared = ("quick", "seed", "subjects", "seeds", "duration", "processes", "recordings")
     settings: dict[str, Any] = {name: getattr(args, name) for name in shared}
@@ -110,7 +113,10 @@ def begun(args: Args) -> Run:
     path = args.resume / "args.json"
     if not path.exists():
         raise FileNotFoundError(f"there is no run in {args.resume}")
-    before = json.loads(path.read_text(encoding="utf-8"))["args"]
+    try:
+        before = dict(json.loads(path.read_text(encoding="utf-8"))["args"])
+    except (KeyError, TypeError, ValueError):
+        raise ValueError(f"{path} does not say how the run was begun: start a new one") from None
     for name in SAME:
         if before.get(name) != jsonable(getattr(args, name)):
             raise ValueError(f"{args.resume} was begun with {name} {before.get(name)}, not {getattr(args, name)}")

@@ -48,6 +48,8 @@ class Study:
     """show bars on the standard error"""
 
     def __post_init__(self) -> None:
+        if self.seed < 0:
+            raise ValueError(f"seed must be 0 or more, got {self.seed}")
         if not self.subjects or any(subject < 0 for subject in self.subjects):
             raise ValueError(f"subjects must be numbers of riders, 0 or more, got {list(self.subjects)}")
         for name in ("seeds", "processes"):

@@ -51,7 +51,9 @@ def load_array(source: str | Path) -> AccelerometerArray:
     if not isinstance(described, dict):
         raise ValueError(f"{path} must hold one object with positions and axes")
     if described.get("format") == "poise-calibration":
-        found = [part["array"] for part in described.get("details", {}).values() if "array" in part]
+        details = described.get("details")
+        parts = details.values() if isinstance(details, dict) else ()
+        found = [part["array"] for part in parts if isinstance(part, dict) and isinstance(part.get("array"), dict)]
         if not found:
             raise ValueError(f"{path} is a calibration record without accelerometers: it holds no array")
         return read_array(found[0])

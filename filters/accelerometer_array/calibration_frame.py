@@ -47,7 +47,7 @@ def align_axes(axes_body: np.ndarray, axes_other: np.ndarray) -> FrameFit:
         axes_other: ``(n, 3)`` the same in the other frame.
 
     Raises:
-        ValueError: shapes that differ, directions that lie in a plane, or a fit that is a mirror.
+        ValueError: shapes that differ, a row of zeros, directions that lie in a plane, or a fit that is a mirror.
     """
     body, other = np.asarray(axes_body, dtype=float), np.asarray(axes_other, dtype=float)
     if body.ndim != 2 or body.shape[1:] != (3,) or body.shape != other.shape:
@@ -55,6 +55,9 @@ def align_axes(axes_body: np.ndarray, axes_other: np.ndarray) -> FrameFit:
     if not (np.isfinite(body).all() and np.isfinite(other).all()):
         raise ValueError("axes must be finite numbers")
     for name, rows in (("axes_body", body), ("axes_other", other)):
+        nothing = np.flatnonzero(~rows.any(axis=1))
+        if len(nothing):
+            raise ValueError(f"{name} must be directions, row {nothing[0] + 1} is zero")
         spread = np.linalg.svd(rows, compute_uv=False)
         if len(spread) < 3 or spread[-1] < 1e-3 * spread[0]:
             raise ValueError(

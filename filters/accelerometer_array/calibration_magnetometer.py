@@ -136,12 +136,15 @@ def align_magnetometer(unit: np.ndarray, orientation: np.ndarray) -> Alignment:
             left out.
 
     Raises:
-        ValueError: shapes that differ, too few samples, or attitudes that do not determine the rotation.
+        ValueError: shapes that differ, a quaternion of zeros, too few samples, or attitudes that do not determine the
+            rotation.
     """
     unit, orientation = np.asarray(unit, dtype=float), np.asarray(orientation, dtype=float)
     if unit.ndim != 2 or unit.shape[1:] != (3,) or orientation.shape != (len(unit), 4):
         raise ValueError(f"unit and orientation must be (T, 3) and (T, 4), got {unit.shape} and {orientation.shape}")
     good = np.isfinite(unit).all(axis=1) & np.isfinite(orientation).all(axis=1)
+    if not rotation.norm(orientation[good]).all():
+        raise ValueError("orientation must hold unit quaternions, one is zero: leave its fields empty (NaN) if unknown")
     unit, orientation = unit[good], rotation.normalize(orientation[good])
     if len(unit) < FEWEST:
         raise ValueError(f"at least {FEWEST} samples with a reference attitude are needed, got {len(unit)}")

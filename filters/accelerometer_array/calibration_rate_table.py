@@ -71,14 +71,16 @@ def calibrate_accelerometer(
         rate: ``(T,)`` rate of the table, rad/s.
         mounting: ``(T,)`` name of the way in which the device was fixed to the table.
         upward: mounting → part of the sensitive axis that pointed up, −1 to 1.
-        gravity: m/s².
+        gravity: m/s², positive.
         saturation: magnitude of raw readings from which on they are discarded; None: only those that stick to the end
             of the range (constant, and equal at different rates) are.
 
     Raises:
-        ValueError: shapes that differ, a mounting that ``upward`` does not know, too few samples, or poses that do not
-            determine scale, offset and positions; the message says which are missing.
+        ValueError: shapes that differ, a mounting that ``upward`` does not know, a gravity or saturation that cannot
+            be, too few samples, or poses that do not determine scale, offset and positions; the message says which are
+            missing.
     """
+    _check_gravity(gravity)
     raw, rate, mounting, discarded = _usable(raw, rate, mounting, upward, saturation)
     up = np.array([upward[name] for name in mounting.tolist()])
     horizontal = [name for name in sorted(set(mounting.tolist())) if abs(upward[name]) < UPRIGHT]
@@ -125,6 +127,7 @@ def calibrate_direction(
     Raises:
         ValueError: as :func:`calibrate_accelerometer`; four upward directions at least must not lie in one plane.
     """
+    _check_gravity(gravity)
     raw, rate, mounting, discarded = _usable(raw, rate, mounting, upward, saturation)
     names = sorted(set(mounting.tolist()))
     _check_rates(rate, mounting, names)
@@ -187,6 +190,8 @@ def saturated(raw: np.ndarray, rate: np.ndarray, mounting: np.ndarray, limit: fl
     rate gives that as well, or where the readings of other rates show noise.
     """
     if limit is not None:
+        if not limit >= 0.0:
+            raise ValueError(f"saturation must be a magnitude of raw readings, 0 or more, got {limit}")
         return np.abs(raw) >= limit
     result = np.zeros(len(raw), bool)
     for name in set(mounting.tolist()):
@@ -218,6 +223,11 @@ def _usable(
     if not kept.any():
         raise ValueError("every sample is saturated or missing: repeat with lower rates or a smaller radius")
     return raw[kept], rate[kept], mounting[kept], int(lost.sum())
+
+
+def _check_gravity(gravity: float) -> None:
+    if not 0.0 < gravity < np.inf:
+        raise ValueError(f"gravity must be positive and finite (m/s²), got {gravity}")
 
 
 def _check_rates(rate: np.ndarray, mounting: np.ndarray, names: list[str]) -> None:

@@ -3,6 +3,7 @@
 import json
 
 import pandas
+import pytest
 
 from poise.filters.accelerometer_array.array import planar_controller
 from poise.scripts.array import Args
@@ -38,6 +39,14 @@ def test_wrong_words_are_explained(capsys):
     assert "octa, controller, planar, triaxial or a JSON file" in capsys.readouterr().err
     assert main(["array", "octa", "--deviation", "0"]) == 2
     assert "deviation must be positive" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("details", [[1], {"x": 5}, {"imu/acc": {"array": 3}}, None])
+def test_a_spoilt_calibration_record_is_explained(details, tmp_path, capsys):
+    path = tmp_path / "record.json"
+    path.write_text(json.dumps({"format": "poise-calibration", "version": 1, "channels": {}, "details": details}))
+    assert main(["array", str(path)]) == 2
+    assert "it holds no array" in capsys.readouterr().err
 
 
 def test_evaluate_shows_estimators_that_give_no_angle(tmp_path, capsys):

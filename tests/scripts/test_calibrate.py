@@ -91,6 +91,43 @@ def test_wrong_words_are_explained(folder, tmp_path, capsys):
     assert "seed must be 0 or more" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--gravity", "nan"], "gravity must be positive and finite"),
+        (["--gravity", "-9.81"], "gravity must be positive and finite"),
+        (["--saturation", "nan"], "saturation must be a magnitude"),
+        (["--raw", "somewhere"], "it needs --simulate"),
+    ],
+)
+def test_numbers_that_cannot_be_are_refused_and_leave_the_record(words, message, folder, tmp_path, capsys):
+    record = tmp_path / "r.json"
+    record.write_text((folder / "record.json").read_text())
+    table = str(folder / "raw" / "accelerometer.csv")
+    assert main(["calibrate", "accelerometer", table, "--record", str(record), *words]) == 2
+    assert message in capsys.readouterr().err
+    assert record.read_text() == (folder / "record.json").read_text()
+
+
+@pytest.mark.parametrize("spoilt", [{"version": "x"}, {"details": [1]}, {"channels": []}])
+def test_a_spoilt_record_is_explained_and_kept(spoilt, tmp_path, capsys):
+    path, axes = tmp_path / "r.json", tmp_path / "axes.csv"
+    axes.write_text("bx,by,bz,ox,oy,oz\n1,0,0,1,0,0\n0,1,0,0,1,0\n0,0,1,0,0,1\n")
+    text = json.dumps({"format": "poise-calibration", "version": 1, "channels": {}, "details": {}} | spoilt)
+    path.write_text(text)
+    assert main(["calibrate", "frame", str(axes), "--record", str(path)]) == 2
+    assert "r.json" in capsys.readouterr().err
+    assert path.read_text() == text
+
+
+def test_simulated_runs_do_not_spoil_machine_readable_output(tmp_path, capsys):
+    words = ["--simulate", "--hold", "0.3", "--raw", str(tmp_path / "raw"), "--record", str(tmp_path / "r.json")]
+    assert main(["calibrate", "gyroscope", *words, "--json"]) == 0
+    output = capsys.readouterr()
+    assert set(json.loads(output.out)["channels"]) == {"imu/gyr"}
+    assert "simulated runs" in output.err
+
+
 def test_directions_of_axes_are_shown(tmp_path, capsys):
     words = ["calibrate", "accelerometer", "--simulate", "--hold", "0.3", "--axis-error", "1", "--estimate-axes"]
     assert main([*words, "--record", str(tmp_path / "r.json")]) == 0

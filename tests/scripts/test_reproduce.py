@@ -80,6 +80,19 @@ def test_an_interrupted_study_goes_on_and_refuses_other_arguments(tmp_path, caps
     assert start(tmp_path, "--resume", str(tmp_path / "nothing")) == 2
 
 
+@pytest.mark.parametrize("text", ["{", "{}", '{"args": 3}', "[]"])
+def test_a_folder_that_is_no_run_is_not_gone_on_with(text, tmp_path, capsys):
+    (tmp_path / "args.json").write_text(text)
+    assert start(tmp_path, "--resume", str(tmp_path)) == 2
+    assert "does not say how the run was begun" in capsys.readouterr().err
+
+
+def test_a_file_in_the_place_of_the_run_folder_is_explained(tmp_path, capsys):
+    (tmp_path / "file").touch()
+    assert start(tmp_path / "file") == 2
+    assert "file" in capsys.readouterr().err
+
+
 def test_rows_are_machine_readable(tmp_path, capsys):
     assert start(tmp_path, "--json") == 0
     lines = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
@@ -92,6 +105,8 @@ def test_rows_are_machine_readable(tmp_path, capsys):
         (["two-gyr"], "did you mean 'two-gyro'"),
         (["small", "--subjects", "7"], "subjects must be numbers from 0 to 4, got [7]"),
         (["small", "--seeds", "0"], "seeds must be at least 1, got 0"),
+        (["small", "--seed", "-1"], "seed must be 0 or more, got -1"),
+        (["small", "--recordings", "nowhere"], "no recording at nowhere"),
     ],
 )
 def test_wrong_arguments_are_named_and_leave_no_folder(tmp_path, capsys, words, message):

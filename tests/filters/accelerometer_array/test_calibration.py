@@ -199,6 +199,8 @@ def test_readings_that_are_no_ellipsoid_are_refused():
     unit = (raw - CENTRE) @ ROOT
     with pytest.raises(ValueError, match="must be"):
         align_magnetometer(unit, quaternions[:-1])
+    with pytest.raises(ValueError, match="one is zero"):
+        align_magnetometer(unit, quaternions * (np.arange(len(unit)) != 7)[:, None])
     spin = Rotation.from_rotvec(np.linspace(0, 6, 300)[:, None] * [0, 0, 1.0])
     flat = spin.inv().apply([0.0, 0.5, -0.8])
     with pytest.raises(ValueError, match="turn the device about at least two axes"):
@@ -219,6 +221,8 @@ def test_frames_are_aligned_and_mirrors_refused():
         align_axes(body * [1, 1, -1], other)
     with pytest.raises(ValueError, match="span space"):
         align_axes(body[:2], other[:2])
+    with pytest.raises(ValueError, match="axes_other must be directions, row 4 is zero"):
+        align_axes(body, other * [[1], [1], [1], [0]])
     with pytest.raises(ValueError, match="as many rows of three"):
         align_axes(body, other[:3])
 
