@@ -14,13 +14,13 @@ from ...envs.calibration_runs import (
     magnetometer_run,
     random_calibration,
 )
+from ...envs.sensors import STANDARD_GRAVITY
 from ...filters.accelerometer_array.array import CONTROLLER
 from ...filters.accelerometer_array.calibration_magnetometer import align_magnetometer, fit_ellipsoid
 from ...filters.accelerometer_array.calibration_rate_table import calibrate_accelerometer, calibrate_gyroscope
 from .report import Report
 from .study import Study
 
-G = 9.80665
 OVER_DEVICES = "mean, smallest … largest over the devices"
 AXES = {"x": 0, "y": 1, "z": 2}
 PRINTED_ROTATION = ((0.6629, 0.7487, 0.0071), (-0.0044, -0.0056, 1.0000), (-0.7487, 0.6629, 0.0004))
@@ -43,7 +43,7 @@ def calibrated(seed: int, hold: float) -> dict[str, Any]:
         upward = {}
         for up, out in ACCELEROMETER_MOUNTINGS:
             upward[f"{up} up, out {out}"] = float(axis[AXES[up[1]]] * float(up[0] + "1"))
-        one = calibrate_accelerometer(runs.raw[:, index], runs.rate, runs.mounting, upward, gravity=G)
+        one = calibrate_accelerometer(runs.raw[:, index], runs.rate, runs.mounting, upward, gravity=STANDARD_GRAVITY)
         found["scale"].append(one.scale / scale[index] - 1.0)
         found["offset"].append(one.offset - offset[index])
         found["residual"].append(one.residual)

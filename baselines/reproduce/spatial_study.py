@@ -218,8 +218,8 @@ def wrong_start(seed: int, angle: float = math.radians(40.0), duration: float = 
         ("open prior, first order", Way("open", parameters=AS_PRINTED | {"orientation_prior": 1.0})),
     ):
         total = metrics.total_error(estimated(way, "controller", trajectory, 0.0, start), truth)
-        early, late = trajectory.time, trajectory.time > duration - 20.0
-        found[label] = [degrees_rms(total[(early > 5.0) & (early < 20.0)]), degrees_rms(total[late])]
+        early, late = (trajectory.time > 5.0) & (trajectory.time < 20.0), trajectory.time > duration - 20.0
+        found[label] = [degrees_rms(total[early]), degrees_rms(total[late])]
     return found
 
 

@@ -79,9 +79,10 @@ class PlanarPose(PlanarEquations, Model):
         super().__post_init__()
         if self.form not in get_args(Form):
             raise ValueError(f"form must be one of {get_args(Form)}, got {self.form!r}")
-        if self.form == "printed-noise" and self.array.size != 4:
+        if self.form == "printed-noise" and not self.array.size == self.array.rank == 4:
             raise ValueError(
-                f"form 'printed-noise' fits four accelerometers, {self.array.name!r} has {self.array.size}"
+                f"form 'printed-noise' fits four accelerometers of rank 4, {self.array.name!r} has {self.array.size} "
+                f"of rank {self.array.rank}"
             )
 
     @property
