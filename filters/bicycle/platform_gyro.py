@@ -67,6 +67,13 @@ class PlatformGyro(Model):
         "measurement": Gain("pitch_rate_noise", description="variance of what violates the pseudo-measurement"),
     }
 
+    def __post_init__(self) -> None:
+        """Refuse what cannot be divided by."""
+        super().__post_init__()
+        for name in ("gyroscope_noise", "bias_time"):
+            if not getattr(self, name) > 0.0:
+                raise ValueError(f"{name} must be positive, got {getattr(self, name)}")
+
     @classmethod
     def for_rider(cls, geometry: RiderGeometry, **parameters: Any) -> Self:
         """The filter for a bicycle: how its sensor is mounted; ``parameters`` are other fields."""

@@ -279,7 +279,8 @@ class TwoGyro(Model):
             value, by_angle, by_rate = level_constraint(x[..., :1], rate, self.platform)
             row = block_matrix([[by_angle[..., None], zeros(x, 1, 6), -by_rate[..., None, :]]])
             r, H = xp.concat([r, -value], axis=-1), xp.concat([H, row], axis=-2)
-            variances.append((self.platform_gyroscope_noise[1] ** 2 + self.constraint_noise**2) / self.dt)
+            across = self.platform_gyroscope_noise[1 if self.platform == "bicycle" else 0]
+            variances.append((across**2 + self.constraint_noise**2) / self.dt)
         return r, H, diagonal(variances, 0.0 * x[..., :1])
 
     def pose(self, x: Array) -> dict[str, Array]:

@@ -246,13 +246,15 @@ def test_the_vertical_and_the_biases_are_in_the_axes_of_the_sensors():
     up = rotation.up_in_body(ride.truth["trunk/orientation"])
     np.testing.assert_allclose(estimate.pose["two-gyro/body_up"][1500:], up[1500:], atol=0.02)
     np.testing.assert_allclose(true_angles(ride.truth)["two-gyro/body_up"], up, atol=1e-12)
+    np.testing.assert_allclose(
+        true_angles(ride.truth, imu_tilt=0.0)["two-gyro/platform_bias"],
+        ride.truth["bicycle_imu/gyroscope_bias"][:, [0, 2]],
+        atol=1e-12,
+    )
     for name, axes, truth in (
         ("trunk_imu/gyroscope_bias", [0, 1, 2], "trunk_imu/gyroscope_bias"),
         ("two-gyro/platform_bias", [0, 2], "bicycle_imu/gyroscope_bias"),
     ):
-        np.testing.assert_allclose(
-            true_angles(ride.truth, imu_tilt=0.0).get(name, ride.truth[truth]), ride.truth[truth][:, axes], atol=1e-12
-        )
         error = estimate.pose[name][-1] - ride.truth[truth][-1][axes]
         np.testing.assert_allclose(error, 0.0, atol=0.15 * DEG)
 
@@ -293,6 +295,21 @@ def test_the_constraint_holds_the_roll_whatever_the_camera_says():
     assert rms[1] < 0.5 * rms[0]
     with pytest.raises(ValueError, match="constraint needs"):
         TwoGyro(constraint=True)
+
+
+@pytest.mark.parametrize(("platform", "axis"), [("bicycle", 1), ("segway", 0)])
+def test_the_constraint_has_the_noise_of_the_axis_that_it_measures(platform, axis):
+    """At rest (5) reads the gyroscope's y, and (6) of a segway its x: only that axis' noise counts."""
+    noise = [0.01, 0.01, 0.01]
+    noise[axis] = 0.05
+    model = TwoGyro(dt=0.02, model="sigma1", constraint=True, platform=platform, platform_gyroscope_noise=tuple(noise))
+    R = model.residual(np.zeros(10), random_sample(np.random.default_rng(0)))[2]
+    assert R[3, 3] == pytest.approx((0.05**2 + model.constraint_noise**2) / 0.02)
+
+
+def test_a_time_that_vanishes_is_refused():
+    with pytest.raises(ValueError, match="bias_time must be positive"):
+        PlatformGyro(bias_time=0.0)
 
 
 def test_geometry_is_told():
