@@ -19,7 +19,8 @@ class RiderGeometry:
     """Lengths in m, masses in kg, angles in rad. The defaults are a person of 1.76 m and 68 kg on the mountain bike.
 
     Raises:
-        ValueError: a number that is not finite, or a length or mass that is not positive.
+        ValueError: a number that is not finite, a length or mass that is not positive, or a ``steer_axis`` that is no
+            unit vector.
     """
 
     wheelbase: float = 1.05
@@ -81,12 +82,16 @@ class RiderGeometry:
         for field in fields(self):
             value = getattr(self, field.name)
             numbers = value if isinstance(value, tuple) else (value,)
+            if isinstance(field.default, float) and isinstance(value, tuple):
+                raise ValueError(f"{field.name} must be a number, got {value}")
             if not all(math.isfinite(number) for number in numbers):
                 raise ValueError(f"{field.name} must be finite, got {value}")
             if isinstance(field.default, tuple) and len(numbers) != 3:
                 raise ValueError(f"{field.name} must be a point of three numbers, got {value}")
             if field.name in POSITIVE and not value > 0.0:
                 raise ValueError(f"{field.name} must be positive, got {value}")
+        if abs(math.hypot(*self.steer_axis) - 1.0) > 1e-3:
+            raise ValueError(f"steer_axis must have length 1, got {self.steer_axis}")
 
     @property
     def knee_to_pedal(self) -> float:

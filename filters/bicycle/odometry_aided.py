@@ -119,6 +119,13 @@ class OdometryAided(Model):
         "vertical": Gain("vertical_slip", description="variance σ_z² of the motion upwards"),
     }
 
+    def __post_init__(self) -> None:
+        """Refuse what cannot be divided by, and measurements without noise."""
+        super().__post_init__()
+        for name in ("wheel_step", "lateral_slip", "vertical_slip", "jump"):
+            if not getattr(self, name) > 0.0:
+                raise ValueError(f"{name} must be positive, got {getattr(self, name)}")
+
     @classmethod
     def for_rider(cls, geometry: RiderGeometry, **parameters: Any) -> Self:
         """The filter on a bicycle: places of its sensors; ``parameters`` win."""

@@ -62,6 +62,10 @@ RATE, ACCELERATION_OF_RATE, SEAT_FORCE = slice(22, 25), slice(25, 28), slice(28,
 SPEED, SHOCK = slice(31, 32), slice(32, 33)
 CONSTRAINTS = ("C1", "C2", "C3", "C5", "C6", "C7")
 TURNING, SITTING = seat_moments(USUAL)
+NOISES = ("lateral", "trunk", "torque", "length", "hinge", "swivel", "twist")
+TIMES = ("yaw_acceleration_time", "relative_acceleration_time", "shock_time", "shock_scale")
+POSITIVE = (*(f"{name}_noise" for name in NOISES), *TIMES)
+"""Parameters by which something is divided, and deviations of measurements."""
 
 
 @dataclass(frozen=True)
@@ -122,8 +126,8 @@ class WholeBody(RiderLinkage, Model):
     hinge_noise: float = 0.03
     """of C2 and C6, sine of an angle"""
     swivel_noise: float = 3.0
-    """of C3 and C7, sine of an angle: elbows of riders who lean stand off by 0.27 rms for 0.6 s or so, which is white
-    noise of 0.27 √(2 · 0.6 s · 100 Hz)"""
+    """of C3 and C7, sine of an angle: elbows of riders who lean stand off by about 0.25 rms for 0.6 s or so, which is
+    white noise of about 0.25 √(2 · 0.6 s · 100 Hz)"""
     twist_noise: float = 0.7
     """rad, of ``usual_twist``; a sample's, at 100 Hz: corrects within some seconds"""
     twist_follow: float = 0.3
@@ -164,6 +168,9 @@ class WholeBody(RiderLinkage, Model):
         object.__setattr__(self, "constraints", tuple(self.constraints))
         if not set(self.constraints) <= set(CONSTRAINTS) or len(set(self.constraints)) < len(self.constraints):
             raise ValueError(f"constraints must be different ones of {CONSTRAINTS}, got {self.constraints}")
+        for name in POSITIVE:
+            if not getattr(self, name) > 0.0:
+                raise ValueError(f"{name} must be positive, got {getattr(self, name)}")
         choices = {
             "knee_axis": ("x", "y"),
             "lateral": ("corrected", "sign", "printed"),

@@ -50,7 +50,15 @@ def test_measuring_errs_as_it_says() -> None:
         measured(geometry, np.random.default_rng(0), lengths=-1.0)
 
 
-@pytest.mark.parametrize(("change", "message"), [({"thigh": 0.0}, "thigh"), ({"hip": (1.0, np.nan, 0.0)}, "hip")])
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"thigh": 0.0}, "thigh"),
+        ({"hip": (1.0, np.nan, 0.0)}, "hip"),
+        ({"trunk_flexion": (1.0, 2.0, 3.0)}, "trunk_flexion must be a number"),
+        ({"steer_axis": (0.0, 0.0, 2.0)}, "steer_axis must have length 1"),
+    ],
+)
 def test_impossible_geometry_is_refused(change: dict[str, object], message: str) -> None:
     with pytest.raises(ValueError, match=message):
         RiderGeometry(**change)  # type: ignore[arg-type]

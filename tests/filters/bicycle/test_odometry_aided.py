@@ -250,6 +250,8 @@ def test_the_filter_is_told_the_bicycle() -> None:
     assert OdometryAided.for_rider(geometry, imu_tilt=0.1).imu_tilt == 0.1
     usual = OdometryAided.for_rider(RiderGeometry())
     assert usual == OdometryAided(wheel_step=usual.wheel_step)
+    with pytest.raises(ValueError, match="jump must be positive"):
+        OdometryAided(jump=0.0)
 
 
 @pytest.mark.slow

@@ -145,7 +145,7 @@ def test_the_seat_moment_of_point_masses():
     R, J = euler_matrix("zxy", x[2:5]), euler_axes("zxy", x[2:5])
     expected = np.cross(trunk + np.array([1.0, 2.0, 0.0]), x[28:31])[0]
     assert model._torque(x, R, J)[0][0] == pytest.approx(expected, abs=1e-12)
-    # a bicycle that leans at rest, rider upright on it: the static special case of the sheet
+    # a bicycle that leans at rest, rider upright on it: the static special case of (9*)
     roll, weight = 0.1, 5.0 * 9.80665
     x[28:31] = 9.80665 * np.array([0.0, math.cos(roll), -math.sin(roll)])
     model = replace(model, sitting_moment=(0.0, 0.0, 0.0))
@@ -257,5 +257,8 @@ def test_choices_are_checked():
     }.items():
         with pytest.raises(ValueError, match=name):
             WholeBody(**{name: value})
+    for name in ("swivel_noise", "shock_time"):
+        with pytest.raises(ValueError, match=f"{name} must be positive"):
+            WholeBody(**{name: 0.0})
     assert set(CONSTRAINTS) == {"C1", "C2", "C3", "C5", "C6", "C7"}
     assert WholeBody.for_rider(RIDER, thigh=0.4).thigh == 0.4
