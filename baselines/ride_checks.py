@@ -126,7 +126,7 @@ def momentum_residual(fidelity: Any, path: Path, speed: float, steps: int) -> tu
     """Largest residual of force and moment (about the saddle, 1 m), as parts of the weight of rider and bicycle."""
     motion = RiderMotion(STYLES["normal"], np.random.default_rng(1))
     ride = Ride(sit(MOUNTAIN_BIKE, SUBJECTS[3]), motion, path, lambda _: speed, fidelity=fidelity)
-    worst_force = worst_moment = 0.0
+    residuals = []
     with ride:
         rider, bicycle = ride.rider, ride.bicycle
         weight = (rider.masses.sum() + bicycle.own_masses.sum()) * ride.physics.gravity
@@ -147,9 +147,10 @@ def momentum_residual(fidelity: Any, path: Path, speed: float, steps: int) -> tu
             force = force - found.seat_force - limbs.sum(axis=0) - ground - drag
             moment = moment - found.seat_moment - rotation.cross(arms, limbs).sum(axis=0) - ground_moment
             moment = moment - rotation.cross(own.position[0] - saddle, drag)
-            worst_force = max(worst_force, float(np.abs(force).max() / weight))
-            worst_moment = max(worst_moment, float(np.abs(moment).max() / weight))
-    return worst_force, worst_moment
+            residuals.append((np.abs(force).max() / weight, np.abs(moment).max() / weight))
+    # NaN stays NaN, and a ride too short to be looked at is an error
+    worst_force, worst_moment = np.max(residuals, axis=0)
+    return float(worst_force), float(worst_moment)
 
 
 def ridden(seed: int, **options: Any) -> Trajectory:

@@ -27,6 +27,13 @@ def test_momentum_balances(fidelity):
     assert 0.0 < moment < (0.01 if fidelity == "full" else 0.001)
 
 
+def test_a_ride_too_short_to_be_looked_at_balances_nothing():
+    from poise.envs.bicycle.path import Path
+
+    with pytest.raises(ValueError, match="zero-size"):
+        ride_checks.momentum_residual("lumped", Path(np.zeros(2)), 4.0, 0)
+
+
 def test_inclinations_are_those_of_the_evaluation():
     rows = list(ride_inclinations.inclination_rows(("tilt",), (("slow", "bicycle_imu"),), duration=2.0))
     assert [row["scenario"] for row in rows] == ["slow"]
