@@ -75,7 +75,7 @@ def measured(
     Args:
         geometry: the true one.
         rng: draws the errors.
-        lengths: standard deviation of each segment's length, relative (the whole-body sheet's study: 2 %).
+        lengths: standard deviation of each segment's length, relative (2 %, as in the whole-body study).
         places: standard deviation of each coordinate of a joint or sensor on the body, m (likewise: 1 cm).
         mass: standard deviation of the trunk's mass, relative.
 

@@ -21,7 +21,7 @@ ORIGIN = np.zeros(1)
 
 def leg_at(side, crank, swivel=0.0):
     hip = LINKAGE.point(LINKAGE.hip, side, ORIGIN)
-    # the sheet's angle is that of the side's own pedal, 0 in front
+    # the fixtures' angle is that of the side's own pedal, 0 in front
     foot = LINKAGE.pedal(side, np.array([crank + math.pi * (side == "right")]))
     frame, knee = limb_frame(hip, foot, LINKAGE.thigh, LINKAGE.knee_to_pedal, np.array([1.0, 0, 0]), "leg", swivel)
     return hip, foot, knee, hip_angles(frame)
@@ -170,6 +170,6 @@ def test_c7_about_the_upright_axis_loses_the_knee():
         for axis, values in felt.items():
             found = limb_constraints.leg(angles, hip, foot, LINKAGE.thigh, LINKAGE.knee_to_pedal, axis)
             values.append(abs(found.by_joint[2] @ (ahead - back)) / 2e-4)
-    # divided by the sine of the angle between thigh and lower leg, as the sheet has it
+    # divided by the sine of the angle between thigh and lower leg
     assert min(felt["y"]) < 0.1 * max(felt["x"])
     assert min(felt["x"]) > 5.0 * min(felt["y"])

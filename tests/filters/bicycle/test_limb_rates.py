@@ -17,7 +17,7 @@ def random_angles(rng, sequence):
     return angles + np.array([0.0, -1.5, 0.0]) * (sequence == "yxy")
 
 
-def test_the_sheet_s_numbers():
+def test_numbers_of_an_independent_computation():
     turn = Rotation.from_euler("Z", 10.0, degrees=True)
     found = zxy_rates(np.array([0.3, 0.2, -0.4]), CHILD, turn.apply([0.4, 0.5, -0.6])).rates
     np.testing.assert_allclose(found, [1.012084, -0.484144, -0.718992], atol=5e-7)

@@ -1,4 +1,4 @@
-"""The rider of the whole-body sheet, whose fixtures have printed numbers."""
+"""The rider of the whole-body fixtures, whose numbers were computed independently."""
 
 import math
 
