@@ -32,6 +32,11 @@ def geometry_of(trajectory: Trajectory) -> RiderGeometry | None:
     return None if described is None else RiderGeometry.read(described)
 
 
+def geometry_or_usual(trajectory: Trajectory) -> RiderGeometry:
+    """As :func:`geometry_of`; the usual rider where the recording does not say."""
+    return geometry_of(trajectory) or RiderGeometry()
+
+
 def told(trajectory: Trajectory, geometry: RiderGeometry) -> Trajectory:
     """The same ride, of which another geometry is told (a measured one instead of the exact one)."""
     return trajectory.replace(metadata={**trajectory.metadata, "geometry": geometry.describe()})

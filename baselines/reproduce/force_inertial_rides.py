@@ -16,12 +16,12 @@ from ...filters import rotation
 from ...filters.bicycle.force_inertial import ForceInertial
 from ...filters.bicycle.force_inertial_axes import true_angles
 from ...filters.bicycle.force_inertial_integration import ForceInertialIntegration
-from ...filters.bicycle.geometry import RiderGeometry
 from ...filters.bounds import posterior_bound
 from ...filters.consistency import nees
 from ...filters.kalman import KalmanFilter
 from ...filters.observer import Observer
 from ..plots import new_figure
+from ..rider_estimators import geometry_or_usual
 from .force_inertial_motion import DEG
 from .force_inertial_simulation import from_the_truth
 from .force_inertial_states import torques, true_states
@@ -59,12 +59,6 @@ PRINTED = {
 }
 """Table II, deg."""
 NAN = (float("nan"),) * 4
-
-
-def geometry(ride: Trajectory) -> RiderGeometry:
-    """The rider's, or that of the usual one."""
-    described = ride.metadata.get("geometry")
-    return RiderGeometry() if described is None else RiderGeometry.read(described)
 
 
 def samples_of(ride: Trajectory) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray], np.ndarray]:
@@ -119,7 +113,7 @@ def assess(path: Path) -> dict[str, Any]:
     """All numbers of one ride."""
     ride = load_ride(path)
     samples, truth, time = samples_of(ride)
-    told = geometry(ride)
+    told = geometry_or_usual(ride)
     model = ForceInertial.for_rider(told, dt=ride.dt)
     found: dict[str, Any] = {"subject": ride.metadata.get("subject"), "filters": {}, "sources": {}}
     for name, options in FILTERS.items():
@@ -259,7 +253,7 @@ def _figure(report: Report, scenario: str, path: Path) -> None:
     """Estimates and truth of the first ride, beside integration."""
     ride = load_ride(path)
     samples, truth, time = samples_of(ride)
-    told = geometry(ride)
+    told = geometry_or_usual(ride)
     poses = {
         "integration": (Observer(ForceInertialIntegration.for_rider(told, dt=ride.dt)).run(samples).pose, "#b9bec7"),
         "filter": (KalmanFilter(ForceInertial.for_rider(told, dt=ride.dt)).run(samples).pose, "#1f5fa8"),

@@ -11,7 +11,6 @@ import numpy as np
 
 from ...envs.trajectory import Trajectory
 from ...filters import rotation
-from ...filters.bicycle.geometry import RiderGeometry
 from ...filters.bicycle.platform_gyro import PlatformGyro, TwoGyroIntegration
 from ...filters.bicycle.two_gyro import TwoGyro
 from ...filters.bicycle.two_gyro_truth import true_angles, true_states
@@ -20,6 +19,7 @@ from ...filters.consistency import nees
 from ...filters.kalman import KalmanFilter
 from ...filters.observer import Observer
 from ...filters.quantity import Estimate
+from ..rider_estimators import geometry_or_usual
 from .report import DEVIATION, Report
 from .study import Study, load_ride
 from .two_gyro_motion import DEG
@@ -78,7 +78,7 @@ def without_errors(
         body: ``trunk`` or ``disk``.
     """
     samples = dict(ride.measurements)
-    tilt = geometry(ride).bicycle_imu_tilt
+    tilt = geometry_or_usual(ride).bicycle_imu_tilt
     second = "trunk_imu" if body == "trunk" else "disk"
     places = {"bicycle_imu": ("bicycle", rotation.exp(np.array([0.0, -tilt, 0.0]))), second: (body, None)}
     for place, (frame, mounted) in places.items():
@@ -100,12 +100,6 @@ def without_errors(
     return samples
 
 
-def geometry(ride: Trajectory) -> RiderGeometry:
-    """The rider's, or that of the usual one."""
-    described = ride.metadata.get("geometry")
-    return RiderGeometry() if described is None else RiderGeometry.read(described)
-
-
 def errors_of(pose: Mapping[str, np.ndarray], truth: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
     """Error ``(T,)`` of θ1, θ2, θ3 (if given) and φ, deg."""
     found = {}
@@ -117,7 +111,7 @@ def errors_of(pose: Mapping[str, np.ndarray], truth: Mapping[str, np.ndarray]) -
 
 def estimates(ride: Trajectory) -> dict[str, Estimate]:
     """Every filter on the ride as it was recorded."""
-    told, dt = geometry(ride), ride.dt
+    told, dt = geometry_or_usual(ride), ride.dt
     found = {
         name: KalmanFilter(TwoGyro.for_rider(told, dt=dt, **options)).run(ride.measurements)
         for name, options in FILTERS.items()
@@ -141,7 +135,7 @@ def summary(errors: Mapping[str, np.ndarray], time: np.ndarray) -> dict[str, flo
 def assess(path: Path) -> dict[str, Any]:
     """All numbers of one ride."""
     ride = load_ride(path)
-    truth, time, told = true_angles(ride.truth), ride.time, geometry(ride)
+    truth, time, told = true_angles(ride.truth), ride.time, geometry_or_usual(ride)
     found: dict[str, Any] = {"subject": ride.metadata.get("subject"), "ended": ride.metadata.get("ended")}
     found["length"] = float(time[-1])
     rate = ride.truth["bicycle/angular_rate"][:, 2] / DEG
@@ -183,7 +177,7 @@ def efficiency(ride: Trajectory, truth: Mapping[str, np.ndarray]) -> dict[str, l
 
     The bound knows white noise and drifting biases, no alignment error of the camera, so that is taken away.
     """
-    model = TwoGyro.for_rider(geometry(ride), dt=ride.dt, orientation_noise=FRAME)
+    model = TwoGyro.for_rider(geometry_or_usual(ride), dt=ride.dt, orientation_noise=FRAME)
     errors = errors_of(KalmanFilter(model).run(without_errors(ride, camera="white")).pose, truth)
     exact = with_gaps(without_errors(ride, gyroscopes="exact", camera="exact"), ride.measurements)
     orientations = {name: ride.truth[name] for name in ("bicycle/orientation", "trunk/orientation")}

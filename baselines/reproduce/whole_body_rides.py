@@ -75,7 +75,7 @@ def ride_scores(path: Path, windows: tuple[tuple[float, float], ...]) -> dict[st
 
 def hinge_residuals(ride: Any, estimate: Any, geometry: RiderGeometry) -> np.ndarray:
     """99th percentile of |C2| (sine of an angle) of right and left arm at the estimates."""
-    model, steer, begin = WholeBody.for_rider(geometry), ride.measurements["steer/angle"], int(SETTLED / 0.01)
+    model, steer, begin = WholeBody.for_rider(geometry), ride.measurements["steer/angle"], round(SETTLED / ride.dt)
     residuals = [_arm(model, side, estimate.pose, steer).residuals[begin:, 1] for side in SIDES]
     return np.nanpercentile(np.abs(residuals), 99.0, axis=1)
 

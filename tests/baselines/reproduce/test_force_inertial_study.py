@@ -8,11 +8,12 @@ import pytest
 from poise.baselines.reproduce.force_inertial import reproduce
 from poise.baselines.reproduce.force_inertial_consistency import FREE, forces_for, ideal_consistency
 from poise.baselines.reproduce.force_inertial_motion import NO_ERRORS, Errors, draw_motion, simulate
-from poise.baselines.reproduce.force_inertial_rides import better_sensors, geometry, rms_after, samples_of
+from poise.baselines.reproduce.force_inertial_rides import better_sensors, rms_after, samples_of
 from poise.baselines.reproduce.force_inertial_simulation import from_the_truth, synthetic, variant, without_forces
 from poise.baselines.reproduce.force_inertial_states import torques, true_states
 from poise.baselines.reproduce.report import Report
 from poise.baselines.reproduce.study import Study
+from poise.baselines.rider_estimators import geometry_or_usual
 from poise.envs.bicycle.environment import RiderBicycleEnv
 from poise.envs.recorder import record
 from poise.filters.bicycle.force_inertial import ForceInertial
@@ -65,7 +66,7 @@ def test_sensors_without_errors_are_the_environment_s():
         rides.append(record(env, seed=3))
         env.close()
     noisy, ideal = rides
-    model = ForceInertial.for_rider(geometry(noisy))
+    model = ForceInertial.for_rider(geometry_or_usual(noisy))
     found, (wanted, _, _) = better_sensors(noisy, model, "force sensors: exact"), samples_of(ideal)
     for name in ("seat/wrench", "handlebar/force"):
         length = min(len(found[name]), len(wanted[name]))
