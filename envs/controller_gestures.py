@@ -14,6 +14,7 @@ from typing import ClassVar
 import numpy as np
 
 from ..filters import rotation
+from ..filters.model import checked_quaternion
 from .controller_motion import (
     Knots,
     PointingGesture,
@@ -27,6 +28,12 @@ from .smooth import Series
 
 SHAKING_DRAWS = 20
 """Motions among which the one with the peak nearest to that asked for is taken."""
+
+
+def _check_positive(config: object, *names: str) -> None:
+    for name in names:
+        if not 0.0 < getattr(config, name) < math.inf:
+            raise ValueError(f"{name} must be positive and finite, got {getattr(config, name)}")
 
 
 @dataclass(frozen=True)
@@ -108,6 +115,9 @@ class Infinity:
     ramp: float = 1.0
     planar: ClassVar[bool] = True
 
+    def __post_init__(self) -> None:
+        _check_positive(self, "width", "height", "period")
+
     def draw(self, generator: np.random.Generator, duration: float | None = None) -> InfinityGesture:
         """The figure; nothing is drawn."""
         duration = self.duration if duration is None else duration
@@ -137,6 +147,9 @@ class Pointing:
     acceleration: float = 5.0
     band: tuple[float, float] = (0.3, 2.0)
     rest: float = 1.0
+
+    def __post_init__(self) -> None:
+        _check_positive(self, "spread", "turn")
 
     def draw(self, generator: np.random.Generator, duration: float | None = None) -> PointingGesture:
         """Draw targets and motion."""
@@ -204,6 +217,9 @@ class Shaking:
     lull: float = 0.03
     rest: float = 1.0
 
+    def __post_init__(self) -> None:
+        _check_positive(self, "rate", "peak", "cycle")
+
     def draw(self, generator: np.random.Generator, duration: float | None = None) -> ShakingGesture:
         """Draw some motions of the asked rate and keep the one whose peak comes nearest to that asked for."""
         duration = self.duration if duration is None else duration
@@ -263,9 +279,8 @@ class RateTable:
     rest: float = 1.0
 
     def __post_init__(self) -> None:
-        for name in ("hold", "ramp"):
-            if not 0.0 < getattr(self, name) < math.inf:
-                raise ValueError(f"{name} must be positive and finite (s), got {getattr(self, name)}")
+        _check_positive(self, "hold", "ramp")
+        checked_quaternion("attitude", self.attitude)
 
     @property
     def duration(self) -> float:

@@ -142,3 +142,20 @@ def test_bad_numbers_are_refused():
         Walk(interval=2.0)
     with pytest.raises(ValueError, match="hold must be positive"):
         RateTable(hold=0.0)
+    with pytest.raises(ValueError, match="attitude"):
+        RateTable(attitude=(0.0, 0.0, 0.0, 0.0))
+
+
+@pytest.mark.parametrize("value", [0.0, -1.0, math.nan])
+@pytest.mark.parametrize(
+    ("kind", "names"),
+    [
+        (Pointing, ("spread", "turn")),
+        (Infinity, ("width", "height", "period")),
+        (Shaking, ("rate", "peak", "cycle")),
+    ],
+)
+def test_numbers_that_a_motion_divides_by_are_positive(kind, names, value):
+    for name in names:
+        with pytest.raises(ValueError, match=f"{name} must be positive and finite"):
+            kind(**{name: value})
