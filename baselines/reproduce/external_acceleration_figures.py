@@ -50,9 +50,9 @@ def beside(ax: Any, time: np.ndarray, ours: np.ndarray, true: np.ndarray, label:
     ax.set_ylabel(label, fontsize=8.5)
 
 
-def fewer(off: np.ndarray) -> np.ndarray:
-    """Differences of angles, deg, in [−180, 180)."""
-    return (off + 180.0) % 360.0 - 180.0
+def wrapped(off: np.ndarray) -> np.ndarray:
+    """Angles, deg, within half a turn."""
+    return rotation.wrap(off / DEGREES) * DEGREES
 
 
 def figure_2(seed: int) -> Figure:
@@ -64,7 +64,7 @@ def figure_2(seed: int) -> Figure:
         found = angles(estimate(trial, printed(mode))["up"])
         for which, name in enumerate(("roll", "pitch")):
             ax = axes[2 * index + which]
-            ax.plot(seconds(trial), fewer(found[which] - true[which]), color=OURS, linewidth=0.9)
+            ax.plot(seconds(trial), wrapped(found[which] - true[which]), color=OURS, linewidth=0.9)
             ax.plot(seconds(trial), true[which], color=TRUE, linewidth=0.9, linestyle="--")
             ax.set_ylabel(f"mode {mode}\n{name}, deg", fontsize=8.5)
     axes[-1].set_xlabel("time, s (solid: error, dashed: reference)")
@@ -127,7 +127,7 @@ def figure_6(seed: int) -> Figure:
     for ax, ours, true, name in zip(
         axes[1:3], angles(pose["up"]), angles(trial.up), ("roll, deg", "pitch, deg"), strict=True
     ):
-        beside(ax, time, fewer(ours - true), fewer(true), name)
+        beside(ax, time, wrapped(ours - true), wrapped(true), name)
     for axis, ax in enumerate(axes[3:]):
         true = referred(trial)[:, axis]
         beside(ax, time, pose["external_acceleration"][:, 0, axis] - true, true, f"a_{'xyz'[axis]}, m/s²")

@@ -252,9 +252,12 @@ class PlanarArray(AccelerometerArray):
 
 
 def _checked_rows(name: str, values: Any, width: int) -> Rows:
-    if len(values) == 0:
+    try:
+        rows = tuple(tuple(float(number) for number in row) for row in values)
+    except (TypeError, ValueError):
+        raise ValueError(f"{name} must have {width} numbers in each row, got {values!r}") from None
+    if not rows:
         raise ValueError(f"{name} must have a row for each sensor, got none")
-    rows = tuple(tuple(float(number) for number in row) for row in values)
     for index, row in enumerate(rows):
         if len(row) != width or not all(math.isfinite(number) for number in row):
             raise ValueError(f"{name} must have {width} finite numbers in each row, row {index} is {row}")

@@ -187,6 +187,8 @@ def test_arrays_are_values_and_travel_as_json(tmp_path):
         (((0, 0),), ((1, 0, 0),), "positions must have 3 finite numbers"),
         (((0, 0, math.nan),), ((1, 0, 0),), "positions must have 3 finite numbers"),
         ((), (), "positions must have a row"),
+        (3, (), "positions must have 3 numbers in each row, got 3"),
+        ([0.0, 0.0, 0.0], (), "positions must have 3 numbers in each row"),
     ],
 )
 def test_bad_geometry_is_refused(positions, axes, message):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -143,26 +144,31 @@ def test_decaying_acceleration_has_the_deviation_that_is_told() -> None:
 def test_weight_of_the_mean_is_the_best_on_a_grid() -> None:
     """(3.23) gives no weight: the derived one against the variance that many draws have for others."""
     rng = np.random.default_rng(0)
-    model, draws, length = PlanarMean(start="known", initial_noise=0.0, inertial_acceleration=1.0), 40_000, 25
+    model, draws, length = PlanarMean(start="known", initial_noise=0.0, inertial_acceleration=0.1), 40_000, 25
     gyroscope = model.gyroscope_noise * rng.normal(size=(length, draws, 1))
     # the tilt's own errors, small enough for its linear form
     tilt = np.sqrt(model.tilt_variance(np.zeros(1))[0]) * rng.normal(size=(length, draws, 1))
     force = 9.81 * np.concatenate([np.sin(tilt), np.cos(tilt)], axis=-1)
     readings = PLANAR.readings(force, np.zeros((length, draws, 1)), np.zeros((length, draws, 1)))
     data = {"planar/gyr": gyroscope, "array/acc": readings}
-    observer = Observer(model, compiled=False)
-    state, before = observer.init({name: array[0] for name, array in data.items()}), None
-    for k in range(length):
-        before = state
-        state, _ = observer.step(state, {name: array[k] for name, array in data.items()})
+
+    def last_two(model: PlanarMean) -> tuple[Any, Any]:
+        observer = Observer(model, compiled=False)
+        state = before = observer.init({name: array[0] for name, array in data.items()})
+        for k in range(length):
+            before = state
+            state, _ = observer.step(state, {name: array[k] for name, array in data.items()})
+        return before, state
+
+    before, state = last_two(model)
     predicted = before.x[:, 0] + 0.005 * (gyroscope[-2] + gyroscope[-1])[:, 0]
-    grid = np.linspace(0.9, 1.0, 201)
+    grid = np.linspace(0.6, 1.0, 401)
     variances = [np.var(rho * predicted + (1.0 - rho) * tilt[-1, :, 0]) for rho in grid]
-    assert state.x[0, 2] == pytest.approx(grid[int(np.argmin(variances))], abs=2e-3)
-    assert state.x[0, 1] == pytest.approx(np.var(state.x[:, 0]), rel=0.03)
+    assert state.x[0, 2] == pytest.approx(grid[int(np.argmin(variances))], abs=5e-3)
+    assert state.x[0, 1] == pytest.approx(np.var(state.x[:, 0]), rel=0.02)
     # without the correlation of two steps with one gyroscope sample, the variance is told wrongly
-    other = Observer(replace(model, correlated=False), compiled=False).run(data)
-    assert set(other.pose) == {"planar/angle"}
+    _, other = last_two(replace(model, correlated=False))
+    assert other.x[0, 1] > 1.035 * np.var(other.x[:, 0])
 
 
 def test_linear_filter_with_the_same_noise_is_the_mean(turning: Trajectory) -> None:
