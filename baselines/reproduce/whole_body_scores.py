@@ -11,7 +11,7 @@ from ...envs.trajectory import Trajectory
 from ...filters import rotation
 from ...filters.bicycle.geometry import RiderGeometry
 from ...filters.bicycle.rider_linkage import ERROR_SIZE, HIP, ROLL, SHOULDER, SIDES, TRUNK, true_angles
-from ...filters.bicycle.whole_body import WholeBody
+from ...filters.bicycle.whole_body import SEAT_FORCE, WholeBody
 from ...filters.bicycle.whole_body_integration import WholeBodyIntegration
 from ...filters.consistency import nees
 from ...filters.kalman import KalmanFilter
@@ -72,7 +72,7 @@ def with_trunk_on_the_seat(ride: Trajectory, model: WholeBody) -> dict[str, np.n
     x = np.zeros((len(ride), model.state_size))
     x[:, TRUNK] = angles
     rate = model.bicycle_axes(found["bicycle_imu/gyr"])
-    x[:, 28:31] = model._seat_force(found, rate, 0.0 * rate)
+    x[:, SEAT_FORCE] = model._seat_force(found, rate, 0.0 * rate)
     R, J = rotation.euler_matrix("zxy", angles), rotation.euler_axes("zxy", angles)
     half = model._torque(x, R, J)[0][:, 0] / model.cells_wide
     found["seat/load_cells"] = np.stack([0.0 * half + 100.0, 150.0 + half, 150.0 - half], axis=-1)

@@ -57,6 +57,7 @@ from .force_inertial_kinematics import (
 )
 from .force_inertial_parameters import CHANNELS, ForceInertialParameters
 from .force_inertial_readings import Readings, readings, static_angles, steering
+from .parameter_matrices import diagonal
 
 DEG = math.pi / 180.0
 TRUNK_ANGLES = Quantity("force-inertial/trunk_angles", "angle", 3, "rad")
@@ -141,7 +142,7 @@ class ForceInertial(ForceInertialParameters, Model):
         memory = [omega_h, omega_b, speed, none, none, 0.0 * speed, z["trunk_imu/acc"], z["bicycle_imu/acc"]]
         bias = self.bias_prior if self.bias_model else 0.0
         deviations = [self.lean_prior, self.pitch_prior, self.spin_prior, self.roll_prior, bias, bias, bias]
-        return xp.concat([start, none, *memory], axis=-1), _diagonal([d * d for d in deviations], start[..., 0])
+        return xp.concat([start, none, *memory], axis=-1), diagonal([d * d for d in deviations], 0.0 * start[..., :1])
 
     def predict(self, x: Array, z: Measurement, previous: Measurement) -> tuple[Array, Array, Array]:
         """(16) with F = I + ΔT F_X (20) and Q = ΔT² G Σ_ω Gᵀ, 2σ² ΔT/τ for the bias."""
@@ -215,7 +216,7 @@ class ForceInertial(ForceInertialParameters, Model):
         if self.form == "printed" and not whole:
             H = self._with_printed_h14(H, x, rate)
         deviations = [self.torque_noise, self.torque_noise, self.roll_noise, self.shoulder_noise]
-        return r, H, _diagonal([d * d for d in deviations], x[..., 0])
+        return r, H, diagonal([d * d for d in deviations], 0.0 * x[..., :1])
 
     def retract(self, x: Array, dx: Array) -> Array:
         """A sum; angles wrap and θ keeps away from its singularities."""
@@ -362,10 +363,3 @@ PUBLISHED: dict[str, float] = {
     "ahead_share": 0.0,
 }
 """Table I of the paper; m_h, h_h, h and all noises are not published and assumed."""
-
-
-def _diagonal(entries: list[Any], like: Array) -> Array:
-    """Diagonal matrix ``(..., n, n)`` of scalars, with the batch shape of ``like`` ``(...)``."""
-    zero = 0.0 * like
-    n = len(entries)
-    return rows([[zero + (entries[i] if i == j else 0.0) for j in range(n)] for i in range(n)])
