@@ -11,10 +11,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .geometry import RiderGeometry
+from .geometry import ARM_MASS, RiderGeometry
 
-ARM_MASS, LEG_MASS = 0.0494, 0.1986
-"""of the body's mass: one arm with hand, one leg with foot"""
+LEG_MASS = 0.1986
+"""of the body's mass: one leg with foot"""
 ARM_AT_GRIP = 0.53
 """part of an arm's weight that hangs at the grip, the rest at the shoulder: place of the arm's centre of mass between
 them, from the same table"""

@@ -12,6 +12,8 @@ from dataclasses import asdict, dataclass, fields
 from typing import Any, Self
 
 Point = tuple[float, float, float]
+ARM_MASS = 0.0494
+"""Of an arm with its hand, part of the rider's (P. de Leva, J. Biomechanics 29(9), 1996, table 4, men)."""
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ from ..model import Equations
 from ..quantity import Channel, Measurement, Quantity
 from ..rotation import elementary_matrix, euler_matrix, exp, rotate
 from . import limb_constraints, whole_body_start
-from .geometry import Point, RiderGeometry
+from .geometry import ARM_MASS, Point, RiderGeometry
 
 USUAL = RiderGeometry()
 SIDES = ("right", "left")
@@ -60,8 +60,8 @@ OUTPUTS = (
     *(Quantity(f"{joint}_{side}/flexion", "angle", 1, "rad") for side in SIDES for joint in ("elbow", "knee")),
 )
 
-ARM, PELVIS = 0.0494, 0.1117
-"""Mass of an arm with its hand and of the lower trunk, parts of the rider's (de Leva 1996, men)"""
+PELVIS = 0.1117
+"""Mass of the lower trunk, part of the rider's (de Leva 1996, men)"""
 
 
 def paper_axes(vector: Array) -> Array:
@@ -254,7 +254,7 @@ def seat_moments(geometry: RiderGeometry) -> tuple[Point, Point]:
     Returns:
         Trunk axes from the lumbar joint, and bicycle axes from the saddle (environment's axes).
     """
-    arms = ARM * geometry.rider_mass
+    arms = ARM_MASS * geometry.rider_mass
     x, _, z = geometry.trunk_centre
     _, _, height = geometry.shoulder
     turning = (geometry.trunk_mass * x, 0.0, geometry.trunk_mass * z + arms * height)
