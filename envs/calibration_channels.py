@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..filters import rotation
-from ..filters.accelerometer_array.array import AccelerometerArray
+from ..filters.accelerometer_array.array import AccelerometerArray, recorded_channel
 from ..filters.accelerometer_array.calibration_magnetometer import align_magnetometer, fit_ellipsoid
 from ..filters.accelerometer_array.calibration_rate_table import (
     AxisCalibration,
@@ -28,7 +28,7 @@ def spatial_axes(array: AccelerometerArray) -> np.ndarray:
 
 def accelerometer_channel(array: AccelerometerArray) -> str:
     """Name of the channel: ``imu/acc`` for a triaxial accelerometer, else ``array/acc``."""
-    return "imu/acc" if array.name == "triaxial" else array.channel.name
+    return recorded_channel(array).name
 
 
 def accelerometer_record(

@@ -6,9 +6,13 @@ Laval; sections 2.3 (OCTA), 3.1 (planar controller), 4.1 and 4.2 (controller).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from types import MappingProxyType
 
+import numpy as np
+
+from ..quantity import ACCELEROMETER, Channel
 from .array_geometry import AccelerometerArray, PlanarArray
 
 
@@ -27,6 +31,18 @@ def planar_controller(half_length: float = 0.15) -> PlanarArray:
     """The planar controller: a biaxial accelerometer at either end, ``half_length`` m from its middle along y."""
     r = (*((0, half_length),) * 2, *((0, -half_length),) * 2)
     return PlanarArray(r, ((1, 0), (0, 1)) * 2, "planar")
+
+
+def recorded_channel(array: AccelerometerArray) -> Channel:
+    """The channel in which recordings keep the readings: ``imu/acc`` for one triaxial accelerometer, else its own.
+
+    One triaxial accelerometer is three axes along x, y, z at one place, as exactly as chips are built: within 5° and
+    2 cm, so that one whose axes were calibrated is the same still.
+    """
+    if array.dimension != 3 or array.size != 3:
+        return array.channel
+    together = np.ptp(array.r, axis=0).max() < 0.02
+    return ACCELEROMETER if together and np.diag(array.e).min() > math.cos(math.radians(5.0)) else array.channel
 
 
 OCTA = AccelerometerArray(

@@ -51,7 +51,6 @@ from ..linear_algebra import block_diagonal, block_matrix
 from ..magnetic_heading import align, field_direction, known
 from ..model import Gain, Model, check_choice, checked_quaternion
 from ..quantity import (
-    ACCELEROMETER,
     ANGULAR_RATE,
     EXTERNAL_ACCELERATION,
     GYROSCOPE,
@@ -63,7 +62,7 @@ from ..quantity import (
     Quantity,
 )
 from ..rotation import exp_matrix, from_matrix, nearest_matrix, normalize, rotate, skew, to_matrix
-from .array import ARRAYS, AccelerometerArray
+from .array import ARRAYS, AccelerometerArray, recorded_channel
 from .products import product_jacobian, products
 from .virtual_controller import VIRTUAL_POSITION, advance
 
@@ -177,8 +176,7 @@ class ArrayOrientation(Model):
     @property
     def readings(self) -> Channel:
         """Channel of the accelerometers."""
-        single = self.geometry.size == 3 and np.array_equal(self.geometry.e, np.eye(3))
-        return ACCELEROMETER if single and not np.ptp(self.geometry.r, axis=0).any() else self.geometry.channel
+        return recorded_channel(self.geometry)
 
     @property
     def has_rate_rows(self) -> bool:

@@ -11,6 +11,7 @@ from poise.envs.devices import HandDevice
 from poise.envs.hand_sensing import simulate_hand
 from poise.filters.accelerometer_array.array import TRIAXIAL
 from poise.filters.accelerometer_array.array_files import load_array
+from poise.filters.accelerometer_array.spatial import ArrayOrientation
 from poise.scripts.main import main
 
 
@@ -136,6 +137,7 @@ def test_directions_of_axes_are_shown(tmp_path, capsys):
     assert 0.1 < np.degrees(max(axis["turned"] for axis in axes)) < 5.0
     array = load_array(tmp_path / "r.json")
     np.testing.assert_allclose(array.e, [axis["axis"] for axis in axes], atol=1e-12)
+    assert ArrayOrientation(array=array).readings.name == "imu/acc", "the channel that the record calibrates"
     assert main(["calibrate", "gyroscope", "--simulate", "--hold", "0.3", "--record", str(tmp_path / "g.json")]) == 0
     with pytest.raises(ValueError, match="calibration record without accelerometers"):
         load_array(tmp_path / "g.json")

@@ -17,6 +17,7 @@ from poise.filters.accelerometer_array.array import (
     TRIAXIAL,
     AccelerometerArray,
     controller,
+    recorded_channel,
 )
 from poise.filters.accelerometer_array.array_files import describe_array, load_array, read_array
 from poise.filters.accelerometer_array.products import centripetal, product_jacobian, products, symmetric
@@ -209,3 +210,13 @@ def test_bad_files_are_refused(tmp_path):
             load_array(tmp_path / "c.json")
     with pytest.raises(ValueError, match=r"missing \['axes'\], unknown \['direction'\]"):
         load_array(tmp_path / "b.json")
+
+
+def test_one_triaxial_accelerometer_stays_one_when_its_axes_are_calibrated():
+    assert recorded_channel(TRIAXIAL).name == "imu/acc"
+    turned = Rotation.from_rotvec([0.02, -0.01, 0.03]).apply(np.eye(3))
+    calibrated = AccelerometerArray([[1e-3, 0, 0], [0, 2e-3, 0], [0, 0, 0]], turned)
+    assert recorded_channel(calibrated).name == "imu/acc"
+    for other in (OCTA, PLANAR, AccelerometerArray([[0.1, 0, 0], [0, 0, 0], [0, 0, 0]], np.eye(3))):
+        assert recorded_channel(other).name == "array/acc"
+    assert recorded_channel(AccelerometerArray(np.zeros((3, 3)), np.eye(3)[[1, 2, 0]])).name == "array/acc"
