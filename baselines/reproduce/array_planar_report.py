@@ -22,7 +22,7 @@ SHOWN = ("time integration", "tilt", "extended filter", "complete pose, thesis",
 
 def planar(study: Study, report: Report) -> None:
     """Figures 3.5 to 3.15."""
-    seeds, duration = (2, 30.0) if study.quick else (5, planar_study.DURATION)
+    seeds, duration = (2, 30.0) if study.quick else (10, planar_study.DURATION)
     roots = [study.seed_of("planar", index) for index in range(seeds)]
     jobs = [(seed, motion, duration) for motion in MOTIONS for seed in roots]
     rows = [row for found in study.map("planar", planar_errors, jobs) for row in found]

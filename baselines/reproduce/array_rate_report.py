@@ -32,7 +32,7 @@ NAMES = {
 
 def angular_rates(study: Study, report: Report) -> None:
     """Table 2.1 and Figures 2.9 to 2.13."""
-    seeds, duration = (2, 40.0) if study.quick else (6, DURATION)
+    seeds, duration = (2, 40.0) if study.quick else (10, DURATION)
     errors = [CALIBRATED, next(iter(ERRORS))] if study.quick else list(ERRORS)
     jobs = [(study.seed_of("shaking", index), kind, duration) for kind in errors for index in range(seeds)]
     rows = [row for found in study.map("angular rate", rate_errors, jobs) for row in found]
