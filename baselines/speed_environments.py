@@ -90,7 +90,7 @@ def reset_rate(identity: str, options: dict[str, Any]) -> float:
 
 def bare_steps(count: int) -> Callable[[], None]:
     """A function that steps a physics client with one free body ``count`` times and does nothing else."""
-    from ..envs.quiet_pybullet import pybullet
+    import pybullet
 
     client = pybullet.connect(pybullet.DIRECT)
     pybullet.setPhysicsEngineParameter(fixedTimeStep=1e-3, numSolverIterations=30, physicsClientId=client)

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+import pybullet
 
 from ..filters import rotation
 from .physics import Physics, Vector, floats
-from .quiet_pybullet import pybullet
 
 
 def joint_states(physics: Physics, body: int, links: Sequence[int]) -> tuple[np.ndarray, np.ndarray]:

@@ -19,9 +19,9 @@ from pathlib import Path
 from typing import Self
 
 import numpy as np
+import pybullet
 
 from ..filters import rotation
-from .quiet_pybullet import pybullet
 from .sensors import STANDARD_GRAVITY, BodyState
 
 BASE = -1

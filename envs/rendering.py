@@ -9,10 +9,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
+import pybullet
 
 from ..filters import rotation
 from .physics import Physics
-from .quiet_pybullet import pybullet
 from .sensors import BodyState
 
 IMAGE_SIZE = (480, 360)

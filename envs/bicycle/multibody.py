@@ -10,10 +10,10 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+import pybullet
 
 from ...filters import rotation
 from ..physics import BASE, Physics, Vector
-from ..quiet_pybullet import pybullet
 
 Tuple3 = tuple[float, float, float]
 LinkState = tuple[Tuple3, tuple[float, float, float, float], Tuple3, Tuple3]

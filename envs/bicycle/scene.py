@@ -6,9 +6,9 @@ import math
 from collections.abc import Mapping
 
 import numpy as np
+import pybullet
 
 from ..physics import Physics
-from ..quiet_pybullet import pybullet
 from ..rendering import TILE_COLOURS, take_picture
 from ..sensors import BodyState
 from .bicycle import bicycle_tree
