@@ -24,13 +24,13 @@ from .envs import register_environments
 
 if TYPE_CHECKING:
     from .baselines.evaluation import evaluate
-    from .baselines.zoo import EstimatorInfo, list_estimators, make_estimator
-    from .envs.calibration import apply_calibration, load_calibration
-    from .envs.recorder import record
-    from .envs.recordings import load_recording
-    from .envs.trajectory import Trajectory
-    from .filters.estimator import Estimator, run
-    from .filters.quantity import Estimate
+    from .baselines.registry import EstimatorInfo, list_estimators, make_estimator
+    from .envs.data.calibration.records import apply_calibration, load_calibration
+    from .envs.data.formats.load import load_recording
+    from .envs.data.trajectory import Trajectory
+    from .envs.record import record
+    from .filters.core.estimator import Estimator, run
+    from .filters.core.quantity import Estimate
 
 __all__ = [
     "Estimate",
@@ -49,18 +49,18 @@ __all__ = [
 ]
 
 _HOMES = {
-    "Estimate": ".filters.quantity",
-    "Estimator": ".filters.estimator",
-    "EstimatorInfo": ".baselines.zoo",
-    "Trajectory": ".envs.trajectory",
-    "apply_calibration": ".envs.calibration",
+    "Estimate": ".filters.core.quantity",
+    "Estimator": ".filters.core.estimator",
+    "EstimatorInfo": ".baselines.registry",
+    "Trajectory": ".envs.data.trajectory",
+    "apply_calibration": ".envs.data.calibration.records",
     "evaluate": ".baselines.evaluation",
-    "list_estimators": ".baselines.zoo",
-    "load_calibration": ".envs.calibration",
-    "load_recording": ".envs.recordings",
-    "make_estimator": ".baselines.zoo",
-    "record": ".envs.recorder",
-    "run": ".filters.estimator",
+    "list_estimators": ".baselines.registry",
+    "load_calibration": ".envs.data.calibration.records",
+    "load_recording": ".envs.data.formats.load",
+    "make_estimator": ".baselines.registry",
+    "record": ".envs.record",
+    "run": ".filters.core.estimator",
 }
 
 try:

@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from dataclasses import fields
 from typing import Any
 
-from ..envs.trajectory import Trajectory
-from ..filters.accelerometer_array.array_files import read_array
-from ..filters.catalogue import Entry
+from ..envs.data.trajectory import Trajectory
+from ..filters.arrays.files import read_array
+from ..filters.registry import Entry
 
 
 def array_parameters(entry: Entry, trajectory: Trajectory) -> dict[str, Any]:

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from ..envs.trajectory import Trajectory
-from ..filters.estimator import Estimator
-from .zoo import list_estimators, make_estimator
+from ..envs.data.trajectory import Trajectory
+from ..filters.core.estimator import Estimator
+from .registry import list_estimators, make_estimator
 
 GESTURES = ("slow", "fast", "severe", "mixed")
 """Gestures of the simulated part: tests A, B, C of the external-acceleration paper, and changing intensity."""
@@ -35,7 +35,7 @@ def simulated(seed: int, episodes: int, gestures: Sequence[str] = GESTURES, **op
     """
     import gymnasium
 
-    from ..envs.recorder import record
+    from ..envs.record import record
 
     trajectories = []
     children = iter(np.random.SeedSequence(seed).spawn(episodes * len(gestures)))

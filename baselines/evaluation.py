@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..envs.recordings import load_recording
-from ..envs.trajectory import Trajectory
-from ..filters import rotation
-from ..filters.consistency import consistency
-from ..filters.estimator import Estimator, run
-from ..filters.metrics import score
-from ..filters.quantity import ORIENTATION, RELATIVE_ORIENTATION, UP, Estimate, Quantity
+from ..envs.data.formats.load import load_recording
+from ..envs.data.trajectory import Trajectory
+from ..filters.core import rotation
+from ..filters.core.consistency import consistency
+from ..filters.core.estimator import Estimator, run
+from ..filters.core.metrics import score
+from ..filters.core.quantity import ORIENTATION, RELATIVE_ORIENTATION, UP, Estimate, Quantity
+from .registry import make_estimator
 from .rider_estimators import make_for, true_quantities
-from .zoo import make_estimator
 
 if TYPE_CHECKING:
     import pandas

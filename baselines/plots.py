@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..envs.trajectory import Trajectory
-from ..filters.metrics import DEGREES, error
-from ..filters.quantity import UP, Estimate
+from ..envs.data.trajectory import Trajectory
+from ..filters.core.metrics import DEGREES, error
+from ..filters.core.quantity import UP, Estimate
 from .evaluation import summary, with_up
 
 if TYPE_CHECKING:

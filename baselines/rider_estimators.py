@@ -13,13 +13,13 @@ from typing import Any
 
 import numpy as np
 
-from ..envs.trajectory import Trajectory
+from ..envs.data.trajectory import Trajectory
 from ..filters.bicycle.geometry import RiderGeometry
 from ..filters.bicycle.told import true_quantities as true_outputs
-from ..filters.catalogue import CATALOGUE
-from ..filters.estimator import Estimator
+from ..filters.core.estimator import Estimator
+from ..filters.registry import CATALOGUE
 from .array_estimators import array_parameters
-from .zoo import make_estimator
+from .registry import make_estimator
 
 
 def geometry_of(trajectory: Trajectory) -> RiderGeometry | None:

@@ -17,8 +17,8 @@ import gymnasium
 import numpy as np
 from gymnasium import spaces
 
-from ..filters import metrics
-from ..filters.quantity import ORIENTATION, RELATIVE_ORIENTATION, Channel, Quantity
+from ..filters.core import metrics
+from ..filters.core.quantity import ORIENTATION, RELATIVE_ORIENTATION, Channel, Quantity
 
 Observation = dict[str, np.ndarray]
 
@@ -42,7 +42,7 @@ class Block(NamedTuple):
 
 
 class Sensing(Protocol):
-    """What an environment needs of its sensors, see :class:`poise.envs.suite.SensorSuite`."""
+    """What an environment needs of its sensors, see :class:`poise.envs.sensors.suite.SensorSuite`."""
 
     @property
     def channels(self) -> tuple[Channel, ...]:
@@ -317,7 +317,7 @@ class PoseEnv(gymnasium.Env[Observation, np.ndarray]):
 
 
 def pose_error(quantity: Quantity, estimate: np.ndarray, truth: np.ndarray) -> float:
-    """:func:`poise.filters.metrics.error` of one tick, in plain floats for orientations, where it is 20 times faster.
+    """:func:`.error` of one tick, in plain floats for orientations, where it is 20 times faster.
 
     Args:
         quantity: what is compared.

@@ -12,19 +12,19 @@ import gymnasium
 import numpy as np
 from gymnasium import spaces
 
-from ..filters.adaptation import gain_sizes, tunable_filter
+from ..filters.adaptation.features import InnovationFeatures
+from ..filters.adaptation.gains import gain_sizes, tunable_filter
+from ..filters.adaptation.tuned import TunedFilter, TunedState
 from ..filters.bicycle.geometry import RiderGeometry
 from ..filters.bicycle.told import told, true_quantities
-from ..filters.innovation_features import InnovationFeatures
-from ..filters.kalman import KalmanFilter
-from ..filters.metrics import error
-from ..filters.quantity import Estimate, Quantity
-from ..filters.tuned import TunedFilter, TunedState
-from .gestures import GestureConfig
-from .hand_trajectories import HandTrajectories
-from .recordings import load_recording
-from .sensor_presets import SensorPreset
-from .trajectory import Trajectory
+from ..filters.core.kalman import KalmanFilter
+from ..filters.core.metrics import error
+from ..filters.core.quantity import Estimate, Quantity
+from .data.formats.load import load_recording
+from .data.trajectory import Trajectory
+from .hand.gestures import GestureConfig
+from .hand.trajectories import HandTrajectories
+from .sensors.presets import SensorPreset
 
 RewardKind = Literal["error", "improvement"]
 NIS_FLOOR = 1e-6
@@ -170,17 +170,17 @@ class HandMotionGainEnv(GainTuningEnv):
     | ``external-acceleration`` | ``process`` (σ_G), ``measurement`` (σ_A), ``c_a`` (10⁻³ to 0.5) |
     | ``bounded-motion`` | ``process`` (σ_g), ``bias`` (σ_b), ``velocity`` (σ_V) |
 
-    c_a is never so large that a gyroscope error of 1 °/s could lock the filter out (:mod:`poise.filters.adaptation`).
+    c_a is never so large that a gyroscope error of 1 °/s could lock the filter out (:mod:`.gains`).
 
     ## Observation space
 
     ``Box(-1, 1, (n,), float32)``: statistics of the whitened innovations, the sensors and the estimated external
     acceleration over five time scales up to 16 s, the time since the start, and the last action
-    (:class:`poise.filters.innovation_features.InnovationFeatures`; ``env.unwrapped.tuned.features.names``).
+    (:class:`poise.filters.adaptation.features.InnovationFeatures`; ``env.unwrapped.tuned.features.names``).
 
     ## Reward
 
-    ``error``: minus the mean error of ``quantity`` over the interval, rad (:func:`poise.filters.metrics.error`).
+    ``error``: minus the mean error of ``quantity`` over the interval, rad (:func:`poise.filters.core.metrics.error`).
     ``improvement``: that of the published tuning, run beside it, minus the agent's: the same optimal policy with far
     less variance. Ticks without truth or that are not scored do not count. With ``consistency`` w, minus
     w·|ln(mean NIS / m)| of the m innovations of the interval.
@@ -200,7 +200,7 @@ class HandMotionGainEnv(GainTuningEnv):
 
     Those of :class:`GainTuningEnv`, and ``gesture``, ``rate`` (Hz), ``sensors`` (preset), each a single one or
     several to draw from, ``grade`` (factor on the sensor's errors, or lowest and highest), ``duration`` (s),
-    ``mounting``, ``drive``; see :class:`poise.envs.hand_trajectories.HandTrajectories`. The dynamic drive costs
+    ``mounting``, ``drive``; see :class:`poise.envs.hand.trajectories.HandTrajectories`. The dynamic drive costs
     seconds a reset.
 
     ## Version history

@@ -5,7 +5,7 @@ from __future__ import annotations
 import gymnasium
 
 ENTRY_POINTS: dict[str, str] = {
-    "poise/HandMotion-v0": "poise.envs.hand:HandMotionEnv",
+    "poise/HandMotion-v0": "poise.envs.hand.environment:HandMotionEnv",
     "poise/Replay-v0": "poise.envs.replay:ReplayEnv",
     "poise/BicycleFixture-v0": "poise.envs.bicycle.fixture:BicycleFixtureEnv",
     "poise/RiderBicycle-v0": "poise.envs.bicycle.environment:RiderBicycleEnv",

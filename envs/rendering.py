@@ -11,9 +11,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import pybullet
 
-from ..filters import rotation
-from .physics import Physics
-from .sensors import BodyState
+from ..filters.core import rotation
+from .physics.world import Physics
+from .sensors.ideal import BodyState
 
 IMAGE_SIZE = (480, 360)
 """Width and height of an image, pixels."""

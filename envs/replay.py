@@ -10,12 +10,12 @@ from typing import Any, ClassVar
 import numpy as np
 from gymnasium import spaces
 
-from ..filters.quantity import ORIENTATION, RELATIVE_ORIENTATION, UP, Channel, Quantity
+from ..filters.core.quantity import ORIENTATION, RELATIVE_ORIENTATION, UP, Channel, Quantity
 from .base import Block, Observation, PoseEnv, Scene, choose_quantity
-from .hand_sensing import check_duration, simulate_hand
-from .observation import ObservationLayout
-from .recordings import load_recording
-from .trajectory import Trajectory
+from .data.formats.load import load_recording
+from .data.trajectory import Trajectory
+from .hand.sensing import check_duration, simulate_hand
+from .sensors.observation import ObservationLayout
 
 UNITS = {"gyr": "rad/s", "acc": "m/s²", "mag": "µT"}
 """Units by the last part of a channel's name."""
@@ -24,7 +24,7 @@ POSE = ("orientation", "relative_orientation", "up")
 
 
 class RecordedSensors:
-    """The channels of a trajectory, with the face of a :class:`poise.envs.suite.SensorSuite`.
+    """The channels of a trajectory, with the face of a :class:`poise.envs.sensors.suite.SensorSuite`.
 
     Args:
         trajectory: what was recorded; the largest magnitude of each channel bounds its observation.

@@ -26,7 +26,7 @@ class Args:
 
 def run(args: Args) -> int:
     """Print the report."""
-    from ..filters.accelerometer_array.array_files import describe_array, load_array
+    from ..filters.arrays.files import describe_array, load_array
     from .tables import print_table
 
     if not 0.0 < args.deviation < math.inf:

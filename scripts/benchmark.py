@@ -36,10 +36,10 @@ def run(args: Args) -> int:
     """Simulate, load, estimate, compare."""
     import pandas
 
-    from ..baselines.acceleration_tests import compare_modes
     from ..baselines.benchmark import HAND_CHANNELS, contenders, groups_of, simulated
     from ..baselines.evaluation import evaluate
-    from ..envs.recordings import load_recording, recording_files
+    from ..baselines.studies.external_acceleration.simulation import compare_modes
+    from ..envs.data.formats.load import load_recording, recording_files
     from .experiment import start_run
     from .report import draw_example, print_comparison, print_progress, provenance
     from .tables import markdown_table, print_table

@@ -22,7 +22,7 @@ import tyro
 from .main import run_command
 
 if TYPE_CHECKING:
-    from ..envs.calibration import CalibrationRecord
+    from ..envs.data.calibration.records import CalibrationRecord
 
 
 @dataclass
@@ -61,7 +61,7 @@ class Args:
 
 def run(args: Args) -> int:
     """Calibrate, print, and write the record."""
-    from ..envs.calibration import CalibrationRecord, load_calibration
+    from ..envs.data.calibration.records import CalibrationRecord, load_calibration
 
     if args.simulate == bool(args.files):
         raise ValueError("name CSV files, or --simulate runs instead of them")
@@ -86,10 +86,10 @@ def run(args: Args) -> int:
 
 def calibrate(args: Args) -> tuple[CalibrationRecord, CalibrationRecord | None]:
     """The record found, and the true one of simulated runs."""
-    from ..envs import calibration_channels as channels
-    from ..envs import calibration_runs as runs
-    from ..envs.calibration_data import MagnetometerData, RateTableData, read_magnetometer, read_rate_table
-    from ..filters.accelerometer_array.array_files import load_array
+    from ..envs.data.calibration import channels as channels
+    from ..envs.data.calibration import runs as runs
+    from ..envs.data.calibration.data import MagnetometerData, RateTableData, read_magnetometer, read_rate_table
+    from ..filters.arrays.files import load_array
     from .report import print_progress
 
     array, files = load_array(args.array), list(args.files)
@@ -163,10 +163,10 @@ def row(number: int, axis: dict[str, Any]) -> dict[str, Any]:
 
 def run_frame(args: Args) -> int:
     """Rotation from the tracker's frame to the device."""
-    from ..envs.calibration import CalibrationRecord, load_calibration
-    from ..envs.calibration_data import read_axes
-    from ..filters import rotation
-    from ..filters.accelerometer_array.calibration_frame import align_axes
+    from ..envs.data.calibration.data import read_axes
+    from ..envs.data.calibration.records import CalibrationRecord, load_calibration
+    from ..filters.arrays.calibration.frame import align_axes
+    from ..filters.core import rotation
 
     if len(args.files) != 1:
         raise ValueError(f"frame needs one CSV file (and has no simulated run), got {len(args.files)}")

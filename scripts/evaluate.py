@@ -36,8 +36,8 @@ def run(args: Args) -> int:
     """Evaluate, print the table, and leave a run folder with a report."""
     from ..baselines.benchmark import groups_of
     from ..baselines.evaluation import evaluate
-    from ..baselines.zoo import list_estimators
-    from ..envs.recordings import load_recording, recording_files
+    from ..baselines.registry import list_estimators
+    from ..envs.data.formats.load import load_recording, recording_files
     from .experiment import start_run
     from .report import draw_example, print_comparison, print_progress, provenance
 
@@ -46,7 +46,7 @@ def run(args: Args) -> int:
         raise ValueError(f"no recording in {', '.join(map(str, args.recordings))}")
     trajectories = [load_recording(path, args.calibration) for path in paths]
     if args.place is not None:
-        from ..envs.bicycle.single_imu import imu_of
+        from ..envs.bicycle.sensors.single_imu import imu_of
 
         trajectories = [imu_of(trajectory, args.place) for trajectory in trajectories]
     names = tuple(list_estimators()) if args.estimators == ("all",) else args.estimators

@@ -65,7 +65,7 @@ def run(args: Args) -> int:
     """Record and say where the files are."""
     from tqdm import tqdm
 
-    from ..envs.batch_recorder import record_episodes
+    from ..envs.batch_record import record_episodes
 
     env_id = environment_id(args.environment)
     with tqdm(total=args.episodes, desc=f"record {env_id}", unit="episode") as bar:

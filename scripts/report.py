@@ -14,7 +14,7 @@ from .tables import markdown_table, print_table, records
 if TYPE_CHECKING:
     import pandas
 
-    from ..envs.trajectory import Trajectory
+    from ..envs.data.trajectory import Trajectory
 
 TITLES = {
     "inclination": "Inclination error, RMS over the scored ticks, deg",
@@ -29,7 +29,7 @@ MOST_COLUMNS = 8
 
 def kinds_of(labels: Any) -> dict[str, str]:
     """Label → kind, for labels that are names of estimators or begin with one (``name (variant)``)."""
-    from ..baselines.zoo import list_estimators
+    from ..baselines.registry import list_estimators
 
     known = list_estimators()
     return {label: known[name].kind for label in map(str, labels) if (name := label.split(" (")[0]) in known}
@@ -151,7 +151,7 @@ def draw_example(
     """
     from ..baselines.evaluation import fitted, has_truth, summary
     from ..baselines.plots import error_curves, save
-    from ..filters.estimator import run as run_estimator
+    from ..filters.core.estimator import run as run_estimator
 
     known = [trajectory for trajectory in trajectories if has_truth(trajectory)]
     if not known:

@@ -19,7 +19,7 @@ from .experiment import Run
 from .main import run_command
 
 if TYPE_CHECKING:
-    from ..baselines.reproduce.report import Entry, Report
+    from ..baselines.studies.report import Entry, Report
 
 SAME = ("paper", "quick", "seed", "seeds", "subjects", "duration", "recordings")
 """Arguments that a resumed run must share with what is there."""
@@ -55,10 +55,10 @@ class Args:
 
 def run(args: Args) -> int:
     """Do the study, print what it finds as it is found, and leave a run folder with a report."""
-    from ..baselines.reproduce import find_paper
-    from ..baselines.reproduce.report import Report
-    from ..baselines.reproduce.study import Study
-    from ..envs.bicycle.anthropometry import SUBJECTS
+    from ..baselines.studies import find_paper
+    from ..baselines.studies.kit import Study
+    from ..baselines.studies.report import Report
+    from ..envs.bicycle.rider.anthropometry import SUBJECTS
     from .report import print_progress
 
     reproduce = find_paper(args.paper)

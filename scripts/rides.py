@@ -13,7 +13,7 @@ from .experiment import COLUMNS, Run
 from .main import run_command
 
 if TYPE_CHECKING:
-    from ..baselines.ride_statistics import RideStatistics
+    from ..baselines.studies.rides.statistics import RideStatistics
 
 SHOWN = {
     "scenario": "scenario",
@@ -80,11 +80,11 @@ def run(args: Args) -> int:
     """Ride, print both tables, draw one ride, and leave a run folder; 1 if anybody fell."""
     from tqdm import tqdm
 
-    from ..baselines.ride_reports import comparison
-    from ..baselines.ride_statistics import ride_all
-    from ..envs.bicycle.anthropometry import SUBJECTS
-    from ..envs.bicycle.scenarios import list_scenarios
-    from ..envs.bicycle.scenarios import scenario as known
+    from ..baselines.studies.rides.reports import comparison
+    from ..baselines.studies.rides.statistics import ride_all
+    from ..envs.bicycle.course.scenarios import list_scenarios
+    from ..envs.bicycle.course.scenarios import scenario as known
+    from ..envs.bicycle.rider.anthropometry import SUBJECTS
     from .report import print_progress, provenance
     from .tables import markdown_table, print_table
 
@@ -137,8 +137,8 @@ def checked(args: Args) -> int:
     """Print physical checks and the errors of filters of one IMU, and leave a report."""
     from tqdm import tqdm
 
-    from ..baselines.ride_checks import all_checks
-    from ..baselines.ride_inclinations import inclination_rows
+    from ..baselines.studies.rides.checks import all_checks
+    from ..baselines.studies.rides.inclinations import inclination_rows
     from .experiment import start_run
     from .report import print_progress, provenance
     from .tables import markdown_table, print_table
@@ -163,7 +163,7 @@ def checked(args: Args) -> int:
 def drawn(args: Args, folder: Run, scenarios: Sequence[str], seeds: Mapping[tuple[str, int], int]) -> dict[str, str]:
     """Heading → Markdown: the beginning of one of the rides with the papers' sensors."""
     from ..baselines.plots import save
-    from ..baselines.ride_plots import example_ride, ride_signals
+    from ..baselines.studies.rides.plots import example_ride, ride_signals
 
     scenario, subject = "outdoor" if "outdoor" in scenarios else scenarios[0], args.subjects[0]
     seconds = min(args.duration, DRAWN)
@@ -196,7 +196,7 @@ def begun(args: Args) -> Run:
 
 def ride_seeds(seed: int, riders: int) -> dict[tuple[str, int], int]:
     """Seed of every scenario and rider, whichever of them ride."""
-    from ..envs.bicycle.scenarios import list_scenarios
+    from ..envs.bicycle.course.scenarios import list_scenarios
     from .experiment import seeds
 
     pairs = list(product(list_scenarios(), range(riders)))

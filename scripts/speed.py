@@ -30,9 +30,9 @@ def run(args: Args) -> int:
     from functools import partial
     from itertools import groupby
 
-    from ..baselines.speed_environments import environment_speeds
-    from ..baselines.speed_families import FAMILIES, family_speeds
-    from ..baselines.speed_filters import filter_speeds, latencies
+    from ..baselines.speed.environments import environment_speeds
+    from ..baselines.speed.families import FAMILIES, family_speeds
+    from ..baselines.speed.filters import filter_speeds, latencies
     from .tables import print_table
 
     parts = {"filters": filter_speeds, "latency": latencies, "environments": environment_speeds}

@@ -13,9 +13,9 @@ from .experiment import Run, start_run, versions
 if TYPE_CHECKING:
     import pandas
 
-    from ..baselines.learned import LearnedEstimator
-    from ..baselines.training import TrainingConfig, TrainingResult
-    from ..envs.trajectory import Trajectory
+    from ..baselines.learned.estimator import LearnedEstimator
+    from ..baselines.learned.training import TrainingConfig, TrainingResult
+    from ..envs.data.trajectory import Trajectory
 
 CONTENDERS = ("bounded-motion", "vqf", "mahony", "tilt", "gyroscope-integration")
 """What the network is compared with on the test episodes."""
@@ -52,8 +52,8 @@ class Gru:
 
 def run_gru(args: Gru) -> int:
     """Train, test, and write weights with their card."""
-    from ..baselines.dataset import LearnedDataset
-    from ..baselines.training import train
+    from ..baselines.learned.dataset import LearnedDataset
+    from ..baselines.learned.training import train
     from ..baselines.weights_io import save_weights
 
     config = training_config(args)
@@ -82,8 +82,8 @@ def run_gru(args: Gru) -> int:
 
 def training_config(args: Gru) -> TrainingConfig:
     """The configuration that the arguments ask for."""
-    from ..baselines.curriculum import Curriculum
-    from ..baselines.training import TrainingConfig
+    from ..baselines.learned.recipe import Curriculum
+    from ..baselines.learned.training import TrainingConfig
 
     config = TrainingConfig()
     if args.preset == "quick":
@@ -111,7 +111,7 @@ def load_all(paths: tuple[Path, ...]) -> list[Trajectory]:
     Raises:
         ValueError: there are none.
     """
-    from ..envs.recordings import load_recording, recording_files
+    from ..envs.data.formats.load import load_recording, recording_files
 
     files = recording_files(paths)
     if not files:
@@ -121,8 +121,8 @@ def load_all(paths: tuple[Path, ...]) -> list[Trajectory]:
 
 def estimator_of(result: TrainingResult, config: TrainingConfig) -> LearnedEstimator:
     """The trained estimator."""
-    from ..baselines.gru import GruNetwork
-    from ..baselines.learned import LearnedEstimator
+    from ..baselines.learned.estimator import LearnedEstimator
+    from ..baselines.learned.gru import GruNetwork
 
     return LearnedEstimator(GruNetwork.from_arrays(result.arrays), config.frame)
 
@@ -146,8 +146,8 @@ def test(estimator: LearnedEstimator, config: TrainingConfig, episodes: int) -> 
 
 def test_trajectories(config: TrainingConfig, episodes: int) -> list[Trajectory]:
     """Held-out episodes of the curriculum, and hand motions of the environment with a sensor that is not in it."""
-    from ..baselines.dataset import simulate
-    from ..envs.hand_trajectories import HandTrajectories
+    from ..baselines.learned.dataset import simulate
+    from ..envs.hand.trajectories import HandTrajectories
 
     trajectories = list(simulate(config.curriculum, config.test_seed(), episodes))
     for index, gesture in enumerate(GESTURES):
@@ -186,7 +186,7 @@ def card_of(args: Gru, config: TrainingConfig, result: TrainingResult, table: pa
     return {
         "name": "gru",
         "description": "upward vertical from gyroscope and accelerometer: level-frame front end and recurrent network",
-        "estimator": "poise.baselines.learned.LearnedEstimator",
+        "estimator": "poise.baselines.learned.estimator.LearnedEstimator",
         "units": config.units,
         "front_end": {name: value for name, value in asdict(config.frame).items() if name != "dt"},
         "command": command_of(args),

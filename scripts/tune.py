@@ -16,10 +16,10 @@ from .experiment import Run, start_run, versions
 from .main import run_command
 
 if TYPE_CHECKING:
-    from ..baselines.constant_gains import ConstantGains
-    from ..baselines.policy import GainPolicy
-    from ..envs.trajectory import Trajectory
-    from ..filters.tuned import TunedFilter
+    from ..baselines.gain_policy.constant_gains import ConstantGains
+    from ..baselines.gain_policy.policy import GainPolicy
+    from ..envs.data.trajectory import Trajectory
+    from ..filters.adaptation.tuned import TunedFilter
 
 QUICK_STEPS = 100_000
 """Decisions with ``--preset quick``."""
@@ -57,11 +57,11 @@ class Args:
 
 def run(args: Args) -> int:
     """Tune, compare with the published tuning and the best constant gains, and write what was found."""
-    from ..baselines.constant_gains import best_constant_gains
-    from ..baselines.policy import GainPolicy
-    from ..baselines.policy_training import TRAINING_MOTIONS
-    from ..filters.adaptation import tunable_filter
-    from ..filters.tuned import TunedFilter
+    from ..baselines.gain_policy.constant_gains import best_constant_gains
+    from ..baselines.gain_policy.policy import GainPolicy
+    from ..baselines.gain_policy.training import TRAINING_MOTIONS
+    from ..filters.adaptation.gains import tunable_filter
+    from ..filters.adaptation.tuned import TunedFilter
 
     config = training_config(args)
     tuned = TunedFilter.of(tunable_filter(args.filter), config.gains)
@@ -96,7 +96,7 @@ def run(args: Args) -> int:
 
 def training_config(args: Args) -> Any:
     """The configuration that the arguments ask for."""
-    from ..baselines.policy_training import shipped_config
+    from ..baselines.gain_policy.training import shipped_config
 
     if args.preset == "shipped":
         config = shipped_config(args.filter)
@@ -117,7 +117,7 @@ def load_all(paths: tuple[Path, ...]) -> list[Trajectory]:
     Raises:
         ValueError: paths are given but hold none.
     """
-    from ..envs.recordings import load_recording, recording_files
+    from ..envs.data.formats.load import load_recording, recording_files
 
     files = recording_files(paths)
     loaded = [load_recording(path) for path in files]
@@ -142,9 +142,9 @@ def train(args: Args, folder: Run, start: np.ndarray) -> GainPolicy:
     """Train a policy from a constant action, with a bar; the best look at validation trajectories is kept."""
     from tqdm import tqdm
 
-    from ..baselines.constant_gains import policy_errors
-    from ..baselines.policy_training import TRAINING_MOTIONS, train_policy
-    from ..filters.adaptation import tunable_filter
+    from ..baselines.gain_policy.constant_gains import policy_errors
+    from ..baselines.gain_policy.training import TRAINING_MOTIONS, train_policy
+    from ..filters.adaptation.gains import tunable_filter
 
     config, kalman = training_config(args), tunable_filter(args.filter)
     unseen = TRAINING_MOTIONS.draw_many(child_seed(args.seed, VALIDATION_SEED), min(24, config.trajectories))
@@ -168,7 +168,7 @@ def compare(
     tuned: TunedFilter, candidates: Mapping[str, GainPolicy], sets: Mapping[str, Sequence[Trajectory]]
 ) -> list[dict[str, Any]]:
     """Errors of every candidate on every trajectory, as rows of results."""
-    from ..baselines.constant_gains import policy_errors
+    from ..baselines.gain_policy.constant_gains import policy_errors
 
     return [
         row(name, trajectory, value)
@@ -182,7 +182,7 @@ def hindsight_rows(
     tuned: TunedFilter, trajectories: Sequence[Trajectory], constant: ConstantGains, points: int = 32
 ) -> list[dict[str, Any]]:
     """Errors of the best constant gains of each trajectory, chosen knowing the truth: a bound, no method."""
-    from ..baselines.constant_gains import constant_errors
+    from ..baselines.gain_policy.constant_gains import constant_errors
 
     # The first that were tried lie evenly in the box; those at the end crowd around the best.
     actions = [constant.action, *constant.tried[:points]]
@@ -231,7 +231,7 @@ def card_of(
     return {
         "name": f"{args.filter.replace('-', '_')}_policy",
         "description": f"sets the gains of the {args.filter} filter while it runs",
-        "estimator": "poise.baselines.adaptive.AdaptiveEstimator",
+        "estimator": "poise.baselines.gain_policy.adaptive.AdaptiveEstimator",
         "method": args.method,
         "command": command_of(args),
         "data": "simulated hand motions",

@@ -10,24 +10,24 @@ import numpy as np
 from gymnasium import spaces
 
 from ...filters.bicycle.geometry import RiderGeometry
-from ...filters.quantity import Quantity
+from ...filters.core.quantity import Quantity
 from ..base import Block, Observation, PoseEnv, Scene, pose_error
-from ..sensors import STANDARD_GRAVITY, Sampling
-from .anthropometry import RiderBody, rider_body
-from .control import ControlSettings
-from .measured_geometry import rider_geometry
-from .paper_sensors import CATALOGUE, rider_bicycle_suite, sensor_places, suite_channels
-from .parameters import BICYCLES, BicycleParameters
-from .posture import Posture, sit
-from .ride import Ride
-from .ride_source import RideSource, SavedRide
-from .ride_truth import QUANTITIES, other_truth
-from .rider import Fidelity
-from .scenarios import Scenario
-from .scenarios import scenario as named_scenario
-from .sensor_readings import RideQuantities, given_readings
-from .style import RiderStyle, rider_style
-from .tyre import TyreParameters
+from ..sensors.ideal import STANDARD_GRAVITY, Sampling
+from .course.scenarios import Scenario
+from .course.scenarios import scenario as named_scenario
+from .frame.parameters import BICYCLES, BicycleParameters
+from .frame.tyre import TyreParameters
+from .ride.control import ControlSettings
+from .ride.ride import Ride
+from .ride.source import RideSource, SavedRide
+from .ride.truth import QUANTITIES, other_truth
+from .rider.anthropometry import RiderBody, rider_body
+from .rider.posture import Posture, sit
+from .rider.rider import Fidelity
+from .rider.style import RiderStyle, rider_style
+from .sensors.measured_geometry import rider_geometry
+from .sensors.readings import RideQuantities, given_readings
+from .sensors.suites import CATALOGUE, rider_bicycle_suite, sensor_places, suite_channels
 
 BLOCK = 50
 """ticks that are computed together"""
@@ -106,13 +106,13 @@ class RiderBicycleEnv(PoseEnv):
     ## Arguments
 
     Args:
-        scenario: name, see :func:`poise.envs.bicycle.scenarios.list_scenarios`; ``"slalom+bumps"`` composes; or a
-            :class:`poise.envs.bicycle.scenarios.Scenario`. ``reset(options={"scenario": …})`` replaces it once.
-        subject: 0…4, ``"random"``, or a :class:`poise.envs.bicycle.anthropometry.RiderBody`; also a reset option.
+        scenario: name, see :func:`.list_scenarios`; ``"slalom+bumps"`` composes; or a
+            :class:`poise.envs.bicycle.course.scenarios.Scenario`. ``reset(options={"scenario": …})`` replaces it once.
+        subject: 0…4, ``"random"``, or a :class:`poise.envs.bicycle.rider.anthropometry.RiderBody`; also a reset option.
         style: ``still``, ``mild``, ``normal``, ``aggressive``, or a style; None for that of the scenario.
         suite: ``two-gyro``, ``force-inertial``, ``whole-body``, ``all``, or a list of channels
-            (:mod:`poise.envs.bicycle.paper_sensors` says where they sit and how they err).
-        sensors: ``paper``, ``ideal``, or a device (:func:`poise.envs.sensor_presets.list_sensor_presets`) in place of
+            (:mod:`poise.envs.bicycle.sensors.suites` says where they sit and how they err).
+        sensors: ``paper``, ``ideal``, or a device (:func:`poise.envs.sensors.presets.list_sensor_presets`) in place of
             the papers' inertial sensors.
         rate: Hz; None for that of the suite.
         duration: s.
@@ -288,7 +288,7 @@ class RiderBicycleEnv(PoseEnv):
 
     def make_scene(self, gui: bool) -> Scene:
         """Rider, bicycle and ground."""
-        from .scene import RideScene
+        from .course.scene import RideScene
 
         self._drawn_ground = self._source.ground
         return RideScene(self._posture, self._source.ground, gui=gui)

@@ -13,18 +13,18 @@ from typing import Any
 
 import numpy as np
 
-from ...filters import rotation
 from ...filters.bicycle.geometry import RiderGeometry
-from ...filters.quantity import Quantity
+from ...filters.core import rotation
+from ...filters.core.quantity import Quantity
 from ..base import Block, PoseEnv, Scene, choose_quantity
-from ..sensors import BodyState
-from .anthropometry import SUBJECTS
-from .limbs import half_turns
-from .measured_geometry import rider_geometry
-from .paper_sensors import fixture_places, rider_bicycle_suite, sensor_places
-from .parameters import MOUNTAIN_BIKE
-from .posture import sit
-from .sensor_readings import RideQuantities, given_readings
+from ..sensors.ideal import BodyState
+from .frame.parameters import MOUNTAIN_BIKE
+from .rider.anthropometry import SUBJECTS
+from .rider.limbs import half_turns
+from .rider.posture import sit
+from .sensors.measured_geometry import rider_geometry
+from .sensors.readings import RideQuantities, given_readings
+from .sensors.suites import fixture_places, rider_bicycle_suite, sensor_places
 
 DISK_CENTRE = (0.26, 0.0, 1.0)
 """m in the bicycle frame: above the saddle; assumed"""

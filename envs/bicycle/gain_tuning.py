@@ -5,17 +5,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from ...filters.kalman import KalmanFilter
+from ...filters.core.kalman import KalmanFilter
+from ..data.trajectory import Trajectory
 from ..gain_tuning import GainTuningEnv
-from ..recorder import record
-from ..sensors import Sampling
-from ..trajectory import Trajectory
-from .anthropometry import RiderBody
+from ..record import record
+from ..sensors.ideal import Sampling
+from .course.scenarios import Scenario
 from .environment import RiderBicycleEnv
-from .rider import Fidelity
-from .scenarios import Scenario
-from .single_imu import PLACES, imu_of
-from .style import RiderStyle
+from .rider.anthropometry import RiderBody
+from .rider.rider import Fidelity
+from .rider.style import RiderStyle
+from .sensors.single_imu import PLACES, imu_of
 
 Scenarios = str | Scenario | Sequence[str | Scenario]
 
@@ -32,7 +32,7 @@ class RiderBicycleGainEnv(GainTuningEnv):
     ## Action Space
 
     ``Box(-1, 1, (k,), float32)``, one number for each gain; 0 is the published tuning exactly, and between 0 and ±1
-    the logarithm of the constant is changed linearly (:mod:`poise.filters.adaptation` has the ranges).
+    the logarithm of the constant is changed linearly (:mod:`poise.filters.adaptation.gains` has the ranges).
 
     | filter | gains (constant that is scaled) |
     |---|---|
@@ -47,7 +47,7 @@ class RiderBicycleGainEnv(GainTuningEnv):
 
     ``Box(-1, 1, (n,), float32)``: statistics of the whitened innovations, the sensors and the estimated external
     acceleration over five time scales up to 16 s, the time since the start, and the last action
-    (:class:`poise.filters.innovation_features.InnovationFeatures`; ``env.unwrapped.tuned.features.names``).
+    (:class:`poise.filters.adaptation.features.InnovationFeatures`; ``env.unwrapped.tuned.features.names``).
 
     ## Rewards
 
@@ -68,14 +68,14 @@ class RiderBicycleGainEnv(GainTuningEnv):
     The same at reset and at every step, as of the last tick taken: ``time`` (s), ``pose`` (true ``quantity``),
     ``truth`` (name → array: ``orientation`` of the sensor to the world, ``up``, ``angular_rate`` in rad/s,
     ``position`` in m, ``gyroscope_bias``, ``accelerometer_bias``; mounting included, see
-    :func:`poise.envs.bicycle.single_imu.imu_of`), ``estimate`` (outputs of the filter; NaN before it started),
+    :func:`poise.envs.bicycle.sensors.single_imu.imu_of`), ``estimate`` (outputs of the filter; NaN before it started),
     ``error_deg`` (mean over the interval; NaN at reset), ``gains`` (name → scaled constant). With a filter of rides
     ``truth`` is all that ``poise/RiderBicycle-v0`` knows.
 
     ## Cost
 
     A reset simulates the whole ride: with the lumped rider a tenth of its duration or so, with the full one a
-    quarter. To train for long, record rides once and give their :func:`~poise.envs.bicycle.single_imu.imu_of` to
+    quarter. To train for long, record rides once and give their :func:`.imu_of` to
     ``poise/ReplayGain-v0``: its resets are free.
 
     ## Arguments
@@ -86,7 +86,7 @@ class RiderBicycleGainEnv(GainTuningEnv):
         scenario: of the rides, one or several to draw from with equal probability.
         subject: 0…4, ``"random"`` for a new rider in every episode, or a rider.
         style: how the rider moves; None for that of the scenario.
-        sensors: ``paper``, ``ideal``, or a device (:func:`poise.envs.sensor_presets.list_sensor_presets`).
+        sensors: ``paper``, ``ideal``, or a device (:func:`poise.envs.sensors.presets.list_sensor_presets`).
         rate: samples a second, Hz.
         duration: of an episode, s.
         fidelity: ``lumped`` (cheap; hands, feet and limbs exert no reactions of their own on frame and trunk) or

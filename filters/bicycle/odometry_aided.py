@@ -31,11 +31,11 @@ import math
 from dataclasses import dataclass
 from typing import Any, ClassVar, Self
 
-from ..backend import Array, constant, expand, namespace
-from ..model import Gain, Model
-from ..quantity import Channel, Measurement, Quantity
-from ..rotation import cross, level, normalize, roll_pitch, rotate, rotate_back, skew, to_matrix, up_in_body
-from ..strapdown import (
+from ..core.backend import Array, constant, expand, namespace
+from ..core.model import Gain, Model
+from ..core.quantity import Channel, Measurement, Quantity
+from ..core.rotation import cross, level, normalize, roll_pitch, rotate, rotate_back, skew, to_matrix, up_in_body
+from ..imu.strapdown import (
     UNIT,
     accelerated,
     advance,

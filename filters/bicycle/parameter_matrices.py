@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from ..backend import Array, constant, expand, namespace
+from ..core.backend import Array, constant, expand, namespace
 
 
 def times(matrix: Array, vector: Array) -> Array:

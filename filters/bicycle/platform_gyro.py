@@ -13,14 +13,14 @@ import math
 from dataclasses import dataclass
 from typing import Any, ClassVar, Self
 
-from ..backend import Array, constant, expand, namespace
-from ..model import Gain, Model, Recurrence
-from ..quantity import Channel, Measurement, Quantity
-from ..rotation import conjugate, exp, from_euler_xyz, multiply, normalize, to_euler_zyx
+from ..core.backend import Array, constant, expand, namespace
+from ..core.model import Gain, Model, Recurrence
+from ..core.quantity import Channel, Measurement, Quantity
+from ..core.rotation import conjugate, exp, from_euler_xyz, multiply, normalize, to_euler_zyx
 from .geometry import RiderGeometry
 from .parameter_matrices import diagonal, zero_where_known
 from .relative_sensor import relative_angles
-from .two_gyro_kinematics import SIGNS, level_constraint, platform_rate
+from .two_gyro.kinematics import SIGNS, level_constraint, platform_rate
 
 DEG = math.pi / 180.0
 ROLL = Quantity("bicycle/roll", "angle", 1, "rad")

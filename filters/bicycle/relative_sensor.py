@@ -9,10 +9,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Self
 
-from ..backend import Array, constant, expand, namespace, rows
-from ..rotation import cross, from_euler_xyz, rotate, to_euler_xyz
+from ..core.backend import Array, constant, expand, namespace, rows
+from ..core.rotation import cross, from_euler_xyz, rotate, to_euler_xyz
 from .geometry import Point, RiderGeometry
-from .two_gyro_kinematics import SIGNS
+from .two_gyro.kinematics import SIGNS
 
 TRUNK_MARKERS: tuple[Point, Point, Point] = ((-0.02, 0.12, 0.10), (-0.02, -0.12, 0.10), (-0.02, 0.0, -0.12))
 """m from the trunk's IMU, trunk axes: arms of a T-shaped fixture; the paper gives no numbers, these are assumed"""

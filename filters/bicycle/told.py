@@ -14,13 +14,13 @@ from typing import Any
 
 import numpy as np
 
-from ..kalman import KalmanFilter
-from ..quantity import Quantity
+from ..core.kalman import KalmanFilter
+from ..core.quantity import Quantity
 from .geometry import RiderGeometry
 
 TRUE_ANGLES = {
-    "two-gyro": ".two_gyro_truth",
-    "force-inertial": ".force_inertial_axes",
+    "two-gyro": ".two_gyro.truth",
+    "force-inertial": ".force_inertial.axes",
 }
 """First word of a quantity's name → module whose ``true_angles`` makes it from the truth of a ride."""
 

@@ -8,10 +8,10 @@ import pytest
 from poise.baselines.array_estimators import array_parameters
 from poise.baselines.evaluation import evaluate
 from poise.baselines.rider_estimators import equations_of, make_for
-from poise.envs.devices import DEVICES
-from poise.envs.hand_sensing import simulate_hand
-from poise.filters.accelerometer_array.array import OCTA
-from poise.filters.catalogue import CATALOGUE
+from poise.envs.hand.devices import DEVICES
+from poise.envs.hand.sensing import simulate_hand
+from poise.filters.arrays.array import OCTA
+from poise.filters.registry import CATALOGUE
 
 
 @pytest.mark.parametrize("device", ["octa", "octa-gyroscope", "controller"])

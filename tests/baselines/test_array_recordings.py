@@ -3,8 +3,8 @@
 import numpy as np
 
 from poise.baselines.plots import error_curves
-from poise.envs.hand_sensing import simulate_hand
-from poise.filters.quantity import Estimate
+from poise.envs.hand.sensing import simulate_hand
+from poise.filters.core.quantity import Estimate
 
 
 def test_curves_show_the_true_motion_where_there_is_no_imu():

@@ -6,8 +6,8 @@ import pytest
 import poise
 from poise.baselines.benchmark import HAND_CHANNELS, contenders
 from poise.baselines.evaluation import COLUMNS, evaluate, summary
-from poise.envs.hand_sensing import simulate_hand
-from poise.filters.metrics import DEGREES, direction_error, rms
+from poise.envs.hand.sensing import simulate_hand
+from poise.filters.core.metrics import DEGREES, direction_error, rms
 
 
 @pytest.fixture(scope="module")

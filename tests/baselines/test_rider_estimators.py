@@ -15,14 +15,14 @@ import pytest
 import poise
 from poise.baselines.evaluation import evaluate
 from poise.baselines.rider_estimators import equations_of, geometry_of, make_for, told, true_quantities
-from poise.envs.batch_recorder import record_episodes
+from poise.envs.batch_record import record_episodes
 from poise.envs.bicycle.environment import RiderBicycleEnv
-from poise.envs.storage import load_trajectory
+from poise.envs.data.storage import load_trajectory
 from poise.filters.bicycle.geometry import RiderGeometry
 from poise.filters.bicycle.told import TRUE_ANGLES
-from poise.filters.catalogue import CATALOGUE, Entry
-from poise.filters.model import Recurrence
-from poise.filters.quantity import Channel, Quantity
+from poise.filters.core.model import Recurrence
+from poise.filters.core.quantity import Channel, Quantity
+from poise.filters.registry import CATALOGUE, Entry
 from poise.scripts.main import main
 
 RATE = Channel("bicycle_imu/gyr", 3, "rad/s")

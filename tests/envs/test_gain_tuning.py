@@ -6,8 +6,9 @@ import pytest
 
 import poise
 from poise.envs.gain_tuning import GainTuningEnv, HandMotionGainEnv, ReplayGainEnv
-from poise.envs.hand_trajectories import HandTrajectories
-from poise.filters.adaptation import (
+from poise.envs.hand.trajectories import HandTrajectories
+from poise.filters.adaptation.features import InnovationFeatures
+from poise.filters.adaptation.gains import (
     DECADES,
     FOLLOWED_DRIFT,
     LARGEST_C_A,
@@ -17,12 +18,11 @@ from poise.filters.adaptation import (
     log_gains,
     tunable_filter,
 )
-from poise.filters.bounded_motion import BoundedMotion
-from poise.filters.external_acceleration import ExternalAcceleration
-from poise.filters.innovation_features import InnovationFeatures
-from poise.filters.kalman import KalmanFilter
-from poise.filters.metrics import direction_error
-from poise.filters.tuned import TunedFilter
+from poise.filters.adaptation.tuned import TunedFilter
+from poise.filters.core.kalman import KalmanFilter
+from poise.filters.core.metrics import direction_error
+from poise.filters.imu.bounded_motion import BoundedMotion
+from poise.filters.imu.external_acceleration import ExternalAcceleration
 
 FILTERS = ("external-acceleration", "bounded-motion")
 FAMILIES = ("constant", "random")

@@ -1,11 +1,11 @@
 import numpy as np
 import pytest
 
-from poise.envs.hand_sensing import simulate_hand
-from poise.envs.recorder import record
+from poise.envs.data.trajectory import Trajectory
+from poise.envs.hand.sensing import simulate_hand
+from poise.envs.record import record
 from poise.envs.replay import ReplayEnv
-from poise.envs.trajectory import Trajectory
-from poise.filters import rotation
+from poise.filters.core import rotation
 
 
 @pytest.fixture(scope="module")

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from poise.baselines.example_data import example
+from poise.baselines.speed.fixtures import example
 
 
 @pytest.fixture(scope="session")

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 import torch
 
-from poise.filters import metrics, rotation
-from poise.filters.catalogue import CATALOGUE, make
-from poise.filters.estimator import Estimator, run, run_by_steps
-from poise.filters.quantity import Estimate
+from poise.filters.core import metrics, rotation
+from poise.filters.core.estimator import Estimator, run, run_by_steps
+from poise.filters.core.quantity import Estimate
+from poise.filters.registry import CATALOGUE, make
 
 Data = dict[str, np.ndarray]
 Motion = Callable[..., Data]

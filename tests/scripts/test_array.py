@@ -5,7 +5,7 @@ import json
 import pandas
 import pytest
 
-from poise.filters.accelerometer_array.array import planar_controller
+from poise.filters.arrays.array import planar_controller
 from poise.scripts.array import Args
 from poise.scripts.experiment import start_run
 from poise.scripts.main import main

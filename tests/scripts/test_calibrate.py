@@ -5,13 +5,13 @@ import json
 import numpy as np
 import pytest
 
-from poise.envs.calibration import CalibrationRecord, load_calibration, undo_calibration
-from poise.envs.calibration_runs import nominal_calibration
-from poise.envs.devices import HandDevice
-from poise.envs.hand_sensing import simulate_hand
-from poise.filters.accelerometer_array.array import TRIAXIAL
-from poise.filters.accelerometer_array.array_files import load_array
-from poise.filters.accelerometer_array.spatial import ArrayOrientation
+from poise.envs.data.calibration.records import CalibrationRecord, load_calibration, undo_calibration
+from poise.envs.data.calibration.runs import nominal_calibration
+from poise.envs.hand.devices import HandDevice
+from poise.envs.hand.sensing import simulate_hand
+from poise.filters.arrays.array import TRIAXIAL
+from poise.filters.arrays.files import load_array
+from poise.filters.arrays.spatial.orientation import ArrayOrientation
 from poise.scripts.main import main
 
 

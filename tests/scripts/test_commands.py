@@ -7,8 +7,8 @@ import pandas
 import pytest
 
 from poise.baselines.evaluation import COLUMNS
-from poise.envs.batch_recorder import episode_seeds
-from poise.envs.storage import load_trajectory
+from poise.envs.batch_record import episode_seeds
+from poise.envs.data.storage import load_trajectory
 from poise.scripts.main import main
 from poise.scripts.record import environment_id, option
 

@@ -7,11 +7,11 @@ import pandas
 import pytest
 
 from poise.baselines.evaluation import COLUMNS
-from poise.baselines.ride_reports import REPORTED, comparison
-from poise.baselines.ride_statistics import RideStatistics, ride, trunk_lean
-from poise.envs.bicycle.scenarios import list_scenarios
-from poise.envs.storage import load_trajectory
-from poise.filters import rotation
+from poise.baselines.studies.rides.reports import REPORTED, comparison
+from poise.baselines.studies.rides.statistics import RideStatistics, ride, trunk_lean
+from poise.envs.bicycle.course.scenarios import list_scenarios
+from poise.envs.data.storage import load_trajectory
+from poise.filters.core import rotation
 from poise.scripts.main import main
 
 RECORD = ["--options", "scenario=outdoor", "subject=2", "fidelity=full", "suite=whole-body", "duration=2.0"]

@@ -12,12 +12,12 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 import poise
-from poise.envs.bicycle.anthropometry import SUBJECTS, RiderBody
 from poise.envs.bicycle.environment import RiderBicycleEnv
-from poise.envs.bicycle.measured_geometry import rider_geometry
-from poise.envs.bicycle.paper_sensors import SUITES
-from poise.envs.bicycle.parameters import BENCHMARK
-from poise.envs.bicycle.ride_truth import QUANTITIES
+from poise.envs.bicycle.frame.parameters import BENCHMARK
+from poise.envs.bicycle.ride.truth import QUANTITIES
+from poise.envs.bicycle.rider.anthropometry import SUBJECTS, RiderBody
+from poise.envs.bicycle.sensors.measured_geometry import rider_geometry
+from poise.envs.bicycle.sensors.suites import SUITES
 
 
 def make(**options):

@@ -8,7 +8,7 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 from poise.envs.bicycle.fixture import BicycleFixtureEnv, FixtureMotion
-from poise.filters import rotation
+from poise.filters.core import rotation
 
 
 def test_velocities_are_derivatives():

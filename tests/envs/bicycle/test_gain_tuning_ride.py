@@ -7,11 +7,11 @@ import pytest
 import poise
 from poise.envs.bicycle.environment import RiderBicycleEnv
 from poise.envs.bicycle.gain_tuning import RiderBicycleGainEnv
-from poise.envs.bicycle.single_imu import PLACES, imu_of
+from poise.envs.bicycle.sensors.single_imu import PLACES, imu_of
 from poise.envs.gain_tuning import ReplayGainEnv
 from poise.filters.bicycle.geometry import RiderGeometry
-from poise.filters.bounded_motion import BoundedMotion
-from poise.filters.kalman import KalmanFilter
+from poise.filters.core.kalman import KalmanFilter
+from poise.filters.imu.bounded_motion import BoundedMotion
 
 
 def rewards_of(env, seed=0):

@@ -12,17 +12,17 @@ from scipy.spatial.transform import Rotation
 from sympy.physics.mechanics import Point, ReferenceFrame, dynamicsymbols
 
 from poise.envs.bicycle.environment import RiderBicycleEnv
-from poise.envs.bicycle.single_imu import imu_of
-from poise.envs.recorder import record
-from poise.envs.trajectory import Trajectory
-from poise.filters import rotation
+from poise.envs.bicycle.sensors.single_imu import imu_of
+from poise.envs.data.trajectory import Trajectory
+from poise.envs.record import record
 from poise.filters.bicycle.geometry import RiderGeometry
 from poise.filters.bicycle.odometry_aided import OdometryAided
-from poise.filters.catalogue import make
-from poise.filters.consistency import consistency, nees
-from poise.filters.estimator import run
-from poise.filters.kalman import KalmanFilter
-from poise.filters.quantity import Channel
+from poise.filters.core import rotation
+from poise.filters.core.consistency import consistency, nees
+from poise.filters.core.estimator import run
+from poise.filters.core.kalman import KalmanFilter
+from poise.filters.core.quantity import Channel
+from poise.filters.registry import make
 
 GRAVITY = np.array([0.0, 0.0, 9.81])
 DT = 0.01

@@ -1,0 +1,1 @@
+"""Policies that adapt filter gains: training, constant-gain references and running them."""

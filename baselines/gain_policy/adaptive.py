@@ -1,0 +1,173 @@
+"""A filter whose gains a policy sets while it runs, as one estimator among others."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...filters.adaptation.gains import tunable_filter
+from ...filters.adaptation.tuned import TunedFilter, TunedState
+from ...filters.core.estimator import check_measurements
+from ...filters.core.kalman import KalmanFilter
+from ...filters.core.quantity import Channel, Estimate, Measurement, Quantity
+from .policy import GainPolicy
+
+
+@dataclass(frozen=True)
+class AdaptiveEstimator:
+    """A Kalman filter tuned by a policy: an :class:`~poise.filters.core.estimator.Estimator` on NumPy arrays.
+
+    The policy decides once an interval, from what has been seen until then; between decisions the gains stay. With
+    a neutral policy it is the filter itself, bit by bit. The state holds arrays only.
+
+    Attributes:
+        filter: in its published tuning, a KalmanFilter (or a name of :data:`poise.filters.adaptation.gains.TUNABLE`).
+        policy: sets the gains.
+
+    Raises:
+        ValueError: the policy sets gains that the filter has not, or the filter reads no gyroscope and accelerometer.
+    """
+
+    filter: KalmanFilter
+    policy: GainPolicy
+
+    def __post_init__(self) -> None:
+        if isinstance(self.filter, str):
+            object.__setattr__(self, "filter", tunable_filter(self.filter))
+        unknown = [part.gain for part in self.policy.ranges if part.gain not in self.filter.gains]
+        if unknown:
+            raise ValueError(f"the policy sets the gains {unknown}; the filter has {sorted(self.filter.gains)}")
+        inputs = self.policy.layers[0][0].shape[1]
+        if inputs != self.tuned.observation_size:
+            raise ValueError(f"the policy takes {inputs} features, there are {self.tuned.observation_size}")
+
+    @classmethod
+    def load(cls, path_or_name: str | Path, dt: float = 0.01) -> AdaptiveEstimator:
+        """The published tuning of a policy's filter, tuned by that policy.
+
+        Args:
+            path_or_name: file or shipped name of the policy.
+            dt: sampling interval, s.
+        """
+        policy = GainPolicy.load(path_or_name)
+        return cls(replace(tunable_filter(policy.filter), keep_covariance=True).with_dt(dt), policy)
+
+    @cached_property
+    def tuned(self) -> TunedFilter:
+        """The filter with what the policy chooses and sees."""
+        return TunedFilter(self.filter, self.policy.ranges, self.policy.features)
+
+    @property
+    def dt(self) -> float:
+        """Sampling interval, s."""
+        return self.filter.dt
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        """What it reads."""
+        return self.filter.channels
+
+    @property
+    def outputs(self) -> tuple[Quantity, ...]:
+        """What it gives."""
+        return self.filter.outputs
+
+    def with_dt(self, dt: float) -> AdaptiveEstimator:
+        """The same for another sampling interval; decisions stay as many seconds apart."""
+        return replace(self, filter=self.filter.with_dt(dt))
+
+    def init(self, measurement: Measurement) -> TunedState:
+        """Empty memory with the batch shape of ``measurement``."""
+        return self.tuned.init(measurement)
+
+    def step(self, state: TunedState, measurement: Measurement) -> tuple[TunedState, Estimate]:
+        """Take one sample ``(*batch, size)`` of every channel, NaN where there is none.
+
+        Raises:
+            ValueError: see :func:`poise.filters.core.estimator.check_measurements`.
+        """
+        arrays = check_measurements(self.channels, measurement, time_axis=False)
+        ticks = {name: np.asarray(array)[None] for name, array in arrays.items()}
+        estimate, state = self._advance(state, ticks)
+        pose = {name: value[0] for name, value in estimate.pose.items()}
+        return state, Estimate(pose, *(None if part is None else part[0] for part in estimate[1:]))
+
+    def run(self, measurements: Mapping[str, Any]) -> Estimate:
+        """Estimates of a whole sequence ``(T, *batch, size)``; equal to stepping."""
+        return self.run_from(None, measurements)[0]
+
+    def run_from(self, state: TunedState | None, measurements: Mapping[str, Any]) -> tuple[Estimate, TunedState]:
+        """As :meth:`run`, but going on from ``state`` (None: from the start) and giving the last state too."""
+        estimate, state, _ = self.run_with_actions(state, measurements)
+        return estimate, state
+
+    def run_with_actions(
+        self, state: TunedState | None, measurements: Mapping[str, Any]
+    ) -> tuple[Estimate, TunedState, np.ndarray]:
+        """As :meth:`run_from`, and the action ``(T, *batch, k)`` that was in force at every tick."""
+        arrays = check_measurements(self.channels, measurements, time_axis=True)
+        arrays = {name: np.asarray(array) for name, array in arrays.items()}
+        length = len(next(iter(arrays.values())))
+        if state is None:
+            state = self.init({name: array[0] for name, array in arrays.items()})
+        parts, actions, start = [], [], 0
+        while start < length:
+            stop = min(length, start + self.tuned.ticks - int(state.memory.tick))
+            estimate, state = self._advance(state, {name: array[start:stop] for name, array in arrays.items()})
+            parts.append(estimate)
+            actions.append(np.broadcast_to(state.action, (stop - start, *state.action.shape)))
+            start = stop
+        return joined(parts), state, np.concatenate(actions)
+
+    def _advance(self, state: TunedState, ticks: Mapping[str, np.ndarray]) -> tuple[Estimate, TunedState]:
+        if int(state.memory.tick) == 0:
+            state = self.tuned.decide(state, self.policy(self.tuned.observe(state)))
+        return self.tuned.advance(state, ticks)
+
+
+def joined(parts: list[Estimate]) -> Estimate:
+    """Estimates of consecutive ticks as one, time first."""
+
+    def join(pieces: list[Any]) -> Any:
+        return None if pieces[0] is None else np.concatenate(pieces)
+
+    pose = {name: join([part.pose[name] for part in parts]) for name in parts[0].pose}
+    return Estimate(pose, *(join([part[index] for part in parts]) for index in (1, 2, 3)))
+
+
+def shipped(weights: str, dt: float = 0.01, **parameters: Any) -> AdaptiveEstimator:
+    """An estimator with a shipped policy.
+
+    Args:
+        weights: name of the policy.
+        dt: sampling interval, s.
+        parameters: constants of the filter that shall differ from the published tuning, by the model's field names. The
+            policy was trained on the published ones.
+
+    Raises:
+        ValueError: an unknown or impossible parameter.
+    """
+    estimator = AdaptiveEstimator.load(weights, dt)
+    if not parameters:
+        return estimator
+    model = estimator.filter.model
+    known = {field.name for field in fields(model)}
+    unknown = sorted(set(parameters) - known)
+    if unknown:
+        raise ValueError(f"unknown parameters {unknown}; {type(model).__name__} has {sorted(known)}")
+    return replace(estimator, filter=replace(estimator.filter, model=replace(model, **parameters)))
+
+
+def shipped_external_acceleration(dt: float = 0.01, **parameters: Any) -> AdaptiveEstimator:
+    """The external-acceleration filter with its shipped policy; see :func:`shipped`."""
+    return shipped("external_acceleration_policy", dt, **parameters)
+
+
+def shipped_bounded_motion(dt: float = 0.01, **parameters: Any) -> AdaptiveEstimator:
+    """The bounded-motion filter with its shipped policy; see :func:`shipped`."""
+    return shipped("bounded_motion_policy", dt, **parameters)

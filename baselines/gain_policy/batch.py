@@ -1,0 +1,292 @@
+"""Many gain-tuning episodes in one process: the environments of :mod:`poise.envs.gain_tuning`, batched for training.
+
+One call of the filter serves all episodes of a sampling rate, which is an order of magnitude faster than one
+environment after the other. Observations, actions and rewards are the same numbers (up to rounding).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+from stable_baselines3.common.vec_env import VecEnv
+
+from ...envs.data.trajectory import Trajectory
+from ...envs.gain_tuning import scored_quantity
+from ...filters.adaptation.tuned import TunedFilter, TunedState
+from ...filters.core.metrics import error
+from ...filters.core.quantity import Quantity
+
+AHEAD = (1, 10, 40)
+"""Decisions over which the critic looks ahead."""
+PRIVILEGED = 2 + 2 * len(AHEAD)
+"""Numbers at the end of an observation that only the critic may see."""
+
+
+SMALL_ERROR = math.radians(0.2)
+"""Added to the error that relative rewards are divided by."""
+
+
+class RateGroup:
+    """Episodes that advance together: same rate, one row each.
+
+    Args:
+        tuned: the filter.
+        trajectories: to draw from, all of one rate; the shortest decides about the length of all.
+        rows: number of episodes.
+        generator: of the choice of trajectories.
+        quantity: what is scored.
+        reference: action whose error the reward is relative to.
+        error_scale: see :class:`TuningBatch`, rad.
+        relative: likewise.
+    """
+
+    def __init__(
+        self,
+        tuned: TunedFilter,
+        trajectories: Sequence[Trajectory],
+        rows: int,
+        generator: np.random.Generator,
+        quantity: Quantity,
+        reference: np.ndarray,
+        error_scale: float,
+        relative: bool,
+    ) -> None:
+        self.tuned, self.error_scale = tuned.with_dt(trajectories[0].dt), error_scale
+        self.rows, self.generator, self.quantity = rows, generator, quantity
+        self.episode = min(len(trajectory) for trajectory in trajectories) // self.tuned.ticks
+        length = self.episode * self.tuned.ticks
+        self.channels = {
+            channel.name: np.stack([trajectory.measurements[channel.name][:length] for trajectory in trajectories])
+            for channel in tuned.kalman.channels
+        }
+        self.truth = np.stack([trajectory.truth_of(quantity.name)[:length] for trajectory in trajectories])
+        self.scored = np.stack([trajectory.mask[:length] for trajectory in trajectories])
+        gains = self.tuned.gains(reference)
+        estimates = (
+            self.tuned.kalman.run(self._sequence(i), gains).pose[quantity.name] for i in range(len(self.truth))
+        )
+        errors = [error(quantity, estimate, truth) for estimate, truth in zip(estimates, self.truth, strict=True)]
+        self.reference = self._cost(np.stack(errors))
+        usual = np.nanmean(np.where(self.scored, self.reference, np.nan), axis=1)
+        self.weight = 1.0 / (usual + SMALL_ERROR) if relative else np.full(len(self.truth), np.degrees(1.0))
+        self.known = self._foresight(trajectories)
+        self.start()
+
+    def _foresight(self, trajectories: Sequence[Trajectory]) -> np.ndarray:
+        """What is known of every decision beforehand ``(trajectories, decisions + 1, PRIVILEGED - 1)``.
+
+        The gyroscope's bias, and over each of :data:`AHEAD` the mean cost of the reference and the mean acceleration.
+        """
+        per_decision = (len(trajectories), self.episode, self.tuned.ticks)
+        length = self.episode * self.tuned.ticks
+        none = np.zeros((length, 3))
+        bias, force = (
+            np.stack([np.linalg.norm(t.truth.get(name, none)[:length], axis=-1) for t in trajectories])
+            for name in ("gyroscope_bias", "external_acceleration")
+        )
+        columns = [np.log1p(np.degrees(bias[:, :: self.tuned.ticks]))]
+        for values in (np.degrees(self.reference), force):
+            means = np.nan_to_num(values).reshape(per_decision).mean(axis=-1)
+            columns += [np.log1p(mean_ahead(means, ahead)) for ahead in AHEAD]
+        table = np.stack(columns, axis=-1)
+        return np.concatenate([table, table[:, -1:]], axis=1)
+
+    def _cost(self, errors: np.ndarray) -> np.ndarray:
+        """Errors as they count in the reward."""
+        if np.isinf(self.error_scale):
+            return errors
+        return self.error_scale * np.log1p(errors / self.error_scale)
+
+    def _sequence(self, index: int) -> dict[str, np.ndarray]:
+        return {name: values[index] for name, values in self.channels.items()}
+
+    def start(self) -> None:
+        """Begin all episodes; the first ones end at random times, so that later ones do not end together."""
+        self.trajectory = self.generator.integers(len(self.truth), size=self.rows)
+        self.decision = np.zeros(self.rows, int)
+        self.end = self.generator.integers(1, self.episode + 1, size=self.rows)
+        self.fresh = self.tuned.init({name: values[self.trajectory, 0] for name, values in self.channels.items()})
+        self.state, self.error = self.fresh, np.zeros(self.rows)
+
+    def observe(self) -> np.ndarray:
+        """Observations, and what only the critic may see ``(rows, n + PRIVILEGED)``."""
+        own = np.log1p(np.degrees(self.error))[:, None]
+        parts = [self.tuned.observe(self.state), self.known[self.trajectory, self.decision], own]
+        return np.concatenate(parts, axis=-1).astype(np.float32)
+
+    def step(self, actions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Advance by one interval.
+
+        Returns:
+            Observations at the end of the interval, see :meth:`observe`, rewards ``(rows,)``, and which
+            episodes are over ``(rows,)``; :meth:`restart` begins these anew.
+        """
+        ticks = self.decision * self.tuned.ticks + np.arange(self.tuned.ticks)[:, None]
+        chunk = {name: values[self.trajectory, ticks] for name, values in self.channels.items()}
+        estimate, self.state = self.tuned.advance(self.tuned.decide(self.state, actions), chunk)
+        errors = error(self.quantity, estimate.pose[self.quantity.name], self.truth[self.trajectory, ticks])
+        gained = self.reference[self.trajectory, ticks] - self._cost(errors)
+        counted = self.scored[self.trajectory, ticks] & np.isfinite(gained)
+        gains = np.where(counted, gained, 0.0).sum(axis=0) / np.maximum(counted.sum(axis=0), 1)
+        rewards = gains * self.weight[self.trajectory]
+        self.decision, self.error = self.decision + 1, np.nan_to_num(errors[-1])
+        return self.observe(), rewards, self.decision >= self.end
+
+    def restart(self, over: np.ndarray) -> None:
+        """Begin new episodes in the rows ``over`` ``(rows,)`` bool."""
+        count = int(over.sum())
+        self.trajectory = self.trajectory.copy()
+        self.trajectory[over] = self.generator.integers(len(self.truth), size=count)
+        self.decision[over], self.end[over], self.error[over] = 0, self.episode, 0.0
+
+        def mixed(new: np.ndarray, old: np.ndarray) -> np.ndarray:
+            if new.ndim == 0:
+                return old
+            return np.where(over.reshape(-1, *(1,) * (new.ndim - 1)), new, old)
+
+        self.state = TunedState(
+            type(self.fresh.filter)(*map(mixed, self.fresh.filter, self.state.filter)),
+            type(self.fresh.memory)(*map(mixed, self.fresh.memory, self.state.memory)),
+            mixed(self.fresh.action, self.state.action),
+        )
+
+
+def mean_ahead(values: np.ndarray, ahead: int) -> np.ndarray:
+    """Mean of each entry of ``(n, decisions)`` and those after it, ``ahead`` in all or as many as there are."""
+    total = np.concatenate([np.zeros((len(values), 1)), np.cumsum(values, axis=1)], axis=1)
+    first = np.arange(values.shape[1])
+    last = np.minimum(first + ahead, values.shape[1])
+    return (total[:, last] - total[:, first]) / (last - first)
+
+
+class TuningBatch(VecEnv):
+    """A Stable-Baselines3 vector environment over a fixed set of trajectories.
+
+    An observation is that of the registered environment, followed by :data:`PRIVILEGED` numbers that take the truth
+    or the future to know: for the critic (:mod:`.asymmetric`), whose value is a baseline and reaches
+    no policy.
+
+    The reward is the mean error of a constant ``reference`` action over the interval minus that of the agent, in
+    degrees.
+
+    Args:
+        tuned: the filter, what may be chosen of it and what is seen.
+        trajectories: drawn from with replacement; every rate among them gets its share of the episodes.
+        envs: episodes that run at a time, at least one for each rate.
+        seed: of the choice of trajectories.
+        quantity: output that is scored; None for ``up``.
+        reference: action ``(k,)``; None for the published tuning.
+        error_scale: errors far above this count by their logarithm, s ln(1 + e / s), so that a few wild seconds do not
+            drown the rest; deg; infinite for errors as they are.
+        relative: whether rewards are divided by the mean error of the reference on the trajectory, so that easy and
+            hard trajectories count the same.
+
+    Raises:
+        ValueError: fewer ``envs`` than rates.
+    """
+
+    def __init__(
+        self,
+        tuned: TunedFilter,
+        trajectories: Sequence[Trajectory],
+        envs: int,
+        *,
+        seed: int = 0,
+        quantity: str | None = None,
+        reference: np.ndarray | None = None,
+        error_scale: float = math.inf,
+        relative: bool = False,
+    ) -> None:
+        groups: dict[int, list[Trajectory]] = {}
+        for trajectory in trajectories:
+            groups.setdefault(round(1e6 * trajectory.dt), []).append(trajectory)
+        if not groups or envs < len(groups):
+            raise ValueError(f"envs must be at least the number of rates ({len(groups)}, not 0), got {envs}")
+        rows = [len(part) for part in np.array_split(np.arange(envs), len(groups))]
+        generators = np.random.default_rng(seed).spawn(len(groups))
+        output = scored_quantity(tuned.kalman, quantity)
+        action = np.zeros(tuned.actions) if reference is None else np.asarray(reference, float)
+        self.groups = [
+            RateGroup(tuned, part, count, generator, output, action, math.radians(error_scale), relative)
+            for part, count, generator in zip(groups.values(), rows, generators, strict=True)
+        ]
+        self.bounds = np.cumsum([0, *rows])
+        self.tuned, self.actions = tuned, np.zeros((envs, tuned.actions))
+        self.returns = np.zeros(envs)
+        super().__init__(
+            envs,
+            spaces.Box(-np.inf, np.inf, (tuned.observation_size + PRIVILEGED,), np.float32),
+            spaces.Box(-1.0, 1.0, (tuned.actions,), np.float32),
+        )
+
+    def privileged_statistics(self) -> tuple[np.ndarray, np.ndarray]:
+        """Mean and deviation of the numbers that only the critic may see, each ``(PRIVILEGED,)``."""
+        known = np.concatenate([group.known.reshape(-1, PRIVILEGED - 1) for group in self.groups])
+        # The agent's own error is not known beforehand; it is about that of the reference.
+        table = np.concatenate([known, known[:, 1:2]], axis=1)
+        return table.mean(axis=0), table.std(axis=0) + 1e-3
+
+    def reset(self) -> np.ndarray:
+        """Begin all episodes."""
+        for group in self.groups:
+            group.start()
+        self.returns[:] = 0.0
+        return np.concatenate([group.observe() for group in self.groups])
+
+    def step_async(self, actions: np.ndarray) -> None:
+        """Remember the actions ``(envs, k)``."""
+        self.actions = np.asarray(actions, float)
+
+    def step_wait(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[dict[str, Any]]]:
+        """Advance all episodes by one interval; those that are over begin anew."""
+        observations, rewards, overs = [], [], []
+        infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
+        for group, first, last in zip(self.groups, self.bounds[:-1], self.bounds[1:], strict=True):
+            observation, reward, over = group.step(self.actions[first:last])
+            lengths = group.decision.copy()
+            self.returns[first:last] += reward
+            if over.any():
+                terminal = observation
+                group.restart(over)
+                observation = np.where(over[:, None], group.observe(), observation)
+                for row in np.flatnonzero(over):
+                    index = first + row
+                    mean = float(self.returns[index] / lengths[row])
+                    infos[index] = {
+                        "TimeLimit.truncated": True,
+                        "terminal_observation": terminal[row],
+                        "episode": {"r": mean, "l": int(lengths[row]), "t": 0.0},
+                    }
+                    self.returns[index] = 0.0
+            observations.append(observation)
+            rewards.append(reward)
+            overs.append(over)
+        return (
+            np.concatenate(observations),
+            np.concatenate(rewards).astype(np.float32),
+            np.concatenate(overs),
+            infos,
+        )
+
+    def close(self) -> None:
+        """Nothing to free."""
+
+    def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
+        """An attribute of the batch, once for each episode."""
+        return [getattr(self, attr_name, None) for _ in self._get_indices(indices)]
+
+    def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
+        """Refused: episodes have no attributes of their own."""
+        raise NotImplementedError("the episodes of a batch have no attributes of their own")
+
+    def env_method(self, method_name: str, *args: Any, indices: Any = None, **kwargs: Any) -> list[Any]:
+        """Refused: episodes have no methods of their own."""
+        raise NotImplementedError("the episodes of a batch have no methods of their own")
+
+    def env_is_wrapped(self, wrapper_class: Any, indices: Any = None) -> list[bool]:
+        """Never wrapped."""
+        return [False for _ in self._get_indices(indices)]

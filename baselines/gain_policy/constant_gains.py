@@ -1,0 +1,140 @@
+"""The best constant gains of a filter: what an adaptive policy must beat, and the starting point of its training."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...envs.data.trajectory import Trajectory
+from ...envs.gain_tuning import scored_quantity
+from ...filters.adaptation.tuned import TunedFilter
+from ...filters.core.kalman import KalmanFilter
+from ...filters.core.metrics import error, rms
+from .adaptive import AdaptiveEstimator
+from .policy import GainPolicy
+
+
+@dataclass(frozen=True, eq=False)
+class ConstantGains:
+    """What a search over constant gains found.
+
+    Attributes:
+        action: ``(k,)`` in [−1, 1], best for the mean over the trajectories.
+        score: its mean error over the trajectories, rad.
+        tried: ``(n, k)`` all actions that were tried; the first is neutral.
+        scores: ``(n, trajectories)`` their root mean square errors, rad.
+    """
+
+    action: np.ndarray
+    score: float
+    tried: np.ndarray
+    scores: np.ndarray
+
+    @property
+    def neutral(self) -> np.ndarray:
+        """Error of the published tuning on every trajectory ``(trajectories,)``, rad."""
+        return self.scores[0]
+
+    @property
+    def hindsight(self) -> np.ndarray:
+        """Least error of any action tried on each trajectory ``(trajectories,)``, rad; only the truth tells it."""
+        return np.min(self.scores, axis=0)
+
+    @property
+    def hindsight_actions(self) -> np.ndarray:
+        """The action of :attr:`hindsight` for each trajectory ``(trajectories, k)``."""
+        return self.tried[np.argmin(self.scores, axis=0)]
+
+
+def best_constant_gains(
+    filter: TunedFilter | KalmanFilter,
+    trajectories: Sequence[Trajectory],
+    *,
+    quantity: str | None = None,
+    guesses: Sequence[Sequence[float]] = (),
+    samples: int = 64,
+    refinements: int = 60,
+    seed: int = 0,
+) -> ConstantGains:
+    """Search the box of actions: evenly spread (Sobol) points, then Nelder–Mead from the best of them.
+
+    Args:
+        filter: the filter, with all its gains or with chosen ones.
+        trajectories: with a truth for ``quantity``.
+        quantity: output that is scored; None for ``up``.
+        guesses: further actions to try in the first stage.
+        samples: points of the first stage, besides the neutral one; best a power of two.
+        refinements: evaluations of the second stage.
+        seed: of the points.
+
+    Raises:
+        ValueError: there is no trajectory, or none can be scored.
+    """
+    from scipy.optimize import minimize
+    from scipy.stats import qmc
+
+    tuned = filter if isinstance(filter, TunedFilter) else TunedFilter.of(filter)
+    if not trajectories:
+        raise ValueError("trajectories must hold at least one, got none")
+    tried: list[np.ndarray] = []
+    scores: list[np.ndarray] = []
+
+    def evaluate(action: np.ndarray) -> float:
+        tried.append(np.clip(action, -1.0, 1.0))
+        scores.append(constant_errors(tuned, trajectories, tried[-1], quantity))
+        return float(np.mean(scores[-1]))
+
+    neutral = evaluate(np.zeros(tuned.actions))
+    if not np.isfinite(neutral):
+        raise ValueError("some trajectory has no tick with a known truth that is scored")
+    spread = 2.0 * qmc.Sobol(tuned.actions, rng=np.random.default_rng(seed)).random(samples) - 1.0 if samples else []
+    values = [neutral, *(evaluate(point) for point in spread), *(evaluate(np.asarray(point)) for point in guesses)]
+    if refinements:
+        start = tried[int(np.argmin(values))]
+        # Steps inwards, so that the first simplex lies in the box.
+        simplex = np.stack([start, *(start + np.where(start > 0.0, -0.3, 0.3) * axis for axis in np.eye(len(start)))])
+        options = {"maxfev": refinements, "initial_simplex": simplex, "xatol": 1e-3, "fatol": 1e-7}
+        minimize(evaluate, start, method="Nelder-Mead", bounds=[(-1.0, 1.0)] * len(start), options=options)
+    means = np.mean(scores, axis=1)
+    best = int(np.argmin(means))
+    return ConstantGains(tried[best], float(means[best]), np.stack(tried), np.stack(scores))
+
+
+def constant_errors(
+    tuned: TunedFilter, trajectories: Sequence[Trajectory], action: np.ndarray, quantity: str | None = None
+) -> np.ndarray:
+    """Root mean square error of one action on each trajectory ``(trajectories,)``, rad."""
+    output = scored_quantity(tuned.kalman, quantity)
+    errors = []
+    for trajectory in trajectories:
+        kalman = tuned.kalman.with_dt(trajectory.dt)
+        estimate = kalman.run(trajectory.measurements, tuned.gains(action))
+        per_tick = error(output, estimate.pose[output.name], trajectory.truth_of(output.name))
+        errors.append(float(rms(per_tick, trajectory.mask)))
+    return np.array(errors)
+
+
+def policy_errors(
+    kalman: KalmanFilter, policy: GainPolicy, trajectories: Sequence[Trajectory], quantity: str | None = None
+) -> np.ndarray:
+    """Root mean square error of a policy on each trajectory ``(trajectories,)``, rad.
+
+    Trajectories of one rate and length run as one batch.
+    """
+    output = scored_quantity(kalman, quantity)
+    groups: dict[tuple[float, int], list[int]] = {}
+    for index, trajectory in enumerate(trajectories):
+        groups.setdefault((round(trajectory.dt, 9), len(trajectory)), []).append(index)
+    errors = np.empty(len(trajectories))
+    for (dt, _), members in groups.items():
+        estimator = AdaptiveEstimator(kalman.with_dt(dt), policy)
+        names = [channel.name for channel in estimator.channels]
+        batch = {name: np.stack([trajectories[i].measurements[name] for i in members], axis=1) for name in names}
+        estimate = estimator.run(batch).pose[output.name]
+        for column, index in enumerate(members):
+            trajectory = trajectories[index]
+            per_tick = error(output, estimate[:, column], trajectory.truth_of(output.name))
+            errors[index] = float(rms(per_tick, trajectory.mask))
+    return errors

@@ -1,0 +1,115 @@
+"""A gain policy: a small network from what a filter sees of itself to its gains, run by NumPy alone."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...filters.adaptation.features import InnovationFeatures
+from ...filters.adaptation.gains import GainRange
+from ...filters.adaptation.tuned import TunedFilter
+from ..weights_io import load_weights, save_weights
+
+KIND = "gain policy"
+"""Field ``kind`` of the card."""
+
+Layer = tuple[np.ndarray, np.ndarray]
+"""Weight ``(outputs, inputs)`` and bias ``(outputs,)``."""
+
+
+@dataclass(frozen=True, eq=False)
+class GainPolicy:
+    """Observation ``(*batch, n)`` → action ``(*batch, k)`` in [−1, 1]: layers with tanh between them, then a clip.
+
+    Attributes:
+        filter: name of the filter that it tunes.
+        ranges: of the actions.
+        features: what it sees, and the interval of its decisions.
+        layers: weights and biases; the normalisation of observations is part of the first.
+        card: description of the training.
+
+    Raises:
+        ValueError: layers do not fit each other, the observation or the actions.
+    """
+
+    filter: str
+    ranges: tuple[GainRange, ...]
+    features: InnovationFeatures
+    layers: tuple[Layer, ...]
+    card: dict[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        layers = tuple((np.asarray(weight, float), np.asarray(bias, float)) for weight, bias in self.layers)
+        object.__setattr__(self, "layers", layers)
+        width = self.features.size(len(self.ranges))
+        for index, (weight, bias) in enumerate(layers):
+            if weight.ndim != 2 or weight.shape[1] != width or bias.shape != weight.shape[:1]:
+                raise ValueError(
+                    f"layer {index} must take {width} inputs, got weight {weight.shape} and bias {bias.shape}"
+                )
+            width = weight.shape[0]
+        if not layers or width != len(self.ranges):
+            raise ValueError(
+                f"the last layer must give {len(self.ranges)} actions, got {width if layers else 'no layer'}"
+            )
+
+    @classmethod
+    def constant(cls, tuned: TunedFilter, action: Sequence[float] | np.ndarray) -> GainPolicy:
+        """A policy that always chooses the same action."""
+        weight = np.zeros((tuned.actions, tuned.observation_size))
+        return cls(tuned.name, tuned.ranges, tuned.features, ((weight, np.asarray(action, float)),))
+
+    @classmethod
+    def neutral(cls, tuned: TunedFilter) -> GainPolicy:
+        """The published tuning."""
+        return cls.constant(tuned, np.zeros(tuned.actions))
+
+    def __call__(self, observation: np.ndarray) -> np.ndarray:
+        """The action of an observation."""
+        x = np.asarray(observation, dtype=float)
+        for weight, bias in self.layers[:-1]:
+            x = np.tanh(x @ weight.T + bias)
+        weight, bias = self.layers[-1]
+        return np.clip(x @ weight.T + bias, -1.0, 1.0)
+
+    def save(self, path: str | Path, card: Mapping[str, Any] | None = None) -> Path:
+        """Write weights and card; see :func:`poise.baselines.weights_io.save_weights`."""
+        arrays = {}
+        for index, (weight, bias) in enumerate(self.layers):
+            arrays[f"{index}.weight"], arrays[f"{index}.bias"] = weight.astype(np.float32), bias.astype(np.float32)
+        own = {
+            "kind": KIND,
+            "filter": self.filter,
+            "interval": self.features.interval,
+            "scales": list(self.features.scales),
+            "gains": [{"gain": part.gain, "lower": part.lower, "upper": part.upper} for part in self.ranges],
+            "layers": len(self.layers),
+        }
+        described = dict(self.card if card is None else card)
+        described.pop("sha256", None)
+        return save_weights(path, arrays, {**own, **{name: described[name] for name in described if name not in own}})
+
+    @classmethod
+    def load(cls, path_or_name: str | Path) -> GainPolicy:
+        """Read a policy: a file, or the name of a shipped one.
+
+        Raises:
+            FileNotFoundError: there is none.
+            ValueError: the weights are damaged or are no gain policy.
+        """
+        arrays, card = load_weights(path_or_name)
+        if card.get("kind") != KIND:
+            raise ValueError(f"{path_or_name} is no {KIND} but {card.get('kind')!r}")
+        try:
+            ranges = tuple(
+                GainRange(entry["gain"], float(entry["lower"]), float(entry["upper"])) for entry in card["gains"]
+            )
+            features = InnovationFeatures(float(card["interval"]), tuple(float(scale) for scale in card["scales"]))
+            layers = tuple((arrays[f"{index}.weight"], arrays[f"{index}.bias"]) for index in range(card["layers"]))
+            return cls(card["filter"], ranges, features, layers, card)
+        except KeyError as missing:
+            raise ValueError(f"{path_or_name}: the {KIND} lacks {missing}") from None

@@ -1,0 +1,1 @@
+"""Learned estimators: features, networks, training and running them."""

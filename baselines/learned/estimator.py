@@ -1,0 +1,161 @@
+"""A trained network as an estimator like all others."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, ClassVar, NamedTuple, Self
+
+import numpy as np
+
+from ...filters.core.backend import Array, is_torch, namespace
+from ...filters.core.estimator import check_measurements, run_by_steps
+from ...filters.core.observer import Observer, ObserverState
+from ...filters.core.quantity import ACCELEROMETER, GYROSCOPE, UP, Channel, Estimate, Measurement, Quantity
+from ...filters.core.rotation import normalize, rotate_back
+from ...filters.core.sampling import empty_memory, join
+from ..weights_io import load_weights
+from .gru import GruNetwork
+from .level_frame import LevelFrame
+
+
+class LearnedState(NamedTuple):
+    """All memory of the estimator.
+
+    Attributes:
+        x: ``(*batch, n)`` state of the level frame; zeros before the start.
+        memory: ``(*batch, H)`` of the network.
+        tilt: ``(*batch, 2)`` what the network said last: horizontal part of the vertical in the level frame.
+        held: ``(*batch, 6)`` last finite sample of every channel element, NaN if there was none.
+        started: ``(*batch,)`` bool.
+    """
+
+    x: Array
+    memory: Array
+    tilt: Array
+    held: Array
+    started: Array
+
+
+@dataclass(frozen=True, eq=False)
+class LearnedEstimator:
+    """The upward vertical from six axes, by a recurrent network on a level frame.
+
+    :class:`.LevelFrame` runs at the rate of the sensor. At fixed intervals, whatever that
+    rate is, the network sees what happened and says by how much the frame leans; in between that is held, in the level
+    frame, where it changes slowly.
+
+    Attributes:
+        network: the weights.
+        frame: the front end and the sampling interval.
+        compiled: use compiled loops for NumPy data (needs numba; arrays serve without it, to rounding).
+
+    Raises:
+        ValueError: the sampling interval is longer than that of the network.
+    """
+
+    network: GruNetwork
+    frame: LevelFrame = field(default_factory=LevelFrame)
+    compiled: bool = True
+
+    channels: ClassVar[tuple[Channel, ...]] = (GYROSCOPE, ACCELEROMETER)
+    outputs: ClassVar[tuple[Quantity, ...]] = (UP,)
+
+    def __post_init__(self) -> None:
+        if self.frame.dt > self.frame.interval * (1.0 + 1e-9):
+            raise ValueError(
+                f"dt must be at most {self.frame.interval:g} s ({1.0 / self.frame.interval:g} Hz or more), "
+                f"got {self.frame.dt:g} s"
+            )
+
+    @classmethod
+    def load(cls, path_or_name: str | Path = "gru", dt: float = 0.01) -> Self:
+        """The estimator of a weights file or of shipped weights.
+
+        Raises:
+            FileNotFoundError: there are no such weights.
+            ValueError: they are damaged, or are those of something else.
+        """
+        arrays, card = load_weights(path_or_name)
+        network = GruNetwork.from_arrays(arrays)
+        try:
+            frame = LevelFrame(**{**card.get("front_end", {}), "dt": dt})
+        except TypeError as reason:
+            raise ValueError(f"{path_or_name}: the card tells of another front end ({reason})") from None
+        return cls(network, frame)
+
+    @property
+    def dt(self) -> float:
+        """Sampling interval, s."""
+        return self.frame.dt
+
+    def with_dt(self, dt: float) -> LearnedEstimator:
+        """The same estimator for another sampling interval."""
+        return replace(self, frame=self.frame.with_dt(dt))
+
+    def init(self, measurement: Measurement) -> LearnedState:
+        """Empty memory with the batch shape and array kind of ``measurement`` (no sample is used up)."""
+        like = join(check_measurements(self.channels, measurement, time_axis=False), self.channels)
+        return LearnedState(*empty_memory(like, (self.frame.state_size,), (self.network.size,), (2,)))
+
+    def step(self, state: LearnedState, measurement: Measurement) -> tuple[LearnedState, Estimate]:
+        """Take one sample of every channel, ``(*batch, 3)``; NaN where there is none."""
+        before = ObserverState(state.x, state.held, state.started)
+        front, seen = self._observer().step(before, measurement)
+        features, due = seen.pose["features"], seen.pose["due"]
+        memory, tilt = state.memory, state.tilt
+        if bool((due == 1.0).any()):
+            compiled = None
+            if self.compiled and not is_torch(features):
+                compiled = self._advance(features[None], due[None], memory, tilt)
+            if compiled is not None:
+                memory, tilt, _ = compiled
+            else:
+                xp = namespace(features)
+                now = due == 1.0
+                moved, leaning = self.network.step(xp.where(now, features, xp.zeros_like(features)), memory)
+                memory, tilt = xp.where(now, moved, memory), xp.where(now, leaning, tilt)
+        pose = {"up": upward(seen.pose["relative_orientation"], tilt)}
+        return LearnedState(front.x, memory, tilt, front.held, front.started), Estimate(pose)
+
+    def run(self, measurements: Mapping[str, Any]) -> Estimate:
+        """Estimates of a whole sequence, ``(T, *batch, 3)`` in and out; equal to stepping."""
+        arrays = check_measurements(self.channels, measurements, time_axis=True)
+        if not self.compiled or any(is_torch(array) for array in arrays.values()):
+            return run_by_steps(self, arrays)
+        state = self.init({name: array[0] for name, array in arrays.items()})
+        seen = self._observer().run(arrays).pose
+        advanced = self._advance(seen["features"], seen["due"], state.memory, state.tilt)
+        if advanced is None:
+            return run_by_steps(self, arrays)
+        return Estimate({"up": upward(seen["relative_orientation"], advanced[2])})
+
+    def _observer(self) -> Observer:
+        return Observer(self.frame, compiled=self.compiled)
+
+    def _advance(
+        self, features: np.ndarray, due: np.ndarray, memory: np.ndarray, tilt: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
+        """Memory and tilt after ``(T, *batch, …)`` ticks, and the tilt of every tick; None without a compiler."""
+        length, batch = features.shape[0], features.shape[1:-1]
+        memory, tilt = memory.copy(), tilt.copy()
+        count = int(np.prod(batch, dtype=int))
+        tilts = self.network.advance(
+            np.ascontiguousarray(features).reshape(length, count, -1),
+            np.ascontiguousarray(due).reshape(length, count),
+            memory.reshape(count, -1),
+            tilt.reshape(count, 2),
+        )
+        return None if tilts is None else (memory, tilt, tilts.reshape(length, *batch, 2))
+
+
+def upward(orientation: Array, tilt: Array) -> Array:
+    """The vertical in sensor coordinates ``(..., 3)`` from the attitude of the level frame and the tilt in it."""
+    xp = namespace(orientation, tilt)
+    return rotate_back(orientation, normalize(xp.concat([tilt, 1.0 + 0.0 * tilt[..., :1]], axis=-1)))
+
+
+def shipped(dt: float = 0.01) -> LearnedEstimator:
+    """The estimator with the weights of the package, for samples ``dt`` seconds apart."""
+    return LearnedEstimator.load("gru", dt)

@@ -1,0 +1,193 @@
+"""The recurrent network of the learned estimator: inference without torch, on any arrays or compiled.
+
+    u = tanh(A s + a),   h ← GRU(u, h),   t = C h + c
+
+with features s, memory h and two numbers t: the horizontal part of the upward vertical in the level frame, where its
+third coordinate is 1. The GRU is that of K. Cho et al., "Learning Phrase Representations using RNN Encoder-Decoder for
+Statistical Machine Translation", EMNLP 2014, with the reset after the product, as PyTorch has it,
+
+    r = σ(W_r u + b_r + V_r h + d_r),   z = σ(W_z u + b_z + V_z h + d_z),
+    n = tanh(W_n u + b_n + r ∘ (V_n h + d_n)),   h ← (1 − z) ∘ n + z ∘ h
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Self
+
+import numpy as np
+
+from ...filters.core.backend import Array, constant, namespace
+from .level_frame import FEATURES
+
+NAMES = (
+    "input.weight",
+    "input.bias",
+    "gru.weight_ih_l0",
+    "gru.bias_ih_l0",
+    "gru.weight_hh_l0",
+    "gru.bias_hh_l0",
+    "output.weight",
+    "output.bias",
+)
+"""Arrays of a network; the names are those of the torch module that is trained."""
+
+
+@dataclass(frozen=True, eq=False)
+class GruNetwork:
+    """The weights, with H units, F features.
+
+    Attributes:
+        input_weight: ``(H, F)`` A.
+        input_bias: ``(H,)`` a.
+        gru_weight: ``(3 H, H)`` W, the blocks in the order r, z, n.
+        gru_bias: ``(3 H,)`` b.
+        memory_weight: ``(3 H, H)`` V.
+        memory_bias: ``(3 H,)`` d.
+        output_weight: ``(2, H)`` C.
+        output_bias: ``(2,)`` c.
+
+    Raises:
+        ValueError: a shape does not fit the others.
+    """
+
+    input_weight: np.ndarray
+    input_bias: np.ndarray
+    gru_weight: np.ndarray
+    gru_bias: np.ndarray
+    memory_weight: np.ndarray
+    memory_bias: np.ndarray
+    output_weight: np.ndarray
+    output_bias: np.ndarray
+
+    def __post_init__(self) -> None:
+        size = self.size
+        wanted = {
+            "input_weight": (size, FEATURES.size),
+            "input_bias": (size,),
+            "gru_weight": (3 * size, size),
+            "gru_bias": (3 * size,),
+            "memory_weight": (3 * size, size),
+            "memory_bias": (3 * size,),
+            "output_weight": (2, size),
+            "output_bias": (2,),
+        }
+        for name, shape in wanted.items():
+            array = np.array(getattr(self, name), dtype=float)
+            if array.shape != shape:
+                raise ValueError(f"{name} must have shape {shape}, got {array.shape}")
+            object.__setattr__(self, name, array)
+
+    @classmethod
+    def from_arrays(cls, arrays: Mapping[str, np.ndarray]) -> Self:
+        """The network of a weights file.
+
+        Raises:
+            ValueError: an array is missing or unknown, or has the wrong shape.
+        """
+        if set(arrays) != set(NAMES):
+            raise ValueError(f"weights of a network hold the arrays {list(NAMES)}, got {sorted(arrays)}")
+        return cls(*(arrays[name] for name in NAMES))
+
+    @property
+    def size(self) -> int:
+        """Units H."""
+        return len(np.atleast_1d(self.input_bias))
+
+    def step(self, features: Array, memory: Array) -> tuple[Array, Array]:
+        """One tick: features ``(..., F)`` and memory ``(..., H)`` → new memory and tilt ``(..., 2)``."""
+        xp, size = namespace(features, memory), self.size
+
+        def affine(weight: np.ndarray, bias: np.ndarray, x: Array) -> Array:
+            return (constant(weight, x) @ x[..., None])[..., 0] + constant(bias, x)
+
+        u = xp.tanh(affine(self.input_weight, self.input_bias, features))
+        new = affine(self.gru_weight, self.gru_bias, u)
+        old = affine(self.memory_weight, self.memory_bias, memory)
+        r = 1.0 / (1.0 + xp.exp(-(new[..., :size] + old[..., :size])))
+        z = 1.0 / (1.0 + xp.exp(-(new[..., size : 2 * size] + old[..., size : 2 * size])))
+        n = xp.tanh(new[..., 2 * size :] + r * old[..., 2 * size :])
+        memory = (1.0 - z) * n + z * memory
+        return memory, affine(self.output_weight, self.output_bias, memory)
+
+    def advance(self, features: np.ndarray, due: np.ndarray, memory: np.ndarray, tilt: np.ndarray) -> np.ndarray | None:
+        """All ticks of all sequences, compiled.
+
+        Args:
+            features: ``(T, B, F)``.
+            due: ``(T, B)``, 1 where the network moves on; elsewhere memory and tilt stay.
+            memory: ``(B, H)``, changed in place.
+            tilt: ``(B, 2)``, changed in place.
+
+        Returns:
+            The tilt of every tick, ``(T, B, 2)``; None where there is no compiler (numba), and nothing was done.
+        """
+        kernel = compiled_kernel()
+        if kernel is None:
+            return None
+        tilts = np.empty((*due.shape, 2))
+        kernel(features, due, memory, tilt, tilts, *self._columns())
+        return tilts
+
+    def _columns(self) -> tuple[np.ndarray, ...]:
+        """The arrays with the matrices by column, so that the inner loops run along memory; made once."""
+        columns = self.__dict__.get("_transposed")
+        if columns is None:
+            arrays = (
+                self.input_weight.T,
+                self.input_bias,
+                self.gru_weight.T,
+                self.gru_bias,
+                self.memory_weight.T,
+                self.memory_bias,
+                self.output_weight,
+                self.output_bias,
+            )
+            columns = self.__dict__["_transposed"] = tuple(np.ascontiguousarray(array) for array in arrays)
+        return columns
+
+
+@lru_cache(maxsize=1)
+def compiled_kernel() -> Callable[..., None] | None:
+    """:func:`advance_all` compiled, or None without numba."""
+    try:
+        from numba import njit
+    except ImportError:
+        return None
+    return njit(cache=True, nogil=True, error_model="numpy")(advance_all)
+
+
+def advance_all(features, due, memory, tilt, tilts, A, a, W, b, V, d, C, c):  # type: ignore[no-untyped-def]  # noqa: D103, ANN
+    T, B, F = features.shape
+    H = memory.shape[1]
+    u, new, old = np.empty(H), np.empty(3 * H), np.empty(3 * H)
+    for t in range(T):
+        for k in range(B):
+            if due[t, k] == 1.0:
+                h = memory[k]
+                u[:] = a
+                for j in range(F):
+                    s = features[t, k, j]
+                    for i in range(H):
+                        u[i] += A[j, i] * s
+                new[:] = b
+                old[:] = d
+                for j in range(H):
+                    s, m = np.tanh(u[j]), h[j]
+                    for i in range(3 * H):
+                        new[i] += W[j, i] * s
+                        old[i] += V[j, i] * m
+                for i in range(H):
+                    r = 1.0 / (1.0 + np.exp(-(new[i] + old[i])))
+                    z = 1.0 / (1.0 + np.exp(-(new[H + i] + old[H + i])))
+                    n = np.tanh(new[2 * H + i] + r * old[2 * H + i])
+                    h[i] = (1.0 - z) * n + z * h[i]
+                for o in range(2):
+                    total = c[o]
+                    for j in range(H):
+                        total += C[o, j] * h[j]
+                    tilt[k, o] = total
+            tilts[t, k, 0] = tilt[k, 0]
+            tilts[t, k, 1] = tilt[k, 1]

@@ -1,0 +1,137 @@
+"""How fast the environments step, beside the bare physics step that they rest on."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from functools import partial
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from .filters import REPEATS, Speed, measure
+
+if TYPE_CHECKING:
+    from ...envs.bicycle.ride.ride import Ride
+
+STEPS = 500
+PHYSICS_PER_TICK = 10
+"""1 kHz of physics under 100 Hz of observations."""
+RIDER = "poise/RiderBicycle-v0"
+RIDER_RATE, RIDER_PHYSICS = 100.0, 500.0
+"""Hz of observations and of physics"""
+
+
+def environment_speeds() -> Iterator[Speed]:
+    """Steps a CPU second of hand motion, replay and gain tuning; simulation without steps; riders on bicycles."""
+    group = "environments at 100 Hz"
+    bare = measure(bare_steps(STEPS * PHYSICS_PER_TICK), STEPS * PHYSICS_PER_TICK)
+    yield Speed(group, "bare stepSimulation of one free body, 10 a tick", bare / PHYSICS_PER_TICK, "ticks/s", 1.0)
+    for what, identity, options in (
+        ("HandMotion, dynamic", "poise/HandMotion-v0", {"gesture": "fast"}),
+        ("HandMotion, kinematic", "poise/HandMotion-v0", {"gesture": "fast", "drive": "kinematic"}),
+        ("Replay", "poise/Replay-v0", {}),
+        ("HandMotionGain, 100 ms a step", "poise/HandMotionGain-v0", {}),
+    ):
+        rate = environment_rate(identity, options)
+        yield Speed(group, what, rate, "steps/s", rate / (bare / PHYSICS_PER_TICK))
+    rate = bulk_rate()
+    yield Speed(group, "simulate_hand, whole episode at once", rate, "ticks/s", rate / (bare / PHYSICS_PER_TICK))
+    yield from rider_speeds("full")
+    yield from rider_speeds("lumped")
+
+
+def rider_speeds(fidelity: Literal["full", "lumped"]) -> Iterator[Speed]:
+    """Bare physics of rider and bicycle, the environment with all sensors, how much faster than life, and resets."""
+    group = f"rider on a bicycle, {fidelity}, at {RIDER_RATE:.0f} Hz"
+    per_tick = round(RIDER_PHYSICS / RIDER_RATE)
+    with standing_ride(fidelity) as ride:
+        start = ride.save()
+
+        def fall() -> None:
+            ride.restore(start)
+            for _ in range(STEPS):
+                ride.physics.step()
+
+        bare = measure(fall, STEPS) / per_tick
+    yield Speed(group, f"bare stepSimulation of the same bodies, {per_tick} a tick", bare, "ticks/s", 1.0)
+    options = {"fidelity": fidelity, "suite": "all", "rate": RIDER_RATE, "physics_rate": RIDER_PHYSICS}
+    rate = environment_rate(RIDER, options)
+    yield Speed(group, "RiderBicycle", rate, "steps/s", rate / bare)
+    yield Speed(group, "RiderBicycle, real-time factor", rate / RIDER_RATE, "s of riding/s")
+    yield Speed(group, "RiderBicycle, reset to another motion", reset_rate(RIDER, options), "resets/s")
+
+
+def standing_ride(fidelity: Literal["full", "lumped"]) -> Ride:
+    """A rider on a mountain bike about to ride straight on, without the environment around them."""
+    from ...envs.bicycle.course.path import Path
+    from ...envs.bicycle.frame.parameters import BICYCLES
+    from ...envs.bicycle.ride.ride import Ride
+    from ...envs.bicycle.rider.anthropometry import rider_body
+    from ...envs.bicycle.rider.posture import sit
+    from ...envs.bicycle.rider.style import RiderMotion, rider_style
+
+    posture = sit(BICYCLES["mountain-bike"], rider_body(0))
+    motion = RiderMotion(rider_style("normal"), np.random.default_rng(0))
+    return Ride(posture, motion, Path(np.zeros(2)), lambda _: 3.0, fidelity=fidelity, physics_rate=RIDER_PHYSICS)
+
+
+def reset_rate(identity: str, options: dict[str, Any]) -> float:
+    """Median resets a CPU second, each to a motion not ridden before."""
+    import gymnasium
+
+    env = gymnasium.make(identity, disable_env_checker=True, **options)
+    env.reset(seed=0)
+    try:
+        return measure(env.reset, 1)
+    finally:
+        env.close()
+
+
+def bare_steps(count: int) -> Callable[[], None]:
+    """A function that steps a physics client with one free body ``count`` times and does nothing else."""
+    import pybullet
+
+    client = pybullet.connect(pybullet.DIRECT)
+    pybullet.setPhysicsEngineParameter(fixedTimeStep=1e-3, numSolverIterations=30, physicsClientId=client)
+    pybullet.createMultiBody(0.25, -1, -1, [0.0, 0.0, 1.0], physicsClientId=client)
+    step = partial(pybullet.stepSimulation, physicsClientId=client)
+
+    def run() -> None:
+        for _ in range(count):
+            step()
+
+    return run
+
+
+def environment_rate(identity: str, options: dict[str, Any]) -> float:
+    """Median steps a CPU second; episodes are reset where they end, outside the clock."""
+    import gymnasium
+
+    env = gymnasium.make(identity, disable_env_checker=True, **options).unwrapped
+    action = env.neutral_action  # type: ignore[attr-defined]
+    rates = []
+    try:
+        for repeat in range(REPEATS + 1):
+            env.reset(seed=repeat)
+            spent, steps, over = 0.0, 0, False
+            while steps < STEPS:
+                if over:
+                    env.reset()
+                start = time.process_time()
+                over = False
+                while steps < STEPS and not over:
+                    _, _, terminated, truncated, _ = env.step(action)
+                    steps, over = steps + 1, terminated or truncated
+                spent += time.process_time() - start
+            rates.append(steps / spent)
+    finally:
+        env.close()
+    return sorted(rates[1:])[REPEATS // 2]
+
+
+def bulk_rate() -> float:
+    """Ticks a CPU second of recording a kinematic episode without an environment."""
+    from ...envs.hand.sensing import simulate_hand
+
+    return measure(lambda: simulate_hand("mixed", seed=0, duration=60.0), 6001)

@@ -1,0 +1,1 @@
+"""The accelerometer-array study."""

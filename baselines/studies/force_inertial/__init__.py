@@ -1,0 +1,1 @@
+"""The force and inertial sensor study."""

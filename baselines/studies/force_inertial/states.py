@@ -1,0 +1,60 @@
+"""True states of the force/inertial filter, for what is evaluated at the truth: torques, bounds."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from scipy.signal import lfilter
+
+from ....filters.bicycle.force_inertial.axes import UP_THE_TRUNK
+from ....filters.bicycle.force_inertial.filter import ForceInertial
+from ....filters.bicycle.force_inertial.kinematics import Angles, rates
+from ....filters.bicycle.force_inertial.readings import Readings, readings, steering
+
+
+def true_states(
+    model: ForceInertial, measurements: Mapping[str, np.ndarray], truth: Mapping[str, np.ndarray]
+) -> np.ndarray:
+    """The filter's state ``(T, 27)`` at the truth: true angles and bias, and what the filter remembers of its inputs.
+
+    Args:
+        model: tells the interval and the low-passes.
+        measurements: without missing samples.
+        truth: with ``force-inertial/trunk_angles``, ``bicycle/roll``, ``trunk_imu/gyroscope_bias``.
+    """
+    names = ("trunk_imu/gyr", "bicycle_imu/gyr", "wheel/speed")
+    now = [measurements[name] for name in names]
+    slow = []
+    for values, constant in zip(now, (model.gyroscope_filter, model.gyroscope_filter, model.speed_filter), strict=True):
+        share = model.dt / (model.dt + constant)
+        raw = np.diff(values, axis=0, prepend=values[:1]) / model.dt
+        slow.append(lfilter([share], [1.0, share - 1.0], raw, axis=0))
+    bias = truth["trunk_imu/gyroscope_bias"] @ UP_THE_TRUNK.T
+    angles = [truth["force-inertial/trunk_angles"], truth["bicycle/roll"], bias]
+    forces = [measurements["trunk_imu/acc"], measurements["bicycle_imu/acc"]]
+    return np.concatenate([*angles, *now, *slow, *forces], axis=-1)
+
+
+def read_forces(model: ForceInertial, states: np.ndarray, measurements: Mapping[str, np.ndarray]) -> Readings:
+    """What seat and hands read, with the handlebar turned as the true motion says."""
+    angles = Angles(*states[:, :4].T)
+    omega_h = states[:, 7:10] @ UP_THE_TRUNK.T - states[:, 4:7]
+    omega_b = states[:, 10:13] * [1.0, -1.0, -1.0]
+    rate = rates(angles, tuple(omega_h.T), tuple(omega_b.T), model.imu_tilt)
+    return readings(model, measurements, steering(model, states[:, 13], rate.psi), model.handlebar_load)
+
+
+def torques(
+    model: ForceInertial, measurements: Mapping[str, np.ndarray], truth: Mapping[str, np.ndarray]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Torques τ_φh and τ_θ ``(T, 2)`` that the sensors read, and that the model predicts at the true state, N·m.
+
+    What the pedals carry is on the predicted side.
+    """
+    states = true_states(model, measurements, truth)
+    residual = model.residual(states, measurements)[0][:, :2]
+    N = read_forces(model, states, measurements).moment
+    delta = states[:, 3] - states[:, 0]
+    read = np.stack([N[0], np.cos(delta) * N[1] - np.sin(delta) * N[2]], axis=-1)
+    return read, read - residual

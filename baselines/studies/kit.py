@@ -1,0 +1,266 @@
+"""What a study computes with: rides and other results that are computed once a run folder, in parallel."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+import zlib
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...envs.batch_record import record_episode
+from ...envs.data.storage import load_trajectory
+from ...envs.data.trajectory import Trajectory
+from ...envs.record import plain
+
+RIDER = "poise/RiderBicycle-v0"
+
+
+@dataclass(frozen=True)
+class Study:
+    """How much is ridden and computed for one paper, and where it is kept.
+
+    Rides are ``subjects`` x ``seeds``; what is finished stays in ``folder``, so that an interrupted study goes on.
+    """
+
+    folder: Path
+    """the run's; rides go to ``rides/``, other results to ``cache/``"""
+    quick: bool = False
+    """fewer and shorter: a study should take less than five minutes on two processors"""
+    seed: int = 0
+    """root seed"""
+    subjects: tuple[int, ...] = (0, 1, 2, 3, 4)
+    """numbers of riders"""
+    seeds: int = 3
+    """rides of each rider"""
+    duration: float = 60.0
+    """s of a ride"""
+    processes: int = 2
+    """how much is computed at a time"""
+    recordings: tuple[Path, ...] = ()
+    """recorded data (files or folders) to look at as well"""
+    progress: bool = True
+    """show bars on the standard error"""
+
+    def __post_init__(self) -> None:
+        if self.seed < 0:
+            raise ValueError(f"seed must be 0 or more, got {self.seed}")
+        if not self.subjects or any(subject < 0 for subject in self.subjects):
+            raise ValueError(f"subjects must be numbers of riders, 0 or more, got {list(self.subjects)}")
+        for name in ("seeds", "processes"):
+            if getattr(self, name) < 1:
+                raise ValueError(f"{name} must be at least 1, got {getattr(self, name)}")
+        if not 1.0 <= self.duration < float("inf"):
+            raise ValueError(f"duration must be at least 1 s and finite, got {self.duration}")
+
+    def seed_of(self, *names: str | int) -> int:
+        """A seed below 2³² that depends on the root seed and on the names only."""
+        words = [zlib.crc32(str(name).encode()) for name in names]
+        return int(np.random.SeedSequence([self.seed, *words]).generate_state(1)[0])
+
+    def rides(self, scenario: str, suite: str | Sequence[str], **settings: Any) -> list[Trajectory]:
+        """The rides of :meth:`ride_files`, which says what may be set.
+
+        Returns:
+            Trajectories named ``<scenario>-<subject>-<index>``, subjects first, with ``metadata`` ``group`` (the
+            scenario), ``subject``, ``index`` and ``geometry``. One that ended in a fall is as long as the rider was
+            up, and its ``metadata["ended"]`` is ``terminated``.
+        """
+        return [load_ride(path) for path in self.ride_files(scenario, suite, **settings)]
+
+    def ride_files(
+        self,
+        scenario: str,
+        suite: str | Sequence[str],
+        *,
+        sensors: str = "paper",
+        rate: float | None = None,
+        fidelity: str = "full",
+        duration: float | None = None,
+        style: str | None = None,
+        options: Mapping[str, Any] | None = None,
+    ) -> list[Path]:
+        """Rides of every subject and seed in ``poise/RiderBicycle-v0``, recorded once.
+
+        The motion of a ride depends on the root seed, scenario, subject and index alone: other sensors see the same
+        ride (if duration, fidelity and style are the same).
+
+        Args:
+            scenario: name, such as ``outdoor`` or ``slalom+bumps``.
+            suite: of sensors, or a list of channels.
+            sensors: ``paper``, ``ideal`` or a device.
+            rate: Hz; None for that of the suite.
+            fidelity: ``full`` or ``lumped``.
+            duration: s; None for that of the study.
+            style: of the rider; None for that of the scenario.
+            options: further arguments of the environment.
+
+        Returns:
+            Their files, for :func:`load_ride`: :meth:`map` should get them rather than long trajectories.
+        """
+        settings = {
+            "scenario": scenario,
+            "suite": suite if isinstance(suite, str) else list(suite),
+            "sensors": sensors,
+            "rate": rate,
+            "fidelity": fidelity,
+            "duration": self.duration if duration is None else float(duration),
+            "style": style,
+            **(options or {}),
+        }
+        wanted = [
+            (f"{scenario}-{subject}-{index}", self.seed_of(scenario, subject, index), {**settings, "subject": subject})
+            for subject in self.subjects
+            for index in range(self.seeds)
+        ]
+        suite_name = suite if isinstance(suite, str) else "channels"
+        return self._recorded(RIDER, f"{scenario}-{suite_name}-{sensors}", settings, wanted)
+
+    def episodes(
+        self, env_id: str, count: int, *, name: str, options: Mapping[str, Any] | None = None
+    ) -> list[Trajectory]:
+        """Episodes of any environment, recorded once.
+
+        Args:
+            env_id: such as ``poise/BicycleFixture-v0``.
+            count: how many.
+            name: of this kind of episode: seeds depend on the root seed, it and the index alone.
+            options: arguments of the environment.
+
+        Returns:
+            Trajectories named ``<name>-<index>``.
+        """
+        settings = dict(options or {})
+        wanted = [(f"{name}-{index}", self.seed_of(env_id, name, index), settings) for index in range(count)]
+        return [load_ride(path) for path in self._recorded(env_id, name, settings, wanted)]
+
+    def _recorded(
+        self, env_id: str, label: str, settings: Mapping[str, Any], wanted: list[tuple[str, int, dict[str, Any]]]
+    ) -> list[Path]:
+        folder = self.folder / "rides" / f"{slug(label)}-{digest([env_id, plain(settings)])}"
+        paths = [folder / f"{slug(name)}.h5" for name, _, _ in wanted]
+        jobs = [
+            (env_id, options, seed, path)
+            for path, (_, seed, options) in zip(paths, wanted, strict=True)
+            if not path.exists()
+        ]
+        for _ in self._parallel(record_episode, jobs, label, "ride"):
+            pass
+        return paths
+
+    def cached(self, key: str, function: Callable[..., Any], *args: Any) -> Any:
+        """``function(*args)``, computed once a run folder.
+
+        Args:
+            key: name of the result, of its own in this study.
+            function: a function of a module, gives what JSON knows (arrays become lists).
+            args: what it takes; if they change (as pickled), the result is computed again.
+
+        Raises:
+            ValueError: the key belongs to another function.
+            TypeError: the result is nothing that JSON knows.
+        """
+        return self.map(key, function, [args], bar=False)[0]
+
+    def map(self, key: str, function: Callable[..., Any], jobs: Iterable[tuple[Any, ...]], *, bar: bool = True) -> list:
+        """``[function(*job) for job in jobs]``, several at a time, each computed once a run folder.
+
+        Args:
+            key: name of the results, of its own in this study; also the bar's label.
+            function: of a module (processes must find it), gives what JSON knows (arrays become lists).
+            jobs: arguments of each call.
+            bar: show a bar.
+
+        Raises:
+            ValueError: the key belongs to another function.
+            TypeError: a result is nothing that JSON knows.
+        """
+        import joblib
+
+        name = f"{function.__module__}:{function.__qualname__}"
+        folder = self.folder / "cache" / slug(key)
+        tasks = [
+            (folder / f"{index:04d}.json", name, joblib.hash(job), function, job) for index, job in enumerate(jobs)
+        ]
+        missing = [task for task in tasks if not is_finished(*task[:3])]
+        for _ in self._parallel(compute, missing, key if bar else None, "job"):
+            pass
+        return [json.loads(task[0].read_text(encoding="utf-8"))["result"] for task in tasks]
+
+    def _parallel(
+        self, function: Callable[..., Any], jobs: Sequence[tuple[Any, ...]], label: str | None, unit: str
+    ) -> Iterator[Any]:
+        """Results as they are finished."""
+        from tqdm import tqdm
+
+        quiet = label is None or not self.progress or not jobs
+        with tqdm(total=len(jobs), desc=label, unit=unit, disable=quiet) as bar:
+            for result in in_processes(function, jobs, self.processes):
+                yield result
+                bar.update()
+
+
+def in_processes(function: Callable[..., Any], jobs: Sequence[tuple[Any, ...]], processes: int) -> Iterator[Any]:
+    """Results as they are finished; one process or a single job needs no other process."""
+    if processes == 1 or len(jobs) < 2:
+        yield from (function(*job) for job in jobs)
+        return
+    from joblib import Parallel, delayed
+
+    workers = min(processes, len(jobs))
+    yield from Parallel(n_jobs=workers, return_as="generator_unordered")(delayed(function)(*job) for job in jobs)
+
+
+def compute(path: Path, name: str, arguments: str, function: Callable[..., Any], job: tuple[Any, ...]) -> None:
+    """Call and keep the result in a file, which appears whole or not at all."""
+    text = json.dumps({"function": name, "arguments": arguments, "result": function(*job)}, default=as_list)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    part = path.with_suffix(".part")
+    part.write_text(text, encoding="utf-8")
+    part.replace(path)
+
+
+def is_finished(path: Path, name: str, arguments: str) -> bool:
+    """Whether the file holds the result of this function for these arguments.
+
+    Raises:
+        ValueError: it is the result of another function.
+    """
+    if not path.exists():
+        return False
+    kept = json.loads(path.read_text(encoding="utf-8"))
+    if kept["function"] != name:
+        raise ValueError(f"key {path.parent.name!r} belongs to {kept['function']}, not to {name}: choose another key")
+    return kept["arguments"] == arguments
+
+
+def as_list(value: Any) -> Any:
+    """What JSON does not know by itself: arrays and numbers of NumPy."""
+    if isinstance(value, np.ndarray | np.generic):
+        return value.tolist()
+    raise TypeError(f"a result must be made of numbers, texts, lists and mappings, got {type(value).__name__}")
+
+
+def load_ride(path: Path) -> Trajectory:
+    """A recorded ride, with what its name tells in the metadata."""
+    ride = load_trajectory(path)
+    kwargs = (ride.metadata.get("environment") or {}).get("kwargs") or {}
+    known = {"index": int(path.stem.rsplit("-", 1)[1]), "group": kwargs.get("scenario", path.stem.rsplit("-", 1)[0])}
+    if "subject" in kwargs:
+        known["subject"] = kwargs["subject"]
+    return ride.replace(metadata={**ride.metadata, **known})
+
+
+def slug(text: str) -> str:
+    """A text as the name of a file."""
+    return re.sub(r"[^A-Za-z0-9.+_-]+", "_", text)
+
+
+def digest(value: Any) -> str:
+    """Eight letters that tell settings apart."""
+    return hashlib.sha256(json.dumps(value, sort_keys=True).encode()).hexdigest()[:8]

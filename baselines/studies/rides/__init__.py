@@ -1,0 +1,1 @@
+"""Ride summary statistics and mechanical checks of simulated rides."""

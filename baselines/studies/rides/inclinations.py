@@ -1,0 +1,53 @@
+"""What filters of a single IMU make of a ride: errors of inclination on the bicycle and on the trunk."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+from ....envs.bicycle.environment import RiderBicycleEnv
+from ....envs.bicycle.sensors.single_imu import imu_of
+from ....envs.record import record
+from ...evaluation import evaluate
+
+ESTIMATORS = ("vqf", "mekf", "bounded-motion", "external-acceleration", "mahony", "tilt")
+RIDES = (
+    ("indoor_circle", "bicycle_imu"),
+    ("indoor_circle", "trunk_imu"),
+    ("outdoor", "bicycle_imu"),
+    ("outdoor", "trunk_imu"),
+    ("straight", "bicycle_imu"),
+    ("slalom", "bicycle_imu"),
+)
+"""Scenario and place of the IMU."""
+
+
+def inclination_rows(
+    estimators: Sequence[str] = ESTIMATORS,
+    rides: Sequence[tuple[str, str]] = RIDES,
+    *,
+    subject: int = 2,
+    seed: int = 7,
+    duration: float = 40.0,
+) -> Iterator[dict[str, Any]]:
+    """Rows: scenario and place, then the RMS error of inclination (deg) of each estimator.
+
+    Args:
+        estimators: names of the zoo.
+        rides: scenario and place of the IMU of each row; rides of one scenario are the same ride.
+        subject: number of the rider, lumped, with the papers' sensors.
+        seed: of the rides.
+        duration: s.
+    """
+    ridden: dict[str, Any] = {}
+    for scenario, place in rides:
+        if scenario not in ridden:
+            suite = ["bicycle_imu/gyr", "bicycle_imu/acc", "trunk_imu/gyr", "trunk_imu/acc"]
+            env = RiderBicycleEnv(scenario, subject, suite=suite, duration=duration, fidelity="lumped")
+            try:
+                ridden[scenario] = record(env, seed=seed)
+            finally:
+                env.close()
+        table = evaluate(list(estimators), imu_of(ridden[scenario], place))
+        errors = table[(table["metric"] == "inclination")].set_index("estimator")["value"]
+        yield {"scenario": scenario, "IMU": place} | {name: f"{errors[name]:.1f}" for name in estimators}

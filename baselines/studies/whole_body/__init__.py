@@ -1,0 +1,1 @@
+"""The whole-body study."""

@@ -1,0 +1,312 @@
+"""Rides whose kinematics are exact: what the whole-body filter assumes holds to rounding, so every error has a cause.
+
+A bicycle rolls without slip on a plane, a rigid trunk turns about its pivot, hands and feet stay where they hold, the
+pelvis is fixed to the frame. Positions and attitudes are closed functions of time; rates and accelerations are their
+central differences of fourth order (1e-7 m/s²). Sensors report values at ticks (``sampling="instant"``).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+
+from ....envs.data.trajectory import Trajectory
+from ....filters.bicycle.geometry import RiderGeometry
+from ....filters.bicycle.whole_body.linkage import SIDES, SIGNS, RiderLinkage, paper_axes, seat_moments
+from ....filters.bicycle.whole_body.start import hip_angles, limb_frame, shoulder_angles
+from ....filters.core import rotation
+
+GRAVITY = 9.80665
+STEP = 1e-3
+"""s, of the differences"""
+MOST_REACH = 0.998
+"""of the straight arm"""
+COURSES = ("indoor", "outdoor", "held")
+"""A circle of 2.5 m at 1 m/s; 0.5 to 6 m/s with turns both ways; straight on with crank and body held."""
+
+
+@dataclass(frozen=True)
+class SensorErrors:
+    """Errors of the synthetic sensors; defaults are an independent simulation's, with biases at 30 % of table I."""
+
+    gyroscope: float = math.radians(0.5)
+    """rad/s a sample, bicycle and trunk"""
+    gyroscope_bias: float = math.radians(0.3)
+    """rad/s: uniform within"""
+    accelerometer: float = 0.0098
+    """m/s² a sample"""
+    accelerometer_bias: float = 0.044
+    """m/s²: uniform within"""
+    limb: float = math.radians(0.3)
+    """rad/s a sample"""
+    limb_bias: float = math.radians(200.0 / 3600.0)
+    """rad/s: uniform within"""
+    limb_step: float = math.radians(0.1)
+    """rad/s: resolution"""
+    torque: float = 3.0
+    """N·m a sample"""
+    counts: int = 1024
+    """of the encoders a turn; 0 for continuous ones"""
+
+    def without_biases(self) -> SensorErrors:
+        """White noise alone: no biases, no steps."""
+        return SensorErrors(self.gyroscope, 0.0, self.accelerometer, 0.0, self.limb, 0.0, 0.0, self.torque, 0)
+
+
+IDEAL = SensorErrors(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0)
+
+
+@dataclass(frozen=True)
+class Waves:
+    """A smooth function of time: a constant and sines."""
+
+    mean: float
+    amplitudes: np.ndarray
+    rates: np.ndarray
+    phases: np.ndarray
+
+    @classmethod
+    def draw(cls, rng: np.random.Generator, mean: float, deviation: float, low: float, high: float) -> Waves:
+        """Three sines between two frequencies (Hz) of the given standard deviation in all."""
+        rates = 2.0 * np.pi * rng.uniform(low, high, 3)
+        return cls(mean, np.full(3, deviation * math.sqrt(2.0 / 3.0)), rates, rng.uniform(0.0, 2.0 * np.pi, 3))
+
+    def __call__(self, t: np.ndarray) -> np.ndarray:
+        """Values at times."""
+        return self.mean + np.sum(self.amplitudes * np.sin(t[..., None] * self.rates + self.phases), axis=-1)
+
+    def integral(self, t: np.ndarray) -> np.ndarray:
+        """Of the values from time 0."""
+        parts = self.amplitudes / self.rates * (np.cos(self.phases) - np.cos(t[..., None] * self.rates + self.phases))
+        return self.mean * t + np.sum(parts, axis=-1)
+
+
+@dataclass(frozen=True)
+class ExactRide:
+    """One motion.
+
+    Attributes:
+        geometry: rider and bicycle.
+        course: see :data:`COURSES`.
+        swivel: rad, standard deviation of how far elbows and knees stand off their plane, and of their slow wander.
+        seed: of motion (and, with another stream, of sensors).
+        bumps: (start, end) in s of shocks of 40 m/s² on the bicycle, or None.
+    """
+
+    geometry: RiderGeometry
+    course: Literal["indoor", "outdoor", "held"] = "indoor"
+    swivel: float = math.radians(3.0)
+    seed: int = 0
+    bumps: tuple[float, float] | None = None
+    functions: dict[str, Waves] = field(init=False, repr=False, compare=False)
+    linkage: RiderLinkage = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        if self.course not in COURSES:
+            raise ValueError(f"course must be one of {COURSES}, got {self.course!r}")
+        rng = np.random.default_rng(np.random.SeedSequence(self.seed).spawn(2)[0])
+        deg, still = math.pi / 180.0, 1.0 - (self.course == "held")
+        speed, yaw = {"indoor": (1.0, 0.4), "outdoor": (3.2, 0.0), "held": (2.0, 0.0)}[self.course]
+        lively = {"indoor": 0.1, "outdoor": 1.5, "held": 0.0}[self.course]
+        draw = Waves.draw
+        flexion = -self.geometry.trunk_flexion
+        functions = {
+            "speed": draw(rng, speed, 0.5 * lively, 0.02, 0.06),
+            "yaw": draw(rng, yaw, {"indoor": 0.03, "outdoor": 0.18, "held": 0.0}[self.course], 0.04, 0.15),
+            "sway": draw(rng, 0.0, 0.5 * deg * still, 0.2, 0.8),
+            "flexion": draw(rng, flexion, 2.5 * deg * still, 0.05, 0.4),
+            "lean": draw(rng, 0.0, 3.0 * deg * still, 0.05, 0.5),
+            # shoulders follow the handlebar, or the outer arm would not reach
+            "twist": draw(rng, {"indoor": 0.12}.get(self.course, 0.0), 3.0 * deg * still, 0.05, 0.5),
+            "steer": draw(rng, {"indoor": 0.26}.get(self.course, 0.0), 0.08 * still, 0.1, 0.6),
+            "cadence": draw(rng, 5.0 * still, 0.6 * still, 0.02, 0.1),
+        }
+        for side in SIDES:
+            for limb in ("arm", "leg"):
+                mean = self.swivel * rng.standard_normal()
+                functions[f"{limb}_{side}"] = draw(rng, mean, self.swivel * still, 0.01, 0.05)
+        object.__setattr__(self, "functions", functions)
+        object.__setattr__(self, "linkage", RiderLinkage.for_rider(self.geometry))
+
+    def roll(self, t: np.ndarray) -> np.ndarray:
+        """φ: leaned into the turn, and swaying."""
+        f = self.functions
+        return -np.arctan(f["speed"](t) * f["yaw"](t) / GRAVITY) + f["sway"](t)
+
+    def frame(self, t: np.ndarray) -> np.ndarray:
+        """Matrix ``(..., 3, 3)`` of the bicycle, paper's axes: R_y(ϑ) R_x(φ)."""
+        yaw = self.functions["yaw"].integral(t)
+        return rotation.elementary_matrix(1, yaw) @ rotation.elementary_matrix(0, self.roll(t))
+
+    def trunk(self, t: np.ndarray) -> np.ndarray:
+        """Θ ``(..., 3)``."""
+        return np.stack([self.functions[name](t) for name in ("flexion", "lean", "twist")], axis=-1)
+
+    def pose(self, t: np.ndarray) -> dict[str, np.ndarray]:
+        """Angles under the environment's names."""
+        f, link = self.functions, self.linkage
+        steer, crank = f["steer"](t)[..., None], f["cadence"].integral(t)[..., None] + 0.7
+        theta = self.trunk(t)
+        R = rotation.euler_matrix("zxy", theta)
+        x = np.zeros((*t.shape, 22))
+        x[..., 0], x[..., 2:5], x[..., 20:21], x[..., 21:22] = self.roll(t), theta, steer, crank
+        for side, arm, leg in zip(SIDES, (8, 14), (11, 17), strict=True):
+            root = link.point(link.trunk_pivot, "left", steer) + R @ link.point(link.shoulder, side, steer)
+            reach = rotation.norm(link.hand(side, steer) - root).max() / (link.upper_arm + link.forearm)
+            if reach > MOST_REACH:
+                raise ValueError(f"the {side} hand is out of reach in this motion: {reach:.3f} of the straight arm")
+            outward = np.array([0.0, 0.0, -SIGNS[side]])
+            frame, _ = limb_frame(
+                root,
+                link.hand(side, steer),
+                link.upper_arm,
+                link.forearm,
+                outward,
+                "arm",
+                f[f"arm_{side}"](t),
+            )
+            x[..., arm : arm + 3] = shoulder_angles(R, frame)
+            hip, out = link.point(link.hip, side, steer) + 0.0 * steer, np.array([1.0, 0.0, 0.0])
+            frame, _ = limb_frame(
+                hip, link.pedal(side, crank), link.thigh, link.knee_to_pedal, out, "leg", f[f"leg_{side}"](t)
+            )
+            x[..., leg : leg + 3] = hip_angles(frame)
+        return link.pose(x) | {
+            "bicycle/steer": steer,
+            "bicycle/crank": crank,
+            "bicycle/speed": f["speed"](t)[..., None],
+        }
+
+    def rates(self, t: np.ndarray) -> dict[str, np.ndarray]:
+        """Absolute rate ``(..., 3)`` of every body in its axes (the paper's)."""
+
+        def matrices(at: np.ndarray) -> dict[str, np.ndarray]:
+            frame, pose = self.frame(at), self.pose(at)
+            trunk = frame @ rotation.euler_matrix("zxy", pose["trunk/angles"])
+            found = {"bicycle_imu": frame, "trunk_imu": trunk}
+            for side in SIDES:
+                found[f"upper_arm_{side}"] = trunk @ rotation.euler_matrix("yxy", pose[f"shoulder_{side}/angles"])
+                found[f"thigh_{side}"] = frame @ rotation.euler_matrix("zxy", pose[f"hip_{side}/angles"])
+            return found
+
+        at = [matrices(t + k * STEP) for k in (-2, -1, 0, 1, 2)]
+        rates = {}
+        for name in at[0]:
+            slope = (at[0][name] - 8.0 * at[1][name] + 8.0 * at[3][name] - at[4][name]) / (12.0 * STEP)
+            W = at[2][name].mT @ slope
+            rates[name] = 0.5 * np.stack(
+                [W[..., 2, 1] - W[..., 1, 2], W[..., 0, 2] - W[..., 2, 0], W[..., 1, 0] - W[..., 0, 1]], axis=-1
+            )
+        return rates
+
+    def forces(self, t: np.ndarray) -> dict[str, np.ndarray]:
+        """Specific force in bicycle axes (the paper's) at the bicycle's IMU, the pivot and the trunk's IMU."""
+        g, link = self.geometry, self.linkage
+        places = {
+            "bicycle_imu": lambda at: paper_axes(np.array(g.bicycle_imu)) + np.zeros((*at.shape, 3)),
+            "pivot": lambda at: paper_axes(np.array(g.trunk_pivot)) + np.zeros((*at.shape, 3)),
+            "trunk_imu": lambda at: (
+                link.point(g.trunk_pivot, "left", at)
+                + rotation.euler_matrix("zxy", self.trunk(at)) @ paper_axes(np.array(g.trunk_imu))
+            ),
+        }
+        f, frame = self.functions, self.frame(t)
+        yaw, speed, rate = f["yaw"].integral(t), f["speed"](t), f["yaw"](t)
+        thrust = (f["speed"](t + STEP) - f["speed"](t - STEP)) / (2.0 * STEP)
+        ahead = np.stack([np.cos(yaw), 0.0 * yaw, -np.sin(yaw)], axis=-1)
+        left = np.stack([-np.sin(yaw), 0.0 * yaw, -np.cos(yaw)], axis=-1)
+        contact = thrust[..., None] * ahead + (speed * rate)[..., None] * left
+        weights = (-1.0, 16.0, -30.0, 16.0, -1.0)
+        forces = {}
+        for name, place in places.items():
+            acceleration = contact + np.array([0.0, GRAVITY, 0.0])
+            for k, weight in zip((-2, -1, 0, 1, 2), weights, strict=True):
+                at = t + k * STEP
+                acceleration = (
+                    acceleration + weight / (12.0 * STEP**2) * (self.frame(at) @ place(at)[..., None])[..., 0]
+                )
+            forces[name] = (frame.mT @ acceleration[..., None])[..., 0]
+        return forces
+
+    def _on_trunk(self, t: np.ndarray, forces: dict[str, np.ndarray]) -> np.ndarray:
+        """Specific force at the trunk's IMU in trunk axes ``(..., 3)``."""
+        R = rotation.euler_matrix("zxy", self.trunk(t))
+        return (R.mT @ forces["trunk_imu"][..., None])[..., 0]
+
+    def record(
+        self,
+        duration: float = 60.0,
+        dt: float = 0.01,
+        errors: SensorErrors | None = None,
+        sampling: Literal["instant", "interval"] = "instant",
+    ) -> Trajectory:
+        """The ride with its sensors, in the environment's channels and axes.
+
+        Args:
+            duration: s.
+            dt: sampling interval, s.
+            errors: of the sensors; None for the defaults of :class:`SensorErrors`.
+            sampling: inertial sensors give the value at the tick, or the mean over the interval before it (Simpson's
+                rule, as the environment's sensors do).
+        """
+        errors = SensorErrors() if errors is None else errors
+        rng = np.random.default_rng(np.random.SeedSequence(self.seed).spawn(2)[1])
+        t = dt * np.arange(round(duration / dt) + 1)
+        pose, rates, forces = self.pose(t), self.rates(t), self.forces(t)
+        own = self._on_trunk(t, forces)
+        pivot = forces["pivot"]
+        if sampling == "interval":
+            parts = [(rates, forces, own)]
+            for at in (t - 0.5 * dt, t - dt):
+                there = self.forces(at)
+                parts.append((self.rates(at), there, self._on_trunk(at, there)))
+            first, middle, last = parts
+            rates = {name: _simpson(*(part[0][name] for part in parts)) for name in rates}
+            forces = {name: _simpson(*(part[1][name] for part in parts)) for name in forces}
+            own = _simpson(first[2], middle[2], last[2])
+        R = rotation.euler_matrix("zxy", pose["trunk/angles"])
+        if self.bumps is not None:
+            shock = 40.0 * rng.uniform(-1.0, 1.0, (t.size, 3)) * ((t >= self.bumps[0]) & (t < self.bumps[1]))[:, None]
+            shock *= (rng.random(t.size) < 0.3)[:, None]
+            forces["bicycle_imu"] = np.clip(forces["bicycle_imu"] + shock, -2.0 * GRAVITY, 2.0 * GRAVITY)
+            own = own + 0.6 * (R.mT @ shock[..., None])[..., 0]
+        turning, sitting = (paper_axes(np.array(part)) for part in seat_moments(self.geometry))
+        torque = rotation.cross(sitting + R @ turning, pivot)[..., 0] + errors.torque * rng.standard_normal(t.size)
+        tilt = rotation.elementary_matrix(2, np.array(self.geometry.bicycle_imu_tilt))
+
+        def read(values: np.ndarray, noise: float, bias: float, step: float = 0.0) -> np.ndarray:
+            values = (
+                values + noise * rng.standard_normal(values.shape) + bias * rng.uniform(-1.0, 1.0, values.shape[-1])
+            )
+            values = step * np.round(values / step) if step else values
+            return np.stack([values[..., 0], -values[..., 2], values[..., 1]], axis=-1)
+
+        measurements = {}
+        for name, rate in rates.items():
+            limb = name not in ("bicycle_imu", "trunk_imu")
+            rate = rate @ tilt if name == "bicycle_imu" else rate
+            sizes = (
+                (errors.limb, errors.limb_bias, errors.limb_step) if limb else (errors.gyroscope, errors.gyroscope_bias)
+            )
+            measurements[f"{name}/gyr"] = read(rate, *sizes)
+        measurements["bicycle_imu/acc"] = read(
+            forces["bicycle_imu"] @ tilt, errors.accelerometer, errors.accelerometer_bias
+        )
+        measurements["trunk_imu/acc"] = read(own, errors.accelerometer, errors.accelerometer_bias)
+        half = torque / self.geometry.cells_wide
+        measurements["seat/load_cells"] = np.stack([0.0 * half + 100.0, 150.0 + half, 150.0 - half], axis=-1)
+        step = 2.0 * math.pi / errors.counts if errors.counts else 0.0
+        for name in ("steer", "crank"):
+            angle = rotation.wrap(pose[f"bicycle/{name}"])
+            measurements[f"{name}/angle"] = step * np.round(angle / step) if step else angle
+        measurements["wheel/speed"] = pose["bicycle/speed"]
+        metadata: dict[str, Any] = {"name": f"exact-{self.course}-{self.seed}", "geometry": self.geometry.describe()}
+        return Trajectory(t, measurements, pose, np.ones(t.size, dtype=bool), metadata)
+
+
+def _simpson(first: np.ndarray, middle: np.ndarray, last: np.ndarray) -> np.ndarray:
+    """Mean over an interval of what is given at its ends and in its middle."""
+    return (first + 4.0 * middle + last) / 6.0

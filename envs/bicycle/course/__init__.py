@@ -1,0 +1,1 @@
+"""Where a ride goes: paths, terrain, scenarios and the drawn scene."""

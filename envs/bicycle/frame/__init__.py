@@ -1,0 +1,1 @@
+"""The bicycle: frame, wheels, tyres, drivetrain and the linear Whipple–Carvallo model."""

@@ -1,0 +1,376 @@
+"""A bicycle as one multibody in PyBullet: rear frame, front assembly, two wheels, crank; tyres and chain around it.
+
+The base is the rear frame and its body frame is the bicycle frame: origin on the ground under the rear hub when
+upright, x forward, y left, z up. A rider hangs further links on the same tree.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from ....filters.core import rotation
+from ...physics.multibody import CentreMotion, Multibody, newton_euler
+from ...physics.urdf import Tree
+from ...physics.world import BASE, Physics
+from ...sensors.ideal import BodyState, straight_line
+from ..course.terrain import FlatGround, Ground
+from .drivetrain import Drivetrain
+from .parameters import BicycleParameters, RigidPart
+from .shapes import bicycle_shapes
+from .tyre import AIRBORNE, Tyre, TyreForce, TyreParameters
+
+AIR_DENSITY = 1.2
+"""kg/m³"""
+BRAKED_SHARE = 0.7
+"""1: part of the friction limit that a brake uses at most"""
+BRAKE_FADE = 0.1
+"""m/s at which a brake has lost a quarter of its force"""
+WHEELS = ("rear_wheel", "front_wheel")
+BICYCLE_LINKS = ("rear_frame", "rear_wheel", "front_assembly", "front_wheel", "crank")
+
+
+class BicycleState(NamedTuple):
+    """The bicycle in numbers; angles in rad, Z-Y-X order, roll to the right and steering to the left positive."""
+
+    time: float
+    x: float
+    """m: origin of the bicycle frame (near the rear contact), world"""
+    y: float
+    z: float
+    roll: float
+    pitch: float
+    """nose down positive"""
+    yaw: float
+    """heading, counter-clockwise from east"""
+    roll_rate: float
+    pitch_rate: float
+    yaw_rate: float
+    speed: float
+    """m/s of the frame's origin along the heading"""
+    steer: float
+    steer_rate: float
+    crank: float
+    """0 with the left pedal in front, growing when pedalling forward (0 without a crank)"""
+    crank_rate: float
+    wheel_rate: float
+    """rad/s of the rear wheel"""
+
+
+@dataclass(frozen=True)
+class BicycleMemory:
+    """What the bicycle remembers besides PyBullet's state."""
+
+    bristles: tuple[tuple[float, float], ...]
+    drivetrain: tuple[float, float, float] | None
+    tyre_forces: tuple[TyreForce, ...]
+
+
+def bicycle_tree(bicycle: BicycleParameters) -> Tree:
+    """Links and joints of a bicycle; the joints are called steer = ``front_assembly``, and as the wheels and crank."""
+    tree, shapes = Tree(bicycle.name), bicycle_shapes(bicycle)
+    frame, front = bicycle.rear_frame, bicycle.front_assembly
+    steer = bicycle.steer_origin
+    tree.link("rear_frame", frame.mass, frame.tensor, frame.centre, shapes["rear_frame"])
+    tree.link("front_assembly", front.mass, front.tensor, np.array(front.centre) - steer, shapes["front_assembly"])
+    tree.joint("rear_frame", "front_assembly", steer, bicycle.steer_axis)
+    for name, wheel, x, parent, origin in (
+        ("rear_wheel", bicycle.rear_wheel, 0.0, "rear_frame", np.zeros(3)),
+        ("front_wheel", bicycle.front_wheel, bicycle.wheelbase, "front_assembly", steer),
+    ):
+        across = wheel.inertia_diameter
+        tree.link(name, wheel.mass, (across, wheel.inertia_axle, across), (0.0, 0.0, 0.0), shapes[name])
+        tree.joint(parent, name, np.array([x, 0.0, wheel.radius]) - origin, (0.0, 1.0, 0.0))
+    if bicycle.drive is not None:
+        drive = bicycle.drive
+        tree.link("crank", drive.mass, drive.inertia, (0.0, 0.0, 0.0), shapes["crank"])
+        tree.joint("rear_frame", "crank", drive.axle, (0.0, 1.0, 0.0))
+    return tree
+
+
+class Bicycle:
+    """A bicycle in a world.
+
+    Args:
+        physics: the world.
+        parameters: the bicycle.
+        ground: what it rolls on; None for a level plane at height 0.
+        tyre: its tyres.
+        load: what sits on it when starting, for the tyres' static deflection: mass and centre of the rider.
+        extend: hangs further links (a rider) on the tree before it is loaded.
+    """
+
+    def __init__(
+        self,
+        physics: Physics,
+        parameters: BicycleParameters,
+        ground: Ground | None = None,
+        tyre: TyreParameters | None = None,
+        *,
+        load: RigidPart | None = None,
+        extend: Callable[[Tree], None] | None = None,
+    ) -> None:
+        self.physics, self.parameters = physics, parameters
+        tree = bicycle_tree(parameters)
+        if extend is not None:
+            extend(tree)
+        self.body = Multibody(physics, physics.load_urdf(tree.text()))
+        wheels = (parameters.rear_wheel, parameters.front_wheel)
+        self.tyres = [
+            Tyre(
+                wheel.radius,
+                wheel.crown_radius,
+                TyreParameters() if tyre is None else tyre,
+                FlatGround(),
+                physics.time_step,
+                parameters.rolling_resistance,
+            )
+            for wheel in wheels
+        ]
+        self.lay(ground)
+        self.tyre_forces: list[TyreForce] = [AIRBORNE, AIRBORNE]
+        self.drivetrain = None if parameters.drive is None else Drivetrain(parameters.drive)
+        self.links = self.body.links
+        self._pose = self._pose_lines()
+        self._wheels = self.body.index(WHEELS)
+        self._driven = [self.links[name] for name in ("rear_wheel", "crank") if name in self.links]
+        self._joints = [self.links["front_assembly"], *self._driven]
+        self._turned = [self.links["front_assembly"], *self._wheels, *self._driven[1:]]
+        self.own_links = [self.links[name] for name in BICYCLE_LINKS if name in self.links]
+        own = [name for name in BICYCLE_LINKS if name in self.links]
+        self.own_masses = np.array([self.body.masses[name] for name in own])
+        self.own_moments = np.array([self.body.moments[name] for name in own])
+        whole = parameters.with_load(*(() if load is None else (load,)))
+        centres = np.array([part.centre for part in whole.parts])
+        masses = np.array([part.mass for part in whole.parts])
+        self._total_mass = float(masses.sum())
+        self._centre = masses @ centres / self._total_mass
+
+    @property
+    def ratio(self) -> float:
+        """Turns of the rear wheel a turn of the crank (0 without a crank)."""
+        return 0.0 if self.drivetrain is None else self.drivetrain.ratio
+
+    def lay(self, ground: Ground | None) -> None:
+        """Put another ground (None: a level plane at height 0) under the wheels; :meth:`start` anew afterwards."""
+        self.ground: Ground = FlatGround() if ground is None else ground
+        for tyre in self.tyres:
+            tyre.ground = self.ground
+
+    def static_loads(self) -> tuple[float, float]:
+        """Weight (N) on the rear and the front tyre, at rest on level ground with the tyres' deflection."""
+        weight, wheelbase = self._total_mass * self.physics.gravity, self.parameters.wheelbase
+        front, pitch = 0.0, 0.0
+        for _ in range(5):
+            # a softer end sinks deeper and takes more of the load
+            front = weight * (self._centre[0] + pitch * self._centre[2]) / wheelbase
+            sinking = [
+                load / tyre.parameters.stiffness for load, tyre in zip((weight - front, front), self.tyres, strict=True)
+            ]
+            pitch = (sinking[1] - sinking[0]) / wheelbase
+        return float(weight - front), float(front)
+
+    def start(
+        self,
+        speed: float = 0.0,
+        position: tuple[float, float] = (0.0, 0.0),
+        heading: float = 0.0,
+        roll: float = 0.0,
+        roll_rate: float = 0.0,
+        steer: float = 0.0,
+        steer_rate: float = 0.0,
+        crank: float = 0.0,
+    ) -> None:
+        """Place the bicycle at static tyre deflection, rolling without slip, the chain just taut.
+
+        Args:
+            speed: m/s.
+            position: of the rear contact, m, world.
+            heading: rad, counter-clockwise from east.
+            roll: rad, right positive; the bicycle rolls about the line through its contacts.
+            roll_rate: rad/s.
+            steer: rad, left positive. A large steering angle would also pitch the bicycle; that is left to settle.
+            steer_rate: rad/s.
+            crank: rad.
+        """
+        bike = self.parameters
+        c, s = math.cos(heading), math.sin(heading)
+        ground, heights, rates = [], [], []
+        wheels = (bike.rear_wheel, bike.front_wheel)
+        for x, load, tyre, wheel in zip((0.0, bike.wheelbase), self.static_loads(), self.tyres, wheels, strict=True):
+            sinking = load / tyre.parameters.stiffness
+            ground.append(self.ground.height_and_slope(position[0] + c * x, position[1] + s * x)[0])
+            heights.append(ground[-1] - sinking)
+            rates.append(speed / wheel.radius)
+            tyre.bristles = (0.0, 0.0)
+        climb = math.atan2(ground[1] - ground[0], bike.wheelbase)
+        pitch = -math.atan2(heights[1] - heights[0], bike.wheelbase)
+        orientation = rotation.from_euler_zyx(np.array(heading), np.array(pitch), np.array(roll))
+        # the frame sits pitched on its tyres, but moves along the ground
+        forward = np.array([c * math.cos(climb), s * math.cos(climb), math.sin(climb)])
+        origin = np.array([*position, heights[0]])
+        self.physics.set_state(
+            self.body.body, BodyState(self.physics.time, origin, orientation, speed * forward, roll_rate * forward)
+        )
+        for link in range(self.physics.link_count(self.body.body)):
+            self.body.set_joint(link, 0.0)
+        self.body.set_joint(self.links["front_assembly"], steer, steer_rate)
+        for name, rate in zip(WHEELS, rates, strict=True):
+            self.body.set_joint(self.links[name], 0.0, rate)
+        if self.drivetrain is not None:
+            ratio = self.drivetrain.gear_for(rates[0])
+            self.body.set_joint(self.links["crank"], crank, rates[0] / ratio)
+            self.drivetrain.engage(crank, 0.0, ratio)
+        self.tyre_forces = [AIRBORNE, AIRBORNE]
+
+    def act(
+        self,
+        steer_torque: float = 0.0,
+        wheel_torque: float = 0.0,
+        crank_torque: float = 0.0,
+        joints: Sequence[int] = (),
+        torques: Sequence[float] = (),
+        brake: float = 0.0,
+    ) -> None:
+        """Apply tyre forces, chain, brakes, air drag and joint torques for the next step.
+
+        Args:
+            steer_torque: N·m between rear frame and front assembly, left positive.
+            wheel_torque: N·m between rear frame and rear wheel, forward positive, besides the chain's.
+            crank_torque: N·m between rear frame and crank, forward positive, besides the chain's.
+            joints: further joints to drive (a rider's), by the links below them.
+            torques: N·m on these.
+            brake: wanted force (N, not negative) of both brakes at the ground, see :meth:`brake_torques`.
+        """
+        body = self.body
+        for number, (link, state) in enumerate(zip(self._wheels, body.link_tuples(self._wheels), strict=True)):
+            centre, (w, x, y, z), velocity, turning = state
+            # second column of the rotation matrix: the axle
+            axle = (2.0 * (x * y - w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z + w * x))
+            result = self.tyres[number].force(centre, axle, velocity, turning)
+            self.tyre_forces[number] = result
+            if result.load > 0.0:
+                body.push(link, result.force, result.point)
+        if self.parameters.drag_area:
+            position, _, velocity, _ = self.physics.base_tuples(body.body)
+            speed = math.sqrt(velocity[0] ** 2 + velocity[1] ** 2 + velocity[2] ** 2)
+            factor = -0.5 * AIR_DENSITY * self.parameters.drag_area * speed
+            body.push(BASE, [factor * part for part in velocity], position)
+        rear, front = self.brake_torques(brake) if brake > 0.0 else (0.0, 0.0)
+        own = [steer_torque, wheel_torque + rear, front]
+        if self.drivetrain is not None:
+            (wheel, wheel_rate), (crank, crank_rate) = body.joint_tuples(self._driven)
+            pull = self.drivetrain.torque(crank, crank_rate, wheel, wheel_rate)
+            own[1] += pull
+            own.append(crank_torque - self.ratio * pull)
+        body.drive_joints([*self._turned, *joints], [*own, *torques])
+
+    def brake_torques(self, force: float) -> tuple[float, float]:
+        """Torques (N·m, not positive) of the brakes on rear and front wheel that together brake with a force (N).
+
+        They share it as the wheels share the weight while slowing down. Each lets go before its wheel would skid, and
+        fades below walking pace: brakes hold wheels, they do not turn them back.
+        """
+        wheels = (self.parameters.rear_wheel, self.parameters.front_wheel)
+        height, wheelbase = self._centre[2], self.parameters.wheelbase
+        ahead = (self._centre[0] + force / (self._total_mass * self.physics.gravity) * height) / wheelbase
+        found = []
+        for part, wheel, tyre, state, (_, rate) in zip(
+            (1.0 - ahead, ahead),
+            wheels,
+            self.tyres,
+            self.tyre_forces,
+            self.body.joint_tuples(self._wheels),
+            strict=True,
+        ):
+            held = min(max(0.0, part) * force, BRAKED_SHARE * tyre.parameters.friction * state.load)
+            found.append(-held * wheel.radius * max(0.0, math.tanh(rate * wheel.radius / BRAKE_FADE)))
+        return found[0], found[1]
+
+    def shift(self) -> None:
+        """Let the rider change the gear where the cadence asks for it."""
+        if self.drivetrain is not None:
+            (wheel, wheel_rate), (crank, _) = self.body.joint_tuples(self._driven)
+            self.drivetrain.shift(self.physics.time, crank, wheel, wheel_rate)
+
+    def state(self) -> BicycleState:
+        """Where the bicycle is and how it moves, now."""
+        motion, angles = self._pose(*self.physics.base_tuples(self.body.body))
+        x, y, z, speed, roll_rate, pitch_rate, yaw_rate = motion
+        roll, pitch, yaw = angles
+        joints = self.body.joint_tuples(self._joints)
+        (steer, steer_rate), (_, wheel_rate) = joints[0], joints[1]
+        crank, crank_rate = joints[2] if len(joints) > 2 else (0.0, 0.0)
+        return BicycleState(
+            self.physics.time,
+            x,
+            y,
+            z,
+            roll,
+            pitch,
+            yaw,
+            roll_rate,
+            pitch_rate,
+            yaw_rate,
+            speed,
+            steer,
+            steer_rate,
+            crank,
+            crank_rate,
+            wheel_rate,
+        )
+
+    def _pose_lines(self) -> Callable[..., list[list[float]]]:
+        """Function of the base's centre-of-mass motion: place, speed and rates ``(7,)``; roll, pitch, yaw ``(3,)``."""
+        centre, axes = self.physics.inertial_frame(self.body.body)
+
+        def compute(position, orientation, velocity, turning):  # type: ignore[no-untyped-def]
+            xp = rotation.namespace(position)
+            frame = rotation.multiply(orientation, rotation.conjugate(axes))
+            lever = rotation.rotate(frame, centre)
+            origin, velocity = position - lever, velocity - rotation.cross(turning, lever)
+            yaw, pitch, roll = rotation.to_euler_zyx(frame)
+            rate = rotation.rotate_back(frame, turning)
+            p, q, r = rate[..., 0], rate[..., 1], rate[..., 2]
+            turn = q * xp.sin(roll) + r * xp.cos(roll)
+            speed = velocity[..., 0] * xp.cos(yaw) + velocity[..., 1] * xp.sin(yaw)
+            roll_rate = p + xp.sin(pitch) / xp.cos(pitch) * turn
+            pitch_rate = q * xp.cos(roll) - r * xp.sin(roll)
+            rates = [speed, roll_rate, pitch_rate, turn / xp.cos(pitch)]
+            return xp.stack([origin[..., 0], origin[..., 1], origin[..., 2], *rates], axis=-1), xp.stack(
+                [roll, pitch, yaw], axis=-1
+            )
+
+        return straight_line(compute, position=3, orientation=4, velocity=3, turning=3)
+
+    def ground_wrench(self, point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Force (N) of the ground on both tyres in the last step and its moment (N·m) about ``point``, world axes."""
+        forces = np.array([tyre.force for tyre in self.tyre_forces])
+        arms = np.array([tyre.point for tyre in self.tyre_forces]) - point
+        return forces.sum(axis=0), rotation.cross(arms, forces).sum(axis=0)
+
+    def own_motion(self) -> CentreMotion:
+        """Motion of the bicycle's own links (not the rider's)."""
+        return self.body.centre_motion(self.own_links)
+
+    def own_wrench(self, before: CentreMotion, after: CentreMotion, point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Wrench of everything outside on the bicycle in the last step; see :func:`newton_euler`."""
+        dt, gravity = self.physics.time_step, self.physics.gravity
+        return newton_euler(before, after, self.own_masses, self.own_moments, point, dt, gravity)
+
+    def save(self) -> BicycleMemory:
+        """Tyre and chain memory; the rest is in :meth:`Physics.save`."""
+        drivetrain = None if self.drivetrain is None else self.drivetrain.save()
+        return BicycleMemory(tuple(tyre.bristles for tyre in self.tyres), drivetrain, tuple(self.tyre_forces))
+
+    def restore(self, memory: BicycleMemory) -> None:
+        """Undo :meth:`save`."""
+        for tyre, bristles in zip(self.tyres, memory.bristles, strict=True):
+            tyre.bristles = bristles
+        if self.drivetrain is not None and memory.drivetrain is not None:
+            self.drivetrain.restore(memory.drivetrain)
+        self.tyre_forces = list(memory.tyre_forces)

@@ -1,0 +1,194 @@
+"""A ride as arrays: each tick is read from PyBullet as plain tuples, everything else is computed for many at once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ....filters.core import rotation
+from ...physics.multibody import CentreMotion, LinkState, newton_euler
+from ...sensors.ideal import BodyState
+from ..rider.limbs import LimbPosture, reach_to, three_turns
+from ..rider.posture import KNEE_OUT, LIMBS, SIDES, SIGNS
+from .contact_forces import Contact
+from .ride import Ride
+
+
+@dataclass(frozen=True)
+class RideLog:
+    """n consecutive ticks of a ride; time axis first. World axes unless said otherwise."""
+
+    time: np.ndarray
+    """(n,) s of the physics"""
+    frames: dict[str, BodyState]
+    """link name → motion of its body frame; with accelerations over the last physics step"""
+    contact: Contact
+    """forces of the rider on the bicycle"""
+    limbs: dict[str, LimbPosture]
+    """limb name → posture in its root's frame (trunk, or bicycle for the legs)"""
+    trunk_angles: np.ndarray
+    """(n, 3) rad about y, x, z"""
+    steer: np.ndarray
+    """(n,) rad"""
+    crank: np.ndarray
+    """(n,) rad, not wrapped"""
+    wheel: np.ndarray
+    """(n,) rad, rear wheel, not wrapped"""
+    rates: np.ndarray
+    """(n, 3) rad/s of steer, crank and rear wheel"""
+    torques: np.ndarray
+    """(n, joints) N·m of the rider's muscles"""
+    fallen: np.ndarray
+    """(n,) bool"""
+
+
+class RideRecorder:
+    """Advances a ride tick by tick.
+
+    Args:
+        ride: the ride.
+        steps: physics steps a tick.
+    """
+
+    def __init__(self, ride: Ride, steps: int) -> None:
+        self.ride, self.steps = ride, steps
+        rider, links = ride.rider, ride.bicycle.links
+        self._links = [links["front_assembly"], links["crank"], *rider.mass_links]
+        self._names = ["front_assembly", "crank", "pelvis", "trunk"]
+        if rider.full:
+            kinds = {"arm": ("upper_arm", "forearm"), "leg": ("thigh", "shank")}
+            self._names += [f"{part}_{limb[4:]}" for limb in LIMBS for part in kinds[limb[:3]]]
+        self._joints = [links["front_assembly"], links["crank"], links["rear_wheel"], *rider.joints, rider.seat]
+
+    def _look(self) -> list[LinkState]:
+        body = self.ride.bicycle.body
+        return [self.ride.physics.base_tuples(body.body), *body.link_tuples(self._links)]
+
+    def record(self, ticks: int) -> RideLog:
+        """Ride on for some ticks; stops early after the tick in which the rider fell."""
+        ride, rider = self.ride, self.ride.rider
+        before, after, forces, joints, torques, times, fallen, swivels = [], [], [], [], [], [], [], []
+        for _ in range(ticks):
+            for _ in range(self.steps - 1):
+                ride.step()
+            before.append(self._look())
+            ride.step()
+            after.append(self._look())
+            forces.append(rider.raw_forces())
+            joints.append(ride.bicycle.body.joint_tuples(self._joints))
+            torques.append(rider.torques)
+            times.append(ride.physics.time)
+            swivels.append(rider.swivel)
+            fallen.append(ride.fallen)
+            if fallen[-1]:
+                break
+        return self._compute(
+            self._motion(before),
+            self._motion(after),
+            np.array(forces),
+            np.array(joints),
+            np.array(torques),
+            np.array(times),
+            np.array(fallen),
+            np.array(swivels),
+        )
+
+    @staticmethod
+    def _motion(rows: list[list[LinkState]]) -> CentreMotion:
+        fields = (np.array([[state[field] for state in row] for row in rows]) for field in range(4))
+        return CentreMotion(*fields)
+
+    def _frame(self, index: int, name: str, before: CentreMotion, after: CentreMotion, time: np.ndarray) -> BodyState:
+        """Motion of a body frame after the last step, with its accelerations in it."""
+        body = self.ride.bicycle.body
+        centre, axes = self.ride.physics.inertial_frame(body.body, body.links[name])
+
+        def carried(motion: CentreMotion) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+            position, orientation, velocity, turning = (field[:, index] for field in motion)
+            orientation = rotation.multiply(orientation, rotation.conjugate(axes))
+            lever = rotation.rotate(orientation, centre)
+            return position - lever, orientation, velocity - rotation.cross(turning, lever), turning
+
+        then, now = carried(before), carried(after)
+        dt = self.ride.physics.time_step
+        return BodyState(time, *now, (now[2] - then[2]) / dt, (now[3] - then[3]) / dt)
+
+    def _compute(
+        self,
+        before: CentreMotion,
+        after: CentreMotion,
+        forces: np.ndarray,
+        joints: np.ndarray,
+        torques: np.ndarray,
+        time: np.ndarray,
+        fallen: np.ndarray,
+        swivels: np.ndarray,
+    ) -> RideLog:
+        rider = self.ride.rider
+        names = ["rear_frame", *self._names]
+        frames = {name: self._frame(index, name, before, after, time) for index, name in enumerate(names)}
+        start = {name: self._frame(index, name, before, before, time) for index, name in enumerate(names[:3])}
+        angles, rates = joints[..., 0], joints[..., 1]
+        steer, crank, trunk = angles[:, 0], angles[:, 1], angles[:, 3:6]
+        contact = self._contact(start, before, after, forces)
+        limbs = {}
+        trunk_turn = three_turns(trunk[:, 0], trunk[:, 1], trunk[:, 2])
+        for index, name in enumerate(LIMBS):
+            if rider.full:
+                upper, lower = names[5 + 2 * index], names[6 + 2 * index]
+                root = frames["trunk" if name.startswith("arm") else "rear_frame"].orientation
+                upper_turn, lower_turn = (
+                    rotation.multiply(rotation.conjugate(root), frames[part].orientation) for part in (upper, lower)
+                )
+                hinge = rotation.rotate(upper_turn, np.array([0.0, 0.0, -rider.posture.limb(name).upper]))
+                limbs[name] = LimbPosture(upper_turn, lower_turn, angles[:, 6 + 4 * index : 10 + 4 * index], hinge)
+            else:
+                limbs[name] = self._solve(name, steer, crank, trunk_turn, swivels[:, index], angles[:, -1])
+        return RideLog(time, frames, contact, limbs, trunk, steer, crank, angles[:, 2], rates[:, :3], torques, fallen)
+
+    def _solve(
+        self,
+        name: str,
+        steer: np.ndarray,
+        crank: np.ndarray,
+        trunk: np.ndarray,
+        swivel: np.ndarray,
+        bounce: np.ndarray,
+    ) -> LimbPosture:
+        """Posture of a limb by inverse kinematics; ``bounce``: height of the pelvis above its place at rest, m."""
+        posture, side = self.ride.rider.posture, name[4:]
+        up = bounce[:, None] * np.array([0.0, 0.0, 1.0])
+        if name.startswith("leg"):
+            return reach_to(posture.leg, posture.leg_target(side, crank) - up, KNEE_OUT, swivel)
+        target = posture.arm_target(side, steer, trunk) - rotation.rotate_back(trunk, up)
+        # a lumped trunk may carry the shoulder a little too far: the arm is then straight
+        length = rotation.norm(target)
+        target = target * np.minimum(1.0, 0.9999 * posture.arm.reach / length)
+        return reach_to(posture.arm, target, posture.elbow_out(side, trunk), swivel)
+
+    def _contact(
+        self, start: dict[str, BodyState], before: CentreMotion, after: CentreMotion, forces: np.ndarray
+    ) -> Contact:
+        """Contact forces in the last physics step of each tick."""
+        rider, physics = self.ride.rider, self.ride.physics
+        posture, frame, front, crank = rider.posture, start["rear_frame"], start["front_assembly"], start["crank"]
+        saddle = frame.position + rotation.rotate(frame.orientation, np.array(posture.bicycle.saddle))
+        rows = slice(3, 3 + len(rider.masses))
+        then, now = (CentreMotion(*(field[:, rows] for field in motion)) for motion in (before, after))
+        force, moment = newton_euler(then, now, rider.masses, rider.moments, saddle, physics.time_step, physics.gravity)
+        if rider.full:
+            hands, feet = forces[:, :2], forces[:, 2:]
+        else:
+            hands = rotation.rotate(frame.orientation[:, None], forces)
+            feet = np.zeros_like(hands)
+        drive = posture.bicycle.drive
+        assert drive is not None
+        for index, side in enumerate(SIDES):
+            grip = np.array(posture.bicycle.grip) * (1.0, SIGNS[side], 1.0) - posture.bicycle.steer_origin
+            pedal = posture.pedal(side, 0.0) - np.array(drive.axle)
+            for body, arm, push in ((front, grip, hands[:, index]), (crank, pedal, feet[:, index])):
+                place = body.position + rotation.rotate(body.orientation, arm)
+                force = force + push
+                moment = moment + rotation.cross(place - saddle, push)
+        return Contact(-force, -moment, hands, feet)

@@ -1,0 +1,168 @@
+"""One ride: world, bicycle, rider and pilot together, stepped, saved and restored."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ...physics.world import Physics
+from ...sensors.ideal import STANDARD_GRAVITY
+from ..course.path import Path
+from ..course.terrain import Ground
+from ..frame.bicycle import Bicycle, BicycleMemory
+from ..frame.tyre import TyreParameters
+from ..rider.posture import Posture
+from ..rider.rider import Fidelity, Rider, RiderMemory
+from ..rider.style import RiderMotion
+from .control import ControlSettings, Pilot, PilotMemory
+
+PREVIEW = 0.3
+"""s: how far ahead the rider leans into turns"""
+COASTING = 5.0
+"""N of wanted slowing that is left to drag, before the brake is used"""
+FALLEN = 1.0
+"""rad of roll at which a ride is over"""
+
+
+@dataclass(frozen=True)
+class RideMemory:
+    """The whole state of a ride between two physics steps; valid in the world that made it."""
+
+    physics: tuple[int, int]
+    bicycle: BicycleMemory
+    rider: RiderMemory
+    pilot: PilotMemory
+    control: int
+
+
+class Ride:
+    """A rider on a bicycle on a path.
+
+    Args:
+        posture: the person fitted to the bicycle.
+        motion: how the rider moves.
+        path: where to ride; the ride begins at its start.
+        speed: wanted speed (m/s) over time (s).
+        ground: what to ride on; None for a level plane.
+        fidelity: ``full`` or ``lumped``.
+        physics_rate: physics steps a second, Hz; a multiple of the control rate.
+        tyre: None for default tyres.
+        control: None for default settings.
+        crank: angle at the start, rad.
+        gravity: m/s².
+        gui: open PyBullet's window.
+
+    Raises:
+        ValueError: the physics rate is not a multiple of the control rate.
+    """
+
+    def __init__(
+        self,
+        posture: Posture,
+        motion: RiderMotion,
+        path: Path,
+        speed: Callable[[float], float],
+        *,
+        ground: Ground | None = None,
+        fidelity: Fidelity = "full",
+        physics_rate: float = 500.0,
+        tyre: TyreParameters | None = None,
+        control: ControlSettings | None = None,
+        crank: float = 0.3,
+        gravity: float = STANDARD_GRAVITY,
+        gui: bool = False,
+    ) -> None:
+        settings = ControlSettings() if control is None else control
+        self._each = round(physics_rate / settings.rate)
+        if self._each < 1 or abs(self._each * settings.rate - physics_rate) > 1e-6 * physics_rate:
+            raise ValueError(f"physics_rate must be a multiple of {settings.rate:g} Hz, got {physics_rate:g} Hz")
+        load = posture.load()
+        self.physics = Physics(time_step=1.0 / physics_rate, gravity=gravity, gui=gui)
+        self.rider = Rider(posture, fidelity)
+        self.bicycle = Bicycle(self.physics, posture.bicycle, ground, tyre, load=load, extend=self.rider.extend)
+        self.rider.mount(self.bicycle)
+        self._loaded, self._settings = posture.bicycle.with_load(load), settings
+        trunk = posture.trunk()
+        whole = sum(part.mass * part.centre[2] for part in self._loaded.parts)
+        self._lean_effect = trunk.mass * float(trunk.centre[2]) * np.cos(posture.flexion) / whole
+        self.begin(motion, path, speed, ground=ground, crank=crank)
+
+    def begin(
+        self,
+        motion: RiderMotion,
+        path: Path,
+        speed: Callable[[float], float],
+        *,
+        ground: Ground | None = None,
+        crank: float = 0.3,
+    ) -> None:
+        """Start another ride of the same person in the same world; bit for bit what a new :class:`Ride` would do.
+
+        Nothing that was saved before can be restored any more. Arguments as those of the class.
+        """
+        self.physics.steps = 0
+        self.bicycle.lay(ground)
+        self.pilot = Pilot(self._loaded, self._settings, self.physics.gravity)
+        self.path, self.speed = path, speed
+        point, first = path.at(0.0), self.pilot.comfortable_speed(path, speed(0.0))
+        self.bicycle.start(first, (point.x, point.y), point.heading, crank=crank)
+        self.rider.start(motion, crank, self.bicycle.state().crank_rate)
+        self.pilot.start(path, first)
+        self._count = 0
+        self.state = self.bicycle.state()
+
+    @property
+    def fallen(self) -> bool:
+        """Whether the bicycle lies down or has left the ground of reason (as of the last control tick)."""
+        roll = self.state.roll
+        return not abs(roll) < FALLEN
+
+    def step(self) -> None:
+        """Advance by one physics step."""
+        rider, bicycle = self.rider, self.bicycle
+        if self._count % self._each == 0:
+            self._control()
+        self._count += 1
+        torques, crank = rider.act()
+        brake = max(0.0, -self.pilot.command[1] - COASTING)
+        bicycle.act(0.0, 0.0, crank, rider.driven, torques, brake)
+        self.physics.step()
+
+    def _control(self) -> None:
+        self.state = state = self.bicycle.state()
+        self.bicycle.shift()
+        lean = self.rider.intended_lean
+        # a rider who leans to the right holds the bicycle further to the left
+        torque, drive = self.pilot.update(state, self.speed(state.time), -self._lean_effect * lean)
+        ahead = self.path.at(self.pilot.distance + PREVIEW * state.speed)
+        self.rider.plan(state, ahead.curvature, torque, drive)
+
+    def save(self) -> RideMemory:
+        """Keep the whole state; free it with :meth:`forget`."""
+        return RideMemory(self.physics.save(), self.bicycle.save(), self.rider.save(), self.pilot.save(), self._count)
+
+    def restore(self, memory: RideMemory) -> None:
+        """Return to a saved state, bitwise."""
+        self.physics.restore(memory.physics)
+        self.bicycle.restore(memory.bicycle)
+        self.rider.restore(memory.rider)
+        self.pilot.restore(memory.pilot)
+        self._count = memory.control
+        self.state = self.bicycle.state()
+
+    def forget(self, memory: RideMemory) -> None:
+        """Free a saved state."""
+        self.physics.forget(memory.physics)
+
+    def close(self) -> None:
+        """End the world."""
+        self.physics.close()
+
+    def __enter__(self) -> Ride:
+        return self
+
+    def __exit__(self, *_: Any) -> None:
+        self.close()

@@ -1,0 +1,180 @@
+"""Rides for an environment: drawn from a generator, ridden tick by tick, saved and restored."""
+
+from __future__ import annotations
+
+import copy
+import math
+import uuid
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ...sensors.ideal import BodyState
+from ..course.scenarios import Scenario
+from ..course.terrain import Ground
+from ..frame.parameters import BicycleParameters
+from ..frame.tyre import TyreParameters
+from ..rider.anthropometry import rider_body
+from ..rider.posture import Posture, sit
+from ..rider.rider import Fidelity
+from ..rider.style import RiderMotion, RiderStyle, rider_style
+from .log import RideLog, RideRecorder
+from .ride import Ride, RideMemory
+from .truth import Quaternions, continuous_pose, segment_states, true_pose
+
+SETTLING = 1.0
+"""s of riding before the first tick"""
+KEPT = 8
+"""snapshots that can be restored without riding again"""
+
+
+class Ridden(NamedTuple):
+    """Some ticks of a ride; times count from the first tick."""
+
+    log: RideLog
+    bodies: dict[str, BodyState]
+    pose: dict[str, np.ndarray]
+
+
+class SavedRide(NamedTuple):
+    """Enough to return to a tick, here or elsewhere."""
+
+    plan: tuple[Scenario, Any, np.random.Generator]
+    """scenario, subject and generator from which the ride was drawn"""
+    ticks: int
+    fallen_at: float
+    quaternions: Quaternions
+    token: str
+    """where PyBullet's state is kept for a quick return"""
+
+
+class RideSource:
+    """Rides of people on one bicycle, one at a time.
+
+    Args:
+        bicycle: what is ridden.
+        style: how riders move; None for the style of each scenario.
+        duration: s of a ride.
+        rate: ticks a second, Hz.
+        physics_rate: physics steps a second, Hz; a multiple of ``rate``.
+        fidelity: ``full`` or ``lumped``.
+        tyre: of both wheels.
+    """
+
+    def __init__(
+        self,
+        bicycle: BicycleParameters,
+        style: str | RiderStyle | None,
+        duration: float,
+        rate: float,
+        physics_rate: float,
+        fidelity: Fidelity,
+        tyre: TyreParameters,
+    ) -> None:
+        self.bicycle, self.style, self.duration, self.rate = bicycle, style, duration, rate
+        self.physics_rate, self.fidelity = physics_rate, fidelity
+        self.tyre = tyre
+        self.ride: Ride | None = None
+        self.fallen_at = math.inf
+        self._kept: dict[str, RideMemory] = {}
+        self._motion_key: tuple[Any, ...]
+        self._world_key: tuple[Any, ...]
+        self._first: RideMemory
+        self.posture: Posture
+        self.ground: Ground
+
+    def begin(self, scenario: Scenario, subject: Any, motion: np.random.Generator) -> None:
+        """Begin a ride at the end of its first second; what was drawn is kept to ride it again.
+
+        The same draw goes back to the state kept there; another one of the same person begins in the same world;
+        another person, or a fall before, needs a new world. All three give the same ride, bit for bit.
+        """
+        seed = str(motion.bit_generator.seed_seq.state)  # type: ignore[attr-defined]
+        key = (scenario, subject, self.style, self.duration, self.physics_rate, self.tyre, seed)
+        if self.ride is not None and self.ride.fallen:
+            self.close()
+        if self.ride is None or key != self._motion_key:
+            plan = (scenario, subject, copy.deepcopy(motion))
+            self._ride_first_second(scenario, subject, motion)
+            self._plan, self._motion_key = plan, key
+        else:
+            self.ride.restore(self._first)
+        assert self.ride is not None
+        self._recorder = RideRecorder(self.ride, round(self.physics_rate / self.rate))
+        self._began = self.ride.physics.time + 1.0 / self.rate
+        self._ticks, self.fallen_at = 0, math.inf
+        self._quaternions: Quaternions = {}
+
+    def _ride_first_second(self, scenario: Scenario, subject: Any, motion: np.random.Generator) -> None:
+        """Draw rider, course and movements, and settle on the saddle."""
+        for_body, for_course, for_movement, for_crank = motion.spawn(4)
+        body = rider_body(subject, for_body)
+        world = (body, self.physics_rate, self.tyre)
+        same = self.ride is not None and world == self._world_key
+        posture = self.posture if same else sit(self.bicycle, body)
+        course = scenario.draw(for_course, self.duration + SETTLING + 1.0)
+        movement = RiderMotion(rider_style(scenario.style if self.style is None else self.style), for_movement)
+        crank = float(for_crank.uniform(0.0, 2.0 * math.pi))
+        if self.ride is not None and same:
+            for memory in (*self._kept.values(), self._first):
+                self.ride.forget(memory)
+            self._kept = {}
+            self.ride.begin(movement, course.path, course.speed, ground=course.ground, crank=crank)
+        else:
+            self.close()
+            self.ride = Ride(
+                posture,
+                movement,
+                course.path,
+                course.speed,
+                ground=course.ground,
+                fidelity=self.fidelity,
+                physics_rate=self.physics_rate,
+                tyre=self.tyre,
+                crank=crank,
+            )
+            self._world_key, self.posture = world, posture
+        self.ground = course.ground
+        for _ in range(round(SETTLING * self.rate) * round(self.physics_rate / self.rate)):
+            self.ride.step()
+        self._first = self.ride.save()
+
+    def record(self, most: int) -> Ridden:
+        """Ride on for ``most`` ticks, or to the one in which the rider fell."""
+        log = self._recorder.record(most)
+        log = replace(log, time=log.time - self._began)
+        bodies = {name: state._replace(time=log.time) for name, state in segment_states(log).items()}
+        pose, self._quaternions = continuous_pose(true_pose(log, bodies), self._quaternions)
+        if log.fallen.any():
+            self.fallen_at = self._ticks + len(log.time) - 1
+        self._ticks += len(log.time)
+        return Ridden(log, bodies, pose)
+
+    def save(self) -> SavedRide:
+        """The drawn ride and how far it is; also where PyBullet's state is kept for a quick return."""
+        assert self.ride is not None
+        token = uuid.uuid4().hex
+        self._kept[token] = self.ride.save()
+        if len(self._kept) > KEPT:
+            self.ride.forget(self._kept.pop(next(iter(self._kept))))
+        return SavedRide(self._plan, self._ticks, self.fallen_at, dict(self._quaternions), token)
+
+    def restore(self, saved: SavedRide) -> None:
+        """Undo :meth:`save`: from memory where the ride is still there, else by riding it again."""
+        if self.ride is not None and saved.plan is self._plan and saved.token in self._kept:
+            self.ride.restore(self._kept[saved.token])
+        else:
+            scenario, subject, motion = saved.plan
+            self.begin(scenario, subject, copy.deepcopy(motion))
+            self._plan = saved.plan
+            if saved.ticks:
+                self._recorder.record(saved.ticks)
+        self._ticks, self.fallen_at, self._quaternions = saved.ticks, saved.fallen_at, dict(saved.quaternions)
+
+    def close(self) -> None:
+        """End the world; may be called twice."""
+        ride, self.ride = self.ride, None
+        self._kept = {}
+        if ride is not None:
+            ride.close()

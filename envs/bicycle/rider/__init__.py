@@ -1,0 +1,1 @@
+"""The rider: anthropometry, posture, limbs, saddle contact and riding style."""

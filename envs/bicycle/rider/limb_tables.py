@@ -1,0 +1,116 @@
+"""What a rider knows by heart: how elbows and knees stand in every position, and what the legs weigh at the crank."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from ....filters.core import rotation
+from .limbs import reach_to, three_turns
+from .posture import KNEE_OUT, LIMBS, SIDES, Posture
+
+POINTS = 49
+STEERS = np.linspace(-0.6, 0.6, POINTS)
+"""rad at which the arms' posture is tabulated"""
+CRANKS = np.linspace(0.0, 2.0 * math.pi, POINTS)
+"""rad at which that of the legs is"""
+SHOULDERS_FOLLOW = 0.45
+"""part of the steering angle by which the trunk twists, so that the outer hand stays within reach"""
+STRAIGHTEST = 0.985
+"""part of the straight arm's length that an arm is stretched to"""
+BIT = 0.01
+"""rad for slopes"""
+
+
+class LimbTables:
+    """Abduction of each limb over steer (arms) or crank (legs), and the legs' weight felt at the crank.
+
+    Args:
+        posture: the person on the bicycle.
+        trunk: angles about y, x, z of the trunk around which the tables are linear, rad.
+        swivel: ``(4,)`` of left arm, right arm, left leg, right leg, likewise.
+        gravity: m/s².
+    """
+
+    def __init__(self, posture: Posture, trunk: Sequence[float], swivel: np.ndarray, gravity: float) -> None:
+        self.posture, self.trunk, self.swivel = posture, tuple(trunk), swivel
+        now = self.angles(CRANKS, STEERS)
+        changed = [self.angles(CRANKS, STEERS, **{what: BIT}) for what in ("extra", "lean", "twist")]
+        rows = []
+        for limb in range(len(LIMBS)):
+            slopes = [(there[limb][:, 1] - now[limb][:, 1]) / BIT for there in changed]
+            rows.append(np.stack([now[limb][:, 1], *slopes], axis=1))
+        # (point, limb, value and slopes)
+        self._table = np.stack(rows, axis=1)
+        legs, lift = posture.segments(), np.array([0.0, 0.0, 1.0])
+        heights = np.zeros(POINTS - 1)
+        for side in SIDES:
+            leg = reach_to(posture.leg, posture.leg_target(side, CRANKS[:-1]), KNEE_OUT)
+            thigh, shank = legs["thigh"], legs["shank"]
+            heights += thigh.mass * (rotation.rotate(leg.upper, thigh.centre) @ lift)
+            heights += shank.mass * ((leg.hinge + rotation.rotate(leg.lower, shank.centre)) @ lift)
+        # derivative of a periodic function through its Fourier series
+        spectrum = np.fft.rfft(heights) * 1j * np.arange(POINTS // 2 + 1)
+        spectrum[-1] = 0.0
+        rising = np.fft.irfft(spectrum, POINTS - 1) * gravity
+        self._weight = np.append(rising, rising[0])
+
+    def angles(
+        self,
+        crank: float | np.ndarray,
+        steer: float | np.ndarray = 0.0,
+        extra: float = 0.0,
+        lean: float = 0.0,
+        twist: float = 0.0,
+    ) -> list[np.ndarray]:
+        """Joint angles ``(..., 4)`` of each limb by inverse kinematics.
+
+        Args:
+            crank: rad.
+            steer: rad, left positive.
+            extra: rad of swivel besides the middle one.
+            lean: rad of the trunk, likewise.
+            twist: rad of the trunk, likewise.
+        """
+        posture, (flexion, first_lean, first_twist) = self.posture, self.trunk
+        turn = first_twist + twist + SHOULDERS_FOLLOW * np.asarray(steer, dtype=float)
+        trunk = three_turns(np.full_like(turn, flexion), np.full_like(turn, first_lean + lean), turn)
+        angles = []
+        for name, turn in zip(LIMBS, (self.swivel + extra).tolist(), strict=True):
+            side = name.split("_")[1]
+            if name.startswith("arm"):
+                target, out = posture.arm_target(side, steer, trunk), posture.elbow_out(side, trunk)
+                # the outer arm is nearly straight in a tight turn
+                target = target * np.minimum(1.0, STRAIGHTEST * posture.arm.reach / rotation.norm(target))
+            else:
+                target, out = posture.leg_target(side, crank), KNEE_OUT
+            angles.append(reach_to(posture.limb(name), target, out, turn).angles)
+        return angles
+
+    def abductions(self, steer: float, crank: float, trunk: Sequence[float], swivel: Sequence[float]) -> list[float]:
+        """Abduction of each limb that puts elbows and knees where they are wanted, rad.
+
+        Args:
+            steer: rad, left positive.
+            crank: rad.
+            trunk: wanted angles about y, x, z.
+            swivel: change of each limb's swivel, rad.
+        """
+        lean, twist = trunk[1] - self.trunk[1], trunk[2] - self.trunk[2] - SHOULDERS_FOLLOW * steer
+        last = POINTS - 1
+        arms = (steer - STEERS[0]) / (STEERS[-1] - STEERS[0]) * last
+        legs = (crank % (2.0 * math.pi)) / (2.0 * math.pi) * last
+        found = []
+        for limb, turn in enumerate(swivel):
+            place = max(0.0, min(last - 1e-9, arms if limb < 2 else legs))
+            index = int(place)
+            first, second = self._table[index, limb], self._table[index + 1, limb]
+            angle, by_swivel, by_lean, by_twist = (first + (place - index) * (second - first)).tolist()
+            found.append(angle + by_swivel * turn + by_lean * lean + by_twist * twist)
+        return found
+
+    def leg_weight(self, crank: float) -> float:
+        """Torque on the crank (N·m) that lifts the legs' common centre of mass."""
+        return float(np.interp(crank % (2.0 * math.pi), CRANKS, self._weight))

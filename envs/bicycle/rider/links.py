@@ -1,0 +1,117 @@
+"""A rider as further links on the bicycle's tree, and what they look like."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...physics.urdf import Tree, ball_shape, box_shape, rod_shape
+from .anthropometry import Mass, join
+from .posture import LIMBS, SIGNS, Posture
+
+PIVOT_MASS, PIVOT_INERTIA = 1e-3, (1e-4, 1e-4, 1e-4)
+"""kg, kg·m² of the links between two of a joint's three axes: too little to be felt"""
+SHIRT, TROUSERS, SKIN, SHOE = (0.15, 0.35, 0.65), (0.18, 0.18, 0.22), (0.85, 0.65, 0.52), (0.1, 0.1, 0.1)
+AXES = {"y": (0.0, 1.0, 0.0), "x": (1.0, 0.0, 0.0), "z": (0.0, 0.0, 1.0)}
+TRUNK_JOINTS = ("trunk_y", "trunk_x", "trunk")
+NAMES = {"arm": ("upper_arm", "forearm"), "leg": ("thigh", "shank")}
+LUMPED_MASSES = ("pelvis", "trunk")
+
+
+def limb_joints(limb: str) -> tuple[str, str, str, str]:
+    """Names of the links below a limb's four joints, such as ``thigh_left_y``, …, ``shank_left``."""
+    kind, side = limb.split("_")
+    upper, lower = NAMES[kind]
+    return f"{upper}_{side}_y", f"{upper}_{side}_x", f"{upper}_{side}", f"{lower}_{side}"
+
+
+def segment_links() -> tuple[str, ...]:
+    """Names of the links that carry the rider's mass, pelvis first."""
+    return "pelvis", "trunk", *(name for limb in LIMBS for name in limb_joints(limb)[2:])
+
+
+def _three_joints(tree: Tree, parent: str, child: str, origin: np.ndarray, mass: Mass, shapes: list[str]) -> None:
+    """Hang a link on three joints about y, x and z that meet in one point."""
+    for axis in ("y", "x"):
+        tree.link(f"{child}_{axis}", PIVOT_MASS, PIVOT_INERTIA, (0.0, 0.0, 0.0))
+        tree.joint(parent, f"{child}_{axis}", origin, AXES[axis])
+        parent, origin = f"{child}_{axis}", np.zeros(3)
+    tree.link(child, mass.mass, mass.tensor, mass.centre, shapes)
+    tree.joint(parent, child, origin, AXES["z"])
+
+
+def add_full_rider(tree: Tree, posture: Posture) -> None:
+    """Pelvis that slides on the saddle, trunk, and four limbs whose ends are still free."""
+    pelvis, segments = posture.pelvis(), posture.segments()
+    tree.link("pelvis", pelvis.mass, pelvis.tensor, pelvis.centre - posture.lumbar, pelvis_shapes(posture))
+    tree.joint("rear_frame", "pelvis", posture.lumbar, AXES["z"], slides=True)
+    _three_joints(tree, "pelvis", "trunk", np.zeros(3), posture.trunk(), trunk_shapes(posture))
+    shapes = limb_shapes(posture)
+    for name in LIMBS:
+        kind, side = name.split("_")
+        flip = np.array([1.0, SIGNS[side], 1.0])
+        upper, lower = NAMES[kind]
+        parent, root = ("trunk", posture.shoulder) if kind == "arm" else ("pelvis", posture.hip - posture.lumbar)
+        _three_joints(tree, parent, f"{upper}_{side}", root * flip, segments[upper], shapes[upper])
+        mass = segments[lower]
+        tree.link(f"{lower}_{side}", mass.mass, mass.tensor, mass.centre, shapes[lower])
+        below = np.array([0.0, 0.0, -posture.limb(name).upper])
+        tree.joint(f"{upper}_{side}", f"{lower}_{side}", below, AXES["y"])
+
+
+def add_lumped_rider(tree: Tree, posture: Posture) -> None:
+    """Pelvis with the legs at rest, sliding on the saddle, and trunk with the arms at rest."""
+    limbs = [posture.limbs_at(crank) for crank in (0.0, np.pi)]
+
+    def mean(kind: str) -> list[Mass]:
+        found = [mass for each in limbs for name, mass in each.items() if name.startswith(kind)]
+        return [Mass(0.5 * mass.mass, mass.centre, 0.5 * mass.tensor) for mass in found]
+
+    pelvis = join([posture.pelvis(), *mean("leg")])
+    tree.link("pelvis", pelvis.mass, pelvis.tensor, pelvis.centre - posture.lumbar, pelvis_shapes(posture))
+    tree.joint("rear_frame", "pelvis", posture.lumbar, AXES["z"], slides=True)
+    trunk = join([posture.trunk(), *mean("arm")])
+    _three_joints(tree, "pelvis", "trunk", np.zeros(3), trunk, trunk_shapes(posture))
+
+
+def pelvis_shapes(posture: Posture) -> list[str]:
+    """Hips, in the pelvis frame."""
+    hip = posture.hip - posture.lumbar
+    return [rod_shape(hip, hip * (1.0, -1.0, 1.0), 0.085, TROUSERS), ball_shape((0.0, 0.0, -0.02), 0.11, TROUSERS)]
+
+
+def trunk_shapes(posture: Posture) -> list[str]:
+    """Chest, shoulders, neck and head, in the trunk frame."""
+    left, scale = posture.shoulder, posture.body.scale
+    top = np.array([0.03, 0.0, left[2] + posture.body.vertex_height + 0.03])
+    return [
+        rod_shape((0.0, 0.0, 0.0), (0.0, 0.0, left[2] - 0.05), 0.115 * scale, SHIRT),
+        rod_shape(left, left * (1.0, -1.0, 1.0), 0.06 * scale, SHIRT),
+        box_shape((0.0, 0.0, 0.72 * left[2]), (0.17 * scale, 0.30 * scale, 0.5 * left[2]), SHIRT),
+        rod_shape((0.0, 0.0, left[2]), top - np.array([0.0, 0.0, 0.15]), 0.05, SKIN),
+        ball_shape(top - np.array([0.0, 0.0, 0.11]), 0.105, SKIN),
+        box_shape(posture.trunk_imu, (0.02, 0.04, 0.06), (0.9, 0.5, 0.1)),
+    ]
+
+
+def limb_shapes(posture: Posture) -> dict[str, list[str]]:
+    """Segment name → shapes in its frame."""
+    arm, leg, shank = posture.arm, posture.leg, posture.body.segment("shank")
+    ankle, pedal = np.array([0.0, 0.0, -shank.length]), np.array([leg.tip[0], 0.0, leg.tip[1]])
+    sole = pedal - ankle
+    return {
+        "upper_arm": [
+            rod_shape((0.0, 0.0, 0.0), (0.0, 0.0, -arm.upper), 0.045, SHIRT),
+            ball_shape((0.0, 0.0, -arm.upper), 0.045, SKIN),
+        ],
+        "forearm": [rod_shape((0.0, 0.0, 0.0), (0.0, 0.0, arm.tip[1]), 0.035, SKIN),
+                    ball_shape((0.0, 0.0, arm.tip[1]), 0.045, SKIN)],
+        "thigh": [
+            rod_shape((0.0, 0.0, 0.0), (0.0, 0.0, -leg.upper), 0.07, TROUSERS),
+            ball_shape((0.0, 0.0, -leg.upper), 0.065, TROUSERS),
+        ],
+        "shank": [
+            rod_shape((0.0, 0.0, 0.0), ankle, 0.05, SKIN),
+            rod_shape(ankle - 0.2 * sole, pedal + 0.25 * sole, 0.035, SHOE),
+            ball_shape(ankle, 0.05, SHOE),
+        ],
+    }  # fmt: skip

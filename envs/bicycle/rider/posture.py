@@ -1,0 +1,219 @@
+"""How a person sits on a bicycle: saddle height, trunk flexion, joints and limbs, and the masses they carry."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ....filters.core import rotation
+from ..frame.parameters import BicycleParameters, RigidPart
+from .anthropometry import Mass, RiderBody, hanging, join
+from .limbs import Limb, reach_to, three_turns
+
+SIDES = ("left", "right")
+SIGNS = {"left": 1.0, "right": -1.0}
+LIMBS = ("arm_left", "arm_right", "leg_left", "leg_right")
+
+LEG_REACH = 0.955
+"""part of the straight leg at the farthest pedal"""
+ARM_REACH = 0.84
+"""part of the straight arm at the handlebar"""
+ANKLE_ANGLE = math.radians(80.0)
+"""between the shank's line and the line from ankle to pedal; the papers' γ"""
+ANKLE_TO_PEDAL = 0.15
+"""m, for a person of the tables' stature"""
+HIP_ABOVE_SADDLE = 0.08
+"""m, likewise"""
+TRUNK_IMU = (-0.10, 0.0, 0.27)
+"""m: sixth thoracic vertebra in the trunk frame, likewise"""
+KNEE_OUT = np.array([1.0, 0.0, 0.0])
+
+
+def _root(function: Callable[[float], float], low: float, high: float, message: str) -> float:
+    """Where a rising function passes zero."""
+    if not function(low) < 0.0 < function(high):
+        raise ValueError(message)
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if function(middle) < 0.0 else (low, middle)
+    return 0.5 * (low + high)
+
+
+@dataclass(frozen=True)
+class Posture:
+    """A person fitted to a bicycle; places in the bicycle frame unless said otherwise, m."""
+
+    body: RiderBody
+    bicycle: BicycleParameters
+    """with the saddle moved to the person's height"""
+    flexion: float
+    """rad: forward lean of the trunk"""
+    lumbar: np.ndarray
+    """(3,) joint between pelvis and trunk; origin of the trunk frame, whose z runs up the trunk"""
+    hip: np.ndarray
+    """(3,) left hip joint"""
+    shoulder: np.ndarray
+    """(3,) left shoulder joint, in the trunk frame"""
+    arm: Limb
+    leg: Limb
+
+    @property
+    def trunk_imu(self) -> tuple[float, float, float]:
+        """Place of the trunk's IMU in the trunk frame, m."""
+        x, y, z = (self.body.scale * part for part in TRUNK_IMU)
+        return x, y, z
+
+    def limb(self, name: str) -> Limb:
+        """Shape of the limb ``arm_left`` and so on."""
+        return self.arm if name.startswith("arm") else self.leg
+
+    def pedal(self, side: str, crank: np.ndarray | float) -> np.ndarray:
+        """Pedal ``(..., 3)`` at a crank angle (rad; 0 with the left pedal in front)."""
+        drive = self.bicycle.drive
+        assert drive is not None
+        sign, angle = SIGNS[side], np.asarray(crank, dtype=float)
+        along, down = drive.crank_length * np.cos(angle), drive.crank_length * np.sin(angle)
+        across = np.full_like(along, drive.pedal_offset)
+        return np.array(drive.axle) + sign * np.stack([along, across, -down], axis=-1)
+
+    def grip(self, side: str, steer: np.ndarray | float) -> np.ndarray:
+        """Hand's place ``(..., 3)`` at a steering angle (rad, left positive)."""
+        origin, axis = self.bicycle.steer_origin, self.bicycle.steer_axis
+        zero = np.array(self.bicycle.grip) * (1.0, SIGNS[side], 1.0) - origin
+        angle = np.asarray(steer, dtype=float)[..., None]
+        return origin + rotation.rotate(rotation.exp(axis * angle), zero)
+
+    def elbow_out(self, side: str, trunk: np.ndarray) -> np.ndarray:
+        """Direction ``(..., 3)`` in which the elbow stands out, trunk axes: sideways in the bicycle frame."""
+        return rotation.rotate_back(trunk, np.array([0.0, SIGNS[side], 0.0]))
+
+    def arm_target(self, side: str, steer: np.ndarray | float, trunk: np.ndarray) -> np.ndarray:
+        """Grip from the shoulder ``(..., 3)`` in trunk axes; ``trunk``: orientation of the trunk in the bicycle."""
+        shoulder = self.shoulder * (1.0, SIGNS[side], 1.0)
+        return rotation.rotate_back(trunk, self.grip(side, steer) - self.lumbar) - shoulder
+
+    def leg_target(self, side: str, crank: np.ndarray | float) -> np.ndarray:
+        """Pedal from the hip ``(..., 3)`` in bicycle axes."""
+        return self.pedal(side, crank) - self.hip * (1.0, SIGNS[side], 1.0)
+
+    def pelvis(self) -> Mass:
+        """Pelvis in the bicycle frame."""
+        segment = self.body.segment("lower_trunk")
+        return hanging(segment, self.lumbar + np.array([0.0, 0.0, 0.5 * segment.length]))
+
+    def trunk(self) -> Mass:
+        """Trunk above the lumbar joint, and head, in the trunk frame."""
+        z = 0.5 * self.body.segment("lower_trunk").length
+        parts = []
+        for name in ("middle_trunk", "upper_trunk"):
+            segment = self.body.segment(name)
+            z += segment.length
+            parts.append(hanging(segment, np.array([0.0, 0.0, z])))
+        parts.append(hanging(self.body.segment("head"), np.array([0.03, 0.0, z + self.body.vertex_height])))
+        return join(parts)
+
+    def segments(self) -> dict[str, Mass]:
+        """Upper arm, forearm with hand, thigh, and shank with foot, each in its frame from the proximal joint."""
+        body, foot = self.body, self.body.segment("foot")
+        forearm, shank = body.segment("forearm"), body.segment("shank")
+        wrist = np.array([0.0, 0.0, -forearm.length])
+        ankle = np.array([0.0, 0.0, -shank.length])
+        tip = np.array([self.leg.tip[0], 0.0, self.leg.tip[1]])
+        forward, sideways, along = foot.moments
+        # the foot's long axis points forward
+        shoe = Mass(foot.mass, ankle + 0.35 * (tip - ankle), np.diag([along, sideways, forward]))
+        return {
+            "upper_arm": hanging(body.segment("upper_arm"), np.zeros(3)),
+            "forearm": join([hanging(forearm, np.zeros(3)), hanging(body.segment("hand"), wrist)]),
+            "thigh": hanging(body.segment("thigh"), np.zeros(3)),
+            "shank": join([hanging(shank, np.zeros(3)), shoe]),
+        }
+
+    def limbs_at(self, crank: float) -> dict[str, Mass]:
+        """Arms (in the trunk frame) and legs (in the bicycle frame) at a crank angle, straight steering."""
+        trunk, segments, found = self.trunk_orientation(), self.segments(), {}
+        for name in LIMBS:
+            side = name.split("_")[1]
+            flip = np.array([1.0, SIGNS[side], 1.0])
+            if name.startswith("arm"):
+                root, names = self.shoulder * flip, ("upper_arm", "forearm")
+                posture = reach_to(self.arm, self.arm_target(side, 0.0, trunk), self.elbow_out(side, trunk))
+            else:
+                root, names = self.hip * flip, ("thigh", "shank")
+                posture = reach_to(self.leg, self.leg_target(side, crank), KNEE_OUT)
+            places = ((root, posture.upper), (root + posture.hinge, posture.lower))
+            found[name] = join([placed(segments[part], *place) for part, place in zip(names, places, strict=True)])
+        return found
+
+    def trunk_orientation(self) -> np.ndarray:
+        """The trunk in the bicycle frame ``(4,)`` in the posture at rest."""
+        return three_turns(np.array(self.flexion), np.array(0.0), np.array(0.0))
+
+    def load(self) -> RigidPart:
+        """The whole rider as a rigid load: the mean of the two level crank positions."""
+        trunk, parts = self.trunk_orientation(), [self.pelvis()]
+        parts.append(placed(self.trunk(), self.lumbar, trunk))
+        for crank in (0.0, math.pi):
+            for name, mass in self.limbs_at(crank).items():
+                where = placed(mass, self.lumbar, trunk) if name.startswith("arm") else mass
+                parts.append(Mass(0.5 * where.mass, where.centre, 0.5 * where.tensor))
+        whole = join(parts)
+        x, _, z = whole.centre.tolist()
+        tensor = whole.tensor
+        inertia = (float(tensor[0, 0]), float(tensor[1, 1]), float(tensor[2, 2]), float(tensor[0, 2]))
+        return RigidPart(whole.mass, (x, 0.0, z), inertia)
+
+
+def placed(mass: Mass, origin: np.ndarray, orientation: np.ndarray) -> Mass:
+    """The same body seen from another frame, in which its frame has this origin and orientation."""
+    R = rotation.to_matrix(orientation)
+    return Mass(mass.mass, origin + R @ mass.centre, R @ mass.tensor @ R.T)
+
+
+def sit(bicycle: BicycleParameters, body: RiderBody) -> Posture:
+    """Fit a person: saddle along the seat tube to the leg's length, trunk flexion to the arm's.
+
+    Raises:
+        ValueError: the bicycle has no crank, or pedals or handlebar cannot be reached in any reasonable posture.
+    """
+    if bicycle.drive is None:
+        raise ValueError(f"a rider needs pedals: the bicycle {bicycle.name!r} has none")
+    scale = body.scale
+    forearm, shank = body.segment("forearm"), body.segment("shank")
+    foot = ANKLE_TO_PEDAL * scale
+    leg = Limb(
+        body.segment("thigh").length,
+        (foot * math.sin(ANKLE_ANGLE), -shank.length - foot * math.cos(ANKLE_ANGLE)),
+        1.0,
+    )
+    arm = Limb(body.segment("upper_arm").length, (0.0, -forearm.length), -1.0)
+    axle = np.array(bicycle.drive.axle)
+    tube = np.array(bicycle.saddle) - axle
+    tube /= np.linalg.norm(tube)
+    above = np.array([0.0, body.hip_half_width, HIP_ABOVE_SADDLE * scale])
+    pedal = axle + np.array([0.0, bicycle.drive.pedal_offset, 0.0])
+
+    def stretch(height: float) -> float:
+        across = axle + height * tube + above - pedal
+        # the farthest pedal lies straight beyond the axle, seen from the side
+        farthest = math.hypot(math.hypot(across[0], across[2]) + bicycle.drive.crank_length, across[1])  # type: ignore[union-attr]
+        return float(farthest / leg.reach - LEG_REACH)
+
+    height = _root(stretch, 0.35, 1.0, f"{body.name} of {body.stature} m cannot reach the pedals of {bicycle.name!r}")
+    saddle = axle + height * tube
+    fitted = replace(bicycle, saddle=(float(saddle[0]), 0.0, float(saddle[2])))
+    lower = body.segment("lower_trunk").length
+    lumbar = saddle + np.array([0.0, 0.0, HIP_ABOVE_SADDLE * scale + 0.5 * lower])
+    notch = 0.5 * lower + body.segment("middle_trunk").length + body.segment("upper_trunk").length
+    shoulder = np.array([0.0, body.shoulder_half_width, notch - 0.035 * scale])
+    posture = Posture(body, fitted, 0.0, lumbar, saddle + above, shoulder, arm, leg)
+
+    def bent(flexion: float) -> float:
+        trunk = replace(posture, flexion=flexion).trunk_orientation()
+        return float(ARM_REACH - np.linalg.norm(posture.arm_target("left", 0.0, trunk)) / arm.reach)
+
+    message = f"{body.name} of {body.stature} m cannot reach the handlebar of {bicycle.name!r}"
+    return replace(posture, flexion=_root(bent, math.radians(2.0), math.radians(75.0), message))

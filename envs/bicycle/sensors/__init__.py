@@ -1,0 +1,1 @@
+"""The published sensor suites on rider and bicycle."""

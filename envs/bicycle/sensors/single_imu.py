@@ -1,0 +1,98 @@
+"""One inertial measurement unit of a ride, as if nothing else had been recorded, for filters of a single IMU."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from ....filters.core import rotation
+from ...data.trajectory import Trajectory
+
+PLACES = ("bicycle_imu", "trunk_imu")
+"""Places with a gyroscope and an accelerometer."""
+KINDS = ("gyr", "acc", "mag")
+
+
+def imu_of(trajectory: Trajectory, place: str = "bicycle_imu") -> Trajectory:
+    """What one IMU of a ride measured, with the true motion of the sensor itself.
+
+    Args:
+        trajectory: an episode of ``poise/RiderBicycle-v0`` or ``poise/BicycleFixture-v0``, recorded, loaded or
+            simulated; its metadata say where the sensors sit.
+        place: ``bicycle_imu`` or ``trunk_imu``.
+
+    Returns:
+        The same ticks, mask and metadata (``name`` gets the place appended), with
+
+        * measurements ``imu/gyr`` (rad/s), ``imu/acc`` (m/s²) and, where the place has one, ``imu/mag`` (µT), each
+          ``(T, 3)`` in sensor axes;
+        * truth ``orientation`` ``(T, 4)``, sensor to world: that of the body turned by the sensor's mounting; ``up``
+          ``(T, 3)``, world's vertical in sensor axes; and where the ride knows them ``angular_rate`` (rad/s, sensor
+          axes), ``position`` (m, world, of the sensor), ``gyroscope_bias``, ``accelerometer_bias`` and
+          ``magnetometer_bias`` (sensor axes).
+
+    Raises:
+        ValueError: an unknown place, or a trajectory that lacks the place's gyroscope or accelerometer, its mounting,
+            or the orientation of the body that carries it.
+    """
+    if place not in PLACES:
+        raise ValueError(f"place must be one of {list(PLACES)}, got {place!r}")
+    measurements = {
+        f"imu/{kind}": trajectory.measurements[f"{place}/{kind}"]
+        for kind in KINDS
+        if f"{place}/{kind}" in trajectory.measurements
+    }
+    missing = [f"{place}/{kind}" for kind in KINDS[:2] if f"imu/{kind}" not in measurements]
+    if missing:
+        raise ValueError(f"trajectory {trajectory.name!r} lacks the channels {missing}")
+    sensor = sensor_at(trajectory, f"{place}/gyr")
+    return trajectory.replace(
+        measurements=measurements,
+        truth=sensor_truth(trajectory.truth, sensor, place, trajectory.name),
+        metadata=trajectory.metadata | {"name": f"{trajectory.name}-{place}", "place": place},
+    )
+
+
+def sensor_at(trajectory: Trajectory, channel: str) -> Mapping[str, Any]:
+    """What the metadata say about the sensor behind a channel: its ``body``, ``rotation``, ``lever_arm`` and more.
+
+    Raises:
+        ValueError: they say nothing about it.
+    """
+    described = trajectory.metadata.get("sensors") or {}
+    for sensor in described.get("sensors", ()):
+        if sensor["channel"] == channel:
+            return sensor
+    raise ValueError(f"the metadata of {trajectory.name!r} do not say where {channel!r} is mounted")
+
+
+def sensor_truth(
+    truth: Mapping[str, np.ndarray], sensor: Mapping[str, Any], place: str, name: str
+) -> dict[str, np.ndarray]:
+    """Truth of the body that carries a sensor → truth of the sensor.
+
+    Args:
+        truth: of the ride, name → ``(T, size)``.
+        sensor: from :func:`sensor_at`.
+        place: of the sensor.
+        name: of the ride, for messages.
+
+    Raises:
+        ValueError: the orientation of the body is not known.
+    """
+    body, axes, lever = sensor["body"], np.array(sensor["rotation"]), np.array(sensor["lever_arm"])
+    if f"{body}/orientation" not in truth:
+        raise ValueError(f"{name!r} knows no '{body}/orientation', which carries {place!r}")
+    carrier = truth[f"{body}/orientation"]
+    orientation = rotation.multiply(carrier, axes)
+    found = {"orientation": orientation, "up": rotation.up_in_body(orientation)}
+    if f"{body}/angular_rate" in truth:
+        found["angular_rate"] = rotation.rotate_back(axes, truth[f"{body}/angular_rate"])
+    if f"{body}/position" in truth:
+        found["position"] = truth[f"{body}/position"] + rotation.rotate(carrier, lever)
+    for kind in ("gyroscope", "accelerometer", "magnetometer"):
+        if f"{place}/{kind}_bias" in truth:
+            found[f"{kind}_bias"] = truth[f"{place}/{kind}_bias"]
+    return found

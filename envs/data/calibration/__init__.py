@@ -1,0 +1,1 @@
+"""Calibration records, and the runs that they are estimated from."""

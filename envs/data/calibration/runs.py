@@ -1,0 +1,204 @@
+"""Simulated calibration runs: a device with drawn scales and offsets on a rate table, or turned about by hand.
+
+The schedules are those of P. He's thesis (Université Laval, chapter 4); counts are those of its sensors (ADXL345,
+L3G4200D), whose tolerances are our choice.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ....filters.arrays.array import AccelerometerArray
+from ....filters.core import rotation
+from ...hand.controller_gestures import BOTH_WAYS, DOWNWARDS, UPWARDS, RateTable
+from ...hand.devices import ArrayPreset, HandDevice, actual_array
+from ...hand.sensing import simulate_hand
+from ...sensors.ideal import STANDARD_GRAVITY, magnetic_field
+from ...sensors.noise_model import NoiseModel
+from .channels import accelerometer_channel, spatial_axes
+from .data import MagnetometerData, RateTableData, mounting_matrix
+from .records import CalibrationRecord, ChannelCalibration
+
+ACCELEROMETER_SCALE = 4e-3 * STANDARD_GRAVITY
+"""m/s² per count: ADXL345, 4 mg."""
+ACCELEROMETER_RANGE = 4095
+"""Counts: ±16 g."""
+GYROSCOPE_SCALE = math.radians(8.75e-3)
+"""rad/s per count: L3G4200D at ±250 °/s."""
+GYROSCOPE_RANGE = 32767
+MAGNETOMETER_SCALE = 1.0 / 300.0
+"""of a unit field, per count"""
+
+ACCELEROMETER_MOUNTINGS = (
+    *(("+z", "+x"), ("-z", "-x")),
+    *(("+x", "+y"), ("-x", "-y")),
+    *(("+y", "+z"), ("-y", "-z")),
+)
+"""(up, out): each axis outwards, inwards, upright and upside down."""
+GYROSCOPE_MOUNTINGS = (("+x", "+y"), ("+y", "+z"), ("+z", "+x"))
+
+
+def nominal_calibration(array: AccelerometerArray) -> CalibrationRecord:
+    """What the data sheets say: typical scales, no offsets, a magnetometer along the axes of the device."""
+    return CalibrationRecord(
+        {
+            accelerometer_channel(array): ChannelCalibration.scaled(
+                [ACCELEROMETER_SCALE] * array.size, [0.0] * array.size, "m/s²"
+            ),
+            "imu/gyr": ChannelCalibration.scaled([GYROSCOPE_SCALE] * 3, [0.0] * 3, "rad/s"),
+            "imu/mag": ChannelCalibration.scaled([MAGNETOMETER_SCALE] * 3, [0.0] * 3, "1"),
+        }
+    )
+
+
+def random_calibration(array: AccelerometerArray, seed: int) -> CalibrationRecord:
+    """A device of its own: true scales, offsets, hard and soft iron, and a turned magnetometer.
+
+    Standard deviations: scale of the accelerometers 5 %, offset 1 m/s² (as wide as the thesis' table 4.1); scale of the
+    gyroscope 1 %, offset 0.5 °/s; hard iron 100 counts, soft iron 5 %, axes of the magnetometer 20°.
+    """
+    acc, gyr, mag = (np.random.default_rng(child) for child in np.random.SeedSequence(seed).spawn(3))
+    m = array.size
+    soft = mag.normal(0.0, 0.05, (3, 3))
+    turned = rotation.exp_matrix(math.radians(20.0) * mag.standard_normal(3))
+    matrix = MAGNETOMETER_SCALE * turned @ (np.eye(3) + 0.5 * (soft + soft.T))
+    return CalibrationRecord(
+        {
+            accelerometer_channel(array): ChannelCalibration.scaled(
+                ACCELEROMETER_SCALE * (1.0 + 0.05 * acc.standard_normal(m)), acc.normal(0.0, 1.0, m), "m/s²"
+            ),
+            "imu/gyr": ChannelCalibration.scaled(
+                GYROSCOPE_SCALE * (1.0 + 0.01 * gyr.standard_normal(3)),
+                math.radians(0.5) * gyr.standard_normal(3),
+                "rad/s",
+            ),
+            "imu/mag": ChannelCalibration(matrix.tolist(), (-matrix @ mag.normal(0.0, 100.0, 3)).tolist(), "1"),
+        }
+    )
+
+
+def built_with(array: AccelerometerArray, axis_error: float, seed: int) -> AccelerometerArray:
+    """The array with axes turned by random angles of standard deviation ``axis_error``, rad, about each normal."""
+    errors = ArrayPreset("axes", "errors of the axes alone", NoiseModel(), NoiseModel(), axis_error=axis_error)
+    return actual_array(array, errors, np.random.default_rng(np.random.SeedSequence(seed).spawn(4)[3]))
+
+
+def counts(channel: ChannelCalibration, readings: np.ndarray, largest: float = math.inf) -> np.ndarray:
+    """Raw readings of a device with the calibration ``channel``: whole counts that stop at the end of the range."""
+    return np.clip(np.rint(channel.undo(readings)), -largest, largest)
+
+
+def accelerometer_runs(
+    array: AccelerometerArray,
+    truth: CalibrationRecord,
+    seed: int,
+    *,
+    hold: float = 10.0,
+    offset: float = 0.1,
+    preset: str = "array-data-sheet",
+    mountings: Sequence[tuple[str, str]] = ACCELEROMETER_MOUNTINGS,
+) -> RateTableData:
+    """Runs for every axis: 80 to 800 °/s where it points outwards, back where it points inwards, and upright.
+
+    Args:
+        array: the device, as it is built.
+        truth: its calibration.
+        seed: of motion and noise.
+        hold: time at each rate, s.
+        offset: distance of the array's reference point from the axis of the table, m.
+        preset: noise.
+        mountings: (up, out) of the runs.
+    """
+    device = HandDevice(array.name, _spatial(array), preset, gyroscope=False, magnetometer=False)
+    channel = truth.channels[accelerometer_channel(array)]
+    runs = []
+    for child, (up, out) in zip(np.random.SeedSequence(seed).spawn(len(mountings)), mountings, strict=True):
+        rates = UPWARDS if out.startswith("+") else DOWNWARDS
+        readings = _run(device, rates, up, out, hold, offset, child)
+        raw = counts(channel, readings[2], ACCELEROMETER_RANGE)
+        runs.append(_data(readings, up, out, raw))
+    return _joined(runs)
+
+
+def gyroscope_runs(
+    truth: CalibrationRecord,
+    seed: int,
+    *,
+    hold: float = 10.0,
+    preset: str = "array-data-sheet",
+    mountings: Sequence[tuple[str, str]] = GYROSCOPE_MOUNTINGS,
+) -> RateTableData:
+    """Runs for every axis: −325 to 350 °/s by 25, of which the largest saturate; arguments as for accelerometers."""
+    one_axis = AccelerometerArray(((0.0, 0.0, 0.0),), ((0.0, 0.0, 1.0),))
+    device = HandDevice("gyroscope", one_axis, preset, magnetometer=False)
+    runs = []
+    for child, (up, out) in zip(np.random.SeedSequence(seed).spawn(len(mountings)), mountings, strict=True):
+        readings = _run(device, BOTH_WAYS, up, out, hold, 0.0, child)
+        runs.append(_data(readings, up, out, counts(truth.channels["imu/gyr"], readings[3], GYROSCOPE_RANGE)))
+    return _joined(runs)
+
+
+def magnetometer_run(
+    truth: CalibrationRecord, seed: int, *, duration: float = 60.0, rate: float = 50.0, reference_error: float = 0.002
+) -> MagnetometerData:
+    """The device turned about by hand into all attitudes, seen by a tracker.
+
+    Args:
+        truth: calibration of the device.
+        seed: of motion and noise.
+        duration: s.
+        rate: Hz.
+        reference_error: standard deviation of the reference attitude, rad about each axis.
+    """
+    one_axis = AccelerometerArray(((0.0, 0.0, 0.0),), ((0.0, 0.0, 1.0),))
+    device = HandDevice("magnetometer", one_axis, "array-data-sheet", gyroscope=False)
+    motion, reference = np.random.SeedSequence(seed).spawn(2)
+    trajectory = simulate_hand("mixed", int(motion.generate_state(1)[0]), rate=rate, duration=duration, device=device)
+    unit = trajectory.measurements["imu/mag"] / np.linalg.norm(magnetic_field())
+    error = np.random.default_rng(reference).normal(0.0, reference_error, (len(unit), 3))
+    attitude = rotation.multiply(trajectory.truth["orientation"], rotation.exp(error))
+    return MagnetometerData(trajectory.time, counts(truth.channels["imu/mag"], unit), attitude)
+
+
+def _spatial(array: AccelerometerArray) -> AccelerometerArray:
+    """The same sensors in space."""
+    padding = ((0, 0), (0, 3 - array.dimension))
+    return AccelerometerArray(np.pad(array.r, padding).tolist(), spatial_axes(array).tolist(), array.name)
+
+
+def _run(
+    device: HandDevice,
+    rates: tuple[float, ...],
+    up: str,
+    out: str,
+    hold: float,
+    offset: float,
+    seed: np.random.SeedSequence,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Time, rate of the table, readings of the array and of the gyroscope, while the rate is constant."""
+    attitude = rotation.from_matrix(mounting_matrix(up, out))
+    table = RateTable(rates=rates, hold=hold, attitude=tuple(attitude.tolist()), offset=(offset, 0.0, 0.0))
+    trajectory = simulate_hand(table, int(seed.generate_state(1)[0]), device=device)
+    gesture = table.draw(np.random.default_rng(0))
+    step = np.searchsorted(gesture.starts, trajectory.time, "right") - 1
+    steady = (step >= 0) & (trajectory.time > gesture.starts[np.maximum(step, 0)] + table.ramp + 0.05)
+    readings = trajectory.measurements
+    gyroscope = readings.get("imu/gyr", np.zeros((len(steady), 3)))
+    return trajectory.time[steady], gesture.rates[step[steady]], readings["array/acc"][steady], gyroscope[steady]
+
+
+def _data(readings: tuple[np.ndarray, ...], up: str, out: str, raw: np.ndarray) -> RateTableData:
+    length = len(raw)
+    return RateTableData(readings[0], np.full(length, up), np.full(length, out), readings[1], raw)
+
+
+def _joined(runs: list[RateTableData]) -> RateTableData:
+    """One session: the device is mounted anew within a minute."""
+    data = runs[0]
+    for run in runs[1:]:
+        data = data.joined(replace(run, time=run.time + data.time[-1] + 60.0))
+    return data

@@ -1,0 +1,1 @@
+"""Readers of recordings, one file format a module; the format is recognised by the content."""

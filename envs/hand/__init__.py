@@ -1,0 +1,1 @@
+"""A hand that moves a device: gestures, drivers, device noise models, the environment."""

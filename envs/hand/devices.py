@@ -1,0 +1,216 @@
+"""Hand-held devices with an array of accelerometers, as data: geometry, other sensors, errors, body.
+
+A device of one's own is a :class:`HandDevice`, or a JSON file that describes its array.
+
+Numbers are from P. He, "Estimating the orientation of a game controller from inertial and magnetic measurements",
+thesis, Université Laval, where a name says ``paper``. Its standard deviations belong to samples at 100 Hz.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, Self
+
+import numpy as np
+
+from ...filters.arrays.array import CONTROLLER, OCTA, PLANAR, AccelerometerArray, PlanarArray
+from ...filters.arrays.files import load_array
+from ...filters.core import rotation
+from ..sensors.ideal import vector
+from ..sensors.noise_model import NoiseModel
+from ..sensors.presets import SensorPreset, list_sensor_presets, sensor_preset
+from .drivers import Device
+
+G = 9.81
+"""m/s², the thesis'."""
+PAPER_RATE = 100.0
+"""Hz, of the thesis' simulations."""
+
+
+def per_sample(deviation: float, full_scale: float, **others: Any) -> NoiseModel:
+    """White noise of a given standard deviation a sample at 100 Hz."""
+    return NoiseModel(white_noise=deviation / math.sqrt(PAPER_RATE), full_scale=full_scale, **others)
+
+
+@dataclass(frozen=True)
+class ArrayPreset(SensorPreset):
+    """Errors of a device with an array: noise, and how far the array is from what filters are told.
+
+    The accelerometer's noise is that of each uniaxial accelerometer.
+
+    Raises:
+        ValueError: a negative or not finite error of the geometry.
+    """
+
+    axis_error: float = 0.0
+    """standard deviation by which each axis is turned, about each of two normals, rad"""
+    position_error: float = 0.0
+    """standard deviation of each coordinate of each position, m"""
+
+    def __post_init__(self) -> None:
+        for name in ("axis_error", "position_error"):
+            if not 0.0 <= getattr(self, name) < math.inf:
+                raise ValueError(f"{name} must be 0 or more and finite, got {getattr(self, name)}")
+
+    def scaled(self, grade: float) -> Self:
+        """The same device with errors ``grade`` times as large."""
+        larger = {name: grade * getattr(self, name) for name in ("axis_error", "position_error")}
+        return replace(super().scaled(grade), **larger)
+
+
+ARRAY_PRESETS = (
+    ArrayPreset(
+        "paper-array",
+        "thesis, section 5.3: σ_a = 0.1 g, σ_ω = 0.1 rad/s, σ_m 1 % of a field of 50 µT; no range is given",
+        per_sample(0.1, 100.0),
+        per_sample(0.1 * G, 1000.0),
+        per_sample(0.5, 1000.0),
+    ),
+    ArrayPreset(
+        "paper-planar",
+        "thesis, section 3: σ_a = 0.3 m/s², σ_ω = 0.6 rad/s; no range is given",
+        per_sample(0.6, 100.0),
+        per_sample(0.3, 1000.0),
+        per_sample(0.5, 1000.0),
+    ),
+    ArrayPreset(
+        "array-data-sheet",
+        "white noise of 0.022 m/s² a sample (ADXL320 and ADXL345 at 100 Hz), 0.03 °/s/√Hz (L3G4200D), 0.25 µT; ranges "
+        "wide enough for shaking",
+        NoiseModel(white_noise=math.radians(0.03), full_scale=100.0),
+        per_sample(0.022, 1000.0),
+        per_sample(0.25, 1000.0),
+    ),
+    ArrayPreset(
+        "array-calibrated",
+        "white noise of 0.05 m/s² and what a calibration leaves: bias of 0.1 m/s², axes 0.5°, positions 1 mm (with "
+        "which Table 2.1 of the thesis comes out); gyroscope 0.1 °/s and magnetometer 0.3 % likewise (our choice)",
+        NoiseModel(white_noise=math.radians(0.03), turn_on_bias=math.radians(0.1), full_scale=100.0),
+        per_sample(0.05, 1000.0, turn_on_bias=0.1),
+        per_sample(0.25, 1000.0, turn_on_bias=0.15),
+        axis_error=math.radians(0.5),
+        position_error=1e-3,
+    ),
+)
+"""Errors for devices with an array; those of :mod:`poise.envs.sensors.presets` may be used as well."""
+
+
+def array_preset(preset: str | SensorPreset) -> SensorPreset:
+    """The errors of a name (:data:`ARRAY_PRESETS` or a sensor preset), or a preset itself.
+
+    Raises:
+        ValueError: there is none of that name.
+    """
+    if isinstance(preset, SensorPreset):
+        return preset
+    known = {one.name: one for one in ARRAY_PRESETS}
+    if preset in known:
+        return known[preset]
+    if preset in list_sensor_presets():
+        return sensor_preset(preset)
+    raise ValueError(f"sensors must be one of {[*known, *list_sensor_presets()]}, got {preset!r}")
+
+
+def actual_array(array: AccelerometerArray, preset: SensorPreset, generator: np.random.Generator) -> AccelerometerArray:
+    """The array as it is built: with the errors of the geometry of ``preset``, drawn from ``generator``."""
+    shift, turn = generator.standard_normal((2, array.size, 3))
+    if not isinstance(preset, ArrayPreset) or not (preset.axis_error or preset.position_error):
+        return array
+    n = array.dimension
+    axes = array.e
+    if n == 2:
+        angle = preset.axis_error * turn[:, :1]
+        axes = axes * np.cos(angle) + np.stack([-axes[:, 1], axes[:, 0]], axis=-1) * np.sin(angle)
+    else:
+        across = turn - np.sum(turn * axes, axis=-1, keepdims=True) * axes
+        axes = rotation.rotate(rotation.exp(preset.axis_error * across), axes)
+    positions = np.array(array.positions) + preset.position_error * shift[:, :n]
+    return type(array)(positions.tolist(), rotation.normalize(axes).tolist(), array.name, array.reference)
+
+
+@dataclass(frozen=True)
+class HandDevice:
+    """A device with an array of accelerometers.
+
+    Channels: ``array/acc``; with a gyroscope ``imu/gyr`` (planar devices: ``planar/gyr``, one axis); with a
+    magnetometer ``imu/mag``. All sit at the array's reference point, along the axes in which the array is given. A
+    planar array makes a planar device: it moves in the vertical plane of east and up, with its x and y axes in it.
+
+    Raises:
+        ValueError: an empty name, no array, or a field that is not three finite numbers.
+    """
+
+    name: str
+    array: AccelerometerArray
+    noise: str | SensorPreset = "paper-array"
+    """a name of :data:`ARRAY_PRESETS`, of a sensor preset, or a preset"""
+    gyroscope: bool = True
+    magnetometer: bool = True
+    body: Device = field(default_factory=lambda: Device(0.25, (0.04, 0.30, 0.04)))
+    """mass and size of the box that the hand moves in the dynamic drive, centred in the reference point"""
+    magnetic_field: tuple[float, ...] | None = None
+    """in the world (east, north, up), µT; None for that of :func:`poise.envs.sensors.ideal.magnetic_field`"""
+
+    def __post_init__(self) -> None:
+        if not self.name:
+            raise ValueError("name of a device must not be empty")
+        if not isinstance(self.array, AccelerometerArray):
+            raise ValueError(f"array must be an AccelerometerArray, got {self.array!r}")
+        array_preset(self.noise)
+        if self.magnetic_field is not None:
+            object.__setattr__(self, "magnetic_field", vector("magnetic_field", self.magnetic_field, 3))
+
+    @property
+    def planar(self) -> bool:
+        """Whether it moves in the vertical plane."""
+        return isinstance(self.array, PlanarArray)
+
+    def describe(self) -> dict[str, Any]:
+        """Everything about it but the errors, for JSON."""
+        return {
+            "name": self.name,
+            "array": self.array.describe(),
+            "noise": array_preset(self.noise).name,
+            "gyroscope": self.gyroscope,
+            "magnetometer": self.magnetometer,
+        }
+
+
+OCTA_BODY = Device(0.4, (0.25, 0.25, 0.25))
+
+DEVICES: Mapping[str, HandDevice] = MappingProxyType(
+    {
+        device.name: device
+        for device in (
+            HandDevice("controller", CONTROLLER),
+            HandDevice("octa", OCTA, gyroscope=False, body=OCTA_BODY),
+            HandDevice("octa-gyroscope", OCTA, body=OCTA_BODY),
+            HandDevice("planar", PLANAR, "paper-planar", magnetometer=False),
+        )
+    }
+)
+"""Name → device; ``imu`` is no device of this kind."""
+
+
+def hand_device(device: str | Path | HandDevice) -> HandDevice | None:
+    """The device of a name, or of a JSON file that describes its array; None for ``imu``.
+
+    Raises:
+        ValueError: unknown name, no such file, or a file that describes no array.
+    """
+    if isinstance(device, HandDevice):
+        return device
+    if device == "imu":
+        return None
+    if device in DEVICES:
+        return DEVICES[str(device)]
+    if not isinstance(device, str | Path) or not Path(device).is_file():
+        raise ValueError(
+            f"device must be imu, {', '.join(DEVICES)}, a JSON file of an array or a HandDevice, got {device!r}"
+        )
+    array = load_array(device)
+    return HandDevice(array.name, array, "paper-planar" if array.dimension == 2 else "paper-array")

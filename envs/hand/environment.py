@@ -1,0 +1,227 @@
+"""``poise/HandMotion-v0``: a hand moves a device, its inertial sensors report, the agent says the orientation."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+
+from ...filters.arrays.array import AccelerometerArray
+from ...filters.core.quantity import ORIENTATION, RELATIVE_ORIENTATION
+from ..base import Block, PoseEnv, Scene, choose_quantity
+from ..sensors.ideal import BodyState, Mounting, Sampling, vector
+from ..sensors.presets import SensorPreset
+from ..sensors.suite import SensorSuite
+from .device_sensing import check_planar
+from .devices import HandDevice, hand_device
+from .drivers import Device, Drive, DynamicDrive, KinematicDrive
+from .gestures import GestureConfig, gesture_config, make_gesture
+from .sensing import HandVariation, built_array, check_duration, hand_gesture, hand_suite, sense, ticks_of
+
+DriveKind = Literal["dynamic", "kinematic"]
+
+
+class HandMotionEnv(PoseEnv):
+    """A hand-held device moves at random; from its inertial sensors an agent says how it is oriented.
+
+    ## Description
+
+    A rigid controller of 0.25 kg follows a random gesture. With ``drive="dynamic"`` a virtual hand pulls and twists it
+    in PyBullet at about 1 kHz (computed force and torque plus feedback); with ``drive="kinematic"`` it follows the
+    gesture exactly and no physics engine is stepped. The sensors follow the actual motion of the device, and so does
+    the truth. World: x east, y north, z up; quaternions w, x, y, z.
+
+    ## Action Space
+
+    ``Box(-1, 1, (4,), float32)``: the agent's own estimate of the orientation at the last observation, a quaternion
+    w, x, y, z that turns sensor axes to world axes. The environment normalises it; zeros count as no rotation. A
+    quaternion and its negative are the same estimate.
+
+    | num | action | unit |
+    |---|---|---|
+    | 0 | w, scalar part | 1 |
+    | 1, 2, 3 | x, y, z, vector part | 1 |
+
+    ## Observation Space
+
+    ``Dict``; bounds are the full scales of the sensors. With the default sensors:
+
+    | key | shape | unit | rate |
+    |---|---|---|---|
+    | ``imu/gyr`` | (3,) float32 | rad/s, angular rate, sensor axes | ``rate`` |
+    | ``imu/acc`` | (3,) float32 | m/s², specific force (+g on an axis that points up at rest) | ``rate`` |
+    | ``imu/mag`` | (3,) float32 | µT, magnetic field; only with ``magnetometer`` | ``rate`` |
+    | ``fresh`` | (channels,) int8 | 1 for a new sample, 0 where the last value is repeated | ``rate`` |
+
+    A device with an array of m uniaxial accelerometers has ``array/acc`` (m,), m/s² along each axis, in place of
+    ``imu/acc``, and ``imu/gyr`` and ``imu/mag`` if it has these sensors; a planar one ``planar/gyr`` (1,), rad/s, about
+    its z axis, in place of ``imu/gyr``.
+
+    The sample of a tick describes the interval that ends there: with ``sampling="interval"`` the rotation vector and
+    the velocity increment over the interval, divided by its length; with ``sampling="instant"`` the values at its end.
+
+    ## Rewards
+
+    Minus the error of the action in rad, at the pose of the observation it answers: the angle of the rotation between
+    estimate and truth, in [0, π]; with ``score="relative_orientation"`` only its inclination, which six-axis sensors
+    can tell, whatever the heading.
+
+    ## Starting State
+
+    At rest for a second at least, with a random heading and attitude (``rest``, ``mixed``, ``walk`` and ``shaking``:
+    any attitude; ``pointing``: at a target; ``planar-walk`` and ``infinity``: the same attitude every time).
+
+    ## Episode End
+
+    Truncated when the gesture is over. Never terminated.
+
+    ## Info
+
+    The same structure at ``reset`` and ``step``; arrays are float64.
+
+    | key | shape | meaning |
+    |---|---|---|
+    | ``time`` | float | s since the start |
+    | ``pose/orientation`` | (4,) | sensor to world |
+    | ``pose/up`` | (3,) | the upward vertical in sensor axes |
+    | ``truth/position``, ``truth/velocity`` | (3,) | of the sensor, world, m and m/s |
+    | ``truth/angular_rate`` | (3,) | rad/s, sensor axes: what an ideal gyroscope reports |
+    | ``truth/external_acceleration`` | (3,) | m/s², sensor axes: what an ideal accelerometer reports without gravity |
+    | ``truth/acceleration`` | (3,) | m/s², world; only with an array, as the following |
+    | ``truth/angular_acceleration`` | (3,) | rad/s², sensor axes |
+    | ``truth/planar/angle`` | (1,) | φ in [−π, π], rad, from east to up; planar devices only, as the following |
+    | ``truth/planar/angular_rate``, ``truth/planar/angular_acceleration`` | (1,) | of φ, rad/s and rad/s² |
+    | ``truth/planar/position``, ``truth/planar/velocity``, ``truth/planar/acceleration`` | (2,) | east and up |
+    | ``truth/gyroscope_bias``, ``truth/accelerometer_bias``, … | (3,) | bias of the last sample of each sensor |
+    | ``scored`` | bool | always True |
+
+    ## Arguments
+
+    Args:
+        gesture: a name of :data:`.GESTURES` (``rest``, ``slow``, ``fast``, ``severe``, ``turn``,
+            ``mixed``, ``walk``, ``pointing``, ``shaking``, ``rate-table``; in the plane ``planar-walk``, ``infinity``)
+            or a configuration; None for ``slow``, with a planar device for ``infinity``.
+            ``reset(options={"gesture": …})`` replaces it for one episode.
+        drive: ``dynamic`` or ``kinematic``.
+        sensors: name of a preset (:func:`poise.envs.sensors.presets.list_sensor_presets`), a preset, or a whole
+            :class:`.SensorSuite` on one body; its mountings count from the place that ``lever_arm`` and
+            ``mounting`` describe, and that place is the one whose pose is asked for. None for ``xsens-mtw-awinda``, or
+            for the errors of the device (:data:`poise.envs.hand.devices.ARRAY_PRESETS`).
+        rate: Hz; None for 100, or for the rate of the suite.
+        duration: length of an episode, s; None for that of the gesture.
+        lever_arm: ``(3,)`` from the centre of the device to the sensor, m, device axes.
+        mounting: ``(4,)`` quaternion that turns sensor axes to device axes.
+        device: ``imu`` (one IMU), ``controller``, ``octa``, ``octa-gyroscope`` or ``planar``, a JSON file that
+            describes an array, or a :class:`.HandDevice`. A planar device moves in the vertical plane
+            of east and up only.
+        magnetometer: False, True or its rate in Hz; None for True if the preset (the device) has one.
+        sampling: ``interval`` or ``instant``; None for ``interval``, with an array for ``instant``.
+        randomise: True or a :class:`HandVariation` varies mounting and mass from episode to episode.
+        score: ``orientation`` or ``relative_orientation``.
+        render_mode: ``human`` (a window), ``rgb_array`` or None.
+
+    Raises:
+        ValueError: an argument out of its range or an unknown name.
+
+    ## Version History
+
+    * v0: first release.
+    """
+
+    reset_options: ClassVar[tuple[str, ...]] = ("gesture",)
+
+    def __init__(
+        self,
+        gesture: str | GestureConfig | None = None,
+        drive: DriveKind = "dynamic",
+        sensors: str | SensorPreset | SensorSuite | None = None,
+        rate: float | None = None,
+        duration: float | None = None,
+        lever_arm: Sequence[float] = (0.0, 0.0, 0.0),
+        mounting: Sequence[float] = (1.0, 0.0, 0.0, 0.0),
+        *,
+        device: str | HandDevice = "imu",
+        magnetometer: bool | float | None = None,
+        sampling: Sampling | None = None,
+        randomise: bool | HandVariation = False,
+        score: str = "orientation",
+        render_mode: str | None = None,
+    ) -> None:
+        held = hand_device(device)
+        gesture = hand_gesture(gesture, held)
+        config = gesture_config(gesture)
+        check_duration(duration)
+        if drive not in ("dynamic", "kinematic"):
+            raise ValueError(f"drive must be 'dynamic' or 'kinematic', got {drive!r}")
+        suite = hand_suite(sensors, rate, magnetometer, sampling, held)
+        quantity = choose_quantity(score, (ORIENTATION, RELATIVE_ORIENTATION))
+        super().__init__(suite, quantity, suite.rate, render_mode)
+        self._suite = suite
+        self.gesture, self.drive_kind, self.duration = gesture, drive, duration
+        self.mounting = Mounting(vector("lever_arm", lever_arm, 3), vector("mounting", mounting, 4))
+        variation = HandVariation() if randomise is True else randomise
+        self.variation = variation or HandVariation(0.0, 0.0, 0.0)
+        self.hand_device, self.device, self._sensors = held, Device() if held is None else held.body, sensors
+        if held is not None:
+            check_planar(held, config, self.mounting)
+            if held.planar and self.variation.mounting:
+                raise ValueError("randomise must leave the mounting of a planar device as it is (mounting=0)")
+        self._array: AccelerometerArray | None = None
+        self._drive: Drive | None = None
+        self._episode_mounting = self.mounting
+        self._before: BodyState | None = None
+
+    def begin(self, motion: np.random.Generator, sensors: np.random.Generator, options: Mapping[str, Any]) -> int:
+        """Draw gesture, mounting and sensor errors."""
+        config = gesture_config(options.get("gesture", self.gesture))
+        if self.hand_device is not None:
+            check_planar(self.hand_device, config, self.mounting)
+        duration = config.duration if self.duration is None else self.duration
+        # a child of its own, so that the variation does not change the gesture
+        setting = motion.spawn(1)[0]
+        gesture = make_gesture(config, motion, duration)
+        self._episode_mounting, mass_factor = self.variation.draw(self.mounting, setting)
+        self._ready_drive().start(gesture, mass_factor)
+        self._suite.reset(sensors)
+        self._array = built_array(self.hand_device, self._sensors, sensors)
+        self._before = None
+        return ticks_of(duration, self.rate) - 1
+
+    def _ready_drive(self) -> Drive:
+        """The drive, made on first use and again after :meth:`close`."""
+        if self._drive is None:
+            if self.drive_kind == "kinematic":
+                self._drive = KinematicDrive(self.rate)
+            else:
+                self._drive = DynamicDrive(self.rate, self.device, gravity=self._suite.gravity)
+        return self._drive
+
+    def next_block(self, most: int) -> Block:
+        """Move the device on and let the sensors see it."""
+        drive = self._ready_drive()
+        states = drive.advance(min(most, drive.block))
+        block, self._before = sense(self._suite, states, self._episode_mounting, self._before, self._array)
+        return block
+
+    def save_source(self) -> Any:
+        """Drive, mounting, the last state, and the array as it is built."""
+        return self._ready_drive().save(), self._episode_mounting, self._before, self._array
+
+    def restore_source(self, saved: Any) -> None:
+        """Undo :meth:`save_source`."""
+        drive, self._episode_mounting, self._before, self._array = saved
+        self._ready_drive().restore(drive)
+
+    def make_scene(self, gui: bool) -> Scene:
+        """The device above the ground, and the axes of the estimate."""
+        from ..rendering import DeviceScene
+
+        return DeviceScene(self.device.size, gui=gui)
+
+    def close(self) -> None:
+        """Close window and physics; may be called twice."""
+        super().close()
+        drive, self._drive, self._block = self._drive, None, None
+        if drive is not None:
+            drive.close()

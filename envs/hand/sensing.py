@@ -1,0 +1,233 @@
+"""What is measured and true on a moving device, many ticks at once; and :func:`simulate_hand`, whole episodes of it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...filters.arrays.array import AccelerometerArray
+from ...filters.core import rotation
+from ..base import Block
+from ..data.trajectory import Trajectory
+from ..sensors.ideal import BodyState, Mounting, Sampling, instant_readings, interval_readings, mounted, vector
+from ..sensors.presets import SensorPreset, sensor_preset
+from ..sensors.suite import SensorSuite, imu_suite
+from .device_sensing import PLANAR_GYROSCOPE, array_readings, array_truth, check_planar, device_suite
+from .devices import HandDevice, actual_array, array_preset, hand_device
+from .drivers import KinematicDrive, States
+from .gestures import GestureConfig, gesture_config, gesture_name, make_gesture
+
+DEFAULT_SENSORS = "xsens-mtw-awinda"
+"""Preset of the device ``imu``."""
+
+
+@dataclass(frozen=True)
+class HandVariation:
+    """What differs from episode to episode besides motion and sensor errors; standard deviations, 0 for no variation.
+
+    Attributes:
+        lever_arm: of the sensor's place, m an axis.
+        mounting: of the sensor's axes on the device, rad an axis.
+        mass: of the logarithm of the device's mass and inertia, which the hand does not know (dynamic drive).
+    """
+
+    lever_arm: float = 0.02
+    mounting: float = math.radians(5.0)
+    mass: float = 0.2
+
+    def __post_init__(self) -> None:
+        for name in ("lever_arm", "mounting", "mass"):
+            if not 0.0 <= getattr(self, name) < math.inf:
+                raise ValueError(f"{name} must be 0 or more and finite, got {getattr(self, name)}")
+
+    def draw(self, mounting: Mounting, generator: np.random.Generator) -> tuple[Mounting, float]:
+        """A mounting around ``mounting``, and a factor for the mass."""
+        shift, turn, mass = generator.standard_normal(3), generator.standard_normal(3), generator.standard_normal()
+        if self.lever_arm or self.mounting:
+            lever = np.array(mounting.lever_arm) + self.lever_arm * shift
+            axes = rotation.multiply(np.array(mounting.rotation), rotation.exp(self.mounting * turn))
+            mounting = Mounting(tuple(lever.tolist()), tuple(rotation.normalize(axes).tolist()))
+        return mounting, math.exp(self.mass * float(mass))
+
+
+def check_duration(duration: float | None) -> None:
+    """Refuse what is no length of an episode."""
+    if duration is not None and not 0.0 < duration < math.inf:
+        raise ValueError(f"duration must be positive and finite (s), got {duration}")
+
+
+def ticks_of(duration: float, rate: float) -> int:
+    """Ticks of an episode, the one at time 0 included; two at least."""
+    return max(1, math.floor(duration * rate + 1e-6)) + 1
+
+
+def hand_gesture(gesture: str | GestureConfig | None, device: HandDevice | None) -> str | GestureConfig:
+    """The gesture itself; where none is given ``slow``, or ``infinity`` for a planar device."""
+    if gesture is not None:
+        return gesture
+    return "infinity" if device is not None and device.planar else "slow"
+
+
+def built_array(
+    device: HandDevice | None, sensors: str | SensorPreset | SensorSuite | None, generator: np.random.Generator
+) -> AccelerometerArray | None:
+    """The array of a device with the errors of its geometry in this episode; None without a device."""
+    if device is None:
+        return None
+    preset = array_preset(device.noise if sensors is None else sensors)  # type: ignore[arg-type]
+    return actual_array(device.array, preset, generator.spawn(1)[0])
+
+
+def hand_suite(
+    sensors: str | SensorPreset | SensorSuite | None = None,
+    rate: float | None = None,
+    magnetometer: bool | float | None = None,
+    sampling: Sampling | None = None,
+    device: HandDevice | None = None,
+) -> SensorSuite:
+    """Sensors at the origin of their own frame; arguments as of :class:`HandMotionEnv`.
+
+    Raises:
+        ValueError: ``rate`` or ``magnetometer`` contradicts a whole suite, or a suite a device.
+    """
+    if device is not None:
+        return device_suite(device, sensors, rate, magnetometer, sampling or "instant")
+    sensors, sampling = DEFAULT_SENSORS if sensors is None else sensors, sampling or "interval"
+    if not isinstance(sensors, SensorSuite):
+        preset = sensor_preset(sensors) if isinstance(sensors, str) else sensors
+        wanted = preset.magnetometer is not None if magnetometer is None else magnetometer
+        return imu_suite(preset, 100.0 if rate is None else rate, magnetometer=wanted, sampling=sampling)
+    if rate is not None and rate != sensors.rate:
+        raise ValueError(f"rate must be None or that of the suite, {sensors.rate:g} Hz, got {rate}")
+    if magnetometer is not None:
+        raise ValueError("magnetometer must be None where a whole suite is given: the suite says what it has")
+    return sensors
+
+
+def sense(
+    suite: SensorSuite,
+    states: States,
+    mounting: Mounting,
+    before: BodyState | None = None,
+    array: AccelerometerArray | None = None,
+) -> tuple[Block, BodyState]:
+    """Measurements and truth of a block of ticks.
+
+    Args:
+        suite: sensors at the mounted place.
+        states: motion of the device.
+        mounting: place and axes on the device.
+        before: what the call for the block before returned second; None for the first block.
+        array: the array of accelerometers as it is built, for a device with one.
+
+    Returns:
+        The block, and the state at its end for the next call.
+    """
+    now, earlier = (mounted(part, mounting) for part in states)
+    first = earlier.at(slice(0, 1)) if before is None else before
+    sampling = suite.sensors[0].sampling
+    rate, acceleration = motion_readings(now, earlier, first, sampling, 0.0)
+    readings, more = None, {}
+    if array is not None:
+
+        def force(now: BodyState, earlier: BodyState, first: BodyState) -> np.ndarray:
+            return motion_readings(now, earlier, first, sampling, suite.gravity)[1]
+
+        readings = {array.channel.name: array_readings(array, (now, earlier, first), force)}
+        readings[PLANAR_GYROSCOPE.name] = rate[:, 2:]
+        more = array_truth(array, now, earlier)
+    measurements, biases = suite.simulate(now, readings, before=earlier)
+    truth = {
+        "position": now.position,
+        "velocity": now.velocity,
+        "angular_rate": rate,
+        "external_acceleration": acceleration,
+        **more,
+        **biases,
+    }
+    pose = {"orientation": now.orientation, "up": rotation.up_in_body(now.orientation)}
+    time = np.asarray(now.time)
+    return Block(time, measurements, pose, truth, np.ones(len(time), bool)), now.at(slice(-1, None))
+
+
+def motion_readings(
+    now: BodyState, earlier: BodyState, first: BodyState, sampling: Sampling, gravity: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Angular rate and specific force ``(n, 3)`` of an ideal sensor at consecutive ticks.
+
+    Args:
+        now: states ``(n, …)`` of the sensor at the ticks.
+        earlier: one physics step before each of them.
+        first: state ``(1, …)`` at the tick before.
+        sampling: ``interval`` or ``instant``.
+        gravity: m/s²; 0 for the acceleration itself.
+    """
+    if sampling == "instant":
+        return instant_readings(now, earlier, gravity)
+    path = BodyState(*(np.concatenate([a, b]) for a, b in zip(first[:5], now[:5], strict=True)))
+    return interval_readings(path.at(slice(None, -1)), path.at(slice(1, None)), gravity)
+
+
+def simulate_hand(
+    gesture: str | GestureConfig = "mixed",
+    seed: int | None = None,
+    sensors: str | SensorPreset | SensorSuite | None = None,
+    rate: float | None = None,
+    duration: float | None = None,
+    sampling: Sampling | None = None,
+    *,
+    device: str | HandDevice = "imu",
+    magnetometer: bool | float | None = None,
+    lever_arm: Sequence[float] = (0.0, 0.0, 0.0),
+    mounting: Sequence[float] = (1.0, 0.0, 0.0, 0.0),
+) -> Trajectory:
+    """Record an episode of ``HandMotionEnv(drive="kinematic")`` at once, without stepping an environment.
+
+    Motion and sensor errors are those that the environment has after ``reset(seed=seed)``.
+
+    Args:
+        gesture: name or configuration.
+        seed: of motion and errors; None draws one, which the metadata name.
+        sensors: preset or suite; a suite is reset here; None as for the environment.
+        rate: Hz; None for 100, or for the rate of the suite.
+        duration: s; None for that of the gesture.
+        sampling: ``interval`` or ``instant``; None as for the environment.
+        device: as for the environment.
+        magnetometer: as for the environment.
+        lever_arm: ``(3,)`` m.
+        mounting: ``(4,)`` quaternion.
+
+    Returns:
+        Measurements and truth as :func:`poise.record` would give them.
+
+    Raises:
+        ValueError: as the environment.
+    """
+    check_duration(duration)
+    seed = int(np.random.SeedSequence().generate_state(1)[0]) if seed is None else int(seed)
+    held = hand_device(device)
+    config, suite = gesture_config(gesture), hand_suite(sensors, rate, magnetometer, sampling, held)
+    where = Mounting(vector("lever_arm", lever_arm, 3), vector("mounting", mounting, 4))
+    if held is not None:
+        check_planar(held, config, where)
+    duration = config.duration if duration is None else duration
+    motion, errors = np.random.default_rng(seed).spawn(2)
+    drive = KinematicDrive(suite.rate)
+    drive.start(make_gesture(config, motion, duration))
+    suite.reset(errors)
+    array = built_array(held, sensors, errors)
+    block, _ = sense(suite, drive.advance(ticks_of(duration, suite.rate)), where, array=array)
+    metadata = {
+        "name": f"hand-{gesture_name(gesture)}-{seed}",
+        "gesture": gesture_name(gesture),
+        "sensors": suite.describe(),
+        "seed": seed,
+        "rate": suite.rate,
+        "source": "simulation",
+    }
+    if held is not None:
+        metadata["device"] = held.describe()
+    return Trajectory(block.time, dict(block.measurements), {**block.pose, **block.truth}, metadata=metadata)

@@ -1,0 +1,1 @@
+"""One PyBullet client: bodies, joints, exact states, generated multibody descriptions."""

@@ -1,0 +1,158 @@
+"""Run an environment and keep what happened as a trajectory."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from importlib import metadata as packages
+from typing import Any
+
+import numpy as np
+
+from .data.trajectory import Trajectory
+
+Policy = Callable[[Any], Any]
+"""Observation → action."""
+
+
+def record(
+    env: Any, *, seed: int | None = None, policy: Policy | None = None, steps: int | None = None, progress: bool = False
+) -> Trajectory:
+    """Play one episode and return it; tick 0 is the reset.
+
+    Args:
+        env: an environment of this package, in wrappers that leave its observations unchanged or in none; or a
+            registered id, which is made and closed here.
+        seed: of the episode; None draws one, which the metadata then name.
+        policy: chooses the action from the observation; by default the ``neutral_action`` of the environment, or
+            seeded samples of its action space if it has none.
+        steps: stop after so many steps if the episode has not ended before; None plays to the end.
+        progress: show a bar.
+
+    Returns:
+        The trajectory of at most ``steps + 1`` ticks. Its truth is the pose and the truth of ``info``; ticks for which
+        ``info["scored"]`` is False are masked.
+
+    Raises:
+        ValueError: ``steps`` is negative, or the environment does not follow the contract of this package.
+    """
+    if steps is not None and steps < 0:
+        raise ValueError(f"steps must not be negative, got {steps}")
+    seed = int(np.random.SeedSequence().generate_state(1)[0]) if seed is None else int(seed)
+    with opened(env) as env:
+        suite = getattr(env.unwrapped, "suite", None)
+        if suite is None:
+            raise ValueError(f"{env} has no sensor suite: only environments of this package can be recorded")
+        choose = policy or default_policy(env, seed)
+        observation, info = env.reset(seed=seed)
+        ticks, infos, ended = [suite.to_measurement(observation)], [info], "steps"
+        for _ in counted(steps, progress):
+            observation, _, terminated, truncated, info = env.step(choose(observation))
+            ticks.append(suite.to_measurement(observation))
+            infos.append(info)
+            if terminated or truncated:
+                ended = "terminated" if terminated else "truncated"
+                break
+        return join(ticks, infos, describe(env, seed) | {"ended": ended})
+
+
+@contextmanager
+def opened(env: Any) -> Iterator[Any]:
+    """The environment itself, or the one made from an id and closed afterwards."""
+    import gymnasium
+
+    if isinstance(env, gymnasium.vector.VectorEnv):
+        raise ValueError("a vector environment cannot be recorded; record its environments one by one")
+    if not isinstance(env, str):
+        yield env
+        return
+    made = gymnasium.make(env)
+    try:
+        yield made
+    finally:
+        made.close()
+
+
+def default_policy(env: Any, seed: int) -> Policy:
+    """The neutral action if the environment names one, else seeded samples."""
+    neutral = getattr(env.unwrapped, "neutral_action", None)
+    if neutral is not None:
+        return lambda observation: neutral
+    env.action_space.seed(seed)
+    return lambda observation: env.action_space.sample()
+
+
+def counted(steps: int | None, progress: bool) -> Iterator[int]:
+    """Count to ``steps`` or for ever, with a bar if wanted."""
+    numbers: Iterator[int] = iter(range(steps)) if steps is not None else iter(int, 1)
+    if not progress:
+        return numbers
+    from rich.progress import track
+
+    return iter(track(numbers, description="recording", total=steps))
+
+
+def join(ticks: list[Mapping[str, Any]], infos: list[Mapping[str, Any]], metadata: dict[str, Any]) -> Trajectory:
+    """Stack measurements and infos of single ticks to a trajectory."""
+    names = {key: set(infos[0].get(key, {})) for key in ("pose", "truth")}
+    for tick, info in enumerate(infos):
+        for key in ("time", "pose", "truth"):
+            if key not in info:
+                raise ValueError(f"info lacks {key!r} at tick {tick}; it holds {sorted(info)}")
+        for key, expected in names.items():
+            if set(info[key]) != expected:
+                raise ValueError(f"info[{key!r}] changed from {sorted(expected)} to {sorted(info[key])} at tick {tick}")
+    truth = {
+        name: np.stack([np.atleast_1d(np.asarray(info[key][name], dtype=float)) for info in infos])
+        for key in ("pose", "truth")
+        for name in infos[0][key]
+    }
+    trajectory = Trajectory(
+        time=np.array([float(info["time"]) for info in infos]),
+        measurements={name: np.stack([np.asarray(tick[name], dtype=float) for tick in ticks]) for name in ticks[0]},
+        truth=truth,
+        mask=np.array([bool(info.get("scored", True)) for info in infos]),
+        metadata=metadata,
+    )
+    return trajectory.replace(metadata=metadata | {"rate": 1.0 / trajectory.dt}) if len(trajectory) > 1 else trajectory
+
+
+def describe(env: Any, seed: int) -> dict[str, Any]:
+    """What is needed to play the same episode again."""
+    spec = env.spec
+    identity = type(env.unwrapped).__name__ if spec is None else spec.id
+    suite = env.unwrapped.suite
+    geometry = getattr(env.unwrapped, "geometry", None)
+    told = {} if geometry is None else {"geometry": geometry.describe()}
+    return {
+        "name": f"{identity}-{seed}",
+        "environment": {"id": identity, "kwargs": plain({} if spec is None else spec.kwargs)},
+        "sensors": plain(suite.describe()) if hasattr(suite, "describe") else None,
+        "seed": seed,
+        "version": package_version(),
+        "source": "simulation",
+        **told,
+    }
+
+
+def package_version() -> str:
+    """The installed version of this package."""
+    try:
+        return packages.version("poise")
+    except packages.PackageNotFoundError:
+        return "unknown"
+
+
+def plain(value: Any) -> Any:
+    """``value`` as JSON knows it; what JSON does not know becomes its ``repr``."""
+    if isinstance(value, np.ndarray | np.generic):
+        return plain(value.tolist())
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        fields = {item.name: plain(getattr(value, item.name)) for item in dataclasses.fields(value)}
+        return {"type": type(value).__name__, **fields}
+    if isinstance(value, Mapping):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple | set | frozenset):
+        return [plain(item) for item in value]
+    return value if isinstance(value, str | int | float | bool | None) else repr(value)

@@ -1,0 +1,1 @@
+"""Ideal readings, error models, named devices, and suites of sensors at their sites."""

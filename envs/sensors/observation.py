@@ -1,0 +1,97 @@
+"""Measurements as observations: what was not sampled keeps its last value and is marked as not fresh."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from gymnasium import spaces
+
+from ...filters.core.quantity import Channel
+
+FRESH = "fresh"
+"""Key of the flags in an observation."""
+
+
+class ObservationLayout:
+    """Channels, their bounds, and the last value of each.
+
+    Args:
+        channels: in the order of the flags.
+        limits: channel name → largest magnitude, in the channel's unit, for all axes or ``(size,)``; larger values are
+            clipped.
+
+    Raises:
+        ValueError: two channels share a name, one is called ``fresh``, or a limit is missing, not positive or infinite.
+    """
+
+    def __init__(self, channels: Sequence[Channel], limits: Mapping[str, float | np.ndarray]) -> None:
+        names = [channel.name for channel in channels]
+        if len(set(names)) < len(names) or FRESH in names or not names:
+            raise ValueError(f"channels must have names of their own, none of them {FRESH!r}, got {names}")
+        boxes: dict[str, spaces.Space] = {}
+        for channel in channels:
+            limit = limits.get(channel.name, math.nan)
+            if not np.all((np.asarray(limit) > 0.0) & (np.asarray(limit) < math.inf)):
+                raise ValueError(
+                    f"limits[{channel.name!r}] must be positive and finite ({channel.unit}), got {limit}: observations "
+                    "need bounds (NoiseModel.full_scale)"
+                )
+            bound = np.full(channel.size, limit, np.float32)
+            boxes[channel.name] = spaces.Box(-bound, bound, dtype=np.float32)
+        boxes[FRESH] = spaces.MultiBinary(len(names))
+        self.channels = tuple(channels)
+        self.space = spaces.Dict(boxes)
+        self._limits = {name: np.asarray(limits[name], np.float32).astype(float) for name in names}
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget: zeros stand for channels without a sample so far."""
+        self.held = {channel.name: np.zeros(channel.size, np.float32) for channel in self.channels}
+
+    def observe(self, measurement: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+        """Turn one measurement into an observation.
+
+        Args:
+            measurement: channel name → ``(size,)``; a channel that is missing, or in which any value is NaN, counts as
+                not sampled.
+
+        Returns:
+            Channel name → float32 ``(size,)`` within the bounds, and ``fresh``: int8 ``(channels,)``.
+        """
+        fresh = np.zeros(len(self.channels), np.int8)
+        for index, channel in enumerate(self.channels):
+            values = measurement.get(channel.name)
+            # sums over Python floats: three values are too few for NumPy
+            if values is None or any(value != value for value in values.tolist()):
+                continue
+            limit = self._limits[channel.name]
+            self.held[channel.name] = np.minimum(np.maximum(values, -limit), limit).astype(np.float32)
+            fresh[index] = 1
+        return {**{name: value.copy() for name, value in self.held.items()}, FRESH: fresh}
+
+    def to_measurement(self, observation: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+        """Undo :meth:`observe`, over any leading (batch, time) dimensions.
+
+        Args:
+            observation: channel name → ``(..., size)``, and ``fresh`` ``(..., channels)``.
+
+        Returns:
+            Channel name → float64 ``(..., size)``; NaN where not fresh.
+
+        Raises:
+            ValueError: a key is missing, or ``fresh`` has not one flag a channel.
+        """
+        missing = [name for name in (*self._limits, FRESH) if name not in observation]
+        if missing:
+            raise ValueError(f"observation lacks {missing}; it holds {sorted(observation)}")
+        fresh = np.asarray(observation[FRESH])
+        if fresh.shape[-1:] != (len(self.channels),):
+            raise ValueError(f"observation['fresh'] must have shape (..., {len(self.channels)}), got {fresh.shape}")
+        return {
+            channel.name: np.where(
+                fresh[..., index, None] > 0, np.asarray(observation[channel.name], dtype=float), np.nan
+            )
+            for index, channel in enumerate(self.channels)
+        }

@@ -1,0 +1,235 @@
+r"""What a gain policy sees: statistics of innovations and sensors over several times, no truth.
+
+Five streams of vectors are watched tick by tick: the whitened innovation of the filter, the gyroscope, the
+accelerometer (nothing for a filter that reads none), the external acceleration a that the filter believes in, and the
+lean u × a / g with its vertical u (both zero where a filter gives none). A steady tilt error τ (b × u), which a
+gyroscope bias b leaves at a time constant τ, is a lean whose mean in sensor axes points along b whatever the attitude,
+while true accelerations of a hand average out. Of each stream, running means of
+
+    1,  v,  |v|²,  |v − v_previous|²        and, of the accelerometer,  ‖f‖ − g  and its square
+
+are kept over each time scale; a missing sample adds nothing. An interval of ticks ends with a decision; there the
+means over the interval m enter
+
+    average ← average + (1 − exp(−interval / τ)) (m − average)
+
+and the features are their invariants, independent of how the sensor is mounted: for every stream and scale the
+logarithms of its root mean square, of its deviation from its mean, of the length of its mean, and of its change from
+tick to tick. A consistent filter has innovations of rms √m without a mean; a mean or slow changes show a gain that is
+too small (R. K. Mehra, "On the identification of variances and adaptive Kalman filtering", IEEE Trans. Automatic
+Control 15(2), 1970).
+
+All is squashed to [−1, 1]. One memory serves a batch of sequences.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from ..core.kalman import KalmanFilter
+from ..core.quantity import Estimate
+from ..core.rotation import cross
+
+STREAMS = ("innovation", "gyr", "acc", "external", "lean")
+STATISTICS = ("rms", "deviation", "mean", "change")
+CENTRES = {
+    "innovation": (0.0, 0.0, -0.5, 0.0),
+    "gyr": (0.0, -0.5, -0.5, -1.0),
+    "acc": (1.0, 0.0, 1.0, 0.0),
+    "external": (0.0, 0.0, -0.5, -0.5),
+    "lean": (-1.0, -1.0, -1.5, -1.5),
+}
+"""Stream → decimal logarithm of each statistic that is mapped to 0: about the middle of what a hand does."""
+FLOOR = 1e-5
+"""Smallest statistic that is told from zero."""
+CHANGE_TIME = 0.01
+"""s: changes of the sensors from tick to tick are given per this time, so that they mean the same at any rate"""
+START_TIME = 20.0
+"""s: time constant of the feature that tells a young filter from an old one."""
+
+
+class FeatureMemory(NamedTuple):
+    """All memory of the features; arrays only.
+
+    Attributes:
+        averages: ``(*batch, scales, moments)`` running means.
+        sums: ``(*batch, moments)`` over the ticks of the interval that is not over.
+        previous: ``(*batch, streams, width)`` last sample of every stream; NaN if there was none.
+        tick: ``()`` int, ticks of the interval that is not over; 0 asks for a decision.
+        decisions: ``(*batch,)`` int, intervals that are over.
+    """
+
+    averages: np.ndarray
+    sums: np.ndarray
+    previous: np.ndarray
+    tick: np.ndarray
+    decisions: np.ndarray
+
+
+@dataclass(frozen=True)
+class InnovationFeatures:
+    """Statistics over several time scales, computed while a filter runs.
+
+    Attributes:
+        interval: time from decision to decision, s; rounded to ticks of the filter, one at least.
+        scales: time constants of the running means, s; 0 for the last interval alone.
+
+    Raises:
+        ValueError: the interval is not positive, or there is no scale, or a negative one.
+    """
+
+    interval: float = 0.1
+    scales: tuple[float, ...] = (0.0, 0.3, 1.0, 4.0, 16.0)
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.interval < math.inf:
+            raise ValueError(f"interval must be positive seconds, got {self.interval}")
+        if not self.scales or not all(0.0 <= scale < math.inf for scale in self.scales):
+            raise ValueError(f"scales must be times in seconds, 0 or more, got {self.scales}")
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Name of every feature, in order; the actions of the last interval follow them."""
+        parts = [f"{stream} {statistic}" for stream in STREAMS for statistic in STATISTICS]
+        parts += ["norm excess", "norm excess rms"]
+        return (*(f"{part} {scale:g} s" for scale in self.scales for part in parts), "time since start")
+
+    def size(self, actions: int) -> int:
+        """Length of :meth:`observe` for that many actions."""
+        return len(self.scales) * (len(STREAMS) * len(STATISTICS) + 2) + 1 + actions
+
+    def ticks(self, dt: float) -> int:
+        """Ticks of an interval at a sampling interval of ``dt`` seconds."""
+        return max(1, round(self.interval / dt))
+
+    def init(self, kalman: KalmanFilter, batch: tuple[int, ...] = ()) -> FeatureMemory:
+        """Empty memory for sequences of shape ``batch``.
+
+        Raises:
+            ValueError: the filter reads no gyroscope.
+        """
+        stream_channels(kalman)
+        width = max(3, kalman.model.residual_size)
+        moments = len(STREAMS) * (width + 3) + 2
+        return FeatureMemory(
+            np.zeros((*batch, len(self.scales), moments)),
+            np.zeros((*batch, moments)),
+            np.full((*batch, len(STREAMS), width), np.nan),
+            np.array(0),
+            np.zeros(batch, int),
+        )
+
+    def update(
+        self, memory: FeatureMemory, kalman: KalmanFilter, measurements: Mapping[str, np.ndarray], estimate: Estimate
+    ) -> FeatureMemory:
+        """Take the ticks that a filter has just run over.
+
+        Args:
+            memory: from :meth:`init` or the update before; it is not changed.
+            kalman: the filter.
+            measurements: channel → ``(T, *batch, size)``.
+            estimate: what the filter said, ``(T, *batch, …)``.
+
+        Raises:
+            ValueError: the ticks reach beyond the end of the interval.
+        """
+        moments, previous = self._moments(memory, kalman, measurements, estimate)
+        tick = int(memory.tick) + len(moments)
+        whole = self.ticks(kalman.dt)
+        if tick > whole:
+            raise ValueError(f"{len(moments)} ticks after {memory.tick} reach beyond the interval of {whole} ticks")
+        # The first axis is added up row by row, so ticks one by one and together give the same sums.
+        sums = np.concatenate([memory.sums[None], moments]).sum(axis=0)
+        if tick < whole:
+            return memory._replace(sums=sums, previous=previous, tick=np.array(tick))
+        duration = whole * kalman.dt
+        rate = np.array([1.0 if scale == 0.0 else -math.expm1(-duration / scale) for scale in self.scales])
+        averages = memory.averages + rate[:, None] * ((sums / whole)[..., None, :] - memory.averages)
+        return FeatureMemory(averages, np.zeros_like(sums), previous, np.array(0), memory.decisions + 1)
+
+    def observe(self, memory: FeatureMemory, kalman: KalmanFilter, action: np.ndarray) -> np.ndarray:
+        """Features and the action of the last interval: float32 ``(*batch, size)`` in [−1, 1].
+
+        Args:
+            memory: at the end of an interval.
+            kalman: the filter.
+            action: ``(*batch, k)`` in [−1, 1].
+        """
+        batch, scales = memory.averages.shape[:-2], len(self.scales)
+        block = memory.averages[..., :-2].reshape(*batch, scales, len(STREAMS), -1)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            means = block[..., 1:] / block[..., :1]
+            excess = memory.averages[..., -2:] / block[..., STREAMS.index("acc"), :1]
+        mean, square, change = means[..., :-2], means[..., -2], means[..., -1]
+        mean_square = np.sum(mean * mean, axis=-1)
+        # Innovations come at a pace of their own; the change of all else is given per time.
+        pace = np.where(np.array(STREAMS) == "innovation", 1.0, (CHANGE_TIME / kalman.dt) ** 2)
+        sizes = np.stack([square, square - mean_square, mean_square, change * pace], axis=-1)
+        logarithms = 0.5 * np.log10(np.fmax(sizes, FLOOR**2)) - np.array([CENTRES[stream] for stream in STREAMS])
+        excess = np.where(np.isfinite(excess), excess, 0.0)
+        excess_rms = 0.5 * np.log10(np.fmax(excess[..., 1:], FLOOR**2)) + 0.5
+        features = np.concatenate([logarithms.reshape(*batch, scales, -1), excess[..., :1], excess_rms], axis=-1)
+        age = memory.decisions * (self.ticks(kalman.dt) * kalman.dt / START_TIME)
+        squashed = np.tanh(np.concatenate([features.reshape(*batch, -1), age[..., None]], axis=-1))
+        return np.concatenate([squashed, action], axis=-1).astype(np.float32)
+
+    def _moments(
+        self, memory: FeatureMemory, kalman: KalmanFilter, measurements: Mapping[str, np.ndarray], estimate: Estimate
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Moments ``(T, *batch, moments)`` of the ticks, and the last sample of every stream."""
+        gyroscope, accelerometer = stream_channels(kalman)
+        gyr = np.asarray(measurements[gyroscope], dtype=float)
+        acc = np.full_like(gyr, np.nan) if accelerometer is None else np.asarray(measurements[accelerometer], float)
+        gravity = getattr(kalman.model, "gravity", 9.81)
+        innovation = np.asarray(estimate.innovation)
+        # A whitened innovation is exactly 0 where there was nothing to compare.
+        innovation = np.where((innovation != 0.0).any(axis=-1, keepdims=True), innovation, np.nan)
+        external = np.asarray(estimate.pose.get("external_acceleration", np.zeros_like(gyr)))
+        lean = cross(np.asarray(estimate.pose.get("up", np.zeros_like(gyr))), external) / gravity
+        values = np.zeros((*acc.shape[:-1], *memory.previous.shape[-2:]))
+        for index, stream in enumerate((innovation, gyr, acc, external, lean)):
+            values[..., index, : stream.shape[-1]] = stream
+        earlier, last = before(values, memory.previous)
+        known = np.isfinite(values).all(axis=-1, keepdims=True)
+        v = np.where(known, values, 0.0)
+        change = np.where(known & np.isfinite(earlier).all(axis=-1, keepdims=True), values - earlier, 0.0)
+        squares = [np.sum(part * part, axis=-1, keepdims=True) for part in (v, change)]
+        moments = np.concatenate([known, v, *squares], axis=-1)
+        size = np.sqrt(np.sum(acc * acc, axis=-1, keepdims=True))
+        excess = np.where(np.isfinite(size), size - gravity, 0.0)
+        flat = moments.reshape(*acc.shape[:-1], -1)
+        return np.concatenate([flat, excess, excess * excess], axis=-1), last
+
+
+def stream_channels(kalman: KalmanFilter) -> tuple[str, str | None]:
+    """Names of the first gyroscope and the first accelerometer that a filter reads; None if it reads no accelerometer.
+
+    Raises:
+        ValueError: it reads no gyroscope.
+    """
+    names = [channel.name for channel in kalman.channels if channel.size == 3]
+    found = [next((name for name in names if name.endswith(kind)), None) for kind in ("/gyr", "/acc")]
+    if found[0] is None:
+        raise ValueError(f"a tuned filter must read a gyroscope, this one reads {names}")
+    return found[0], found[1]
+
+
+def before(values: np.ndarray, held: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The last known vector before every tick ``(T, *batch, d)``, and that after the last tick ``(*batch, d)``.
+
+    Args:
+        values: ``(T, *batch, d)``; a vector with any NaN is unknown.
+        held: ``(*batch, d)`` last known vector before the first tick.
+    """
+    row = np.concatenate([held[None], values])
+    known = np.isfinite(row).all(axis=-1)
+    if not known[1:].all():
+        ticks = np.arange(len(row)).reshape(-1, *(1,) * (known.ndim - 1))
+        latest = np.maximum.accumulate(np.where(known, ticks, 0), axis=0)
+        row = np.take_along_axis(row, latest[..., None], axis=0)
+    return row[:-1], row[-1]

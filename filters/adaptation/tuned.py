@@ -1,0 +1,107 @@
+"""A Kalman filter whose gains somebody chooses while it runs: what environments and adaptive estimators share."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..core.kalman import FilterState, KalmanFilter
+from ..core.quantity import Estimate
+from .features import FeatureMemory, InnovationFeatures
+from .gains import GainRange, filter_name, gain_ranges, log_gains
+
+
+class TunedState(NamedTuple):
+    """All memory of a tuned filter; arrays only, so copying them is saving it.
+
+    Attributes:
+        filter: of the filter.
+        memory: of the features.
+        action: ``(*batch, k)`` in force since the last decision.
+    """
+
+    filter: FilterState
+    memory: FeatureMemory
+    action: np.ndarray
+
+
+@dataclass(frozen=True)
+class TunedFilter:
+    """A filter, what may be chosen of it, and what is seen of it.
+
+    Attributes:
+        kalman: the filter in its published tuning.
+        ranges: of the actions, in their order.
+        features: what is seen, and how often there is a decision.
+    """
+
+    kalman: KalmanFilter
+    ranges: tuple[GainRange, ...]
+    features: InnovationFeatures
+
+    @classmethod
+    def of(
+        cls, kalman: KalmanFilter, gains: tuple[str, ...] | None = None, features: InnovationFeatures | None = None
+    ) -> TunedFilter:
+        """A tuned filter with the ranges of :func:`poise.filters.adaptation.gains.gain_ranges`."""
+        return cls(kalman, gain_ranges(kalman, gains), features or InnovationFeatures())
+
+    @property
+    def name(self) -> str:
+        """Name of the filter."""
+        return filter_name(self.kalman)
+
+    @property
+    def actions(self) -> int:
+        """Number k of gains that are chosen."""
+        return len(self.ranges)
+
+    @property
+    def observation_size(self) -> int:
+        """Length of an observation."""
+        return self.features.size(self.actions)
+
+    @property
+    def ticks(self) -> int:
+        """Ticks from decision to decision."""
+        return self.features.ticks(self.kalman.dt)
+
+    def with_dt(self, dt: float) -> TunedFilter:
+        """The same for another sampling interval; decisions stay as many seconds apart, to a tick."""
+        return replace(self, kalman=self.kalman.with_dt(dt))
+
+    def init(self, measurement: Mapping[str, Any]) -> TunedState:
+        """Empty memory with the batch shape of ``measurement``; the action is neutral.
+
+        Raises:
+            ValueError: the filter reads no gyroscope, or a channel is missing.
+        """
+        state = self.kalman.init(measurement)
+        batch = tuple(state.x.shape[:-1])
+        return TunedState(state, self.features.init(self.kalman, batch), np.zeros((*batch, self.actions)))
+
+    def observe(self, state: TunedState) -> np.ndarray:
+        """Observation ``(*batch, n)``, float32 in [−1, 1], at a decision."""
+        return self.features.observe(state.memory, self.kalman, state.action)
+
+    def gains(self, action: np.ndarray) -> dict[str, np.ndarray]:
+        """Log gains of an action; see :func:`poise.filters.adaptation.gains.log_gains`."""
+        return log_gains(self.kalman.model, self.ranges, action)
+
+    def decide(self, state: TunedState, action: np.ndarray) -> TunedState:
+        """Put an action ``(*batch, k)`` in force; values beyond [−1, 1] count as these."""
+        bounded = np.minimum(np.maximum(np.asarray(action, dtype=float), -1.0), 1.0)
+        return state._replace(action=np.broadcast_to(bounded, state.action.shape))
+
+    def advance(self, state: TunedState, measurements: Mapping[str, Any]) -> tuple[Estimate, TunedState]:
+        """Run over ticks ``(T, *batch, size)`` of one interval, not beyond its end, with the action in force."""
+        length = len(next(iter(measurements.values())))
+        gains = {
+            name: np.broadcast_to(factor, (length, *factor.shape)) for name, factor in self.gains(state.action).items()
+        }
+        estimate, after = self.kalman.run_from(state.filter, measurements, gains)
+        memory = self.features.update(state.memory, self.kalman, measurements, estimate)
+        return estimate, TunedState(after, memory, state.action)

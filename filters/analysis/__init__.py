@@ -1,0 +1,1 @@
+"""What a model can achieve: posterior bounds, observability, exact derivatives."""

@@ -1,0 +1,161 @@
+r"""How well any filter could do along one true trajectory: the posterior Cramér–Rao bound, for every model here.
+
+P. Tichavský, C. H. Muravchik, A. Nehorai, "Posterior Cramér–Rao bounds for discrete-time nonlinear filtering", IEEE
+Transactions on Signal Processing 46(5), 1998. With the information matrix J and
+
+    D¹¹ = Fᵀ Q⁻¹ F,   D¹² = −Fᵀ Q⁻¹,   D²² = Q⁻¹ + Hᵀ R⁻¹ H,
+    J(k+1) = D²² − D²¹ (J(k) + D¹¹)⁻¹ D¹²
+
+no estimator has a smaller covariance than J⁻¹, on average over what the expectation is taken of. Here F, Q, H and R are
+those at the true states of one trajectory, as the two-gyroscope paper (27)–(29) has it: the bound of the linearised
+problem, not an average. It then equals the Riccati recursion, which needs no Q⁻¹:
+
+    P(k+1)⁻ = F P(k) Fᵀ + Q,   P(k+1) = (P(k+1)⁻ ⁻¹ + Hᵀ R⁻¹ H)⁻¹
+
+Left out is ½ tr(Q⁻¹ ∂ᵢQ Q⁻¹ ∂ⱼQ), which D¹¹ also has where Q depends on the state: what the size of the noise tells. No
+Kalman filter uses it, and the paper leaves it out (with it the bound of a platform that does not turn would not grow).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..core.estimator import check_measurements
+from ..core.kalman import correct
+from ..core.model import Model
+from ..core.sampling import filled, hold, join, split
+
+
+class Linearisation(NamedTuple):
+    """A model along a trajectory of T states: T − 1 steps, T measurements.
+
+    Attributes:
+        F: ``(T − 1, e, e)`` Jacobian of the error from tick k to k + 1.
+        Q: ``(T − 1, e, e)`` process covariance.
+        H: ``(T, m, e)`` Jacobian of the measurement.
+        R: ``(T, m, m)`` its covariance.
+        usable: ``(T, m)`` bool, rows that were measured.
+    """
+
+    F: np.ndarray
+    Q: np.ndarray
+    H: np.ndarray
+    R: np.ndarray
+    usable: np.ndarray
+
+
+def linearise(model: Model, states: np.ndarray, measurements: Mapping[str, Any]) -> Linearisation:
+    """Jacobians and covariances of a model at true states.
+
+    Args:
+        model: the equations.
+        states: ``(T, n)`` true states.
+        measurements: channel → ``(T, size)`` of the same ticks, without errors for the bound (samples of an ideal
+            sensor plus the biases in ``states``, see :func:`with_gaps`); NaN where there is no sample: missing inputs
+            are held, missing measurements tell nothing, as in :class:`poise.filters.core.kalman.KalmanFilter`.
+
+    Raises:
+        ValueError: shapes do not fit.
+    """
+    samples, held = samples_of(model, measurements)
+    states = np.asarray(states, dtype=float)
+    if states.shape != (len(samples), model.state_size):
+        raise ValueError(f"states must have shape {(len(samples), model.state_size)}, got {states.shape}")
+    inputs = split(filled(held), model.channels)
+    now = {name: array[1:] for name, array in inputs.items()}
+    before = {name: array[:-1] for name, array in inputs.items()}
+    _, F, Q = model.predict(states[:-1], now, before)
+    r, H, R = model.residual(states, split(samples, model.channels))
+    usable = np.isfinite(r) & np.isfinite(H).all(-1) & np.isfinite(np.linalg.diagonal(R))
+    ticks, e, m = len(samples), model.error_size, model.residual_size
+    F, Q = (np.broadcast_to(part, (ticks - 1, e, e)) for part in (F, Q))
+    return Linearisation(F, Q, np.broadcast_to(H, (ticks, m, e)), np.broadcast_to(R, (ticks, m, m)), usable)
+
+
+def samples_of(model: Model, measurements: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray]:
+    """All channels of a model side by side ``(T, d)``: as they are, and with missing samples held."""
+    arrays = check_measurements(model.channels, measurements, time_axis=True)
+    samples = np.asarray(join(arrays, model.channels), dtype=float)
+    held = [samples[0]]
+    for sample in samples[1:]:
+        held.append(hold(sample, held[-1]))
+    return samples, np.array(held)
+
+
+def start_of(model: Model, measurements: Mapping[str, Any]) -> tuple[int, np.ndarray]:
+    """First tick at which a filter of this model can start, and the covariance ``(e, e)`` with which it does.
+
+    Raises:
+        ValueError: it never can.
+    """
+    _, held = samples_of(model, measurements)
+    x, P = (np.asarray(part, dtype=float) for part in model.prior(split(held, model.channels)))
+    P = np.broadcast_to(P, (len(held), *P.shape[-2:]))
+    ready = np.isfinite(x).all(axis=-1) & np.isfinite(P).all(axis=(-2, -1))
+    if not ready.any():
+        raise ValueError(f"measurements never suffice for the prior of {type(model).__name__}: a channel has no sample")
+    first = int(np.argmax(ready))
+    return first, P[first]
+
+
+def posterior_bound(
+    model: Model, states: np.ndarray, measurements: Mapping[str, Any], prior: np.ndarray | None = None
+) -> np.ndarray:
+    """Bound ``(T, e, e)`` on the covariance of any estimate at each tick, by the Riccati form; NaN before the start.
+
+    Args:
+        model: the equations, with the noises that the sensors truly have.
+        states: ``(T, n)`` true states.
+        measurements: as for :func:`linearise`.
+        prior: ``(e, e)`` covariance at the first tick, whose measurement is counted in it; None for the model's, at the
+            tick at which a filter can start.
+
+    Raises:
+        ValueError: shapes do not fit, or the samples never suffice for the model's prior.
+    """
+    F, Q, H, R, usable = linearise(model, states, measurements)
+    first, P = start_of(model, measurements) if prior is None else (0, np.asarray(prior, dtype=float))
+    bounds = [np.full_like(P, np.nan)] * first + [P]
+    for k in range(first, len(F)):
+        P = F[k] @ P @ F[k].T + Q[k]
+        if usable[k + 1].any():
+            P = correct(P, np.where(usable[k + 1], 0.0, np.nan), H[k + 1], R[k + 1])[1]
+        bounds.append(P)
+    return np.array(bounds)
+
+
+def information_step(J: np.ndarray, F: np.ndarray, Q: np.ndarray, H: np.ndarray, R: np.ndarray) -> np.ndarray:
+    """One step of the information recursion as published; Q must not be singular.
+
+    Args:
+        J: ``(e, e)`` information at tick k.
+        F: ``(e, e)`` Jacobian from k to k + 1.
+        Q: ``(e, e)`` process covariance.
+        H: ``(m, e)`` rows that are measured at k + 1.
+        R: ``(m, m)`` their covariance.
+    """
+    weighted = np.linalg.solve(Q, F)  # Q⁻¹ F
+    D22 = np.linalg.inv(Q) + H.T @ np.linalg.solve(R, H)
+    return D22 - weighted @ np.linalg.solve(J + F.T @ weighted, weighted.T)
+
+
+def with_gaps(ideal: Mapping[str, Any], recorded: Mapping[str, Any]) -> dict[str, np.ndarray]:
+    """Error-free samples where a recording has samples, NaN where it has none.
+
+    Args:
+        ideal: channel → ``(T, size)`` of ideal sensors that saw the same motion (same seed, ``sensors="ideal"``).
+        recorded: channel → ``(T, size)``, whose pattern counts.
+
+    Raises:
+        ValueError: a channel is missing or has another shape.
+    """
+    result = {}
+    for name, samples in recorded.items():
+        pattern, exact = np.asarray(samples, dtype=float), np.asarray(ideal.get(name, np.nan), dtype=float)
+        if exact.shape != pattern.shape:
+            raise ValueError(f"ideal[{name!r}] must have shape {pattern.shape}, got {exact.shape}")
+        result[name] = np.where(np.isfinite(pattern), exact, np.nan)
+    return result

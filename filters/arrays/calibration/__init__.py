@@ -1,0 +1,1 @@
+"""Estimation of scale, offset and axes from rate-table and tumbling runs."""

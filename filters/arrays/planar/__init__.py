@@ -1,0 +1,1 @@
+"""Orientation in a vertical plane from accelerometers and one gyroscope."""

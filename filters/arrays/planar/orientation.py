@@ -1,0 +1,198 @@
+r"""Orientation in a vertical plane: what the planar methods share, and the Kalman filters on the angle alone.
+
+P. He, "Estimating the orientation of a game controller from inertial and magnetic measurements", thesis, Université
+Laval; chapter 3; equation numbers are the thesis'. A controller with four accelerometers and a gyroscope moves in a
+plane, x to the right, y up; φ is the angle, counter-clockwise, by which its axes are turned. The array gives the
+specific force c̈ = b̈ − Qᵀg in body axes, of which the filters take b̈ for white noise:
+
+    φ_k = φ_{k−1} + ½ Δt (ω_{k−1} + ω_k) + e,   var e = Δt² σ_ω²                                            (3.30)
+    extended   c̈ = g [sin φ, cos φ]ᵀ + n,   R = σ_b̈² 1 + σ_a² B_P,   H = g [cos φ, −sin φ]ᵀ            (3.31), (3.35)
+    linear     atan2(c̈_x, c̈_y) = φ + n,     R = min((σ_b̈² + σ_a²/2)/g², π²/3),   H = 1
+
+π²/3 is the variance of an angle that nothing is known of. As R is a multiple of 1, the extended filter's covariance
+does not depend on the data.
+
+Differs from print: (3.20), (3.61) have an arctangent of one argument; (3.31) adds b̈ in the wrong axes, which does not
+matter where its covariance is a multiple of 1. The linear filter takes the wrapped difference of the angles;
+``wrapped=False`` is print, which is lost after the first half-turn (and not, as the thesis says, for being linear).
+
+A hand does not accelerate like white noise: σ_b̈ wants to be about three times the acceleration it stands for.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+
+from ...core.backend import Array, constant, expand, namespace
+from ...core.model import Equations, Gain, Model
+from ...core.quantity import Channel, Measurement, Quantity
+from ...core.rotation import wrap
+from ..array import PLANAR, AccelerometerArray
+
+PLANAR_GYROSCOPE = Channel("planar/gyr", 1, "rad/s")
+"""Angular rate about the normal of the plane, counter-clockwise."""
+PLANAR_ANGLE = Quantity("planar/angle", "angle", 1, "rad")
+"""Turn φ of the body's axes against x (right) and y (up) of the plane, counter-clockwise."""
+
+UNKNOWN_ANGLE = math.pi**2 / 3.0
+"""rad²: variance of an angle that may be any"""
+
+
+@dataclass(frozen=True)
+class PlanarEquations(Equations):
+    """Parameters and readings that the planar methods share.
+
+    Raises:
+        ValueError: an unknown start, or an array that is not planar or does not determine the specific force.
+    """
+
+    array: AccelerometerArray = PLANAR
+    """where the accelerometers sit"""
+    start: Literal["tilt", "known"] = "tilt"
+    """where the first angle comes from: the first readings, or ``initial_angle``"""
+    initial_angle: float = 0.0
+    """φ₀ of a known start, rad"""
+    initial_noise: float = 0.1
+    """standard deviation of φ₀ of a known start, rad; the thesis' P₀ = 10³ rad² lets the first correction turn the
+    angle by whole turns"""
+    gyroscope_noise: float = 0.6
+    """σ_ω, rad/s per sample (section 3.4.1)"""
+    accelerometer_noise: float = 0.3
+    """σ_a, m/s² per sample (section 3.4.1)"""
+    inertial_acceleration: float = 10.0
+    """σ_b̈, m/s² per axis: how hard the controller is accelerated, inflated as it is no white noise"""
+    gravity: float = 9.81
+    """g, m/s²"""
+
+    outputs: ClassVar[tuple[Quantity, ...]] = (PLANAR_ANGLE,)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.start not in ("tilt", "known"):
+            raise ValueError(f"start must be 'tilt' or 'known', got {self.start!r}")
+        if self.array.dimension != 2 or not self.array.determined[:2].all():
+            raise ValueError(
+                f"array {self.array.name!r} must be planar and determine the specific force, got dimension "
+                f"{self.array.dimension}, rank {self.array.rank}"
+            )
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:  # type: ignore[override]
+        """Gyroscope and readings of the array."""
+        return (PLANAR_GYROSCOPE, self.array.channel)
+
+    def specific_force(self, z: Measurement) -> Array:
+        """c̈ ``(..., 2)``, m/s², body axes."""
+        a = z[self.array.channel.name]
+        return (constant(self.array.pseudo_inverse[:2], a) @ a[..., None])[..., 0]
+
+    def tilt(self, z: Measurement) -> Array:
+        """φ̄ ``(..., 1)``: the angle if nothing but gravity is felt (3.20)."""
+        force = self.specific_force(z)
+        return namespace(force).atan2(force[..., :1], force[..., 1:])
+
+    def tilt_variance(self, like: Array) -> Array:
+        """Variance of φ̄ ``(..., 1)``, rad²."""
+        xp = namespace(like)
+        spread = float(np.trace(self.array.B_P[:2, :2])) / 2.0
+        variance = expand((self.inertial_acceleration**2 + spread * self.accelerometer_noise**2) / self.gravity**2, 1)
+        return xp.minimum(0.0 * like[..., :1] + variance, 0.0 * like[..., :1] + UNKNOWN_ANGLE)
+
+    def first(self, z: Measurement) -> tuple[Array, Array]:
+        """φ₀ and its variance ``(..., 1)``; NaN while a channel has not spoken."""
+        xp = namespace(*z.values())
+        spoken = xp.all(xp.isfinite(xp.concat([z[channel.name] for channel in self.channels], axis=-1)), axis=-1)
+        angle = self.tilt(z)
+        variance = self.tilt_variance(angle)
+        if self.start == "known":
+            angle = 0.0 * angle + expand(self.initial_angle, 1)
+            variance = 0.0 * variance + expand(self.initial_noise**2, 1)
+        return xp.where(spoken[..., None], angle, xp.nan), variance
+
+    def integrated(self, x: Array, z: Measurement, previous: Measurement) -> Array:
+        """φ ``(..., 1)`` one interval later, by the mean of two samples of the gyroscope."""
+        name = PLANAR_GYROSCOPE.name
+        return x[..., :1] + 0.5 * expand(self.dt, 1) * (previous[name] + z[name])
+
+
+@dataclass(frozen=True)
+class PlanarOrientation(PlanarEquations, Model):
+    """Kalman filters on the angle, section 3.3: ``extended`` on the specific force, ``linear`` on the tilt angle."""
+
+    method: Literal["extended", "linear"] = "extended"
+    """what the filter is told: c̈ or its angle"""
+    wrapped: bool = True
+    """of the linear one: the difference of angles is taken within half a turn"""
+
+    state_size: ClassVar[int] = 1
+    error_size: ClassVar[int] = 1
+    gains: ClassVar[dict[str, Gain]] = {
+        "process": Gain("gyroscope_noise", description="process variance σ_ω²"),
+        "measurement": Gain("inertial_acceleration", description="variance σ_b̈² of the inertial acceleration"),
+    }
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.method not in ("extended", "linear"):
+            raise ValueError(f"method must be 'extended' or 'linear', got {self.method!r}")
+
+    @property
+    def residual_size(self) -> int:  # type: ignore[override]
+        """Numbers in the residual."""
+        return 2 if self.method == "extended" else 1
+
+    def prior(self, z: Measurement) -> tuple[Array, Array]:
+        """Angle and variance of the start."""
+        angle, variance = self.first(z)
+        return angle, variance[..., None]
+
+    def predict(self, x: Array, z: Measurement, previous: Measurement) -> tuple[Array, Array, Array]:
+        """Trapezoidal rule (3.30)."""
+        F = 1.0 + 0.0 * x[..., None]
+        return self.integrated(x, z, previous), F, expand(self.dt**2 * self.gyroscope_noise**2, 2) * F
+
+    def residual(self, x: Array, z: Measurement) -> tuple[Array, Array, Array]:
+        """c̈ − g [sin φ, cos φ]ᵀ (3.31), (3.35), or the difference of the angles."""
+        xp = namespace(x)
+        if self.method == "linear":
+            r = self.tilt(z) - x
+            return wrap(r) if self.wrapped else r, 1.0 + 0.0 * x[..., None], self.tilt_variance(x)[..., None]
+        force, slope = self.expected(x), self.slope(x)
+        R = self.force_covariance(x)
+        return self.specific_force(z) - force, slope[..., None], R + 0.0 * xp.sum(slope, axis=-1)[..., None, None]
+
+    def expected(self, x: Array) -> Array:
+        """h(φ) = g [sin φ, cos φ]ᵀ ``(..., 2)``."""
+        xp = namespace(x)
+        return expand(self.gravity, 1) * xp.concat([xp.sin(x), xp.cos(x)], axis=-1)
+
+    def slope(self, x: Array) -> Array:
+        """dh/dφ ``(..., 2)``."""
+        xp = namespace(x)
+        return expand(self.gravity, 1) * xp.concat([xp.cos(x), -xp.sin(x)], axis=-1)
+
+    def force_covariance(self, like: Array) -> Array:
+        """R = σ_b̈² 1 + σ_a² B_P ``(2, 2)`` (3.34)."""
+        unit, noise = constant(np.eye(2), like), constant(self.array.B_P[:2, :2], like)
+        return expand(self.inertial_acceleration**2, 2) * unit + expand(self.accelerometer_noise**2, 2) * noise
+
+    def pose(self, x: Array) -> dict[str, Array]:
+        """The angle; whole turns are counted."""
+        return {PLANAR_ANGLE.name: x}
+
+
+def planar_force(angle: Any, acceleration: Any, gravity: float = 9.81) -> np.ndarray:
+    """c̈ = Qᵀ(b̈ − g) ``(..., 2)``: what a point feels in body axes, m/s².
+
+    Args:
+        angle: φ ``(...)``, rad.
+        acceleration: b̈ ``(..., 2)`` in the plane's axes, m/s².
+        gravity: g, m/s².
+    """
+    c, s = np.cos(angle), np.sin(angle)
+    x, y = acceleration[..., 0], acceleration[..., 1] + gravity
+    return np.stack([c * x + s * y, c * y - s * x], axis=-1)

@@ -1,0 +1,115 @@
+r"""Orientation in a vertical plane by the unscented Kalman filter of the package filterpy.
+
+P. He, thesis, Université Laval; section 3.3.6: the model of the extended filter (:class:`.PlanarOrientation`) with
+sigma points (3.48), λ = α̃²(L + κ) − L, L = 1, κ = 3 − L. Near a mean
+that is this well known the tangent fits, and the two agree.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+
+from ...core.backend import constant, to_numpy
+from ...core.estimator import check_measurements, run_by_steps
+from ...core.quantity import Estimate, Measurement
+from ...core.sampling import check_batch, filled, hold, join, split
+from .orientation import PLANAR_ANGLE, PlanarEquations, PlanarOrientation
+
+
+class UnscentedState(NamedTuple):
+    """Memory of the filter; NumPy arrays.
+
+    Attributes:
+        x: ``(*batch, 1)`` angle, rad; zero before the start.
+        covariance: ``(*batch, 1, 1)``, rad².
+        held: ``(*batch, d)`` last finite sample of every channel element, NaN if there was none.
+        started: ``(*batch,)`` bool.
+    """
+
+    x: np.ndarray
+    covariance: np.ndarray
+    held: np.ndarray
+    started: np.ndarray
+
+
+@dataclass(frozen=True)
+class PlanarUnscented(PlanarEquations):
+    """The unscented filter; batches are looped over, computation is NumPy's.
+
+    Raises:
+        ValueError: ``spread`` is not in (0, 1], or as :class:`.PlanarEquations`.
+    """
+
+    spread: float = 1e-3
+    """α̃: how far the sigma points lie from the mean, 10⁻⁴ to 1 (section 3.3.6)"""
+    weight: float = 2.0
+    """β̃ of the scaled transform: 2 suits a normal distribution"""
+
+    state_size: ClassVar[int] = 1
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not 0.0 < self.spread <= 1.0:
+            raise ValueError(f"spread must lie in (0, 1], got {self.spread}")
+
+    @property
+    def _model(self) -> PlanarOrientation:
+        return PlanarOrientation(**{item.name: getattr(self, item.name) for item in fields(PlanarEquations)})
+
+    def _filter(self, model: PlanarOrientation) -> Any:
+        """The package's filter, to be given state and samples."""
+        from filterpy.kalman import MerweScaledSigmaPoints, UnscentedKalmanFilter
+
+        points = MerweScaledSigmaPoints(1, alpha=self.spread, beta=self.weight, kappa=2.0)
+        made = UnscentedKalmanFilter(1, 2, self.dt, hx=model.expected, fx=_turned, points=points)
+        made.Q = np.array([[self.dt**2 * self.gyroscope_noise**2]])
+        made.R = model.force_covariance(np.zeros(1))
+        return made
+
+    def init(self, measurement: Measurement) -> UnscentedState:
+        """Empty memory with the batch shape of ``measurement``."""
+        sample = to_numpy(join(check_measurements(self.channels, measurement, time_axis=False), self.channels))
+        batch = sample.shape[:-1]
+        return UnscentedState(
+            np.zeros((*batch, 1)), np.zeros((*batch, 1, 1)), np.full(sample.shape, np.nan), np.zeros(batch, bool)
+        )
+
+    def step(self, state: UnscentedState, measurement: Measurement) -> tuple[UnscentedState, Estimate]:
+        """Take one sample of every channel, ``(*batch, size)``; NaN where there is none."""
+        arrays = check_measurements(self.channels, measurement, time_axis=False)
+        check_batch(arrays, state.started)
+        model, like = self._model, next(iter(arrays.values()))
+        engine = self._filter(model)
+        sample = to_numpy(join(arrays, self.channels)).astype(float)
+        current = hold(sample, state.held)
+        now, before = (split(filled(part), self.channels) for part in (current, state.held))
+        turn = model.integrated(np.zeros_like(state.x), now, before)
+        force = model.specific_force(split(sample, self.channels))
+        first, variance = model.first(split(current, self.channels))
+        x, P, started = state.x.copy(), state.covariance.copy(), state.started.copy()
+        for index in np.ndindex(started.shape):
+            if started[index]:
+                engine.x, engine.P = x[index].copy(), P[index].copy()
+                engine.predict(turn=turn[index])
+                if np.isfinite(force[index]).all():
+                    engine.update(force[index])
+                x[index], P[index] = engine.x, np.maximum(engine.P, 0.0)
+            elif math.isfinite(first[index].item()):
+                x[index], P[index], started[index] = first[index], variance[index], True
+        angle = np.where(started[..., None], x, np.nan)
+        covariance = np.where(started[..., None, None], P, np.nan)
+        estimate = Estimate({PLANAR_ANGLE.name: constant(angle, like)}, constant(covariance, like))
+        return UnscentedState(x, P, current, started), estimate
+
+    def run(self, measurements: Mapping[str, Any]) -> Estimate:
+        """Estimates of a whole sequence, ``(T, *batch, size)`` in and out; equal to stepping."""
+        return run_by_steps(self, measurements)
+
+
+def _turned(x: np.ndarray, dt: float, turn: np.ndarray) -> np.ndarray:
+    return x + turn

@@ -1,0 +1,1 @@
+"""Orientation in space from an accelerometer array and a magnetometer; the virtual controller."""

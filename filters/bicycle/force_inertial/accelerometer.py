@@ -1,0 +1,110 @@
+"""Angular accelerations from accelerometers: (7) and (8) of the force/inertial paper, corrected and as printed.
+
+Frames and names are those of :mod:`.force_inertial_kinematics`. An accelerometer reads specific force f = a − g, which
+with z down is (0, 0, −g) level and at rest.
+
+The corrected forms are exact. They are an option, because gravity cancels when (8) feeds the torque model (9): the
+predicted torque then depends on the state only through 1 − h_h/h of gravity, h_h and h being the heights of the trunk's
+centre and of its accelerometer. With h ≤ h_h the torque tells nothing, or the wrong way.
+
+As printed, (5)–(8) lack the lateral acceleration v_b ψ̇ of the rear contact, have +g although z points down, the
+opposite sign of every p_z, ω̇ without its y entry ψ̇ φ̇_b, φ̈_b = 0, no turn of the accelerometer's axes by φ, and a
+trunk rate differentiated as if R did not turn.
+"""
+
+from __future__ import annotations
+
+from ...analysis.forward_mode import Scalar, cos, sin
+from .kinematics import Accelerations, Angles, Rates, Travel, Triple, point_acceleration
+
+
+def yaw_acceleration(
+    a_by: Scalar,
+    phi_b: Scalar,
+    rate: Rates,
+    roll_acceleration: Scalar,
+    travel: Travel,
+    place: tuple[Scalar, Scalar],
+    gravity: Scalar,
+    printed: bool = False,
+) -> Scalar:
+    """Equation (7), rad/s².
+
+    Args:
+        a_by: specific force along y of the bicycle's IMU, m/s².
+        phi_b: roll.
+        rate: of the angles.
+        roll_acceleration: φ̈_b; the printed form takes it as zero.
+        travel: of the rear contact.
+        place: p_x, p_z of the IMU: ahead of the rear contact, above ground, m.
+        gravity: m/s².
+        printed: with the printed signs and omissions.
+    """
+    p_x, p_z = place
+    s_b, c_b = sin(phi_b), cos(phi_b)
+    squared = rate.psi * rate.psi
+    if printed:
+        spurious = p_x * s_b * rate.psi * rate.phi_b
+        return (a_by - s_b * gravity - p_z * s_b * c_b * squared - spurious) / (p_x * c_b)
+    kept = p_z * s_b * c_b * squared - p_z * roll_acceleration
+    return (a_by + s_b * gravity - c_b * travel.speed * rate.psi + kept) / (p_x * c_b)
+
+
+def accelerometer_accelerations(
+    angles: Angles,
+    rate: Rates,
+    a_h: Triple,
+    a_by: Scalar,
+    roll_acceleration: Scalar,
+    axial: Scalar,
+    travel: Travel,
+    places: tuple[Scalar, Scalar, Scalar, Scalar, Scalar],
+    gravity: Scalar,
+    printed: bool = False,
+) -> Accelerations:
+    """Equations (7) and (8).
+
+    Args:
+        angles: of trunk and bicycle.
+        rate: theirs.
+        a_h: specific force of the trunk's accelerometer, trunk axes, m/s².
+        a_by: of the bicycle's along its y.
+        roll_acceleration: φ̈_b, rad/s²; unused in the printed form.
+        axial: derivative of the trunk's rate about its axis, passed on.
+        travel: of the rear contact.
+        places: p_x, p_z of the bicycle's IMU, l_s, h_s of the trunk's pivot, and h from there up to the trunk's IMU, m.
+        gravity: m/s².
+        printed: with the printed signs and omissions.
+    """
+    p_x, p_z, l_s, h_s, h = places
+    s_h, c_h = sin(angles.phi_h), cos(angles.phi_h)
+    s_t, c_t = sin(angles.theta), cos(angles.theta)
+    s_p, c_p = sin(angles.phi), cos(angles.phi)
+    if printed:
+        roll_acceleration = 0.0 * roll_acceleration
+    yaw = yaw_acceleration(a_by, angles.phi_b, rate, roll_acceleration, travel, (p_x, p_z), gravity, printed)
+    acceleration = Accelerations(0.0, 0.0, axial, roll_acceleration, yaw)
+    seat_x, seat_y, seat_z = point_acceleration(l_s, h_s, angles.phi_b, rate, acceleration, travel)
+    squared, cotangent = rate.psi * rate.psi, c_t / s_t
+    if printed:
+        a_y, a_z = a_h[1], a_h[2]
+        seat_y, seat_z = seat_y - travel.speed * rate.psi, seat_z + gravity
+        lean = c_h * rate.psi * rate.theta - s_h * cotangent * rate.phi_h * rate.psi
+        lean = lean - cotangent * rate.phi_h * rate.theta
+        pitch = (2.0 * c_t * c_t - 1.0) * c_h * rate.phi_h * rate.psi
+    else:
+        a_y, a_z = c_p * a_h[1] - s_p * a_h[2], s_p * a_h[1] + c_p * a_h[2]
+        seat_z = seat_z - gravity
+        lean = 2.0 * c_h * rate.psi * rate.theta - 2.0 * cotangent * rate.phi_h * rate.theta
+        pitch = -2.0 * c_h * s_t * s_t * rate.phi_h * rate.psi
+    return Accelerations(
+        (a_y - c_h * seat_y - s_h * seat_z) / (s_t * h) + s_h * c_h * squared + lean - c_h * cotangent * yaw,
+        (-a_z + s_t * seat_x - c_t * s_h * seat_y + c_h * c_t * seat_z) / h
+        + pitch
+        - s_t * c_t * c_h * c_h * squared
+        + s_t * c_t * rate.phi_h * rate.phi_h
+        - s_h * yaw,
+        axial,
+        roll_acceleration,
+        yaw,
+    )

@@ -1,0 +1,218 @@
+"""Forces of the force/inertial filter: what the seat's sensors read, and what the rider's motion needs.
+
+Frames are those of :mod:`.force_inertial_kinematics` (z down); loads are those of the rider on seat and handlebar.
+
+**Read.** Centre of pressure from the load cells, (10) moves the six-axis sensor's load there, (11) and (12) on to the
+trunk's pivot P. Written out, the centre of pressure cancels: the moment about P is that of the six-axis sensor,
+whatever the load cells say. (Not with the printed sign of (12), where R_z x_C counts twice.) A missing load cell
+therefore costs nothing, and its noise does not count.
+
+**Needed.** Newton and Euler for all that sits on the seat, about P, with f = a − g of each part:
+
+    N = h_h u × m_h f_H + d/dt (I_t u × u̇ + I_a ω_u u) + r_c × m_c f_c
+
+The first term is the paper's (9) and (19): a point mass m_h at h_h up the trunk's axis u. The second is the rotational
+inertia of a trunk with moments I_t across and I_a along its axis. The third is what else is carried and turns with the
+bicycle: pelvis, legs, and the part of the arms that hangs at the grips; with m_c = I_t = I_a = 0 it is the paper's
+model.
+
+**Pedals** have no sensor. Their vertical force is what Newton's law misses, F_p = −Σ m f − R_h − F_h along z of the
+bicycle. At rest legs push down and back on the pedals, on the mean of a turn at the crank's axle; what goes beyond that
+drives, and acts further ahead (:func:`pedal_moment`). With ``pedal_share`` = 0 there are no pedals, as in the paper.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from ...analysis.forward_mode import Scalar, atan2, cos, sin
+from .kinematics import Accelerations, Angles, Rates, Travel, Triple, axis_motion, point_acceleration, trunk_axis
+
+
+class Masses(NamedTuple):
+    """What sits on the seat; kg, kg·m², m."""
+
+    trunk: Scalar
+    """m_h"""
+    height: Scalar
+    """h_h, from the pivot up the trunk"""
+    across: Scalar
+    """I_t, about the centre of mass"""
+    along: Scalar
+    """I_a"""
+    carried: Scalar
+    """m_c"""
+    carried_forward: Scalar
+    """of its centre from the pivot"""
+    carried_up: Scalar
+
+
+class Needed(NamedTuple):
+    """What the seat and the hands must give."""
+
+    tau_phi_h: Scalar
+    """moment about x through the pivot, N·m"""
+    tau_theta: Scalar
+    """moment about the trunk's pitch axis y', N·m"""
+    force: Triple
+    """Σ m f of trunk and what is carried, axes of R, N"""
+
+
+def _turned(arm: Triple, force: Triple, s_h: Scalar, c_h: Scalar) -> tuple[Scalar, Scalar]:
+    """Moment ``arm × force`` about x and about y' = (0, c_h, s_h)."""
+    (x, y, z), (f_x, f_y, f_z) = arm, force
+    return y * f_z - z * f_y, c_h * (z * f_x - x * f_z) + s_h * (x * f_y - y * f_x)
+
+
+def needed_load(
+    angles: Angles,
+    rate: Rates,
+    acceleration: Accelerations,
+    axial_rate: Scalar,
+    travel: Travel,
+    pivot: tuple[Scalar, Scalar],
+    masses: Masses,
+    gravity: Scalar,
+) -> Needed:
+    """Moments about the trunk's pivot, and the force, that a motion needs.
+
+    Args:
+        angles: of trunk and bicycle.
+        rate: theirs.
+        acceleration: theirs.
+        axial_rate: of the trunk about its own axis, rad/s.
+        travel: of the rear contact.
+        pivot: l_s ahead of the rear contact and h_s high, m.
+        masses: what sits on the seat.
+        gravity: m/s²; all rates and accelerations zero give the static model.
+    """
+    l_s, h_s = pivot
+    s_h, c_h = sin(angles.phi_h), cos(angles.phi_h)
+    u = trunk_axis(angles)
+    first, second = axis_motion(angles, rate, acceleration)
+    base = point_acceleration(l_s, h_s, angles.phi_b, rate, acceleration, travel)
+    a_x, a_y, a_z = (a + masses.height * b for a, b in zip(base, second, strict=True))
+    force = (masses.trunk * a_x, masses.trunk * a_y, masses.trunk * (a_z - gravity))
+    # the moment of the point mass and I_t u × ü have the same arm
+    along_u = tuple(masses.height * f + masses.across * b for f, b in zip(force, second, strict=True))
+    tau_x, tau_y = _turned(u, (along_u[0], along_u[1], along_u[2]), s_h, c_h)
+    tau_x = tau_x + masses.along * (axial_rate * first[0] + acceleration.axial * u[0])
+    # u itself is perpendicular to y'
+    tau_y = tau_y + masses.along * axial_rate * (c_h * first[1] + s_h * first[2])
+    s_b, c_b = sin(angles.phi_b), cos(angles.phi_b)
+    forward, up = masses.carried_forward, masses.carried_up
+    c_x, c_y, c_z = point_acceleration(l_s + forward, h_s + up, angles.phi_b, rate, acceleration, travel)
+    load = (masses.carried * c_x, masses.carried * c_y, masses.carried * (c_z - gravity))
+    more_x, more_y = _turned((forward, up * s_b, -up * c_b), load, s_h, c_h)
+    return Needed(tau_x + more_x, tau_y + more_y, (force[0] + load[0], force[1] + load[1], force[2] + load[2]))
+
+
+def apparent_vertical(force: Triple) -> Scalar:
+    """φ_c, from the vertical to what must carry the load ``force`` = Σ m f, in the plane across R, rad."""
+    return atan2(force[1], -force[2])
+
+
+def in_bicycle(force: Triple, phi_b: Scalar) -> Triple:
+    """A vector of R in the axes of the bicycle."""
+    s_b, c_b = sin(phi_b), cos(phi_b)
+    return force[0], c_b * force[1] + s_b * force[2], c_b * force[2] - s_b * force[1]
+
+
+class Pedals(NamedTuple):
+    """Where and how feet push on the pedals; m, N."""
+
+    axle_forward: Scalar
+    """of the crank's axle from the pivot"""
+    axle_up: Scalar
+    """negative"""
+    down: Scalar
+    """force of both resting legs, mean of a turn"""
+    back: Scalar
+    """likewise, backwards"""
+    drive_forward: Scalar
+    """of where the driving force acts, from the pivot"""
+
+
+def pedal_moment(force: Scalar, pedals: Pedals) -> Scalar:
+    """Moment about the bicycle's y of the pedals on the rider, about the pivot, N·m.
+
+    Args:
+        force: of the rider down on the pedals, bicycle axes, N.
+        pedals: where and how.
+    """
+    resting = pedals.axle_forward * pedals.down - pedals.axle_up * pedals.back
+    return resting + pedals.drive_forward * (force - pedals.down)
+
+
+class SeatSensors(NamedTuple):
+    """Where the seat's sensors are; m, rad."""
+
+    post_length: Scalar
+    """L_1"""
+    post_tilt: Scalar
+    """γ"""
+    cells_long: Scalar
+    """L_x"""
+    cells_wide: Scalar
+    """L_y"""
+    cells_behind: Scalar
+    """L_m"""
+    forward: Scalar
+    """of the saddle point from the pivot"""
+    below: Scalar
+    """of the saddle point from the pivot"""
+
+
+def seat_load(
+    wrench: tuple[Triple, Triple], sensors: SeatSensors, centre: tuple[Scalar, Scalar]
+) -> tuple[Triple, Triple]:
+    """Equation (10): the load on the seat about a point of its plane, axes of the bicycle.
+
+    Args:
+        wrench: force (N) and moment (N·m) of the rider on the six-axis sensor, its axes (z down).
+        sensors: where they are.
+        centre: of pressure x_C, y_C from the saddle point, m; zeros for the saddle point itself.
+
+    Returns:
+        R_h and M_h.
+    """
+    force, moment = wrench
+    s_g, c_g = sin(sensors.post_tilt), cos(sensors.post_tilt)
+    R = (c_g * force[0] + s_g * force[2], force[1], c_g * force[2] - s_g * force[0])
+    T = (c_g * moment[0] + s_g * moment[2], moment[1], c_g * moment[2] - s_g * moment[0])
+    x = sensors.post_length * s_g - centre[0]
+    y = -1.0 * centre[1]
+    z = sensors.post_length * c_g
+    return R, (T[0] + y * R[2] - z * R[1], T[1] + z * R[0] - x * R[2], T[2] + x * R[1] - y * R[0])
+
+
+def centre_of_pressure(cells: Triple, sensors: SeatSensors) -> tuple[Scalar, Scalar]:
+    """x_C ahead and y_C to the right of the saddle point, m, from the cells front, rear **right**, rear left (N)."""
+    total = cells[0] + cells[1] + cells[2]
+    return (
+        cells[0] / total * sensors.cells_long - sensors.cells_behind,
+        0.5 * (cells[1] - cells[2]) / total * sensors.cells_wide,
+    )
+
+
+def trunk_moment(
+    R: Triple, M: Triple, centre: tuple[Scalar, Scalar], sensors: SeatSensors, printed: bool = False
+) -> Triple:
+    """Equations (11) and (12) before the trunk's turn: moment of the seat on the rider about the pivot, N·m.
+
+    The paper's V lies in the plane of the seat; here the pivot may be above it.
+
+    Args:
+        R: load on the seat, bicycle axes, N.
+        M: its moment about the centre of pressure.
+        centre: of pressure from the saddle point, m.
+        sensors: where they are.
+        printed: −R_z(x_C − x_V) in N_y as printed; the cross product gives plus.
+    """
+    x, y, z = centre[0] + sensors.forward, centre[1], sensors.below
+    sign = -1.0 if printed else 1.0
+    return (
+        -1.0 * M[0] - (y * R[2] - z * R[1]),
+        -1.0 * M[1] - z * R[0] + sign * x * R[2],
+        -1.0 * M[2] - (x * R[1] - y * R[0]),
+    )

@@ -1,0 +1,1 @@
+"""Roll of a bicycle and attitude of the trunk from two gyroscopes and a camera."""

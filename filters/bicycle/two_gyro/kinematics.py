@@ -1,0 +1,125 @@
+r"""Rates of the angles between a platform and a body on it: equations (3) to (15) of the two-gyroscope paper.
+
+Y. Zhang, K. Chen, J. Yi and colleagues, drift-free attitude of a rigid body on a moving platform from two gyroscopes
+and relative measurements. The paper's axes are x forward, y to the right, z down, and its two triples of angles follow
+different sequences although it calls both "X-Y-Z ordered": (3) holds for the first, (11) for the second only,
+
+    platform   R_IP = R_z(ψ) R_y(χ) R_x(φ)          roll φ, pitch χ, yaw ψ
+    relative   R_PH = R_x(θ₁) R_y(θ₂) R_z(θ₃)        body to platform
+
+With δω^p and δω^h the true rates of platform and body, each in its own axes,
+
+    dθ/dt = A δω^h + M δω^p,    M = −A R_PHᵀ                                              (11), (13)
+
+holds for any motion: model Σ1. While the platform does not pitch, its rate about y follows from the others,
+δω^p_y = tan φ δω^p_z (5), and putting that into M δω^p gives model Σ2 (15), which knows the roll:
+
+    dθ/dt = A δω^h + M [δω^p_x, tan φ δω^p_z, δω^p_z],    dφ/dt = δω^p_x                  (8)
+
+The second equation needs χ = 0, not a constant pitch alone: it lacks sin χ dψ/dt. A pitch rate makes the first one
+wrong by −M_:2 (dχ/dt) / cos φ. A segway turns this around: it pitches and does not roll, δω^p_x = −tan χ δω^p_z (6),
+
+    dθ/dt = A δω^h + M [−tan χ δω^p_z, δω^p_y, δω^p_z],    dχ/dt = δω^p_y
+
+Everything is singular at θ₂ = ±90°, and Σ2 at φ (or χ) = ±90°. Arrays are ``(*batch, 3)`` and ``(*batch, 3, 3)``.
+"""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from ...core.backend import Array, constant, namespace, rows
+
+SIGNS = (1.0, -1.0, -1.0)
+"""Of x, y and z (and of turns about them) between these axes and the sensors' (x forward, y left, z up)."""
+Platform = Literal["bicycle", "segway"]
+"""``bicycle`` rolls and does not pitch, ``segway`` pitches and does not roll."""
+
+
+def in_paper_axes(rate: Array) -> Array:
+    """A rate ``(..., 3)`` in a sensor's axes (x forward, y left, z up) in the paper's (x forward, y right, z down)."""
+    return rate * constant(SIGNS, rate)
+
+
+def platform_rate(sample: Array, tilt: Array | float) -> Array:
+    """Rate of the platform ``(..., 3)``, paper's axes, of a gyroscope that is mounted nose up by ``tilt`` (rad)."""
+    xp = namespace(sample, tilt)
+    angle = tilt + 0.0 * sample[..., 0]
+    c, s = xp.cos(angle), xp.sin(angle)
+    x, y, z = sample[..., 0], sample[..., 1], sample[..., 2]
+    return xp.stack([c * x - s * z, -y, -(s * x + c * z)], axis=-1)
+
+
+def body_rate_matrix(theta: Array) -> Array:
+    """A of (13): what the body's rate does to the relative angles; its determinant is 1 / cos θ₂."""
+    xp = namespace(theta)
+    c2, s2, c3, s3 = xp.cos(theta[..., 1]), xp.sin(theta[..., 1]), xp.cos(theta[..., 2]), xp.sin(theta[..., 2])
+    return rows([[c3 / c2, -s3 / c2, 0.0], [s3, c3, 0.0], [-c3 * s2 / c2, s3 * s2 / c2, 1.0]])
+
+
+def platform_rate_matrix(theta: Array) -> Array:
+    """M = −A R_PHᵀ of (13): what the platform's rate does to the relative angles."""
+    xp = namespace(theta)
+    c1, s1, c2, s2 = xp.cos(theta[..., 0]), xp.sin(theta[..., 0]), xp.cos(theta[..., 1]), xp.sin(theta[..., 1])
+    return rows([[-1.0, -s1 * s2 / c2, c1 * s2 / c2], [0.0, -c1, -s1], [0.0, s1 / c2, -c1 / c2]])
+
+
+def body_rate_derivative(theta: Array, rate: Array) -> Array:
+    """Derivative of A(θ) ``rate`` by θ: column j holds that by θ_j."""
+    xp = namespace(theta)
+    c2, t2 = xp.cos(theta[..., 1]), xp.tan(theta[..., 1])
+    c3, s3 = xp.cos(theta[..., 2]), xp.sin(theta[..., 2])
+    p = c3 * rate[..., 0] - s3 * rate[..., 1]
+    q = s3 * rate[..., 0] + c3 * rate[..., 1]
+    return rows([[0.0, p * t2 / c2, -q / c2], [0.0, 0.0, p], [0.0, -p / (c2 * c2), q * t2]])
+
+
+def platform_rate_derivative(theta: Array, rate: Array) -> Array:
+    """Derivative of M(θ) ``rate`` by θ: column j holds that by θ_j."""
+    xp = namespace(theta)
+    c1, s1 = xp.cos(theta[..., 0]), xp.sin(theta[..., 0])
+    c2, t2 = xp.cos(theta[..., 1]), xp.tan(theta[..., 1])
+    u = s1 * rate[..., 1] - c1 * rate[..., 2]
+    w = c1 * rate[..., 1] + s1 * rate[..., 2]
+    return rows([[-w * t2, -u / (c2 * c2), 0.0], [u, 0.0, 0.0], [w / c2, u * t2 / c2, 0.0]])
+
+
+def substitution(angle: Array, platform: Platform) -> Array:
+    """S ``(*batch, 3, 2)``: all three platform rates from two, by (5) or (6).
+
+    Args:
+        angle: ``(*batch,)`` φ of a bicycle, χ of a segway.
+        platform: of a bicycle the two are the rates about x and z, of a segway those about y and z; M S is D of (15).
+    """
+    tangent = namespace(angle).tan(angle)
+    if platform == "bicycle":
+        return rows([[1.0, 0.0 * tangent], [0.0, tangent], [0.0, 1.0]])
+    return rows([[0.0, -tangent], [1.0, 0.0 * tangent], [0.0, 1.0]])
+
+
+def substitution_derivative(angle: Array, rate: Array, platform: Platform) -> Array:
+    """Derivative ``(*batch, 3)`` of S [·, ``rate``] by the angle, with ``rate`` ``(*batch,)`` about z."""
+    xp = namespace(angle)
+    slope = rate / xp.cos(angle) ** 2
+    zero = 0.0 * slope
+    if platform == "bicycle":
+        return xp.stack([zero, slope, zero], axis=-1)
+    return xp.stack([-slope, zero, zero], axis=-1)
+
+
+def level_constraint(angle: Array, rate: Array, platform: Platform) -> tuple[Array, Array, Array]:
+    """What (5) says is zero, cos φ δω_y − sin φ δω_z; of a segway (6), cos χ δω_x + sin χ δω_z.
+
+    Args:
+        angle: ``(*batch, 1)`` φ or χ.
+        rate: ``(*batch, 3)`` of the platform.
+        platform: which of the two.
+
+    Returns:
+        The value ``(*batch, 1)``, its derivative by the angle ``(*batch, 1)`` and by the rate ``(*batch, 3)``.
+    """
+    xp = namespace(angle)
+    c, s, x, y, z = xp.cos(angle), xp.sin(angle), rate[..., :1], rate[..., 1:2], rate[..., 2:]
+    if platform == "bicycle":
+        return c * y - s * z, -s * y - c * z, xp.concat([0.0 * c, c, -s], axis=-1)
+    return c * x + s * z, c * z - s * x, xp.concat([c, 0.0 * c, s], axis=-1)

@@ -1,0 +1,1 @@
+"""Trunk, arms and legs of a rider from six gyroscopes and kinematic constraints."""

@@ -1,0 +1,139 @@
+r"""What hands on the handlebar and feet on the pedals say about limbs: constraints C1–C3 and C5–C7, angles C4 and C8.
+
+Whole-body paper, equations (11)–(19), in the paper's axes (x forward, y up, z to the right), vectors in the bicycle's
+axes. Long axes of limbs point to the proximal joint (ISB): an upper segment of length l ends at −l y from its joint.
+Residuals are divided by the lengths and are pure numbers, where print leaves metres.
+
+Differs from print: the knee's swivel constraint C7 is printed about the bicycle's upright y, where it loses the swivel
+at some crank positions; about the forward x it keeps it. C8 is printed with the small-angle form l_z γ / l_sp of
+asin(l_z sin γ / l_sp), which is 7° off at γ = 80°.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from ...core.backend import Array, constant, expand, namespace
+from ...core.rotation import cross, euler_axes, euler_matrix, norm, skew
+
+
+class Limb(NamedTuple):
+    """Where a limb is, with derivatives by the angles of trunk (arms only) and of its own proximal joint."""
+
+    residuals: Array
+    """``(..., 3)`` constraint value minus what it should be: length, hinge, swivel; pure numbers"""
+    by_trunk: Array | None
+    """``(..., 3, 3)`` rows by constraint, columns by trunk angle; None for legs"""
+    by_joint: Array
+    """``(..., 3, 3)`` likewise by the angles of shoulder or hip"""
+
+
+def arm(trunk: Array, shoulder: Array, pivot: Array, joint: Array, hand: Array, upper: float, lower: float) -> Limb:
+    """C1–C3: the forearm reaches the hand, the elbow is a hinge, the arm's plane contains the bicycle's z (elbows out).
+
+    Args:
+        trunk: ``(..., 3)`` Z-X-Y angles Θ of the trunk.
+        shoulder: ``(..., 3)`` Y-X-Y angles Φ.
+        pivot: ``(3,)`` point about which the trunk turns, m.
+        joint: ``(3,)`` shoulder joint in the trunk's frame from there, m.
+        hand: ``(..., 3)`` place of the hand, m.
+        upper: length of the upper arm, m.
+        lower: elbow to hand, m.
+    """
+    xp = namespace(trunk, shoulder)
+    R, J = euler_matrix("zxy", trunk), euler_axes("zxy", trunk)
+    RH, JH = R @ euler_matrix("yxy", shoulder), R @ euler_axes("yxy", shoulder)
+    offset = (R @ joint[..., None])[..., 0]
+    u = expand(-upper, 1) * RH[..., :, 1]
+    z = RH[..., :, 2]
+    f = pivot + offset + u - hand
+    normal = constant([0.0, 0.0, 1.0], trunk)
+    du, dz = (-skew(u) @ JH, -skew(z) @ JH)
+    by_joint = _gradients(f, u, z, normal, du, du, dz, upper, lower)
+    du, dz = -skew(u) @ J, -skew(z) @ J
+    df = du - skew(offset) @ J
+    by_trunk = _gradients(f, u, z, normal, du, df, dz, upper, lower)
+    return Limb(xp.stack(_values(f, u, z, normal, upper, lower), axis=-1), by_trunk, by_joint)
+
+
+def leg(hip: Array, joint: Array, foot: Array, upper: float, lower: float, axis: str) -> Limb:
+    """C5–C7: shank and foot reach the pedal, the knee is a hinge, the leg's plane contains an axis of the bicycle.
+
+    Args:
+        hip: ``(..., 3)`` Z-X-Y angles Ψ.
+        joint: ``(3,)`` hip joint, m.
+        foot: ``(..., 3)`` pedal, m.
+        upper: length of the thigh, m.
+        lower: knee to pedal, m.
+        axis: ``"x"`` or ``"y"`` (printed), in the plane of C7.
+    """
+    xp = namespace(hip)
+    R, J = euler_matrix("zxy", hip), euler_axes("zxy", hip)
+    u = expand(-upper, 1) * R[..., :, 1]
+    z = R[..., :, 2]
+    f = joint + u - foot
+    normal = constant([1.0, 0.0, 0.0] if axis == "x" else [0.0, 1.0, 0.0], hip)
+    du, dz = -skew(u) @ J, -skew(z) @ J
+    by_joint = _gradients(f, u, z, normal, du, du, dz, upper, lower)
+    return Limb(xp.stack(_values(f, u, z, normal, upper, lower), axis=-1), None, by_joint)
+
+
+def _values(f: Array, u: Array, z: Array, normal: Array, upper: float, lower: float) -> list[Array]:
+    xp = namespace(f)
+    hinge = xp.sum(z * f, axis=-1) / lower
+    swivel = xp.sum(cross(-u, f) * normal, axis=-1) / (upper * lower)
+    return [norm(f)[..., 0] / lower - 1.0, hinge, swivel]
+
+
+def _gradients(
+    f: Array, u: Array, z: Array, normal: Array, du: Array, df: Array, dz: Array, upper: float, lower: float
+) -> Array:
+    """Derivatives of :func:`_values` by angles: rows d‖f‖, d(z·f), d((−u × f)·n)."""
+    xp = namespace(f)
+
+    def by(vector: Array, matrix: Array) -> Array:
+        return (vector[..., None, :] @ matrix)[..., 0, :]
+
+    normal = normal + 0.0 * f
+    length = by(f, df) / (norm(f) * expand(lower, 1))
+    hinge = (by(f, dz) + by(z, df)) / expand(lower, 1)
+    swivel = -(by(cross(f, normal), du) + by(cross(normal, u), df)) / expand(upper * lower, 1)
+    return xp.stack([length, hinge, swivel], axis=-2)
+
+
+def _bend(distance: Array, upper: float, lower: float) -> Array:
+    """Exterior angle ``(...)`` between two segments whose ends are ``distance`` ``(..., 1)`` apart."""
+    xp = namespace(distance)
+    cosine = (upper * upper + lower * lower - distance[..., 0] ** 2) / (2.0 * upper * lower)
+    one = 1.0 + 0.0 * cosine
+    # a measured length may put the end out of reach: straight or folded then
+    cosine = xp.where(xp.greater(cosine, 1.0), one, xp.where(xp.less(cosine, -1.0), -one, cosine))
+    return xp.pi - xp.acos(cosine)
+
+
+def elbow_flexion(trunk: Array, pivot: Array, joint: Array, hand: Array, upper: float, lower: float) -> Array:
+    """C4 (14): flexion α ``(...)`` of the elbow, 0 if straight; arguments as for :func:`arm`."""
+    reach = pivot + (euler_matrix("zxy", trunk) @ joint[..., None])[..., 0] - hand
+    return _bend(norm(reach), upper, lower)
+
+
+def knee_flexion(
+    joint: Array, foot: Array, upper: float, shank: float, foot_length: float, ankle: float, printed: bool = False
+) -> Array:
+    """C8 (18), (19): flexion β ``(...)`` of the knee, 0 if straight.
+
+    Args:
+        joint: ``(3,)`` hip joint, m.
+        foot: ``(..., 3)`` pedal, m.
+        upper: length of the thigh, m.
+        shank: knee to ankle, l_s, m.
+        foot_length: ankle to pedal, l_z, m.
+        ankle: exterior angle γ of the held ankle, 0 with the foot in line with the shank, rad.
+        printed: with the small-angle form of print.
+    """
+    xp = namespace(foot)
+    one = 1.0 + 0.0 * foot[..., 0]
+    sine, cosine = foot_length * xp.sin(ankle * one), shank + foot_length * xp.cos(ankle * one)
+    lower = xp.sqrt(sine * sine + cosine * cosine)
+    turned = foot_length * ankle / lower if printed else xp.atan2(sine, cosine)
+    return _bend(norm(joint - foot), upper, lower) + turned

@@ -1,0 +1,385 @@
+r"""Pose of a whole bicycle rider from few worn sensors and what hands and feet hold.
+
+Y. Zhang, K. Chen, J. Yi, T. Liu, Q. Pan, "Whole-Body Pose Estimation in Human Bicycle Riding Using a Small Set of
+Wearable Sensors", 2016; equation numbers are the paper's, * marks those that were corrected. Axes are the paper's
+inside (x forward, y up, z to the right) and the environment's at every door (:mod:`.rider_linkage`).
+
+State X = [φ, ϑ̈, Θ, a_ts, Φ_r, Ψ_r, Φ_l, Ψ_l] (20): roll, yaw acceleration, trunk, acceleration of the trunk's sensor
+against the seat, right shoulder and hip, left shoulder and hip. Six gyroscopes are inputs: with w the child's and q
+the parent's rate, Θ̇ = M w + G q (6), likewise hips (15) and shoulders (10); φ̇ from (2). Outputs (17), with f the
+specific force that the bicycle's accelerometer gives at the trunk's pivot:
+
+    a_bz = −g sin φ − p_y tan φ ω_y² − p_x cos φ ϑ̈ − v ω_y + p_y φ̈              (3*)
+    a_t  = R_BTᵀ (f + a_ts)                                                      (8)
+    τ    = [(k_S + R_BT k_T) × f]_x                                              (9*)
+    C1–C3 of each arm, C5–C7 of each leg equal their values                      (11)–(17)
+
+Differs from print: (3) has gravity with the wrong sign and lacks the turn's own acceleration v ϑ̇, without which φ is
+pulled to zero in a turn; (9) holds in a balanced turn only. Residuals of C2, C3, C6, C7 are divided by lengths. C7 is
+taken about the forward axis (``knee_axis="y"`` is printed). k_T is the trunk's first moment of mass about its pivot
+and k_S that of what sits still between saddle and pivot (:func:`.rider_linkage.seat_moments`); as hands may carry the
+trunk's lean, ``seat_share`` is the part of it that the seat feels. Legs and pedal forces are left to the noise.
+
+Q is that of the gyroscopes' noise, which trunk and arms share; what φ, trunk and legs share of the bicycle's gyroscope
+is left out, so that the filter falls into four parts that do not meet: {φ, ϑ̈}, {Θ, a_ts, Φ_r, Φ_l}, {Ψ_r}, {Ψ_l}. A
+shock (|f| far from g) widens a_bz, a_t and τ and wears off (``shock_guard``).
+
+Not estimated: yaw, gyroscope and accelerometer biases. Assumed: flat ground, no pitch, no side slip, a pelvis fixed to
+the frame, held ankles.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar, Literal, Self
+
+from ...core.backend import Array, constant, expand, namespace
+from ...core.model import Gain, Model
+from ...core.quantity import Measurement
+from ...core.rotation import cross, euler_axes, euler_matrix, norm, skew
+from ..geometry import Point, RiderGeometry
+from . import constraints as limb_constraints
+from .blocks import BLOCKS, assemble, row_of, unit
+from .linkage import (
+    CRANK,
+    ERROR_SIZE,
+    HIP,
+    RELATIVE_ACCELERATION,
+    ROLL,
+    SHOULDER,
+    SIDES,
+    STEER,
+    TRUNK,
+    USUAL,
+    YAW_ACCELERATION,
+    RiderLinkage,
+    paper_axes,
+    seat_moments,
+)
+from .rates import Rates, advance
+
+RATE, ACCELERATION_OF_RATE, SEAT_FORCE = slice(22, 25), slice(25, 28), slice(28, 31)
+SPEED, SHOCK = slice(31, 32), slice(32, 33)
+CONSTRAINTS = ("C1", "C2", "C3", "C5", "C6", "C7")
+TURNING, SITTING = seat_moments(USUAL)
+NOISES = ("lateral", "trunk", "torque", "length", "hinge", "swivel", "twist")
+TIMES = ("yaw_acceleration_time", "relative_acceleration_time", "shock_time", "shock_scale")
+POSITIVE = (*(f"{name}_noise" for name in NOISES), *TIMES)
+"""Parameters by which something is divided, and deviations of measurements."""
+
+
+@dataclass(frozen=True)
+class WholeBody(RiderLinkage, Model):
+    """The paper's extended Kalman filter, corrected.
+
+    State: the 22 numbers of :class:`.rider_linkage.RiderLinkage`; remembered: bicycle's rate (3), its derivative (3,
+    low-passed), f (3), speed (1, low-passed), level of a shock (1, m/s²).
+    """
+
+    constraints: tuple[str, ...] = CONSTRAINTS
+    """which constraints are used, of both arms or both legs"""
+    knee_axis: Literal["x", "y"] = "x"
+    """axis of the bicycle that the leg's plane contains in C7; y is printed"""
+    lateral: Literal["corrected", "sign", "printed"] = "corrected"
+    """(3): corrected, with the sign of gravity corrected only, as printed"""
+    torque: Literal["seat_force", "printed"] = "seat_force"
+    """(9): corrected, as printed"""
+    usual_twist: bool = False
+    """one more output, not the paper's: θ₃ is about ``twist_follow`` times the steering angle, as shoulders follow
+    hands. Where hands carry the trunk's lean, the seat torque does not tell how the trunk is turned about gravity"""
+    shock_guard: bool = True
+    """widen a_bz, a_t and τ during shocks"""
+    sampling: Literal["interval", "instant"] = "interval"
+    """what a gyroscope's sample is: the mean rate of the interval that it ends, or the rate at its end (the paper's)"""
+    turning_moment: Point = TURNING
+    """k_T, kg·m, trunk axes from the pivot"""
+    sitting_moment: Point = SITTING
+    """k_S, kg·m, bicycle axes from the saddle"""
+    seat_share: float = 0.0
+    """part of the trunk's sideways lean that the seat carries; 1 in the paper, 0 for riders who prop on the handlebar,
+    as the environment's do"""
+    cells_wide: float = USUAL.cells_wide
+    """m between the rear load cells"""
+
+    bicycle_gyroscope_noise: float = 1.0e-2
+    """rad/s/√Hz (0.6 °/s/√Hz): ten times the device's, so that roll forgets a bias within a second or two"""
+    trunk_gyroscope_noise: float = 7.0e-3
+    """rad/s/√Hz (0.4 °/s/√Hz)"""
+    limb_gyroscope_noise: float = 7.0e-3
+    """rad/s/√Hz (0.4 °/s/√Hz)"""
+    yaw_acceleration_deviation: float = 0.5
+    """rad/s², stationary"""
+    yaw_acceleration_time: float = 1.0
+    """s (table II)"""
+    relative_acceleration_deviation: float = 0.8
+    """m/s², stationary, of a_ts"""
+    relative_acceleration_time: float = 1.0
+    """s (table II)"""
+    lateral_noise: float = 0.5
+    """m/s², of a_bz"""
+    trunk_noise: float = 0.4
+    """m/s², of a_t"""
+    torque_noise: float = 6.0
+    """N·m, of τ"""
+    length_noise: float = 0.02
+    """of C1 and C5, pure number: 5 to 10 mm"""
+    hinge_noise: float = 0.03
+    """of C2 and C6, sine of an angle"""
+    swivel_noise: float = 3.0
+    """of C3 and C7, sine of an angle: elbows of riders who lean stand off by about 0.25 rms for 0.6 s or so, which is
+    white noise of about 0.25 √(2 · 0.6 s · 100 Hz)"""
+    twist_noise: float = 0.7
+    """rad, of ``usual_twist``; a sample's, at 100 Hz: corrects within some seconds"""
+    twist_follow: float = 0.3
+    """part of the steering angle by which shoulders turn with the handlebar; a guess"""
+    roll_prior: float = 0.087
+    """rad"""
+    trunk_prior: float = 0.12
+    """rad"""
+    limb_prior: float = 0.2
+    """rad"""
+    difference_time: float = 0.05
+    """s, of the low-pass on the derivative of the bicycle's rate"""
+    speed_time: float = 0.1
+    """s, of the low-pass on the wheel's speed"""
+    shock_threshold: float = 1.5
+    """m/s² of ||f| − g|"""
+    shock_scale: float = 0.2
+    """m/s²: variances are multiplied by 1 + ((peak − threshold) / scale)²"""
+    shock_time: float = 0.3
+    """s, in which the peak decays"""
+    gravity: float = 9.80665
+    """m/s²"""
+
+    state_size: ClassVar[int] = 33
+    error_size: ClassVar[int] = ERROR_SIZE
+    gains: ClassVar = {
+        "bicycle": Gain("bicycle_gyroscope_noise", description="process variance of roll"),
+        "trunk": Gain("trunk_gyroscope_noise", description="process variance of the trunk's angles"),
+        "limb": Gain("limb_gyroscope_noise", description="process variance of the limbs' angles"),
+        "acceleration": Gain("trunk_noise", description="variance of the trunk's accelerometer"),
+        "lateral": Gain("lateral_noise", description="variance of the bicycle's lateral acceleration"),
+        "swivel": Gain("swivel_noise", description="variance of C3 and C7"),
+    }
+
+    def __post_init__(self) -> None:
+        """Refuse what is not a choice."""
+        super().__post_init__()
+        object.__setattr__(self, "constraints", tuple(self.constraints))
+        if not set(self.constraints) <= set(CONSTRAINTS) or len(set(self.constraints)) < len(self.constraints):
+            raise ValueError(f"constraints must be different ones of {CONSTRAINTS}, got {self.constraints}")
+        for name in POSITIVE:
+            if not getattr(self, name) > 0.0:
+                raise ValueError(f"{name} must be positive, got {getattr(self, name)}")
+        choices = {
+            "knee_axis": ("x", "y"),
+            "lateral": ("corrected", "sign", "printed"),
+            "torque": ("seat_force", "printed"),
+            "sampling": ("interval", "instant"),
+        }
+        for name, allowed in choices.items():
+            if getattr(self, name) not in allowed:
+                raise ValueError(f"{name} must be one of {allowed}, got {getattr(self, name)!r}")
+
+    @classmethod
+    def for_rider(cls, geometry: RiderGeometry, **parameters: Any) -> Self:
+        """The filter told about a person and a bicycle; ``parameters`` win over what the geometry says."""
+        turning, sitting = seat_moments(geometry)
+        return super().for_rider(geometry, **({"turning_moment": turning, "sitting_moment": sitting} | parameters))
+
+    @property
+    def residual_size(self) -> int:  # type: ignore[override]
+        """m: five accelerations and torques, two rows a constraint, the twist."""
+        return 5 + 2 * len(self.constraints) + self.usual_twist
+
+    def prior(self, z: Measurement) -> tuple[Array, Array]:
+        """Upright, trunk as usual, limbs by inverse kinematics; P₀ diagonal."""
+        x = self.start(z)
+        xp = namespace(x)
+        zero = 0.0 * x[..., :1]
+        speed = xp.where(xp.isfinite(z["wheel/speed"]), z["wheel/speed"], zero)
+        rate = self.bicycle_axes(z["bicycle_imu/gyr"])
+        force = self._seat_force(z, rate, 0.0 * rate)
+        x = xp.concat([x, rate, 0.0 * rate, force, speed, zero], axis=-1)
+        deviations = [self.roll_prior, self.yaw_acceleration_deviation, *[self.trunk_prior] * 3]
+        deviations += [*[self.relative_acceleration_deviation] * 3, *[self.limb_prior] * 12]
+        diagonal = xp.concat([1.0 + zero * 0.0 + expand(value**2 - 1.0, 1) for value in deviations], axis=-1)
+        return x, diagonal[..., :, None] * unit(zero, ERROR_SIZE)
+
+    def _seat_force(self, z: Measurement, rate: Array, change: Array) -> Array:
+        """f: specific force at the trunk's pivot ``(..., 3)``, from the bicycle's accelerometer."""
+        arm = paper_axes(constant([a - b for a, b in zip(self.trunk_pivot, self.bicycle_imu, strict=True)], rate))
+        return self.bicycle_axes(z["bicycle_imu/acc"]) + cross(change, arm) + cross(rate, cross(rate, arm + 0.0 * rate))
+
+    def predict(self, x: Array, z: Measurement, previous: Measurement) -> tuple[Array, Array, Array]:
+        """Midpoint rule on (2), (4)*, (6), (7), (10), (15), with the exact derivative; Q from the gyroscopes' noise."""
+        xp = namespace(x)
+        dt, one = self.dt, 1.0 + 0.0 * x[..., :1]
+        now = self.rates(z)
+        rates = now
+        if self.sampling == "instant":
+            before = self.rates(previous)
+            rates = {name: 0.5 * (now[name] + before[name]) for name in now}
+        bicycle, trunk = rates["bicycle_imu/gyr"], rates["trunk_imu/gyr"]
+        parts: dict[int, Array] = {0: x[..., ROLL] + expand(dt, 1) * bicycle[..., :1]}
+        F: dict[tuple[int, int], Array] = {(0, 0): one[..., None]}
+        Q: dict[tuple[int, int], Array] = {(0, 0): one[..., None] * expand(dt * self.bicycle_gyroscope_noise**2, 2)}
+        memories = (
+            (1, YAW_ACCELERATION, self.yaw_acceleration_time, self.yaw_acceleration_deviation),
+            (3, RELATIVE_ACCELERATION, self.relative_acceleration_time, self.relative_acceleration_deviation),
+        )
+        for index, part, time, deviation in memories:
+            keep = xp.exp(-(dt / time) * one)
+            parts[index] = keep * x[..., part]
+            F[index, index] = keep[..., None] * unit(x, part.stop - part.start)
+            spread = expand(deviation**2, 2) * (1.0 - keep * keep)[..., None]
+            Q[index, index] = spread * unit(x, part.stop - part.start)
+        steps: dict[int, Rates] = {}
+        joints = [(2, "zxy", TRUNK, trunk, bicycle)]
+        for side, (arm, leg) in zip(SIDES, ((4, 5), (6, 7)), strict=True):
+            joints.append((arm, "yxy", SHOULDER[side], rates[f"upper_arm_{side}/gyr"], trunk))
+            joints.append((leg, "zxy", HIP[side], rates[f"thigh_{side}/gyr"], bicycle))
+        noise = {
+            name: expand(dt * getattr(self, f"{name}_gyroscope_noise") ** 2, 2) for name in ("bicycle", "trunk", "limb")
+        }
+        for index, sequence, part, child, parent in joints:
+            parts[index], F[index, index], steps[index] = advance(sequence, x[..., part], child, parent, dt)
+            M, G = steps[index].by_child, steps[index].by_parent
+            own, its = ("trunk", "bicycle") if index == 2 else ("limb", "trunk" if index in (4, 6) else "bicycle")
+            Q[index, index] = noise[own] * (M @ M.mT) + noise[its] * (G @ G.mT)
+        for row, column in ((2, 4), (2, 6), (4, 6)):
+            first = steps[row].by_child if row == 2 else steps[row].by_parent
+            Q[row, column] = noise["trunk"] * (first @ steps[column].by_parent.mT)
+            Q[column, row] = Q[row, column].mT
+        angles = xp.concat([parts[index] for index in range(len(BLOCKS))], axis=-1)
+        memory = self._remember(x, z, now["bicycle_imu/gyr"])
+        return xp.concat([angles, memory], axis=-1), assemble(F, x), assemble(Q, x)
+
+    def _remember(self, x: Array, z: Measurement, rate: Array) -> Array:
+        """Encoders, rate and its derivative, f, speed, shock: what the measurement equations need of held samples."""
+        xp = namespace(x)
+        share = self.dt / (self.dt + self.difference_time)
+        change = x[..., ACCELERATION_OF_RATE]
+        change = change + share * ((rate - x[..., RATE]) / self.dt - change)
+        force = self._seat_force(z, rate, change)
+        speed = x[..., SPEED] + self.dt / (self.dt + self.speed_time) * (z["wheel/speed"] - x[..., SPEED])
+        deviation = xp.abs(norm(force) - self.gravity)
+        faded = x[..., SHOCK] * xp.exp(-(self.dt / self.shock_time) * (1.0 + 0.0 * deviation))
+        shock = xp.where(xp.greater(deviation, faded), deviation, faded)
+        return xp.concat([z["steer/angle"], z["crank/angle"], rate, change, force, speed, shock], axis=-1)
+
+    def residual(self, x: Array, z: Measurement) -> tuple[Array, Array, Array]:
+        """(3*), (8), (9*), C1–C3, C5–C7; a row whose samples are missing is NaN."""
+        xp = namespace(x)
+        zero = 0.0 * x[..., :1]
+        bicycle = xp.all(xp.isfinite(z["bicycle_imu/acc"]), axis=-1)[..., None]
+        rows: list[tuple[Array, dict[int, Array], Any]] = []
+        calm = self._calm(x)
+        expected, slope, by_change = self._lateral(x)
+        rows.append(
+            (
+                -z["bicycle_imu/acc"][..., 1:2] - expected,
+                {0: slope[..., None, :], 1: by_change[..., None, :]},
+                calm * expand(self.lateral_noise**2, 1),
+            )
+        )
+        R, J = euler_matrix("zxy", x[..., TRUNK]), euler_axes("zxy", x[..., TRUNK])
+        total = x[..., SEAT_FORCE] + x[..., RELATIVE_ACCELERATION]
+        residual = paper_axes(z["trunk_imu/acc"]) - (R.mT @ total[..., None])[..., 0]
+        by_trunk = R.mT @ skew(total) @ J
+        for i in range(3):
+            rows.append(
+                (
+                    xp.where(bicycle, residual[..., i : i + 1], xp.nan),
+                    {2: by_trunk[..., i : i + 1, :], 3: R.mT[..., i : i + 1, :]},
+                    calm * expand(self.trunk_noise**2, 1),
+                )
+            )
+        torque, by_trunk = self._torque(x, R, J)
+        cells = z["seat/load_cells"]
+        measured = 0.5 * self.cells_wide * (cells[..., 1:2] - cells[..., 2:3])
+        rows.append(
+            (
+                xp.where(bicycle, measured - torque, xp.nan),
+                {2: by_trunk[..., None, :]},
+                calm * expand(self.torque_noise**2, 1),
+            )
+        )
+        rows += self._held(x, z)
+        if self.usual_twist:
+            difference = expand(self.twist_follow, 1) * x[..., STEER] - x[..., TRUNK][..., 2:]
+            by_twist = constant([[0.0, 0.0, 1.0]], x) + 0.0 * x[..., :1, None]
+            rows.append((difference, {2: by_twist}, expand(self.twist_noise**2, 1)))
+        r = xp.concat([row[0] for row in rows], axis=-1)
+        H = xp.concat([row_of(row[1], x) for row in rows], axis=-2)
+        variances = xp.concat([row[2] + zero for row in rows], axis=-1)
+        return r, H, variances[..., :, None] * unit(x, len(rows))
+
+    def _calm(self, x: Array) -> Array:
+        """Factor ``(..., 1)`` on variances: 1, more during a shock."""
+        xp = namespace(x)
+        one = 1.0 + 0.0 * x[..., SHOCK]
+        if not self.shock_guard:
+            return one
+        over = x[..., SHOCK] - self.shock_threshold
+        return xp.where(xp.greater(over, 0.0), 1.0 + (over / self.shock_scale) ** 2, one)
+
+    def _lateral(self, x: Array) -> tuple[Array, Array, Array]:
+        """(3*) ``(..., 1)`` and its derivatives by φ and ϑ̈; ω_y = ϑ̇ cos φ is measured."""
+        xp = namespace(x)
+        px, _, py = self.bicycle_imu
+        s, c = xp.sin(x[..., ROLL]), xp.cos(x[..., ROLL])
+        rate = x[..., RATE][..., 1:2]
+        gravity = self.gravity if self.lateral == "printed" else -self.gravity
+        yaw = x[..., YAW_ACCELERATION]
+        expected = gravity * s - py * s / c * rate * rate - px * c * yaw
+        if self.lateral == "corrected":
+            expected = expected - x[..., SPEED] * rate + py * x[..., ACCELERATION_OF_RATE][..., :1]
+        return expected, gravity * c - py * rate * rate / (c * c) + px * s * yaw, -px * c
+
+    def _torque(self, x: Array, R: Array, J: Array) -> tuple[Array, Array]:
+        """(9*) ``(..., 1)`` and its derivative ``(..., 3)`` by Θ; the support's moment on the rider about x."""
+        xp = namespace(x)
+        turning = paper_axes(constant([*self.turning_moment], x))
+        k = (R @ turning[..., None])[..., 0]
+        if self.torque == "printed":
+            s, c = xp.sin(x[..., TRUNK]), xp.cos(x[..., TRUNK])
+            weight, zero = turning[..., 1:2] * self.gravity, 0.0 * s[..., :1]
+            return -weight * s[..., 1:2], xp.concat([zero, -weight * c[..., 1:2], zero], axis=-1)
+        f, share = x[..., SEAT_FORCE], self.seat_share
+        still = paper_axes(constant([*self.sitting_moment], x))
+        torque = (still[..., 1] + k[..., 1]) * f[..., 2] - share * (still[..., 2] + k[..., 2]) * f[..., 1]
+        dk = -skew(k) @ J
+        return torque[..., None], f[..., 2:3] * dk[..., 1, :] - share * f[..., 1:2] * dk[..., 2, :]
+
+    def _held(self, x: Array, z: Measurement) -> list[tuple[Array, dict[int, Array], Any]]:
+        """Rows of the chosen constraints: right arm, right leg, left arm, left leg."""
+        xp = namespace(x)
+        deviations = (self.length_noise, self.hinge_noise, self.swivel_noise)
+        pivot, rows = self.point(self.trunk_pivot, "left", x), []
+        known = {name: xp.isfinite(z[f"{name}/angle"]) for name in ("steer", "crank")}
+        for side, (arm, leg) in zip(SIDES, ((4, 5), (6, 7)), strict=True):
+            hand, foot = self.hand(side, x[..., STEER]), self.pedal(side, x[..., CRANK])
+            joint = self.point(self.shoulder, side, x)
+            upper = limb_constraints.arm(
+                x[..., TRUNK], x[..., SHOULDER[side]], pivot, joint, hand, self.upper_arm, self.forearm
+            )
+            hip = self.point(self.hip, side, x)
+            lower = limb_constraints.leg(x[..., HIP[side]], hip, foot, self.thigh, self.knee_to_pedal, self.knee_axis)
+            for limb, block, names, encoder in (
+                (upper, arm, CONSTRAINTS[:3], "steer"),
+                (lower, leg, CONSTRAINTS[3:], "crank"),
+            ):
+                for i, name in enumerate(names):
+                    if name not in self.constraints:
+                        continue
+                    by = {block: limb.by_joint[..., i : i + 1, :]}
+                    if limb.by_trunk is not None:
+                        by[2] = limb.by_trunk[..., i : i + 1, :]
+                    r = xp.where(known[encoder], -limb.residuals[..., i : i + 1], xp.nan)
+                    rows.append((r, by, expand(deviations[i] ** 2, 1)))
+        return rows
+
+    def retract(self, x: Array, dx: Array) -> Array:
+        """Angles and accelerations are corrected by a sum; what is remembered stays."""
+        return namespace(x).concat([x[..., :ERROR_SIZE] + dx, x[..., ERROR_SIZE:]], axis=-1)

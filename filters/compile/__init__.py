@@ -1,0 +1,1 @@
+"""From a model written once over arrays to a compiled loop over time: record, print, compile, run."""

@@ -1,0 +1,205 @@
+"""What a published filter contributes: its equations. The recursion around them is elsewhere.
+
+A :class:`Model` goes into :class:`poise.filters.core.kalman.KalmanFilter`, a :class:`Recurrence` (no covariance) into
+:class:`.Observer`. Either is a frozen dataclass: its fields are its parameters (floats with unit
+and source), its methods its equations, written over ``xp = namespace(x)`` for arrays ``(*batch, …)``. The same lines
+run on NumPy, on torch and, traced once, as compiled code.
+"""
+
+from __future__ import annotations
+
+import copy
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, fields, replace
+from typing import Any, ClassVar, Self, TypeVar
+
+from .backend import Array
+from .quantity import Channel, Measurement, Quantity
+
+E = TypeVar("E", bound="Equations")
+
+
+@dataclass(frozen=True)
+class Gain:
+    """A tuning constant that may be scaled at every tick, by a log factor: 0 is the published tuning.
+
+    Attributes:
+        parameter: the model's field that is scaled.
+        power: the field is multiplied by ``exp(power * log_factor)``. 0.5 for a standard deviation: the log factor then
+            scales the variance, that is Q or R.
+        maximum: the scaled field never exceeds this.
+        description: what the gain does, in one line.
+    """
+
+    parameter: str
+    power: float = 0.5
+    maximum: float = math.inf
+    description: str = ""
+
+
+@dataclass(frozen=True)
+class Equations:
+    """What models and recurrences share: channels, outputs, parameters, the sampling interval.
+
+    Measurements arrive as channel → ``(*batch, size)``. ``predict`` sees each channel's last sample (zeros if
+    there was none yet), ``prior`` too (NaN if there was none); ``residual`` and ``finish`` see NaN where this tick
+    brought none.
+    A float parameter may be an array ``(*batch,)``: use :func:`.expand` where it scales a matrix.
+
+    Attributes of the class: ``channels``, what is read; ``outputs``, the quantities of ``pose``; ``state_size`` n, the
+    numbers in the state; ``gains``, name → :class:`Gain`.
+    """
+
+    dt: float = 0.01
+    """sampling interval, s"""
+
+    channels: ClassVar[tuple[Channel, ...]]
+    outputs: ClassVar[tuple[Quantity, ...]]
+    state_size: ClassVar[int]
+    gains: ClassVar[Mapping[str, Gain]] = {}
+
+    def __post_init__(self) -> None:
+        """Refuse parameters that are not finite numbers and intervals that are not positive."""
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if isinstance(value, int) and isinstance(field.default, float):
+                object.__setattr__(self, field.name, float(value))
+        for name, value in parameters_of(self).items():
+            if not math.isfinite(value):
+                raise ValueError(f"{type(self).__name__}: parameter {name} must be a finite number, got {value}")
+        if self.dt <= 0.0:
+            raise ValueError(f"{type(self).__name__}: dt must be positive seconds, got {self.dt}")
+
+    def finish(self, x: Array, z: Measurement) -> Array:
+        """Last word of a tick, after the correction: normalise, remember what the next tick needs."""
+        return x
+
+    def pose(self, x: Array) -> dict[str, Array]:
+        """The quantities that the state tells."""
+        raise NotImplementedError
+
+    def with_dt(self, dt: float) -> Self:
+        """The same equations for another sampling interval."""
+        return replace(self, dt=float(dt))
+
+
+@dataclass(frozen=True)
+class Model(Equations):
+    """Equations of a Kalman filter with state x (``n`` numbers) and error state (``e`` numbers).
+
+    Subclasses write ``prior``, ``predict``, ``residual`` and ``pose``; ``retract`` and ``finish`` have defaults.
+    Further attributes of the class: ``error_size`` e, ``residual_size`` m.
+    """
+
+    error_size: ClassVar[int]
+    residual_size: ClassVar[int]
+
+    def prior(self, z: Measurement) -> tuple[Array, Array]:
+        """State ``(..., n)`` and covariance ``(..., e, e)`` from the first samples; NaN while they do not suffice."""
+        raise NotImplementedError
+
+    def predict(self, x: Array, z: Measurement, previous: Measurement) -> tuple[Array, Array, Array]:
+        """State after one interval, Jacobian F ``(..., e, e)`` of its error, and process covariance Q.
+
+        ``z`` holds the samples of the tick that is predicted to, ``previous`` those of the tick before.
+        """
+        raise NotImplementedError
+
+    def residual(self, x: Array, z: Measurement) -> tuple[Array, Array, Array]:
+        """Measured minus expected ``(..., m)``, Jacobian H ``(..., m, e)`` of the expectation, covariance R.
+
+        A row with anything not finite corrects nothing.
+        """
+        raise NotImplementedError
+
+    def retract(self, x: Array, dx: Array) -> Array:
+        """The state ``x`` corrected by the error ``dx``: a sum, unless the state holds rotations."""
+        return x + dx
+
+
+@dataclass(frozen=True)
+class Recurrence(Equations):
+    """Equations of a method without covariance: an observer with fixed gains, or plain integration.
+
+    Subclasses write ``prior``, ``predict`` and ``pose``; what corrects is written in ``finish``.
+    """
+
+    def prior(self, z: Measurement) -> Array:
+        """State ``(..., n)`` from the first samples; NaN while they do not suffice."""
+        raise NotImplementedError
+
+    def predict(self, x: Array, z: Measurement, previous: Measurement) -> Array:
+        """State after one interval; ``z`` belongs to the tick that is predicted to, ``previous`` to the one before."""
+        raise NotImplementedError
+
+
+def check_choice(name: str, value: str, choices: tuple[str, ...]) -> None:
+    """Refuse a text that is none of ``choices``.
+
+    Raises:
+        ValueError: names the parameter, the value and the choices.
+    """
+    if value not in choices:
+        raise ValueError(f"{name} must be one of {choices}, got {value!r}")
+
+
+def checked_quaternion(name: str, value: Any) -> tuple[float, ...]:
+    """A unit quaternion as four floats.
+
+    Raises:
+        ValueError: it has not four numbers, or its length is not 1 within 1e-6.
+    """
+    numbers = tuple(float(number) for number in value)
+    if len(numbers) != 4 or not abs(math.hypot(*numbers) - 1.0) <= 1e-6:
+        raise ValueError(f"{name} must be a unit quaternion (w, x, y, z), got {value}")
+    return numbers
+
+
+def parameters_of(model: Equations) -> Mapping[str, float]:
+    """The numbers a model is tuned by: every float of its fields, by a name such as ``lever_arm[0]``."""
+    return _remembered(model)[0]
+
+
+def structure_of(model: Equations) -> tuple[Any, ...]:
+    """What is not a float and so is fixed when a model is compiled: its class and its integers, booleans and texts."""
+    return _remembered(model)[1]
+
+
+def _remembered(model: Equations) -> tuple[Mapping[str, float], tuple[Any, ...]]:
+    """Parameters and structure, found once a model: stepping asks for them at every tick."""
+    found = model.__dict__.get("_leaves")
+    if found is None:
+        leaves = list(_leaves(model))
+        parameters = {path: value for path, value in leaves if isinstance(value, float)}
+        structure = (type(model), *((path, value) for path, value in leaves if not isinstance(value, float)))
+        found = model.__dict__["_leaves"] = (parameters, structure)
+    return found
+
+
+def with_parameters(model: E, values: Mapping[str, Any]) -> E:
+    """A copy whose floats are replaced (by arrays or traced scalars too), without the checks of construction."""
+    changed = copy.copy(model)
+    changed.__dict__.pop("_leaves", None)
+    for field in fields(model):
+        object.__setattr__(changed, field.name, _rebuild(field.name, getattr(model, field.name), values))
+    return changed
+
+
+def _leaves(model: Equations) -> Iterator[tuple[str, Any]]:
+    for field in fields(model):
+        yield from _walk(field.name, getattr(model, field.name))
+
+
+def _walk(path: str, value: Any) -> Iterator[tuple[str, Any]]:
+    if isinstance(value, tuple):
+        for index, item in enumerate(value):
+            yield from _walk(f"{path}[{index}]", item)
+    else:
+        yield path, value
+
+
+def _rebuild(path: str, value: Any, values: Mapping[str, Any]) -> Any:
+    if isinstance(value, tuple):
+        return tuple(_rebuild(f"{path}[{index}]", item, values) for index, item in enumerate(value))
+    return values.get(path, value)

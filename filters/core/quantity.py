@@ -1,0 +1,74 @@
+"""What is measured and what is estimated: channels, quantities, estimates.
+
+A measurement is a mapping from channel name to array ``(..., size)``. ``NaN`` means: not sampled at this tick. Names
+are ``place/kind`` (``imu/gyr``, ``bicycle_imu/acc``); the axes are those of the sensor.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
+
+from .backend import Array
+
+Measurement = Mapping[str, Array]
+"""Channel name → array ``(..., size)``; NaN where a channel brought no sample at this tick."""
+
+
+@dataclass(frozen=True)
+class Channel:
+    """A stream of samples: its name, its width and its unit."""
+
+    name: str
+    size: int
+    unit: str
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """Something that an estimator gives and a truth can be compared with.
+
+    The kind decides how an error is formed (:mod:`poise.filters.core.metrics`): ``rotation`` is a unit quaternion
+    w, x, y, z (body to world), ``direction`` a unit vector, ``angle`` radians that wrap, ``vector`` anything else.
+    """
+
+    name: str
+    kind: Literal["rotation", "direction", "angle", "vector"]
+    size: int
+    unit: str
+
+
+class Estimate(NamedTuple):
+    """What an estimator says at one tick, or (time axis first) over a whole sequence.
+
+    Attributes:
+        pose: quantity name → array ``(..., size)``; NaN before the estimator could start.
+        covariance: ``(..., e, e)`` of the error state, or None where a method has none.
+        innovation: ``(..., m)`` whitened innovation (unit variance if the filter is consistent); 0 where a row of the
+            measurement was missing; None where a method has none.
+        nis: ``(...,)`` normalised innovation squared, the squared length of ``innovation``; 0 without a measurement.
+    """
+
+    pose: dict[str, Array]
+    covariance: Array | None = None
+    innovation: Array | None = None
+    nis: Array | None = None
+
+
+GYROSCOPE = Channel("imu/gyr", 3, "rad/s")
+ACCELEROMETER = Channel("imu/acc", 3, "m/s²")
+MAGNETOMETER = Channel("imu/mag", 3, "any")
+
+UP = Quantity("up", "direction", 3, "1")
+"""The upward vertical in sensor coordinates."""
+ORIENTATION = Quantity("orientation", "rotation", 4, "1")
+"""Sensor to world (x east, y north, z up)."""
+RELATIVE_ORIENTATION = Quantity("relative_orientation", "rotation", 4, "1")
+"""Sensor to a level frame of unknown constant heading: all that six axes can tell."""
+EXTERNAL_ACCELERATION = Quantity("external_acceleration", "vector", 3, "m/s²")
+"""Acceleration of the sensor without gravity, in sensor coordinates."""
+GYROSCOPE_BIAS = Quantity("gyroscope_bias", "vector", 3, "rad/s")
+"""Constant part of the gyroscope's error, sensor coordinates."""
+ANGULAR_RATE = Quantity("angular_rate", "vector", 3, "rad/s")
+"""Angular velocity of the sensor relative to the world, sensor coordinates."""

@@ -1,0 +1,1 @@
+"""Estimators of other packages (vqf, imufusion, ahrs) with the interface of this one."""

@@ -1,0 +1,1 @@
+"""Filters of a single inertial sensor, with and without a magnetometer."""

@@ -1,0 +1,155 @@
+r"""Attitude and external acceleration from a six-axis inertial sensor.
+
+J. K. Lee, E. J. Park, S. N. Robinovitch, "Estimation of Attitude and External Acceleration Using Inertial Sensor
+Measurement During Various Dynamic Conditions", IEEE Transactions on Instrumentation and Measurement 61(8), 2012,
+doi 10.1109/TIM.2012.2187245. Equation numbers are the paper's.
+
+The state is Z, the upward vertical in sensor coordinates. The accelerometer sees gravity and the external
+acceleration a,
+
+    y_A = g Z + a + n_A                                                   (6b)
+    a_t = c_a a_{t−1} + ε_t                                               (7)
+
+and the filter subtracts what it expects of a, and trusts the rest the less the larger the last a was:
+
+    a⁻ = c_a a⁺_{t−1},   z = y_A − a⁻,   H = g I                          (16–19)
+    M = (c_a² ‖a⁺_{t−1}‖² / 3) I + σ_A² I                                 (20–23)
+
+Differs from print: (31) has a transposed ω̃ that would turn the wrong way, (14) an index k for t, and (4) a
+single-argument arctangent that is 0/0 at zero roll (:func:`poise.filters.core.rotation.roll_pitch` is its well-defined
+form). c_a acts as a covariance gain more than as the correlation that (7) calls it: under (7) the variance of (23)
+would be that of ε, which falls as c_a grows. The printed first-order rotation (12) loses 1.9 °/s at 10 rad/s and
+100 Hz; ``exact_rotation`` replaces it by the exponential. The text never says how to start: here Z₀ = y_A/‖y_A‖,
+P₀ = 10⁻² I, sensor at rest.
+
+Not estimated: heading, gyroscope bias. Sustained acceleration cannot be told from tilt.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar, Literal
+
+from ..core.backend import Array, constant, expand, namespace
+from ..core.model import Gain, Model
+from ..core.quantity import ACCELEROMETER, EXTERNAL_ACCELERATION, GYROSCOPE, UP, Measurement
+from ..core.rotation import exp_matrix, norm, normalize, skew
+
+
+@dataclass(frozen=True)
+class ExternalAcceleration(Model):
+    """The paper's filter in its three modes.
+
+    * Mode 1: acceleration model, equations (16)–(29).
+    * Mode 2: static assumption, M = σ_A² I; the same as mode 1 with c_a = 0.
+    * Mode 3: threshold, mode 2 that corrects only while | ‖y_A‖ − g | ≤ ε_A held for all of the last n Δt seconds (30).
+
+    State: Z (3), a⁺ (3, remembered), number of samples for which the threshold has held.
+    """
+
+    mode: Literal[1, 2, 3] = 1
+    """which of the paper's modes"""
+    exact_rotation: bool = True
+    """propagate by the exponential instead of the printed first order (12)"""
+    gyroscope_sample: Literal["current", "previous"] = "current"
+    """which sample turns t−1 into t: ``previous`` is printed (12), right for samples that hold until the next one;
+    ``current`` is right for samples that describe the interval that they end"""
+    gyroscope_noise: float = 1e-2
+    """σ_G, rad/s per sample (section IV: σ_G² = 10⁻⁴)"""
+    accelerometer_noise: float = 1e-2
+    """σ_A, m/s² per sample (section IV: σ_A² = 10⁻⁴)"""
+    c_a: float = 0.1
+    """constant of the acceleration model (7), 0 to 1; the paper uses 0.1"""
+    threshold: float = 0.2
+    """ε_A of mode 3, m/s²"""
+    window: float = 0.04
+    """n Δt of mode 3, s: the paper's n = 4 at 100 Hz; kept in seconds at any rate"""
+    gravity: float = 9.8
+    """g, m/s² (the paper's experiments; its introduction says 9.81)"""
+
+    channels: ClassVar = (GYROSCOPE, ACCELEROMETER)
+    outputs: ClassVar = (UP, EXTERNAL_ACCELERATION)
+    state_size: ClassVar = 7
+    error_size: ClassVar = 3
+    residual_size: ClassVar = 3
+    gains: ClassVar = {
+        "process": Gain("gyroscope_noise", description="process variance σ_G²"),
+        "measurement": Gain("accelerometer_noise", description="measurement variance σ_A²"),
+        "c_a": Gain("c_a", power=1.0, maximum=1.0, description="constant of the acceleration model"),
+    }
+
+    def __post_init__(self) -> None:
+        """Refuse a mode, a sample or a c_a that the paper does not know."""
+        super().__post_init__()
+        if self.mode not in (1, 2, 3):
+            raise ValueError(f"mode must be 1, 2 or 3, got {self.mode!r}")
+        if self.gyroscope_sample not in ("current", "previous"):
+            raise ValueError(f"gyroscope_sample must be 'current' or 'previous', got {self.gyroscope_sample!r}")
+        if not 0.0 <= self.c_a <= 1.0:
+            raise ValueError(f"c_a must lie in [0, 1], got {self.c_a}")
+
+    def prior(self, z: Measurement) -> tuple[Array, Array]:
+        """Z₀ along the first accelerometer sample, a₀⁺ = y_A − g Z₀, P₀ = 10⁻² I."""
+        y = z["imu/acc"]
+        xp = namespace(y)
+        up = normalize(y)
+        x = xp.concat([up, y - expand(self.gravity, 1) * up, self._is_static(y)], axis=-1)
+        return x, constant([[1e-2, 0, 0], [0, 1e-2, 0], [0, 0, 1e-2]], y) + 0.0 * y[..., None]
+
+    def predict(self, x: Array, z: Measurement, previous: Measurement) -> tuple[Array, Array, Array]:
+        """Equations (10)–(15), (24), (25): Φ, and Q = −Δt² Z̃ Σ_G Z̃ with the corrected Z of the tick before."""
+        xp = namespace(x)
+        rate = (z if self.gyroscope_sample == "current" else previous)["imu/gyr"]
+        turn = expand(self.dt, 1) * rate
+        identity = constant([[1, 0, 0], [0, 1, 0], [0, 0, 1]], x)
+        phi = exp_matrix(-turn) if self.exact_rotation else identity - skew(turn)
+        up = x[..., :3]
+        squared = xp.sum(up * up, axis=-1)[..., None, None]
+        variance = expand(self.dt**2 * self.gyroscope_noise**2, 2)
+        Q = variance * (squared * identity - up[..., :, None] * up[..., None, :])
+        return xp.concat([(phi @ up[..., None])[..., 0], x[..., 3:]], axis=-1), phi, Q
+
+    def residual(self, x: Array, z: Measurement) -> tuple[Array, Array, Array]:
+        """Equations (16)–(23), or the threshold (30): rows that it shuts out are NaN and correct nothing."""
+        xp = namespace(x)
+        y, up, last = z["imu/acc"], x[..., :3], x[..., 3:6]
+        identity = constant([[1, 0, 0], [0, 1, 0], [0, 0, 1]], x) + 0.0 * x[..., :3, None]
+        variance = expand(self.accelerometer_noise**2, 2)
+        r = y - expand(self.gravity, 1) * up
+        if self.mode == 1:
+            r = r - expand(self.c_a, 1) * last
+            squared = xp.sum(last * last, axis=-1)[..., None, None]
+            variance = variance + expand(self.c_a**2, 2) * squared / 3.0
+        if self.mode == 3:
+            held = xp.greater(self._static_samples(x, y), self.window / self.dt + 0.5)
+            r = xp.where(held, r, xp.nan)
+        return r, expand(self.gravity, 2) * identity, variance * identity
+
+    def retract(self, x: Array, dx: Array) -> Array:
+        """Z is corrected by a sum, as printed (27)."""
+        return namespace(x).concat([x[..., :3] + dx, x[..., 3:]], axis=-1)
+
+    def finish(self, x: Array, z: Measurement) -> Array:
+        """Normalise Z (28) and form a⁺ = y_A − g Z⁺ (29); without a sample a⁺ becomes c_a a⁺, as (16) expects."""
+        xp = namespace(x)
+        y = z["imu/acc"]
+        up = normalize(x[..., :3])
+        acceleration = y - expand(self.gravity, 1) * up
+        expected = (expand(self.c_a, 1) if self.mode == 1 else 0.0) * x[..., 3:6]
+        acceleration = xp.where(xp.isfinite(acceleration), acceleration, expected)
+        return xp.concat([up, acceleration, self._static_samples(x, y)], axis=-1)
+
+    def pose(self, x: Array) -> dict[str, Array]:
+        """The upward vertical and the external acceleration, both in sensor coordinates."""
+        return {"up": x[..., :3], "external_acceleration": x[..., 3:6]}
+
+    def _is_static(self, y: Array) -> Array:
+        xp = namespace(y)
+        deviation = xp.abs(norm(y) - expand(self.gravity, 1))
+        one = 1.0 + 0.0 * deviation
+        missing = xp.where(xp.isfinite(one), 0.0 * one, xp.zeros_like(one))
+        return xp.where(xp.less_equal(deviation, expand(self.threshold, 1)), one, missing)
+
+    def _static_samples(self, x: Array, y: Array) -> Array:
+        """Length of the run of static samples that ends now, ``(..., 1)``."""
+        return (x[..., 6:] + 1.0) * self._is_static(y)

@@ -1,0 +1,233 @@
+r"""Quaternion by Gauss–Newton from accelerometer and magnetometer, then a Kalman filter with the gyroscope.
+
+J. L. Marins, X. Yun, E. R. Bachmann, R. B. McGhee, M. J. Zyda, "An Extended Kalman Filter for Quaternion-Based
+Orientation Estimation Using MARG Sensors", IROS 2001, in the form in which P. He compares with it (thesis, Université
+Laval, section 5.1.12; equation numbers are the thesis').
+
+First step: with the unit vectors y_F = [vertical, field] in the world, y_B in the sensor's axes, and the matrix of a
+quaternion of any length M(q) = (w² − u·u) 1 + 2 u uᵀ + 2 w [u]× (5.40), four steps of
+
+    ε = y_F − [M y_B1; M y_B2],   J = −∂[M y_B]/∂q,   q ← q − (JᵀJ)⁻¹ Jᵀ ε             (5.41)–(5.43)
+
+from the predicted quaternion, then normalised and given the sign of the prediction. Both vectors weigh the same, so an
+acceleration of the hand turns the result as much as the field does.
+
+Second step: a Kalman filter with the state [ω; q] that measures both (5.47),
+
+    ω̇ = (−ω + w) / τ,  w white noise,     q̇ = ½ q ⊗ [0; ω]                             (5.45), (5.46)
+
+discretised exactly for ω: φ = e^(−Δt/τ), variance σ_Ω² (1 − φ²) with the stationary deviation σ_Ω; q turns by the
+rotation vector Δt ω.
+
+Differs from print: (5.45) is driven by the angular rate itself instead of white noise, (5.46) multiplies by a
+scalar-first [0; ω] where q has its scalar last. The vertical is the *upward* one, as an accelerometer reads +g upwards.
+Quaternions are scalar-first here, and the world is x east, y north, z up.
+
+The thesis gives neither τ nor noises, and everything hangs on σ_q: at 0.01 the filter believes the first step and has
+the large errors that the thesis reports; at 0.5, about what an acceleration of 5 m/s² does to the first step, it rivals
+the filter of the thesis on a horizontal field. With a steep field the two vectors are nearly antiparallel, and their
+disagreement leaves a bias.
+
+Not estimated: gyroscope bias. Disturbed fields and sustained accelerations go straight into the estimate.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar, Literal
+
+from ..core.backend import Array, constant, expand, namespace
+from ..core.matrices import block_diagonal, block_matrix, solve_positive
+from ..core.model import Gain, Model, check_choice, checked_quaternion
+from ..core.quantity import (
+    ACCELEROMETER,
+    ANGULAR_RATE,
+    GYROSCOPE,
+    MAGNETOMETER,
+    ORIENTATION,
+    UP,
+    Channel,
+    Measurement,
+    Quantity,
+)
+from ..core.rotation import cross, exp, multiply, normalize, rotate, rotate_back, up_in_body
+from .magnetic_heading import align, field_direction, known
+
+STEPS = 4
+"""Steps of Gauss and Newton; the thesis: 3 to 4."""
+
+
+@dataclass(frozen=True)
+class Marins(Model):
+    """The comparison of the thesis: two steps, quaternion from two vectors, then a linear measurement of the state.
+
+    State: ω (3), q (4), unit field in the world (3). The error state is the first seven, additive. A sample of
+    accelerometer or magnetometer that is missing leaves the first step out.
+
+    Raises:
+        ValueError: an unknown start or field, a start that is no unit quaternion, or a deviation or time constant that
+            is not positive.
+    """
+
+    start: Literal["samples", "given"] = "samples"
+    """``samples``: at rest, from the first samples; ``given``: :attr:`start_orientation`"""
+    field: Literal["start", "given"] = "start"
+    """``start``: the dip is that of the first samples; ``given``: :attr:`dip`"""
+    quaternion_deviation: float = 0.5
+    """σ_q of each element of the first step's quaternion; 0.01 follows the first step, 0.5 is what 5 m/s² do to it"""
+    gyroscope_deviation: float = 0.1
+    """σ_ω, rad/s per sample (section 5.3.2)"""
+    rate_deviation: float = 3.0
+    """σ_Ω, rad/s: of the angular rate of the motion"""
+    rate_time: float = 0.5
+    """τ, s; the thesis gives none"""
+    orientation_prior: float = 0.05
+    """standard deviation of each element of the quaternion at the start"""
+    start_orientation: tuple[float, ...] = (1.0, 0.0, 0.0, 0.0)
+    """unit quaternion, sensor to world, of a given start"""
+    declination: float = 0.0
+    """of the magnetic field, rad, positive east"""
+    dip: float = 0.0
+    """of a given magnetic field below the horizontal, rad"""
+
+    channels: ClassVar[tuple[Channel, ...]] = (GYROSCOPE, ACCELEROMETER, MAGNETOMETER)
+    outputs: ClassVar[tuple[Quantity, ...]] = (ORIENTATION, UP, ANGULAR_RATE)
+    state_size: ClassVar[int] = 10
+    error_size: ClassVar[int] = 7
+    residual_size: ClassVar[int] = 7
+    gains: ClassVar[dict[str, Gain]] = {
+        "process": Gain("rate_deviation", description="process variance σ_Ω² of the angular rate"),
+        "measurement": Gain("quaternion_deviation", description="variance σ_q² of the first step"),
+    }
+
+    def __post_init__(self) -> None:
+        """Refuse what is no start, and what must be positive and is not."""
+        super().__post_init__()
+        check_choice("start", self.start, ("samples", "given"))
+        check_choice("field", self.field, ("start", "given"))
+        object.__setattr__(self, "start_orientation", checked_quaternion("start_orientation", self.start_orientation))
+        for name in ("quaternion_deviation", "gyroscope_deviation", "rate_deviation", "rate_time"):
+            if getattr(self, name) <= 0.0:
+                raise ValueError(f"{name} must be positive, got {getattr(self, name)}")
+
+    def prior(self, z: Measurement) -> tuple[Array, Array]:
+        """At rest: inclination from the accelerometer, heading from the field; ω₀ is the gyroscope's sample."""
+        xp, field, rate = namespace(z["imu/mag"]), z["imu/mag"], z["imu/gyr"]
+        q = align(z["imu/acc"], field, self.declination)
+        if self.start == "given":
+            q = 0.0 * q + xp.concat([0.0 * q[..., :1] + expand(value, 1) for value in self.start_orientation], axis=-1)
+        world = rotate(q, normalize(field))
+        if self.field == "given":
+            world = field_direction(self.declination, self.dip, q)
+        x = xp.concat([rate, q, world], axis=-1)
+        one = 1.0 + 0.0 * x[..., :1]
+        deviations = [self.gyroscope_deviation] * 3 + [self.orientation_prior] * 4
+        diagonal = xp.concat([one * expand(value**2, 1) for value in deviations], axis=-1)
+        return x, diagonal[..., :, None] * _unit(7, x)
+
+    def predict(self, x: Array, z: Measurement, previous: Measurement) -> tuple[Array, Array, Array]:
+        """Equations (5.45), (5.46), corrected."""
+        xp = namespace(x)
+        rate, q = x[..., :3], x[..., 3:7]
+        turn = expand(self.dt, 1) * rate
+        turned = multiply(q, exp(turn))
+        zero = 0.0 * x[..., :1]
+        decay = xp.exp(zero - expand(self.dt / self.rate_time, 1))
+        # a change of ω acts in the middle of the turn: exact to second order in Δt ω
+        half = exp(0.5 * turn)
+        axes = (multiply(multiply(multiply(q, half), _basis(index, q)), half) for index in (1, 2, 3))
+        lever = _columns([0.5 * expand(self.dt, 1) * axis for axis in axes])
+        right = _columns([multiply(_basis(index, q), exp(turn)) for index in range(4)])
+        three, none = _unit(3, x) + 0.0 * zero[..., None], 0.0 * lever
+        F = block_matrix([[decay[..., None] * three, none.mT], [lever, right]])
+        power = expand(self.rate_deviation**2, 1) * (1.0 - decay * decay)
+        Q = block_diagonal([power[..., None] * three, 0.0 * right])
+        return xp.concat([decay * rate, turned, x[..., 7:]], axis=-1), F, Q
+
+    def residual(self, x: Array, z: Measurement) -> tuple[Array, Array, Array]:
+        """State measured directly (5.47): the gyroscope, and the quaternion of the first step."""
+        xp, q, world = namespace(x), x[..., 3:7], x[..., 7:10]
+        up = constant([0.0, 0.0, 1.0], x) + 0.0 * world
+        (force, there), (field, also) = known(z["imu/acc"]), known(z["imu/mag"])
+        complete = xp.logical_and(there, also)
+        # what is expected stands in for missing samples: two vectors that are parallel have no solution
+        force = normalize(xp.where(complete, force, rotate_back(normalize(q), up)))
+        field = normalize(xp.where(complete, field, rotate_back(normalize(q), world)))
+        found = solve_orientation(normalize(q), (up, world), (force, field))
+        r = xp.concat([z["imu/gyr"] - x[..., :3], xp.where(complete, found - q, xp.nan + 0.0 * q)], axis=-1)
+        seven = _unit(7, x) + 0.0 * x[..., :1, None]
+        deviations = [self.gyroscope_deviation] * 3 + [self.quaternion_deviation] * 4
+        one = 1.0 + 0.0 * x[..., :1]
+        diagonal = xp.concat([one * expand(value**2, 1) for value in deviations], axis=-1)
+        return r, seven, diagonal[..., :, None] * seven
+
+    def retract(self, x: Array, dx: Array) -> Array:
+        """A sum."""
+        return namespace(x).concat([x[..., :7] + dx, x[..., 7:]], axis=-1)
+
+    def finish(self, x: Array, z: Measurement) -> Array:
+        """Normalise the quaternion."""
+        return namespace(x).concat([x[..., :3], normalize(x[..., 3:7]), x[..., 7:]], axis=-1)
+
+    def pose(self, x: Array) -> dict[str, Array]:
+        """Orientation, vertical and angular rate."""
+        return {"orientation": x[..., 3:7], "up": up_in_body(x[..., 3:7]), "angular_rate": x[..., :3]}
+
+
+def solve_orientation(q: Array, world: tuple[Array, Array], body: tuple[Array, Array]) -> Array:
+    """The unit quaternion that turns two body vectors onto two world vectors best, by four steps from ``q``.
+
+    Equations (5.41)–(5.43). The quaternion is free in its length while the steps last.
+
+    Args:
+        q: where to start, ``(..., 4)``; near the solution, as the steps find the nearest one.
+        world: two vectors in the world, ``(..., 3)``.
+        body: the same in the body's axes.
+
+    Returns:
+        ``(..., 4)`` with the sign of ``q``; not finite where the vectors are parallel.
+    """
+    xp, start = namespace(q), q
+    for _ in range(STEPS):
+        blocks, errors = [], []
+        for seen, target in zip(body, world, strict=True):
+            w, u = q[..., :1], q[..., 1:]
+            along = xp.sum(u * seen, axis=-1, keepdims=True)
+            turned = (w * w - xp.sum(u * u, axis=-1, keepdims=True)) * seen + 2.0 * along * u
+            errors.append(target - turned - 2.0 * w * cross(u, seen))
+            blocks.append(matrix_jacobian(q, seen))
+        jacobian, error = xp.concat(blocks, axis=-2), xp.concat(errors, axis=-1)
+        normal = jacobian.mT @ jacobian
+        q = q + solve_positive(normal, (jacobian.mT @ error[..., None])[..., 0])
+    q = normalize(q)
+    aligned = xp.sum(q * start, axis=-1, keepdims=True)
+    return xp.where(xp.less(aligned, 0.0), -q, q)
+
+
+def matrix_jacobian(q: Array, v: Array) -> Array:
+    """∂(M(q) v)/∂q ``(..., 3, 4)`` of the quaternion's matrix (5.40), whatever its length.
+
+    M v = (w² − u·u) v + 2 (u·v) u + 2 w u × v.
+    """
+    xp = namespace(q, v)
+    w, u = q[..., :1], q[..., 1:]
+    along = xp.sum(u * v, axis=-1, keepdims=True)
+    columns = [2.0 * (w * v + cross(u, v))]
+    for index in range(3):
+        axis = 0.0 * v + constant([float(index == i) for i in range(3)], v)
+        part, seen = u[..., index : index + 1], v[..., index : index + 1]
+        columns.append(2.0 * (seen * u + along * axis - part * v + w * cross(axis, v)))
+    return _columns(columns)
+
+
+def _columns(vectors: list[Array]) -> Array:
+    return namespace(*vectors).stack(vectors, axis=-1)
+
+
+def _basis(index: int, like: Array) -> Array:
+    """The quaternion with a one at ``index``, in the batch shape of ``like`` ``(..., 4)``."""
+    return 0.0 * like + constant([float(index == i) for i in range(4)], like)
+
+
+def _unit(size: int, like: Array) -> Array:
+    return constant([[float(i == j) for j in range(size)] for i in range(size)], like)

@@ -1,0 +1,67 @@
+"""Speed of families of filters: the same filters in every form, filterpy among them."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from poise.baselines.registry import list_estimators, make_estimator
+from poise.baselines.speed import families as speed_families
+from poise.baselines.speed import filters as speed_filters
+from poise.baselines.speed.fixtures import example
+from poise.filters.core.kalman import KalmanFilter
+from poise.scripts.main import main
+
+NAMES = [name for names in speed_families.FAMILIES.values() for name in names if name in list_estimators()]
+KALMAN = [name for name in NAMES if isinstance(make_estimator(name), KalmanFilter)]
+
+
+@pytest.fixture
+def _hurry(monkeypatch):
+    monkeypatch.setattr(speed_filters, "REPEATS", 1)
+    for name, value in (("BATCHES", (4,)), ("STEPS", 20), ("LONG", 50), ("ARRAYS", 3), ("SAMPLES", 20)):
+        monkeypatch.setattr(speed_families, name, value)
+    monkeypatch.setitem(speed_families.FAMILIES, "bicycle", ("platform-gyro", "to-come"))
+    monkeypatch.setitem(speed_families.FAMILIES, "arrays", ("planar-mean",))
+
+
+@pytest.mark.parametrize("name", KALMAN)
+def test_filterpy_computes_the_same_filter(name):
+    estimator = make_estimator(name, compiled=False)
+    data = speed_families.repeated(example(estimator, 1, 40), 60)
+    theirs = speed_families.filterpy_run(estimator.model, data)
+    memory = estimator.init({channel: array[0] for channel, array in data.items()})
+    for t in range(60):
+        memory, _ = estimator.step(memory, {channel: array[t] for channel, array in data.items()})
+        np.testing.assert_allclose(memory.x, theirs[t], rtol=1e-7, atol=1e-7)
+
+
+def test_samples_are_repeated_forth_and_back():
+    data = {"a/b": np.arange(3.0)[:, None]}
+    assert speed_families.repeated(data, 8)["a/b"][:, 0].tolist() == [0, 1, 2, 2, 1, 0, 0, 1]
+    wide = speed_families.widened(data, 5)["a/b"]
+    assert wide.shape == (3, 5, 1)
+    assert (wide == data["a/b"][:, None]).all()
+
+
+@pytest.mark.usefixtures("_hurry")
+def test_the_command_knows_the_families(capsys):
+    assert main(["speed", "--what", "bicycle", "arrays", "--json"]) == 0
+    rows = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    groups = {row["group"].split(" (")[0] for row in rows}
+    assert groups == {"platform-gyro", "planar-mean"}
+    for group in {row["group"] for row in rows}:
+        assert next(row["ratio"] for row in rows if row["group"] == group) == 1.0
+    assert {"batch of 4, compiled", "batch of 4, arrays", "step by step, compiled"} <= {row["what"] for row in rows}
+    with pytest.raises(ValueError, match="family must be one of"):
+        next(speed_families.family_speeds("boats"))
+
+
+def test_unknown_channels_are_named():
+    class Odd:
+        channels = (type("Channel", (), {"name": "nose/cold"}),)
+
+    with pytest.raises(ValueError, match="nose/cold"):
+        example(Odd(), 0)

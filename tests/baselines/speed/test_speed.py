@@ -1,0 +1,44 @@
+"""What the speed command measures is what it says; how fast it is, is not tested."""
+
+import json
+
+import numpy as np
+import pytest
+
+from poise.baselines.speed import environments as speed_environments
+from poise.baselines.speed import filters as speed_filters
+from poise.filters.core.estimator import run
+from poise.filters.core.kalman import KalmanFilter
+from poise.filters.imu.external_acceleration import ExternalAcceleration
+from poise.scripts.main import main
+
+
+@pytest.fixture(autouse=True)
+def hurry(monkeypatch):
+    monkeypatch.setattr(speed_filters, "REPEATS", 1)
+    monkeypatch.setattr(speed_filters, "BATCHES", (8,))
+    monkeypatch.setattr(speed_environments, "REPEATS", 1)
+    monkeypatch.setattr(speed_environments, "STEPS", 20)
+
+
+def test_the_yardstick_computes_the_same_filter():
+    model = ExternalAcceleration(c_a=0.2)
+    measurements = speed_filters.samples(300)
+    ours = run(KalmanFilter(model), measurements).pose["up"]
+    np.testing.assert_allclose(speed_filters.filterpy_run(model, measurements), ours, rtol=0, atol=1e-9)
+
+
+def test_the_command_prints_rates_and_ratios(capsys):
+    assert main(["speed", "--what", "filters", "environments", "--json"]) == 0
+    rows = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    groups = {row["group"] for row in rows}
+    assert len(groups) == 5
+    for group in groups:
+        yardsticks = [row for row in rows if row["group"] == group and row["ratio"] == 1.0]
+        assert len(yardsticks) == (0 if group == "whole sequence by name" else 1)
+    assert all(row["rate"] > 0.0 for row in rows)
+    riding = {(row["group"].split(", ")[1], row["what"]): row["rate"] for row in rows if "rider" in row["group"]}
+    for fidelity in ("full", "lumped"):
+        steps, factor = (riding[fidelity, f"RiderBicycle{what}"] for what in ("", ", real-time factor"))
+        assert factor == pytest.approx(steps / speed_environments.RIDER_RATE)
+    assert {"batch of 8, compiled", "whole sequence, compiled"} <= {row["what"] for row in rows}

@@ -1,0 +1,119 @@
+"""Studies of chapters 2 and 3 of the thesis on arrays: short ones every day, published claims when slow."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from poise.baselines.studies.accelerometer_array import planar as planar_study
+from poise.baselines.studies.accelerometer_array import rate as angular_rate_study
+from poise.baselines.studies.accelerometer_array.rate import CALIBRATED, ERRORS, PRINTED, WAYS
+
+
+@pytest.fixture
+def few_ways(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Those whose compiled forms other tests make too."""
+    monkeypatch.setattr(angular_rate_study, "WAYS", WAYS[5:])
+    monkeypatch.setattr(planar_study, "WAYS", (planar_study.WAYS[3], planar_study.WAYS[6]))
+
+
+def test_rows_and_tables_of_angular_rates(few_ways: None) -> None:
+    rows = angular_rate_study.rate_errors(2, "white 0.1", 16.0)
+    rows += angular_rate_study.rate_errors(2, CALIBRATED, 16.0)
+    assert json.loads(json.dumps(rows)) == rows
+    table = angular_rate_study.rate_table(rows)
+    assert [row["method"] for row in table] == [WAYS[5].name, WAYS[6].name] * 2
+    best = {row["errors"]: row["mean"] for row in table if row["method"] == WAYS[6].name}
+    assert best["white 0.1"] < 0.2
+    assert best[CALIBRATED] < 1.0
+    assert all(row["least"] <= row["mean"] <= row["largest"] for row in table)
+    for row in angular_rate_study.weight_table(rows):
+        slow, *_, fast = [value for key, value in row.items() if key not in ("errors", "method")]
+        assert slow > fast
+
+
+def test_curves_of_angular_rates(few_ways: None) -> None:
+    curves = angular_rate_study.rate_curves(1, start=2.0, length=1.0)
+    assert {len(values) for values in curves.values()} == {101}
+    assert "true" in curves
+    assert "weight" in curves
+
+
+def test_rows_and_tables_of_planar_angles(few_ways: None) -> None:
+    rows = planar_study.planar_errors(0, "infinity", 12.0)
+    assert json.loads(json.dumps(rows)) == rows
+    table = {row["method"]: row for row in planar_study.planar_table(rows)}
+    assert table["extended filter"]["rms (°)"] < 6.0
+    assert table["extended filter"]["within 10°"] > 0.9
+    assert table["mean, wrapped difference"]["rms (°)"] < 8.0
+    curves = planar_study.planar_curves(0, "infinity", 12.0)
+    assert np.abs(curves["extended filter"]).max() < 30.0
+
+
+def test_unscented_and_extended_filter_are_one_on_both_motions() -> None:
+    for motion in planar_study.MOTIONS:
+        assert planar_study.unscented_difference(0, motion, 4.0) < 1e-5
+
+
+@pytest.mark.slow
+def test_table_2_1() -> None:
+    """Ranking on every seed; errors within those of the thesis; ranges of an independent simulation."""
+    rows = [row for seed in range(6) for errors in ERRORS for row in angular_rate_study.rate_errors(seed, errors)]
+    for row in angular_rate_study.rankings(rows):
+        assert row["weighted is best"], row
+        assert row["with biases"] <= max(PRINTED["weighted"]), row
+        assert row["sound"] < 1.06, row
+    means = {(row["errors"], row["method"]): row["mean"] for row in angular_rate_study.rate_table(rows)}
+    for errors, largest in (("white 0.022", 0.020), ("white 0.1", 0.093), ("white 0.3", 0.29)):
+        assert means[errors, "weighted, sound"] <= 1.05 * largest
+        assert means[errors, "weighted, sound"] < 0.7 * means[errors, "weighted, as printed"]
+        assert means[errors, "weighted, sound"] < 0.8 * means[errors, "weighted, corrected"]
+        # what biases would cost where there are none
+        assert means[errors, WAYS[6].name] < 1.35 * means[errors, "weighted, sound"]
+    assert means[CALIBRATED, WAYS[6].name] < 0.9 * means[CALIBRATED, "weighted, sound"]
+    assert means[CALIBRATED, "time integration"] > 10.0
+    for row in angular_rate_study.weight_table(rows):
+        if row["method"] == "weighted, sound" and row["errors"] in ("white 0.022", "white 0.1"):
+            weights = [value for key, value in row.items() if key not in ("errors", "method")]
+            np.testing.assert_allclose(weights, [0.99, 0.97, 0.93, 0.88], atol=0.02)
+
+
+@pytest.mark.slow
+def test_planar_figures() -> None:
+    """Means of ten seeds against those of an independent simulation."""
+    rows = [
+        row for motion in planar_study.MOTIONS for seed in range(10) for row in planar_study.planar_errors(seed, motion)
+    ]
+    found = {(row["motion"], row["method"]): row for row in planar_study.planar_table(rows)}
+
+    def rms(motion: str, method: str) -> float:
+        return found[motion, method]["rms (°)"]
+
+    for motion, extended, mean in (("planar-walk", 6.0, 8.6), ("infinity", 4.8, 7.6)):
+        assert rms(motion, "extended filter") <= extended
+        assert rms(motion, "mean, wrapped difference") <= mean
+        assert rms(motion, "unscented filter") == pytest.approx(rms(motion, "extended filter"), abs=1e-5)
+        assert 15.0 < rms(motion, "time integration") < 40.0
+        assert rms(motion, "tilt") > 40.0
+        assert rms(motion, "mean, literal") > 50.0
+        assert rms(motion, "linear filter, literal") > 50.0
+    best = "complete pose, acceleration returns to zero"
+    assert rms("infinity", best) <= 3.3
+    assert found["infinity", best]["largest error (°)"] <= 9.0
+    assert found["infinity", best]["within 10°"] > 0.99
+    thesis = rms("infinity", "complete pose, thesis")
+    assert thesis > rms("infinity", "extended filter")
+    assert rms("infinity", "complete pose, thesis, printed R") > 2.0 * thesis
+    assert rms("infinity", "complete pose, thesis, printed H") > 5.0 * thesis
+    assert rms("planar-walk", "complete pose, thesis") > 80.0
+    assert rms("planar-walk", best) < 15.0
+
+
+@pytest.mark.slow
+def test_correlated_acceleration_wants_an_inflated_variance() -> None:
+    rows = [row for seed in range(5) for row in planar_study.inflation_errors(seed)]
+    errors = {row["R"]: row["rms (°)"] for row in planar_study.planar_table(rows, "R")}
+    for R, expected in ((10.0, 8.8), (30.0, 6.2), (100.0, 4.8), (300.0, 4.7), (1000.0, 5.7)):
+        assert errors[R] == pytest.approx(expected, abs=0.4)

@@ -1,0 +1,124 @@
+"""The force/inertial study: exact data, consistency, better sensors, the order of the synthetic table."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from poise.baselines.rider_estimators import geometry_or_usual
+from poise.baselines.studies.force_inertial.consistency import FREE, forces_for, ideal_consistency
+from poise.baselines.studies.force_inertial.motion import NO_ERRORS, Errors, draw_motion, simulate
+from poise.baselines.studies.force_inertial.rides import better_sensors, rms_after, samples_of
+from poise.baselines.studies.force_inertial.simulation import from_the_truth, synthetic, variant, without_forces
+from poise.baselines.studies.force_inertial.states import torques, true_states
+from poise.baselines.studies.force_inertial.study import reproduce
+from poise.baselines.studies.kit import Study
+from poise.baselines.studies.report import Report
+from poise.envs.bicycle.environment import RiderBicycleEnv
+from poise.envs.record import record
+from poise.filters.bicycle.force_inertial.filter import ForceInertial
+from poise.filters.core.kalman import KalmanFilter
+
+
+def test_the_model_predicts_what_the_exact_data_read():
+    """Only the low-passed differences lag behind."""
+    samples, truth = synthetic("outdoor", 1, 8.0, 0, NO_ERRORS)
+    samples, truth = ({name: array[:, 0] for name, array in part.items()} for part in (samples, truth))
+    read, predicted = torques(ForceInertial.published(), samples, truth)
+    assert np.abs(read[50:]).max() > 30.0
+    assert np.abs(predicted - read)[50:].max() < 2.5
+    quick = ForceInertial.published(gyroscope_filter=0.0, speed_filter=0.0)
+    assert np.abs(torques(quick, samples, truth)[1] - read)[50:].max() < 1.0
+
+
+def test_true_states_remember_as_the_filter_does():
+    samples, truth = synthetic("indoor", 1, 2.0, 1, Errors())
+    samples, truth = ({name: array[:, 0] for name, array in part.items()} for part in (samples, truth))
+    model = ForceInertial.published()
+    x = true_states(model, samples, truth)
+    for k in (1, 7, 60):
+        now, before = ({name: array[j] for name, array in samples.items()} for j in (k, k - 1))
+        np.testing.assert_allclose(model.predict(x[k - 1], now, before)[0][7:], x[k][7:], atol=1e-9)
+
+
+def test_forces_are_found_for_any_residual():
+    samples, _ = synthetic("indoor", 3, 0.2, 2, NO_ERRORS)
+    model = ForceInertial.published()
+    z = {name: array[5] for name, array in samples.items()}
+    x = model.prior(z)[0]
+    wanted = np.random.default_rng(0).normal(size=(3, 3)) * [6.0, 6.0, 0.03]
+    wrench = forces_for(model, x, z, wanted)
+    np.testing.assert_allclose(model.residual(x, {**z, "seat/wrench": wrench})[0][:, :3], wanted, atol=1e-6)
+    untouched = [k for k in range(6) if k not in FREE]
+    np.testing.assert_array_equal(wrench[:, untouched], z["seat/wrench"][:, untouched])
+
+
+def test_consistent_where_the_model_is_exact():
+    for name, found in ideal_consistency(60, 4.0, 1, level=0.999).items():
+        assert found["lower"] <= found["ratio"] <= found["upper"], name
+
+
+def test_sensors_without_errors_are_the_environment_s():
+    rides = []
+    for sensors in ("paper", "ideal"):
+        settings = {"fidelity": "lumped", "duration": 0.6, "suite": "force-inertial", "sensors": sensors}
+        env = RiderBicycleEnv("straight", 2, **settings)
+        rides.append(record(env, seed=3))
+        env.close()
+    noisy, ideal = rides
+    model = ForceInertial.for_rider(geometry_or_usual(noisy))
+    found, (wanted, _, _) = better_sensors(noisy, model, "force sensors: exact"), samples_of(ideal)
+    for name in ("seat/wrench", "handlebar/force"):
+        length = min(len(found[name]), len(wanted[name]))
+        np.testing.assert_allclose(found[name][-length:], wanted[name][-length:], atol=1e-6)
+    known, recorded = better_sensors(noisy, model, "force sensors: zeros known"), samples_of(noisy)[0]
+    assert np.abs(known["seat/wrench"] - recorded["seat/wrench"]).max() > 0.0
+    np.testing.assert_array_equal(known["trunk_imu/gyr"], recorded["trunk_imu/gyr"])
+
+
+def test_integration_from_the_truth_ignores_forces():
+    samples, truth = synthetic("indoor", 2, 2.0, 4, NO_ERRORS)
+    kalman = KalmanFilter(ForceInertial.published(shoulder_noise=1e6, gyroscope_sample="previous"), compiled=False)
+    pose = from_the_truth(kalman, without_forces(samples), truth)
+    error = pose["force-inertial/trunk_angles"][-1] - truth["force-inertial/trunk_angles"][-1]
+    assert np.degrees(np.abs(error)).max() < 0.5
+    off = from_the_truth(kalman, without_forces(samples), truth, 0.1)["force-inertial/trunk_angles"]
+    assert np.abs(off[0, :, 0] - truth["force-inertial/trunk_angles"][1, :, 0] - 0.1).max() < 0.02
+
+
+def test_exact_data_repeat():
+    motion = draw_motion(np.random.default_rng(0), "indoor", Errors())
+    first, again = (
+        simulate(motion, Errors(), ForceInertial.published(), 0.5, np.random.default_rng(1))[0] for _ in range(2)
+    )
+    for name, array in first.items():
+        np.testing.assert_array_equal(array, again[name])
+    with pytest.raises(ValueError, match="course must be"):
+        draw_motion(np.random.default_rng(0), "hall", Errors())  # type: ignore[arg-type]
+
+
+def test_errors_count_from_a_time_on():
+    errors, time = np.ones((100, 4)), np.arange(100) * 0.1
+    assert rms_after(errors, time, 5.0) == [1.0] * 4
+    assert np.isnan(rms_after(errors, time, 50.0)).all()
+
+
+@pytest.mark.slow
+def test_the_synthetic_table_in_order_and_size():
+    names = ("exact: differentiated gyroscopes, apparent vertical", "same, raw (13)", "static torque, raw (13)")
+    exact, raw, static = (variant(name, "indoor", 2, 30.0, 0) for name in names)
+    assert max(exact[:3]) < 1.5
+    assert exact[3] < 0.3
+    assert 7.0 < raw[3] < 11.0
+    assert static[0] > 5.0 * exact[0]
+
+
+@pytest.mark.slow
+def test_the_whole_study(tmp_path):
+    study = Study(tmp_path, quick=True, subjects=(0,), seeds=1, duration=14.0, processes=1, progress=False)
+    report = Report(tmp_path)
+    reproduce(study, report)
+    titles = [entry.title for entry in report.entries]
+    assert "Table II, indoor_circle" in titles
+    assert "Consistency where the model is exact" in titles
+    assert report.results

@@ -1,0 +1,129 @@
+"""What studies compute with: seeds, rides that are recorded once, results that are computed once."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from poise.baselines.studies import PAPERS, find_paper
+from poise.baselines.studies.kit import Study, load_ride
+
+FIXTURE = "poise/BicycleFixture-v0"
+CALLS: list[tuple[float, ...]] = []
+
+
+def root_sum(*values):
+    CALLS.append(values)
+    return {"sum": float(sum(values)), "roots": np.sqrt(values), "none": None}
+
+
+def other(*values):
+    return 0
+
+
+def wrong(value):
+    return {1, 2}
+
+
+@pytest.fixture
+def study(tmp_path):
+    CALLS.clear()
+    return Study(tmp_path, subjects=(0, 2), seeds=2, duration=1.0, processes=1, progress=False)
+
+
+def equal(left, right):
+    return all(values.tobytes() == right[name].tobytes() for name, values in left.items())
+
+
+def test_seeds_depend_on_root_and_names_only(tmp_path):
+    study = Study(tmp_path)
+    assert study.seed_of("outdoor", 1, 2) == Study(tmp_path, quick=True, seeds=1).seed_of("outdoor", 1, 2)
+    found = {
+        Study(tmp_path, seed=root).seed_of(name, subject, index)
+        for root in (0, 1)
+        for name in ("outdoor", "indoor_circle")
+        for subject in range(5)
+        for index in range(3)
+    }
+    assert len(found) == 60
+
+
+def test_rides_of_one_name_share_the_motion_whatever_the_sensors(study):
+    settings = {"fidelity": "lumped"}
+    paper = study.rides("straight", "two-gyro", **settings)
+    ideal = study.rides("straight", ["bicycle_imu/acc", "bicycle_imu/gyr"], sensors="ideal", rate=50.0, **settings)
+    assert [ride.name for ride in paper] == ["straight-0-0", "straight-0-1", "straight-2-0", "straight-2-1"]
+    assert [(ride.metadata["subject"], ride.metadata["index"]) for ride in ideal] == [(0, 0), (0, 1), (2, 0), (2, 1)]
+    assert paper[0].metadata["group"] == "straight"
+    for fast, slow in zip(paper, ideal, strict=True):
+        assert set(slow.measurements) == {"bicycle_imu/acc", "bicycle_imu/gyr"}
+        np.testing.assert_array_equal(fast.truth["bicycle/position"][1::2][:50], slow.truth["bicycle/position"][:50])
+    assert not np.allclose(paper[0].truth["bicycle/position"], paper[1].truth["bicycle/position"])
+
+
+def test_recorded_episodes_are_kept_and_lost_ones_are_recorded_again_bit_for_bit(study):
+    options = {"duration": 2.0}
+    first = study.episodes(FIXTURE, 3, name="push", options=options)
+    paths = sorted(study.folder.glob("rides/push-*/*.h5"))
+    assert [load_ride(path).name for path in paths] == ["push-0", "push-1", "push-2"]
+    stamps = [path.stat().st_mtime_ns for path in paths]
+    paths[1].unlink()
+    again = study.episodes(FIXTURE, 3, name="push", options=options)
+    assert [path.stat().st_mtime_ns == stamp for path, stamp in zip(paths, stamps, strict=True)] == [True, False, True]
+    assert all(equal(one.measurements, two.measurements) for one, two in zip(first, again, strict=True))
+    longer = study.episodes(FIXTURE, 1, name="push", options={"duration": 3.0})
+    assert len(longer[0]) > len(first[0])
+
+
+def test_rides_of_two_processes_are_those_of_one(study, tmp_path):
+    options = {"duration": 2.0}
+    two = Study(tmp_path / "two", processes=2, progress=False).episodes(FIXTURE, 2, name="push", options=options)
+    one = study.episodes(FIXTURE, 2, name="push", options=options)
+    assert all(equal(left.measurements, right.measurements) for left, right in zip(one, two, strict=True))
+
+
+def test_a_result_is_computed_once_and_again_when_its_arguments_change(study):
+    expected = {"sum": 5.0, "roots": [1.0, 2.0], "none": None}
+    assert study.cached("a key", root_sum, 1.0, 4.0) == expected
+    assert study.cached("a key", root_sum, 1.0, 4.0) == expected
+    assert CALLS == [(1.0, 4.0)]
+    assert study.cached("a key", root_sum, 9.0)["sum"] == 9.0
+    assert len(CALLS) == 2
+    with pytest.raises(ValueError, match="belongs to"):
+        study.cached("a key", other, 9.0)
+
+
+def test_jobs_keep_their_order_and_only_the_missing_ones_run(study):
+    assert [each["sum"] for each in study.map("sums", root_sum, [(1,), (2,)])] == [1.0, 2.0]
+    assert [each["sum"] for each in study.map("sums", root_sum, [(1,), (2,), (3,)])] == [1.0, 2.0, 3.0]
+    assert CALLS == [(1,), (2,), (3,)]
+    assert study.map("none", root_sum, []) == []
+
+
+def test_a_failed_job_leaves_no_file_and_says_what_it_gave(study):
+    with pytest.raises(TypeError, match="got set"):
+        study.cached("wrong", wrong, 1)
+    assert not list(study.folder.rglob("wrong/*.json"))
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"subjects": ()}, "subjects"),
+        ({"seeds": 0}, "seeds must be at least 1, got 0"),
+        ({"processes": 0}, "processes"),
+        ({"duration": 0.5}, "duration must be at least 1 s"),
+        ({"duration": float("nan")}, "duration"),
+    ],
+)
+def test_wrong_settings_are_named(tmp_path, changes, message):
+    with pytest.raises(ValueError, match=message):
+        Study(tmp_path, **changes)
+
+
+def test_papers_are_found_by_name_and_absent_ones_are_named(monkeypatch):
+    with pytest.raises(ValueError, match="did you mean 'two-gyro'"):
+        find_paper("two-gyros")
+    monkeypatch.setitem(PAPERS, "lost", ".lost")
+    with pytest.raises(ValueError, match="study of 'lost' is not part of this version"):
+        find_paper("lost")

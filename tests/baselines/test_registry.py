@@ -1,0 +1,60 @@
+"""Names of estimators, and what importing the package costs."""
+
+import subprocess
+import sys
+
+import pytest
+
+import poise
+from poise.filters.core.estimator import Estimator
+
+KINDS = {"filter", "reference", "learned", "adaptive", "external"}
+
+
+def test_every_entry_tells_what_it_is():
+    listed = poise.list_estimators()
+    assert {info.kind for info in listed.values()} == KINDS
+    for name, info in listed.items():
+        assert info.name == name
+        assert info.description
+        assert "\n" not in info.description
+        assert info.channels
+        assert all("/" in channel for channel in info.channels)
+        assert info.outputs
+
+
+@pytest.mark.parametrize("name", poise.list_estimators())
+def test_every_estimator_is_what_the_list_says(name):
+    info = poise.list_estimators()[name]
+    if info.kind == "external":
+        pytest.importorskip(name.split("-")[0])
+    estimator = poise.make_estimator(name, dt=0.02)
+    assert isinstance(estimator, Estimator)
+    assert estimator.dt == 0.02
+    assert {channel.name for channel in estimator.channels} == set(info.channels)
+    assert {quantity.name for quantity in estimator.outputs} == set(info.outputs)
+    if "orientation" in info.outputs:
+        assert "imu/mag" in info.channels, "nothing else tells the heading"
+
+
+def test_unknown_names_list_the_valid_ones():
+    with pytest.raises(ValueError, match=r"unknown estimator 'bounded', did you mean .*mahony"):
+        poise.make_estimator("bounded")
+    with pytest.raises(ValueError, match="unknown parameters \\['colour'\\] of 'mekf'"):
+        poise.make_estimator("mekf", colour=1)
+    with pytest.raises(AttributeError, match="no attribute 'nothing'"):
+        poise.nothing  # noqa: B018
+
+
+def test_the_public_face_is_light_to_import():
+    heavy = ("pybullet", "torch", "stable_baselines3", "numba", "matplotlib", "pandas", "scipy")
+    code = (
+        "import sys, poise; poise.list_estimators(); dir(poise); "
+        f"loaded = set({heavy}) & set(sys.modules); assert not loaded, loaded"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_every_public_name_can_be_had():
+    for name in poise.__all__:
+        assert getattr(poise, name) is not None

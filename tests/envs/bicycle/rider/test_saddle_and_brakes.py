@@ -1,0 +1,106 @@
+"""What a rider sits on, leans on and stops with."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from poise.envs.bicycle.course.path import Path
+from poise.envs.bicycle.course.scenarios import scenario
+from poise.envs.bicycle.frame.bicycle import Bicycle
+from poise.envs.bicycle.frame.parameters import MOUNTAIN_BIKE, RigidPart, combine
+from poise.envs.bicycle.ride.ride import Ride
+from poise.envs.bicycle.rider.anthropometry import SUBJECTS
+from poise.envs.bicycle.rider.posture import sit
+from poise.envs.bicycle.rider.saddle import Saddle, SaddleParameters, balanced_hand_load, resting_load
+from poise.envs.bicycle.rider.style import STYLES, RiderMotion
+from poise.envs.physics.world import Physics
+from poise.envs.sensors.ideal import STANDARD_GRAVITY
+
+
+def test_a_saddle_presses_and_never_pulls():
+    saddle = Saddle(400.0, SaddleParameters(4e4, 900.0))
+    assert saddle.force(0.0, 0.0) == 400.0
+    assert saddle.force(-0.005, 0.0) == pytest.approx(600.0)
+    assert saddle.force(0.0, -0.1) == pytest.approx(490.0)
+    assert saddle.force(0.011, 0.0) == 0.0
+    p = SaddleParameters()
+    # 45 kg bounce at 5 Hz, a third of critical damping
+    assert math.sqrt(p.stiffness / 45.0) / (2.0 * math.pi) == pytest.approx(5.0, abs=0.1)
+    assert p.damping / (2.0 * math.sqrt(p.stiffness * 45.0)) == pytest.approx(1.0 / 3.0, abs=0.01)
+    for bad in ({"stiffness": 0.0}, {"damping": -1.0}):
+        with pytest.raises(ValueError, match=next(iter(bad))):
+            SaddleParameters(**bad)
+
+
+@pytest.mark.parametrize("subject", [0, 4])
+def test_a_still_rider_rests_where_the_posture_has_the_pelvis(subject):
+    """Statics of the balance on the saddle against what the simulated rider's links say."""
+    posture = sit(MOUNTAIN_BIKE, SUBJECTS[subject])
+    motion = RiderMotion(STYLES["still"], np.random.default_rng(0))
+    with Ride(posture, motion, Path(np.zeros(2)), lambda _: 2.0) as ride:
+        heights, forces = [], []
+        for step in range(1500):
+            ride.step()
+            if step > 700:
+                heights.append(ride.bicycle.body.joint_tuples([ride.rider.seat])[0][0])
+                forces.append(ride.rider.saddle.force(*ride.bicycle.body.joint_tuples([ride.rider.seat])[0]))
+    assert abs(np.mean(heights)) < 1.5e-3
+    load = resting_load(posture, balanced_hand_load(posture), pedals=True)
+    assert np.mean(forces) == pytest.approx(load, rel=0.15)
+    assert 0.4 < load / (SUBJECTS[subject].mass * STANDARD_GRAVITY) < 0.65
+    # without pedals the saddle carries the legs too
+    lumped = resting_load(posture, balanced_hand_load(posture), pedals=False)
+    weight = SUBJECTS[subject].mass * STANDARD_GRAVITY
+    assert lumped == pytest.approx(weight - 2.0 * balanced_hand_load(posture))
+
+
+def test_light_riders_lean_less_on_their_hands():
+    loads = [balanced_hand_load(sit(MOUNTAIN_BIKE, body)) for body in SUBJECTS]
+    assert loads[3] == pytest.approx(STYLES["normal"].hand_load, rel=0.05)
+    assert loads[4] < loads[2] < loads[1] < loads[0]
+
+
+RIDER = RigidPart(70.0, (0.33, 0.0, 1.12), (6.0, 6.5, 1.5, 0.3))
+
+
+@pytest.mark.parametrize("wanted", [1.5, 3.5])
+def test_brakes_stop_without_a_skid_and_hold(wanted):
+    bike = MOUNTAIN_BIKE.with_load(RIDER)
+    mass = combine(bike.parts).mass
+    spinning = sum(w.inertia_axle / w.radius**2 for w in (bike.rear_wheel, bike.front_wheel))
+    with Physics() as physics:
+        bicycle = Bicycle(physics, bike)
+        bicycle.start(4.0)
+        slips, speeds = [], []
+        for _ in range(3500):
+            bicycle.act(brake=wanted * mass)
+            physics.step()
+            state = bicycle.state()
+            speeds.append(state.speed)
+            slips.append(abs(state.wheel_rate * bike.rear_wheel.radius - state.speed))
+            for tyre, force in zip(bicycle.tyres, bicycle.tyre_forces, strict=True):
+                shear = math.hypot(force.force[0], force.force[1])
+                # each wheel keeps from its friction limit, also while the load shifts
+                assert force.load < 60.0 or shear < 0.95 * tyre.parameters.friction * force.load
+        stop = int(np.argmax(np.array(speeds) < 1.0))
+    slowed = (speeds[200] - speeds[stop]) / ((stop - 200) * physics.time_step)
+    assert slowed == pytest.approx(wanted * mass / (mass + spinning), rel=0.12)
+    assert max(slips[:stop]) < 0.3
+    # the tyres spring back once, then it stands
+    assert min(speeds) > -0.15
+    assert abs(np.mean(speeds[-200:])) < 0.02
+    assert abs(state.pitch) < 0.05
+
+
+def test_varied_speeds_come_from_the_whole_range():
+    for seed in range(5):
+        speed = scenario("outdoor").draw(np.random.default_rng(seed), 122.0).speed
+        found = [speed(time) for time in np.arange(0.0, 122.0, 0.5)]
+        assert min(speed.levels) < 1.1
+        assert max(speed.levels) > 5.9
+        assert min(found) >= min(speed.levels) - 1e-9
+        # half of each level's time it stays
+        assert speed(0.0) == speed(0.45 * speed.hold)
