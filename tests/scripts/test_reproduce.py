@@ -9,7 +9,7 @@ from types import ModuleType
 import pandas
 import pytest
 
-from poise.baselines import reproduce as package
+from poise.baselines import studies as package
 from poise.baselines.plots import new_figure
 from poise.scripts.main import main
 
@@ -34,7 +34,7 @@ def reproduce(study, report):
 
 @pytest.fixture(autouse=True)
 def _paper(monkeypatch):
-    module = ModuleType("poise.baselines.reproduce.small")
+    module = ModuleType("poise.baselines.studies.small")
     vars(module).update(reproduce=reproduce)
     monkeypatch.setitem(sys.modules, module.__name__, module)
     monkeypatch.setitem(package.PAPERS, "small", ".small")

@@ -166,7 +166,7 @@ def test_snapshots_of_two_environments_do_not_mix():
 RIDE_HASH = """
 import hashlib
 from poise.envs.bicycle.environment import RiderBicycleEnv
-from poise.envs.bicycle.measured_geometry import rider_geometry
+from poise.envs.bicycle.sensors.measured_geometry import rider_geometry
 env = RiderBicycleEnv(fidelity="full", suite="all", duration=0.5)
 digest = hashlib.sha256()
 observation, info = env.reset(seed=11)

@@ -95,8 +95,8 @@ def test_without_numba_the_array_form_serves_with_one_hint():
 import sys, warnings
 sys.modules["numba"] = None
 import numpy as np
-from poise.filters.external_acceleration import ExternalAcceleration
-from poise.filters.kalman import KalmanFilter
+from poise.filters.imu.external_acceleration import ExternalAcceleration
+from poise.filters.core.kalman import KalmanFilter
 with warnings.catch_warnings(record=True) as caught:
     warnings.simplefilter("always")
     for mode in (1, 2):

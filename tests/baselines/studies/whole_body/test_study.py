@@ -36,7 +36,7 @@ def test_the_printed_table_has_a_value_for_every_angle():
         assert all(0.5 < float(value.split("±")[0]) < 7.0 for value in values.values())
     assert printed("indoor")["βr"] == "5.01±1.22"
     assert printed("outdoor")["ψl3"] == "6.34±2.13"
-    assert find_paper("whole-body").__module__.endswith("reproduce.whole_body")
+    assert find_paper("whole-body").__module__.endswith("studies.whole_body.study")
 
 
 def test_errors_are_degrees_by_column(ride):
