@@ -13,6 +13,7 @@ import numpy as np
 
 from ..evaluation import COLUMNS
 from ..plots import save
+from .claims import Claim
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -131,6 +132,17 @@ class Report:
                 | {"interval": interval_text(spread), "unit": row["unit"]}
             )
         self.table(title, shown, f"Ours: {interval}. {note}".strip())
+
+    def claims(self, title: str, claims: Sequence[Claim], note: str = "") -> None:
+        """Add a table of statements, the numbers that decide each, and whether it holds.
+
+        Args:
+            title: heading, of its own in this report.
+            claims: what is claimed; a report states no finding elsewhere.
+            note: Markdown beneath.
+        """
+        rows = [{"statement": each.statement, "number": each.number, "holds": each.holds} for each in claims]
+        self.table(title, rows, note)
 
     def _new_file(self, folder: str, name: str, suffix: str) -> Path:
         path = self.folder / folder / (re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-")[:80] + suffix)
