@@ -26,7 +26,7 @@ class AdaptiveEstimator:
     a neutral policy it is the filter itself, bit by bit. The state holds arrays only.
 
     Attributes:
-        filter: in its published tuning, a KalmanFilter (or a name of :data:`poise.filters.adaptation.gains.TUNABLE`).
+        filter: in its published tuning, a KalmanFilter (or the name of one).
         policy: sets the gains.
 
     Raises:

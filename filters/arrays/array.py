@@ -1,4 +1,4 @@
-"""The thesis' arrays of accelerometers, by name; what an array is lies in :mod:`.array_geometry`.
+"""The thesis' arrays of accelerometers, by name; what an array is lies in :mod:`.arrays.geometry`.
 
 P. He, "Estimating the orientation of a game controller from inertial and magnetic measurements", thesis, Université
 Laval; sections 2.3 (OCTA), 3.1 (planar controller), 4.1 and 4.2 (controller).

@@ -213,7 +213,7 @@ class AccelerometerArray:
         return type(self)(self.positions, self.axes, self.name, tuple(map(float, reference)))
 
     def describe(self) -> dict[str, Any]:
-        """Everything about it, for JSON; :func:`.array_files.read_array` turns it back."""
+        """Everything about it, for JSON; :func:`.arrays.files.read_array` turns it back."""
         return {
             "name": self.name,
             "positions": [list(row) for row in self.positions],

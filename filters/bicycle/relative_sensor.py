@@ -1,6 +1,6 @@
 """What a camera on a bicycle sees of a body on it: its orientation, or the distances of three markers.
 
-Relative angles are those of :mod:`.two_gyro_kinematics` (x forward, y right, z down). The sensors' axes are x forward,
+Relative angles are those of :mod:`.two_gyro.kinematics` (x forward, y right, z down). The sensors' axes are x forward,
 y left, z up: half a turn about x apart, so that θ₂ and θ₃ change their signs and θ₁ does not.
 """
 

@@ -325,7 +325,7 @@ def print_code(outputs: dict[str, np.ndarray], *, indent: str = "    ") -> list[
         indent: put before every line.
 
     Returns:
-        Lines of code that use ``sin``, ``sqrt`` … of :mod:`math` and ``isfinite`` by these names.
+        Lines of code that use ``sin``, ``sqrt`` … of ``math`` and ``isfinite`` by these names.
     """
     live: dict[int, Expression] = {}
     pending = [item for array in outputs.values() for item in array.ravel() if isinstance(item, Expression)]

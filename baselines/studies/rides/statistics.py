@@ -85,7 +85,7 @@ def ride_statistics(
         trajectory: of ``poise/RiderBicycle-v0`` with the channel ``bicycle_imu/acc``.
         scenario: its name.
         subject: number of the rider.
-        gaps: ``(T, 4)`` m, see :func:`.loop_gaps`; None if there is nothing to tell.
+        gaps: ``(T, 4)`` m, see :func:`.rider.loop_closure`; None if there is nothing to tell.
     """
     truth = trajectory.truth
     speed, roll, pitch = (truth[f"bicycle/{name}"][:, 0] for name in ("speed", "roll", "pitch"))

@@ -1,4 +1,4 @@
-"""A rider who sits, holds, pedals, steers and sways: joint torques on the links of :mod:`.rider_links`.
+"""A rider who sits, holds, pedals, steers and sways: joint torques on the links of :mod:`.rider.links`.
 
 ``full``: hands and feet are held to handlebar and pedals by point-to-point constraints. The arms steer and the legs
 pedal by joint torques that let the tips push with the wanted force (virtual work); whatever else the constraints carry

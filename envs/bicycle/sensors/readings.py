@@ -22,7 +22,7 @@ class RideQuantities:
     """
 
     bodies: Mapping[str, BodyState]
-    """motion of the bodies named in :mod:`.paper_sensors`; distances need positions, everything else orientations"""
+    """motion of the bodies named in :mod:`.sensors.suites`; distances need positions, everything else orientations"""
     wheel_rate: float | np.ndarray | None = None
     """(...) rad/s of the rear wheel, at the tick or on average since the last one"""
     steer: float | np.ndarray | None = None

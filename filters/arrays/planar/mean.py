@@ -1,6 +1,6 @@
 r"""Orientation in a vertical plane without a Kalman filter: integration, tilt, and their mean of least variance.
 
-P. He, thesis, Université Laval; sections 3.3.1 to 3.3.3 (see :mod:`.planar` for frames and symbols).
+P. He, thesis, Université Laval; sections 3.3.1 to 3.3.3 (see :mod:`.planar.orientation` for frames and symbols).
 
     integration  φ̃_k = φ̂_{k−1} + ½ Δt (ω_{k−1} + ω_k)
     tilt         φ̄_k = atan2(c̈_x, c̈_y)                                                                     (3.20)

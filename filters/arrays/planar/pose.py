@@ -1,6 +1,6 @@
 r"""Complete pose in a vertical plane, from accelerometers alone.
 
-P. He, thesis, Université Laval; section 3.3.5 (see :mod:`.planar` for frames and symbols). The state
+P. He, thesis, Université Laval; section 3.3.5 (see :mod:`.planar.orientation` for frames and symbols). The state
 x = [φ, ω, α, p, v, b̈] (p, v, b̈ in the plane's axes) is driven by white jerk: γ turns, β moves,
 
     F, G: triple integrators with the input held                                                   (3.40), (3.41)

@@ -1,6 +1,6 @@
 """Angular accelerations from accelerometers: (7) and (8) of the force/inertial paper, corrected and as printed.
 
-Frames and names are those of :mod:`.force_inertial_kinematics`. An accelerometer reads specific force f = a − g, which
+Frames and names are those of :mod:`.force_inertial.kinematics`. An accelerometer reads specific force f = a − g, which
 with z down is (0, 0, −g) level and at rest.
 
 The corrected forms are exact. They are an option, because gravity cancels when (8) feeds the torque model (9): the

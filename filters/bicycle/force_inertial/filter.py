@@ -2,7 +2,7 @@ r"""Rider's trunk and bicycle's roll from two inertial units, the seat's forces 
 
 Y. Zhang, K. Chen, J. Yi, "Rider Trunk and Bicycle Pose Estimation With Fusion of Force/Inertial Sensors", IEEE
 Transactions on Biomedical Engineering 60, 2013, doi 10.1109/TBME.2013.2260339. Equation numbers are the paper's; frames
-and letters are in :mod:`.force_inertial_kinematics`, the change of axes in :mod:`.force_inertial_axes`.
+and letters are in :mod:`.force_inertial.kinematics`, the change of axes in :mod:`.force_inertial.axes`.
 
     X = [φ_h θ φ φ_b b]                trunk X-Y-X angles, roll of the bicycle, bias of the trunk's gyroscope
     Ẋ = f(X, ω_h − b, ω_b)             (3), (4), (15), one Euler step a sample (16)
@@ -14,7 +14,7 @@ the seat's force must be that of the apparent vertical, and shoulders are level.
 Differs from print, each with an option that brings the printed form back:
 
 * ``acceleration``: q̈ from differentiated gyroscopes. With the accelerometers of (7), (8), gravity cancels in (9); the
-  printed (7), (8) have errors besides (:mod:`.force_inertial_accelerometer`).
+  printed (7), (8) have errors besides (:mod:`.force_inertial.accelerometer`).
 * ``torque_reading``: τ̂_θ = c_δ N_y − s_δ N_z, δ = φ_b − φ_h; the printed (12) drops N_z, and has R_z (x_C − x_V) with
   the wrong sign.
 * ``roll_model``: the seat's force points along the **apparent** vertical, R_y / R_z = tan(φ_b − φ_c) with
@@ -25,7 +25,7 @@ Differs from print, each with an option that brings the printed form back:
   and φ then is wrong by their tilt over cos θ.
 * the bias is the Gauss–Markov process that (15) writes, not the random walk that the text says.
 * a rider is no point mass on a seat: the seat also carries the pelvis and part of the legs, the pivot is above it, each
-  hand pushes at its own grip (:mod:`.force_inertial_forces`). All of that vanishes in :meth:`ForceInertial.published`.
+  hand pushes at its own grip (:mod:`.force_inertial.forces`). All of that vanishes in :meth:`ForceInertial.published`.
 
 Gyroscope offsets (14) are to be subtracted from the samples before.
 """

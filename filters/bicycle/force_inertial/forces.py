@@ -1,6 +1,6 @@
 """Forces of the force/inertial filter: what the seat's sensors read, and what the rider's motion needs.
 
-Frames are those of :mod:`.force_inertial_kinematics` (z down); loads are those of the rider on seat and handlebar.
+Frames are those of :mod:`.force_inertial.kinematics` (z down); loads are those of the rider on seat and handlebar.
 
 **Read.** Centre of pressure from the load cells, (10) moves the six-axis sensor's load there, (11) and (12) on to the
 trunk's pivot P. Written out, the centre of pressure cancels: the moment about P is that of the six-axis sensor,

@@ -7,8 +7,8 @@ its IMU B Ry(α), the trunk R Rx(φ_h) Ry(θ) Rx(φ), whose **x axis points up t
 
 Everything takes and gives scalars: arrays ``(...)`` or :class:`.Dual`. SI units, rad.
 
-Differs from print: (7) and (8) are those of the forms in :mod:`.force_inertial_printed`, which keep the errors; what
-is used by default are the differentiated gyroscopes (exact, no gravity in them, no division by p_x).
+Differs from the publication: (7) and (8) are an option, with and without their errors (:mod:`.accelerometer`). The
+default differentiates the gyroscopes, which is exact, holds no gravity and divides by no p_x.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@ r"""Roll of a bicycle and attitude of its rider's trunk from two gyroscopes and 
 
 Y. Zhang, K. Chen, J. Yi and colleagues, drift-free attitude estimation of a rigid body on a moving platform from two
 gyroscopes and relative measurements; equation numbers are the paper's. No accelerometer: that the platform does not
-pitch makes its roll observable while it turns (:mod:`.two_gyro_kinematics`).
+pitch makes its roll observable while it turns (:mod:`.two_gyro.kinematics`).
 
 State: φ, θ (3), biases of the body's gyroscope (3) and of the platform's (x and z in Σ2, all three in Σ1); yaw is not
 estimated. Every rate below is less its bias, x(k+1) = x(k) + T [dφ/dt, dθ/dt, −b/τ] (23), and the process covariance is

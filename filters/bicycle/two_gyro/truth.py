@@ -19,14 +19,14 @@ def true_angles(
     imu_tilt: float = 10.0 * DEG,
     used_axes: tuple[int, ...] = (0, 2),
 ) -> dict[str, np.ndarray]:
-    """Quantity of :class:`.two_gyro.TwoGyro` → ``(T, size)``.
+    """Quantity of :class:`.TwoGyro` → ``(T, size)``.
 
     Args:
         truth: ``bicycle/orientation`` and ``<body>/orientation`` ``(T, 4)``, body to world; with
             ``bicycle_imu/gyroscope_bias`` ``(T, 3)`` the platform's biases are given too.
         body: what the second gyroscope is on.
         imu_tilt: rad, how far nose up the platform's gyroscope is mounted.
-        used_axes: of the platform's biases, :attr:`.two_gyro.TwoGyro.used_axes`.
+        used_axes: of the platform's biases, :attr:`.TwoGyro.used_axes`.
 
     Raises:
         ValueError: an orientation is missing.

@@ -2,7 +2,7 @@ r"""Pose of a whole bicycle rider from few worn sensors and what hands and feet 
 
 Y. Zhang, K. Chen, J. Yi, T. Liu, Q. Pan, "Whole-Body Pose Estimation in Human Bicycle Riding Using a Small Set of
 Wearable Sensors", 2016; equation numbers are the paper's, * marks those that were corrected. Axes are the paper's
-inside (x forward, y up, z to the right) and the environment's at every door (:mod:`.rider_linkage`).
+inside (x forward, y up, z to the right) and the environment's at every door (:mod:`.whole_body.linkage`).
 
 State X = [φ, ϑ̈, Θ, a_ts, Φ_r, Ψ_r, Φ_l, Ψ_l] (20): roll, yaw acceleration, trunk, acceleration of the trunk's sensor
 against the seat, right shoulder and hip, left shoulder and hip. Six gyroscopes are inputs: with w the child's and q
@@ -17,7 +17,7 @@ specific force that the bicycle's accelerometer gives at the trunk's pivot:
 Differs from print: (3) has gravity with the wrong sign and lacks the turn's own acceleration v ϑ̇, without which φ is
 pulled to zero in a turn; (9) holds in a balanced turn only. Residuals of C2, C3, C6, C7 are divided by lengths. C7 is
 taken about the forward axis (``knee_axis="y"`` is printed). k_T is the trunk's first moment of mass about its pivot
-and k_S that of what sits still between saddle and pivot (:func:`.rider_linkage.seat_moments`); as hands may carry the
+and k_S that of what sits still between saddle and pivot (:func:`.seat_moments`); as hands may carry the
 trunk's lean, ``seat_share`` is the part of it that the seat feels. Legs and pedal forces are left to the noise.
 
 Q is that of the gyroscopes' noise, which trunk and arms share; what φ, trunk and legs share of the bicycle's gyroscope
@@ -72,7 +72,7 @@ POSITIVE = (*(f"{name}_noise" for name in NOISES), *TIMES)
 class WholeBody(RiderLinkage, Model):
     """The paper's extended Kalman filter, corrected.
 
-    State: the 22 numbers of :class:`.rider_linkage.RiderLinkage`; remembered: bicycle's rate (3), its derivative (3,
+    State: the 22 numbers of :class:`.RiderLinkage`; remembered: bicycle's rate (3), its derivative (3,
     low-passed), f (3), speed (1, low-passed), level of a shock (1, m/s²).
     """
 

@@ -16,7 +16,7 @@ from .rates import advance
 class WholeBodyIntegration(RiderLinkage, Recurrence):
     """Equations (2), (6), (10), (15) of the paper from the same start as the filter.
 
-    State: as :class:`.rider_linkage.RiderLinkage`; accelerations stay zero. Elbows and knees come from the encoders
+    State: as :class:`.RiderLinkage`; accelerations stay zero. Elbows and knees come from the encoders
     (C4, C8), as in the filter.
     """
 

@@ -1,0 +1,79 @@
+"""Cross-references in docstrings name things that exist."""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+LAYERS = ("filters", "envs", "baselines", "scripts")
+FILES = [ROOT / "__init__.py", *(path for layer in LAYERS for path in sorted((ROOT / layer).rglob("*.py")))]
+ROLE = re.compile(r":(mod|class|func|meth|attr|data|obj|exc):`~?\.?(?:[^`<]*<)?~?\.?([\w.]+)>?`")
+ELSEWHERE = ("numpy", "scipy", "gymnasium", "torch", "pandas", "h5py", "pathlib", "collections", "stable_baselines3")
+
+
+def module_name(path: Path) -> str:
+    parts = ("poise", *path.relative_to(ROOT).with_suffix("").parts)
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+def names_in(body: list[ast.stmt], prefix: str) -> Iterator[str]:
+    """Dotted names that statements define: functions, classes and what is inside of them, assignments, attributes."""
+    for node in body:
+        if isinstance(node, ast.FunctionDef):
+            yield f"{prefix}.{node.name}"
+            for inner in ast.walk(node):
+                if isinstance(inner, ast.Attribute) and ast.unparse(inner.value) == "self":
+                    yield f"{prefix.rsplit('.', 1)[0] if node.name == '__init__' else prefix}.{inner.attr}"
+                    yield f"{prefix}.{inner.attr}"
+        elif isinstance(node, ast.ClassDef):
+            yield f"{prefix}.{node.name}"
+            yield from names_in(node.body, f"{prefix}.{node.name}")
+        elif isinstance(node, ast.Assign | ast.AnnAssign):
+            for target in node.targets if isinstance(node, ast.Assign) else [node.target]:
+                for name in ast.walk(target):
+                    if isinstance(name, ast.Name):
+                        yield f"{prefix}.{name.id}"
+        elif isinstance(node, ast.If | ast.Try):
+            yield from names_in(node.body, prefix)
+        elif isinstance(node, ast.ImportFrom):
+            for alias in node.names:
+                yield f"{prefix}.{alias.asname or alias.name}"
+
+
+@cache
+def defined() -> frozenset[str]:
+    """Every dotted name of the package, and every suffix of one (``.KalmanFilter.step``), which Sphinx resolves too."""
+    found: set[str] = set()
+    for path in FILES:
+        module = module_name(path)
+        for name in (module, *names_in(ast.parse(path.read_text(encoding="utf-8")).body, module)):
+            parts = name.split(".")
+            found.update(".".join(parts[start:]) for start in range(len(parts)))
+    return frozenset(found)
+
+
+def unresolved(source: str) -> list[str]:
+    """References of a file's docstrings to nothing that the package defines."""
+    missing = []
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Constant) and isinstance(node.value, str):
+            for role, target in ROLE.findall(node.value):
+                if target.split(".")[0] not in ELSEWHERE and target not in defined():
+                    missing.append(f"line {node.lineno}: :{role}:`{target}`")
+    return missing
+
+
+@pytest.mark.parametrize("path", FILES, ids=module_name)
+def test_every_reference_resolves(path: Path) -> None:
+    assert unresolved(path.read_text(encoding="utf-8")) == []
+
+
+def test_a_reference_to_nothing_is_seen() -> None:
+    assert unresolved('"""See :class:`KalmanFilter` and :class:`poise.filters.core.kalman.NoSuchFilter`."""')
+    assert not unresolved('"""See :class:`KalmanFilter` and :meth:`~poise.filters.core.kalman.KalmanFilter.step`."""')
