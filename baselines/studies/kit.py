@@ -1,13 +1,15 @@
-"""What a study computes with: rides and other results that are computed once a run folder, in parallel."""
+"""What a study computes with: rides and other results that are computed once a run folder and version, in parallel."""
 
 from __future__ import annotations
 
 import hashlib
 import json
 import re
+import sys
 import zlib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +19,7 @@ from ...envs.batch_record import record_episode
 from ...envs.data.storage import load_trajectory
 from ...envs.data.trajectory import Trajectory
 from ...envs.record import plain
+from ..code_version import code_version
 
 RIDER = "poise/RiderBicycle-v0"
 
@@ -25,7 +28,8 @@ RIDER = "poise/RiderBicycle-v0"
 class Study:
     """How much is ridden and computed for one paper, and where it is kept.
 
-    Rides are ``subjects`` x ``seeds``; what is finished stays in ``folder``, so that an interrupted study goes on.
+    Rides are ``subjects`` x ``seeds``; what is finished stays in ``folder``, so that an interrupted study is resumed.
+    Rides and results belong to the code that computed them: another version computes them again, and says so.
     """
 
     folder: Path
@@ -57,6 +61,21 @@ class Study:
                 raise ValueError(f"{name} must be at least 1, got {getattr(self, name)}")
         if not 1.0 <= self.duration < float("inf"):
             raise ValueError(f"duration must be at least 1 s and finite, got {self.duration}")
+
+    @cached_property
+    def version(self) -> str:
+        """The code that computes; a folder that another version has worked in gives a notice on standard error."""
+        now, path = code_version(), self.folder / "code.txt"
+        before = path.read_text(encoding="utf-8").strip() if path.exists() else None
+        if before not in (None, now):
+            print(
+                f"{self.folder} holds results of poise {before}; this is poise {now}: they are computed again",
+                file=sys.stderr,
+            )
+        if before != now:
+            self.folder.mkdir(parents=True, exist_ok=True)
+            path.write_text(f"{now}\n", encoding="utf-8")
+        return now
 
     def seed_of(self, *names: str | int) -> int:
         """A seed below 2³² that depends on the root seed and on the names only."""
@@ -142,7 +161,7 @@ class Study:
     def _recorded(
         self, env_id: str, label: str, settings: Mapping[str, Any], wanted: list[tuple[str, int, dict[str, Any]]]
     ) -> list[Path]:
-        folder = self.folder / "rides" / f"{slug(label)}-{digest([env_id, plain(settings)])}"
+        folder = self.folder / "rides" / f"{slug(label)}-{digest([env_id, plain(settings), self.version])}"
         paths = [folder / f"{slug(name)}.h5" for name, _, _ in wanted]
         jobs = [
             (env_id, options, seed, path)
@@ -154,7 +173,7 @@ class Study:
         return paths
 
     def cached(self, key: str, function: Callable[..., Any], *args: Any) -> Any:
-        """``function(*args)``, computed once a run folder.
+        """``function(*args)``, computed once a run folder and version of the code.
 
         Args:
             key: name of the result, of its own in this study.
@@ -168,7 +187,7 @@ class Study:
         return self.map(key, function, [args], bar=False)[0]
 
     def map(self, key: str, function: Callable[..., Any], jobs: Iterable[tuple[Any, ...]], *, bar: bool = True) -> list:
-        """``[function(*job) for job in jobs]``, several at a time, each computed once a run folder.
+        """``[function(*job) for job in jobs]``, several at a time, each computed once a run folder and version.
 
         Args:
             key: name of the results, of its own in this study; also the bar's label.
@@ -185,7 +204,8 @@ class Study:
         name = f"{function.__module__}:{function.__qualname__}"
         folder = self.folder / "cache" / slug(key)
         tasks = [
-            (folder / f"{index:04d}.json", name, joblib.hash(job), function, job) for index, job in enumerate(jobs)
+            (folder / f"{index:04d}.json", name, f"{self.version} {joblib.hash(job)}", function, job)
+            for index, job in enumerate(jobs)
         ]
         missing = [task for task in tasks if not is_finished(*task[:3])]
         for _ in self._parallel(compute, missing, key if bar else None, "job"):
@@ -216,17 +236,17 @@ def in_processes(function: Callable[..., Any], jobs: Sequence[tuple[Any, ...]], 
     yield from Parallel(n_jobs=workers, return_as="generator_unordered")(delayed(function)(*job) for job in jobs)
 
 
-def compute(path: Path, name: str, arguments: str, function: Callable[..., Any], job: tuple[Any, ...]) -> None:
+def compute(path: Path, name: str, origin: str, function: Callable[..., Any], job: tuple[Any, ...]) -> None:
     """Call and keep the result in a file, which appears whole or not at all."""
-    text = json.dumps({"function": name, "arguments": arguments, "result": function(*job)}, default=as_list)
+    text = json.dumps({"function": name, "origin": origin, "result": function(*job)}, default=as_list)
     path.parent.mkdir(parents=True, exist_ok=True)
     part = path.with_suffix(".part")
     part.write_text(text, encoding="utf-8")
     part.replace(path)
 
 
-def is_finished(path: Path, name: str, arguments: str) -> bool:
-    """Whether the file holds the result of this function for these arguments.
+def is_finished(path: Path, name: str, origin: str) -> bool:
+    """Whether the file holds the result of this function from this origin: version of the code and its arguments.
 
     Raises:
         ValueError: it is the result of another function.
@@ -236,7 +256,7 @@ def is_finished(path: Path, name: str, arguments: str) -> bool:
     kept = json.loads(path.read_text(encoding="utf-8"))
     if kept["function"] != name:
         raise ValueError(f"key {path.parent.name!r} belongs to {kept['function']}, not to {name}: choose another key")
-    return kept["arguments"] == arguments
+    return kept.get("origin") == origin
 
 
 def as_list(value: Any) -> Any:
