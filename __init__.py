@@ -17,10 +17,10 @@ registers its environments with Gymnasium and loads neither PyBullet nor torch.
 from __future__ import annotations
 
 import importlib
-from importlib.metadata import PackageNotFoundError, version
 from typing import TYPE_CHECKING, Any
 
 from .envs import register_environments
+from .filters.support.version import poise_version
 
 if TYPE_CHECKING:
     from .baselines.evaluation import evaluate
@@ -63,10 +63,7 @@ _HOMES = {
     "run": ".filters.core.estimator",
 }
 
-try:
-    __version__ = version("poise")
-except PackageNotFoundError:  # a checkout that is not installed
-    __version__ = "0+unknown"
+__version__ = poise_version()
 
 register_environments()
 

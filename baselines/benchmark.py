@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from typing import Any
 
-import numpy as np
-
 from ..envs.data.trajectory import Trajectory
 from ..filters.core.estimator import Estimator
+from ..filters.support.seeds import child_seeds
 from .registry import list_estimators, make_estimator
 
 GESTURES = ("slow", "fast", "severe", "mixed")
@@ -38,12 +37,12 @@ def simulated(seed: int, episodes: int, gestures: Sequence[str] = GESTURES, **op
     from ..envs.record import record
 
     trajectories = []
-    children = iter(np.random.SeedSequence(seed).spawn(episodes * len(gestures)))
+    seeds = iter(child_seeds(seed, episodes * len(gestures)))
     for gesture in gestures:
         env = gymnasium.make("poise/HandMotion-v0", gesture=gesture, **options)
         try:
             for number in range(1, episodes + 1):
-                trajectory = record(env, seed=int(next(children).generate_state(1)[0]))
+                trajectory = record(env, seed=next(seeds))
                 metadata = {**trajectory.metadata, "name": f"{gesture}-{number}", "group": gesture}
                 trajectories.append(trajectory.replace(metadata=metadata))
         finally:

@@ -15,6 +15,7 @@ from ..filters.core.consistency import consistency
 from ..filters.core.estimator import Estimator, run
 from ..filters.core.metrics import score
 from ..filters.core.quantity import ORIENTATION, RELATIVE_ORIENTATION, UP, Estimate, Quantity
+from ..filters.support.parallel import progress_bar
 from .registry import make_estimator
 from .rider_estimators import make_for, true_quantities
 
@@ -58,7 +59,6 @@ def evaluate(
         FileNotFoundError: a recording that is not there.
     """
     import pandas
-    from tqdm import tqdm
 
     contenders = named_estimators(estimators)
     paths = [trajectories] if isinstance(trajectories, Trajectory | str | Path) else list(trajectories)
@@ -67,7 +67,7 @@ def evaluate(
     rows: list[tuple[Any, ...]] = []
     skipped: list[tuple[str, str, str]] = []
     seen: set[str] = set()
-    bar = tqdm(total=len(paths) * len(contenders), disable=not progress, desc="evaluate", unit="run")
+    bar = progress_bar(len(paths) * len(contenders), "evaluate", "run", show=progress)
     for path in paths:
         trajectory = path if isinstance(path, Trajectory) else load_recording(path)
         if trajectory.name in seen:

@@ -5,7 +5,6 @@ The only place where names turn into estimators. The tables hold texts; an estim
 
 from __future__ import annotations
 
-import difflib
 import importlib
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -13,6 +12,7 @@ from typing import Any, Literal
 from ..filters.core.estimator import Estimator
 from ..filters.registry import CATALOGUE
 from ..filters.registry import make as make_filter
+from ..filters.support.names import look_up
 
 Kind = Literal["filter", "reference", "learned", "adaptive", "external"]
 
@@ -103,11 +103,7 @@ def make_estimator(name: str, **parameters: Any) -> Estimator[Any]:
         ValueError: an unknown name or parameter (the message lists the valid ones), or a value out of its range.
         ImportError: the package that an external estimator wraps is not installed.
     """
-    known = list_estimators()
-    if name not in known:
-        close = difflib.get_close_matches(str(name), known, n=1)
-        hint = f", did you mean {close[0]!r}?" if close else ""
-        raise ValueError(f"unknown estimator {name!r}{hint} (estimators: {', '.join(known)})")
+    look_up("estimator", name, list_estimators())
     if name in TRAINED:
         module, function = TRAINED[name].factory.split(":")
         return getattr(importlib.import_module(f".{module}", __package__), function)(**parameters)

@@ -8,8 +8,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
-import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -17,6 +15,8 @@ from typing import Any
 import numpy as np
 from safetensors import SafetensorError
 from safetensors.numpy import load, save
+
+from ..filters.support.files import write_bytes, write_text
 
 WEIGHTS = Path(__file__).resolve().parent / "weights"
 """Folder of the weights that come with the package."""
@@ -58,9 +58,7 @@ def save_weights(path: str | Path, arrays: Mapping[str, np.ndarray], card: Mappi
         text = json.dumps({**card, **digest}, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
     except (SafetensorError, KeyError, TypeError, ValueError) as reason:
         raise ValueError(f"cannot write {path.name}: {reason}") from None
-    path.parent.mkdir(parents=True, exist_ok=True)
-    _replace(path, data)
-    _replace(card_path(path), text.encode("utf-8"))
+    write_text(card_path(write_bytes(path, data)), text)
     return path
 
 
@@ -129,16 +127,3 @@ def weights_path(path: str | Path) -> Path:
 def card_path(path: Path) -> Path:
     """Path of the card of weights."""
     return path.with_suffix(".json")
-
-
-def _replace(path: Path, data: bytes) -> None:
-    """Write a whole file in one move, so that a reader never sees half of it."""
-    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-    try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(data)
-        os.chmod(temporary, 0o644)
-        os.replace(temporary, path)
-    except BaseException:
-        Path(temporary).unlink(missing_ok=True)
-        raise

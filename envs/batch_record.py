@@ -3,19 +3,14 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
+from ..filters.support.parallel import in_parallel
+from ..filters.support.seeds import child_seeds
 from .data.storage import load_trajectory
 from .data.trajectory import Trajectory
-
-
-def episode_seeds(seed: int, episodes: int) -> list[int]:
-    """Seeds of the episodes, children of one root; a larger number of episodes keeps the first ones."""
-    return [int(child.generate_state(1)[0]) for child in np.random.SeedSequence(seed).spawn(episodes)]
 
 
 def episode_path(folder: Path, env_id: str, index: int) -> Path:
@@ -80,7 +75,7 @@ def record_episodes(
     folder, options = Path(folder), dict(options or {})
     folder.mkdir(parents=True, exist_ok=True)
     paths = [episode_path(folder, env_id, index) for index in range(episodes)]
-    seeds = episode_seeds(seed, episodes)
+    seeds = child_seeds(seed, episodes)
     missing = []
     for path, episode_seed in zip(paths, seeds, strict=True):
         if path.exists():
@@ -88,23 +83,11 @@ def record_episodes(
             if report is not None:
                 report(path)
         else:
-            missing.append((path, episode_seed))
-    for path in played(env_id, options, missing, processes):
+            missing.append((env_id, options, episode_seed, path))
+    for path in in_parallel(record_episode, missing, processes):
         if report is not None:
             report(path)
     return paths
-
-
-def played(env_id: str, options: Mapping[str, Any], missing: list[tuple[Path, int]], processes: int) -> Iterator[Path]:
-    """Play the missing episodes and give their paths as they are finished."""
-    if processes == 1 or len(missing) < 2:
-        for path, seed in missing:
-            yield record_episode(env_id, options, seed, path)
-        return
-    from joblib import Parallel, delayed
-
-    jobs = (delayed(record_episode)(env_id, options, seed, path) for path, seed in missing)
-    yield from Parallel(n_jobs=min(processes, len(missing)), return_as="generator_unordered")(jobs)
 
 
 def check_same(trajectory: Trajectory, env_id: str, options: Mapping[str, Any], seed: int, path: Path) -> None:

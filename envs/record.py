@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from importlib import metadata as packages
 from typing import Any
 
 import numpy as np
 
+from ..filters.support.parallel import progress_bar
+from ..filters.support.seeds import root_seed
+from ..filters.support.version import poise_version
 from .data.trajectory import Trajectory
 
 Policy = Callable[[Any], Any]
@@ -39,18 +42,19 @@ def record(
     """
     if steps is not None and steps < 0:
         raise ValueError(f"steps must not be negative, got {steps}")
-    seed = int(np.random.SeedSequence().generate_state(1)[0]) if seed is None else int(seed)
-    with opened(env) as env:
+    seed = root_seed(seed)
+    with opened(env) as env, progress_bar(steps, "record", "step", show=progress) as bar:
         suite = getattr(env.unwrapped, "suite", None)
         if suite is None:
             raise ValueError(f"{env} has no sensor suite: only environments of this package can be recorded")
         choose = policy or default_policy(env, seed)
         observation, info = env.reset(seed=seed)
         ticks, infos, ended = [suite.to_measurement(observation)], [info], "steps"
-        for _ in counted(steps, progress):
+        for _ in itertools.count() if steps is None else range(steps):
             observation, _, terminated, truncated, info = env.step(choose(observation))
             ticks.append(suite.to_measurement(observation))
             infos.append(info)
+            bar.update()
             if terminated or truncated:
                 ended = "terminated" if terminated else "truncated"
                 break
@@ -81,16 +85,6 @@ def default_policy(env: Any, seed: int) -> Policy:
         return lambda observation: neutral
     env.action_space.seed(seed)
     return lambda observation: env.action_space.sample()
-
-
-def counted(steps: int | None, progress: bool) -> Iterator[int]:
-    """Count to ``steps`` or for ever, with a bar if wanted."""
-    numbers: Iterator[int] = iter(range(steps)) if steps is not None else iter(int, 1)
-    if not progress:
-        return numbers
-    from rich.progress import track
-
-    return iter(track(numbers, description="recording", total=steps))
 
 
 def join(ticks: list[Mapping[str, Any]], infos: list[Mapping[str, Any]], metadata: dict[str, Any]) -> Trajectory:
@@ -130,18 +124,10 @@ def describe(env: Any, seed: int) -> dict[str, Any]:
         "environment": {"id": identity, "kwargs": plain({} if spec is None else spec.kwargs)},
         "sensors": plain(suite.describe()) if hasattr(suite, "describe") else None,
         "seed": seed,
-        "version": package_version(),
+        "version": poise_version(),
         "source": "simulation",
         **told,
     }
-
-
-def package_version() -> str:
-    """The installed version of this package."""
-    try:
-        return packages.version("poise")
-    except packages.PackageNotFoundError:
-        return "unknown"
 
 
 def plain(value: Any) -> Any:

@@ -6,13 +6,13 @@ estimator is made.
 
 from __future__ import annotations
 
-import difflib
 import importlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from typing import Any, Literal
 
 from .core.estimator import Estimator
+from .support.names import look_up
 
 SIX = ("imu/gyr", "imu/acc")
 NINE = (*SIX, "imu/mag")
@@ -251,11 +251,7 @@ def make(name: str, **parameters: Any) -> Estimator[Any]:
             refused.
         ImportError: the package that is wrapped is not installed.
     """
-    if name not in CATALOGUE:
-        close = difflib.get_close_matches(name, CATALOGUE, n=3)
-        hint = f"; did you mean {' or '.join(map(repr, close))}?" if close else f"; there are {sorted(CATALOGUE)}"
-        raise ValueError(f"unknown estimator {name!r}{hint}")
-    entry = CATALOGUE[name]
+    entry = look_up("estimator", name, CATALOGUE)
     equations = entry.load()
     recursion = _recursion(entry)
     own = {item.name for item in fields(equations)} - set(entry.fixed)

@@ -15,19 +15,19 @@ import csv
 import dataclasses
 import enum
 import io
-import json
-import os
 import platform
 import subprocess
-import tempfile
 from collections.abc import Iterable, Mapping, Sequence
 from datetime import datetime
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from ..filters.support.files import write_json as write_plain_json
+from ..filters.support.files import write_text
+from ..filters.support.parallel import processors
+from ..filters.support.version import ROOT, code_version, package_version
 from .tables import markdown_table, records
 
 COLUMNS = ("estimator", "trajectory", "quantity", "metric", "value", "unit")
@@ -57,7 +57,7 @@ class Run:
     command: str
     """Name of the command."""
     seed: int
-    """Root seed; children come from :func:`seeds`."""
+    """Root seed."""
 
     @property
     def figures(self) -> Path:
@@ -114,11 +114,6 @@ def new_folder(parent: Path, name: str) -> Path:
             return folder
 
 
-def seeds(root: int, n: int) -> tuple[int, ...]:
-    """Return ``n`` independent child seeds of ``root``, each below 2³²; a larger ``n`` keeps the first ones."""
-    return tuple(int(child.generate_state(1)[0]) for child in np.random.SeedSequence(root).spawn(n))
-
-
 def write_results(path: Path, rows: Iterable[Any]) -> Path:
     """Write rows of results as CSV, in one move, so that a reader never sees half a file.
 
@@ -149,18 +144,14 @@ def versions(packages: Sequence[str] = PACKAGES) -> dict[str, Any]:
     return {
         "python": platform.python_version(),
         "platform": platform.platform(),
-        "processors": os.cpu_count(),
-        "poise": {"version": package_version("poise"), **git_state(Path(__file__).resolve().parents[1])},
+        "processors": processors(),
+        "poise": {
+            "version": package_version("poise"),
+            "code": code_version(),
+            **git_state(ROOT),
+        },
         "packages": {name: package_version(name) for name in packages},
     }
-
-
-def package_version(name: str) -> str | None:
-    """Return the installed version of a package, None if it is not installed."""
-    try:
-        return version(name)
-    except PackageNotFoundError:
-        return None
 
 
 def git_state(checkout: Path) -> dict[str, Any]:
@@ -207,18 +198,4 @@ def jsonable(value: Any) -> Any:
 
 def write_json(path: Path, value: Any) -> Path:
     """Write ``value`` as indented JSON."""
-    return write_text(path, json.dumps(jsonable(value), indent=2, ensure_ascii=False, allow_nan=False) + "\n")
-
-
-def write_text(path: Path, text: str) -> Path:
-    """Write a whole text file in one move and return its path."""
-    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-    try:
-        with os.fdopen(handle, "w", encoding="utf-8", newline="\n") as file:
-            file.write(text)
-        os.chmod(temporary, 0o644)
-        os.replace(temporary, path)
-    except BaseException:
-        Path(temporary).unlink(missing_ok=True)
-        raise
-    return path
+    return write_plain_json(path, jsonable(value))

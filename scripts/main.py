@@ -9,16 +9,17 @@ Exit status: 0 done, 2 wrong input, 130 interrupted, 141 nobody reads the output
 
 from __future__ import annotations
 
-import difflib
 import importlib
 import os
 import sys
 from collections.abc import Sequence
-from importlib.metadata import PackageNotFoundError, version
 from typing import NamedTuple, NoReturn
 
 import tyro
 from gymnasium.error import UnregisteredEnv
+
+from ..filters.support.names import unknown
+from ..filters.support.version import poise_version
 
 USAGE_ERROR = 2
 INTERRUPTED = 130
@@ -90,10 +91,10 @@ def dispatch(words: Sequence[str]) -> int:
         return 0 if words else USAGE_ERROR
     name, *rest = words
     if name == "--version":
-        print(f"poise {installed_version()}")
+        print(f"poise {poise_version()}")
         return 0
     if name not in COMMANDS:
-        return fail(unknown_command(name))
+        return fail(unknown("command", name, COMMANDS))
     return run(name, rest)
 
 
@@ -128,21 +129,6 @@ def usage() -> str:
             "  --debug     show the traceback of an error (also POISE_DEBUG=1)",
         ]
     )
-
-
-def installed_version() -> str:
-    """Return the version of the installed package."""
-    try:
-        return version("poise")
-    except PackageNotFoundError:
-        return "unknown (not installed)"
-
-
-def unknown_command(name: str) -> str:
-    """Explain that ``name`` is no command, with the nearest one that is."""
-    near = difflib.get_close_matches(name, COMMANDS, n=1)
-    hint = f", did you mean {near[0]!r}?" if near else ""
-    return f"unknown command {name!r}{hint} (commands: {', '.join(COMMANDS)})"
 
 
 def one_line(error: BaseException) -> str:

@@ -197,10 +197,10 @@ def begun(args: Args) -> Run:
 def ride_seeds(seed: int, riders: int) -> dict[tuple[str, int], int]:
     """Seed of every scenario and rider, whichever of them ride."""
     from ..envs.bicycle.course.scenarios import list_scenarios
-    from .experiment import seeds
+    from ..filters.support.seeds import child_seeds
 
     pairs = list(product(list_scenarios(), range(riders)))
-    return dict(zip(pairs, seeds(seed, len(pairs)), strict=True))
+    return dict(zip(pairs, child_seeds(seed, len(pairs)), strict=True))
 
 
 def results(rides: Sequence[RideStatistics]) -> list[dict[str, Any]]:

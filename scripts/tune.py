@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 import tyro
 
+from ..filters.support.seeds import child_seed
 from .experiment import Run, start_run, versions
 from .main import run_command
 
@@ -104,11 +105,6 @@ def training_config(args: Args) -> Any:
         config = replace(shipped_config(args.filter), steps=QUICK_STEPS, trajectories=48, hindsight=24)
     given = {name: getattr(args, name) for name in ("steps", "trajectories")}
     return replace(config, seed=args.seed, **{name: value for name, value in given.items() if value is not None})
-
-
-def child_seed(seed: int, child: int) -> int:
-    """A seed that shares nothing with the training's."""
-    return int(np.random.SeedSequence(seed, spawn_key=(child,)).generate_state(1)[0])
 
 
 def load_all(paths: tuple[Path, ...]) -> list[Trajectory]:

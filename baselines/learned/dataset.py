@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import NamedTuple, Self
@@ -16,6 +15,8 @@ from ...envs.data.trajectory import Trajectory
 from ...filters.core import rotation
 from ...filters.core.estimator import run
 from ...filters.core.observer import Observer
+from ...filters.support.files import replacing
+from ...filters.support.parallel import progress_bar
 from .level_frame import FEATURES, VECTORS, LevelFrame
 from .recipe import Curriculum
 
@@ -120,16 +121,10 @@ class LearnedDataset:
 
     def save(self, path: str | Path) -> Path:
         """Write a NumPy archive in one move."""
-        path = Path(path)
-        path.parent.mkdir(parents=True, exist_ok=True)
-        temporary = path.with_name(f".{path.stem}.{os.getpid()}.npz")
-        try:
+        with replacing(path) as part:
             names = np.array(self.names)
-            np.savez(temporary, features=self.features, vertical=self.vertical, scored=self.scored, names=names)
-            os.replace(temporary, path)
-        finally:
-            temporary.unlink(missing_ok=True)
-        return path
+            np.savez(part, features=self.features, vertical=self.vertical, scored=self.scored, names=names)
+        return Path(path)
 
     @classmethod
     def load(cls, path: str | Path) -> Self:
@@ -164,13 +159,10 @@ class LearnedDataset:
 
 def simulate(curriculum: Curriculum, seed: int, episodes: int, progress: str = "") -> Iterator[Trajectory]:
     """Episodes one after the other, named ``curriculum-<seed>-<index>``."""
-    children: Sequence[np.random.SeedSequence] = np.random.SeedSequence(seed).spawn(episodes)
-    if progress:
-        from tqdm import tqdm
-
-        children = tqdm(children, desc=progress, unit="episode")
-    for index, child in enumerate(children):
-        yield curriculum.draw(child, f"curriculum-{seed}-{index}")
+    with progress_bar(episodes, progress, "episode", show=bool(progress)) as bar:
+        for index, child in enumerate(np.random.SeedSequence(seed).spawn(episodes)):
+            yield curriculum.draw(child, f"curriculum-{seed}-{index}")
+            bar.update()
 
 
 def sequence_of(trajectory: Trajectory, frame: LevelFrame) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field
@@ -15,6 +14,8 @@ import numpy as np
 import torch
 from torch import nn
 
+from ...filters.support.files import replacing
+from ...filters.support.seeds import child_seed, child_seeds
 from .dataset import LearnedDataset
 from .gru_module import GruModule
 from .level_frame import LevelFrame
@@ -73,13 +74,12 @@ class TrainingConfig:
 
     def seeds(self) -> tuple[int, int, int, int]:
         """Children of the root seed: training data, validation data, initial weights, order."""
-        children = np.random.SeedSequence(self.seed).spawn(4)
-        train, validation, weights, order = (int(child.generate_state(1)[0]) for child in children)
+        train, validation, weights, order = child_seeds(self.seed, 4)
         return train, validation, weights, order
 
     def test_seed(self) -> int:
         """Child of the root seed for episodes that neither training nor the choice of the epoch sees."""
-        return int(np.random.SeedSequence(self.seed).spawn(5)[4].generate_state(1)[0])
+        return child_seed(self.seed, 4)
 
 
 class TrainingResult(NamedTuple):
@@ -253,12 +253,8 @@ class Trainer:
             "history": self.history,
             "best": {name: torch.from_numpy(array.copy()) for name, array in self.best.items()},
         }
-        temporary = path.with_name(f".{path.name}.{os.getpid()}")
-        try:
-            torch.save(state, temporary)
-            os.replace(temporary, path)
-        finally:
-            temporary.unlink(missing_ok=True)
+        with replacing(path) as part:
+            torch.save(state, part)
 
     def restore(self, path: Path) -> None:
         """Go on from a checkpoint.

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import difflib
 import importlib
 from collections.abc import Callable
 from typing import TYPE_CHECKING
+
+from ...filters.support.names import look_up
 
 if TYPE_CHECKING:
     from .kit import Study
@@ -27,11 +28,7 @@ def find_paper(name: str) -> Callable[[Study, Report], None]:
     Raises:
         ValueError: an unknown paper, or one whose study is not part of this version.
     """
-    if name not in PAPERS:
-        near = difflib.get_close_matches(name, PAPERS, n=1)
-        hint = f", did you mean {near[0]!r}?" if near else ""
-        raise ValueError(f"unknown paper {name!r}{hint} (papers: {', '.join(PAPERS)})")
-    module = PAPERS[name]
+    module = look_up("paper", name, PAPERS)
     try:
         return importlib.import_module(module, __package__).reproduce
     except ModuleNotFoundError as error:

@@ -7,13 +7,12 @@ Layout, version 1: attributes ``format`` and ``format_version``; datasets ``time
 from __future__ import annotations
 
 import json
-import os
-import secrets
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ...filters.support.files import replacing
 from .trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -54,25 +53,17 @@ def save_trajectory(trajectory: Trajectory, path: str | Path) -> Path:
     """
     import h5py
 
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    # In the same folder, because os.replace is atomic only within one file system.
-    part = path.with_name(f".{path.name}.{secrets.token_hex(4)}.part")
-    try:
-        with h5py.File(part, "w") as file:
-            file.attrs["format"] = FORMAT
-            file.attrs["format_version"] = FORMAT_VERSION
-            file.create_dataset("metadata", data=json.dumps(trajectory.metadata, ensure_ascii=False))
-            write(file, "time", trajectory.time)
-            write(file, "mask", trajectory.mask)
-            for folder in ("measurements", "truth"):
-                group = file.create_group(folder, track_order=True)
-                for name, values in getattr(trajectory, folder).items():
-                    write(group, name, values)
-        os.replace(part, path)
-    finally:
-        part.unlink(missing_ok=True)
-    return path
+    with replacing(path) as part, h5py.File(part, "w") as file:
+        file.attrs["format"] = FORMAT
+        file.attrs["format_version"] = FORMAT_VERSION
+        file.create_dataset("metadata", data=json.dumps(trajectory.metadata, ensure_ascii=False))
+        write(file, "time", trajectory.time)
+        write(file, "mask", trajectory.mask)
+        for folder in ("measurements", "truth"):
+            group = file.create_group(folder, track_order=True)
+            for name, values in getattr(trajectory, folder).items():
+                write(group, name, values)
+    return Path(path)
 
 
 def write(group: h5py.Group, name: str, values: np.ndarray) -> None:

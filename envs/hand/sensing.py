@@ -10,6 +10,7 @@ import numpy as np
 
 from ...filters.arrays.array import AccelerometerArray
 from ...filters.core import rotation
+from ...filters.support.seeds import root_seed
 from ..base import Block
 from ..data.trajectory import Trajectory
 from ..sensors.ideal import BodyState, Mounting, Sampling, instant_readings, interval_readings, mounted, vector
@@ -207,7 +208,7 @@ def simulate_hand(
         ValueError: as the environment.
     """
     check_duration(duration)
-    seed = int(np.random.SeedSequence().generate_state(1)[0]) if seed is None else int(seed)
+    seed = root_seed(seed)
     held = hand_device(device)
     config, suite = gesture_config(gesture), hand_suite(sensors, rate, magnetometer, sampling, held)
     where = Mounting(vector("lever_arm", lever_arm, 3), vector("mounting", mounting, 4))

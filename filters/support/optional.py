@@ -16,7 +16,10 @@ EXTRAS: dict[str, frozenset[str]] = {
 
 @contextmanager
 def extra(name: str) -> Iterator[None]:
-    """Surround imports of what comes with an extra of the installation: ``with extra("sim"): import pybullet``.
+    """Surround the imports of what an extra of the installation brings.
+
+    Args:
+        name: a key of :data:`EXTRAS`.
 
     Raises:
         ImportError: it is not installed; the message says how to install it.

@@ -7,8 +7,8 @@ import pandas
 import pytest
 
 from poise.baselines.evaluation import COLUMNS
-from poise.envs.batch_record import episode_seeds
 from poise.envs.data.storage import load_trajectory
+from poise.filters.support.seeds import child_seed
 from poise.scripts.main import main
 from poise.scripts.record import environment_id, option
 
@@ -33,7 +33,7 @@ def test_record_writes_episodes_and_goes_on_where_it_stopped(episodes, capsys):
     assert record(episodes, "--episodes", "3", "--seed", "7") == 0
     assert [path.stat().st_mtime_ns for path in paths] == stamps
     third = load_trajectory(episodes / "hand_motion_0002.h5")
-    assert third.metadata["seed"] == episode_seeds(7, 3)[2]
+    assert third.metadata["seed"] == child_seed(7, 2)
     assert third.metadata["environment"]["kwargs"]["gesture"] == "fast"
     assert "3 episodes" in capsys.readouterr().out
 

@@ -170,13 +170,6 @@ def test_report(run: experiment.Run) -> None:
     assert "| vqf | hand-0 | orientation | rmse | 0.333 | deg |" in text
 
 
-def test_seeds() -> None:
-    assert experiment.seeds(5, 3) == experiment.seeds(5, 7)[:3]
-    assert len({*experiment.seeds(5, 100), *experiment.seeds(6, 100)}) == 200
-    children = np.random.SeedSequence(5).spawn(2)
-    assert experiment.seeds(5, 2) == tuple(int(child.generate_state(1)[0]) for child in children)
-
-
 @pytest.mark.parametrize(
     ("value", "text"),
     [(1.23456, "1.23"), (12345.6, "12346"), (1e-7, "1e-07"), (math.nan, "–"), (None, "–"), (True, "yes"), (12, "12")],

@@ -14,6 +14,7 @@ from types import ModuleType
 
 import pytest
 
+import poise
 from poise.scripts import main as cli
 
 
@@ -118,7 +119,7 @@ def test_interrupt(capsys: pytest.CaptureFixture[str]) -> None:
 
 def test_version(capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["--version"]) == 0
-    assert capsys.readouterr().out == f"poise {cli.installed_version()}\n"
+    assert capsys.readouterr().out == f"poise {poise.__version__}\n"
 
 
 def test_help_is_light() -> None:

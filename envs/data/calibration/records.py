@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import secrets
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import Any, Self
 
 import numpy as np
 
+from ....filters.support.files import write_json
 from ..trajectory import Trajectory
 
 FORMAT = "poise-calibration"
@@ -83,15 +83,7 @@ class CalibrationRecord:
 
     def save(self, path: str | Path) -> Path:
         """Write the record as JSON; an earlier one in its place is lost only when the new one is complete."""
-        path = Path(path)
-        path.parent.mkdir(parents=True, exist_ok=True)
-        part = path.with_name(f".{path.name}.{secrets.token_hex(4)}.part")
-        try:
-            part.write_text(json.dumps(self.describe(), indent=1) + "\n", encoding="utf-8")
-            part.replace(path)
-        finally:
-            part.unlink(missing_ok=True)
-        return path
+        return write_json(path, self.describe(), indent=1)
 
 
 def load_calibration(path: str | Path) -> CalibrationRecord:
