@@ -87,8 +87,8 @@ def run(args: Args) -> int:
 def calibrate(args: Args) -> tuple[CalibrationRecord, CalibrationRecord | None]:
     """The record found, and the true one of simulated runs."""
     from ..envs.data.calibration import channels as channels
-    from ..envs.data.calibration import runs as runs
     from ..envs.data.calibration.data import MagnetometerData, RateTableData, read_magnetometer, read_rate_table
+    from ..envs.hand import calibration_runs as runs
     from ..filters.arrays.files import load_array
     from .report import print_progress
 

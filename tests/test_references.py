@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import re
+import sys
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
@@ -14,7 +15,7 @@ ROOT = Path(__file__).resolve().parents[1]
 LAYERS = ("filters", "envs", "baselines", "scripts")
 FILES = [ROOT / "__init__.py", *(path for layer in LAYERS for path in sorted((ROOT / layer).rglob("*.py")))]
 ROLE = re.compile(r":(mod|class|func|meth|attr|data|obj|exc):`~?\.?(?:[^`<]*<)?~?\.?([\w.]+)>?`")
-ELSEWHERE = ("numpy", "scipy", "gymnasium", "torch", "pandas", "h5py", "pathlib", "collections", "stable_baselines3")
+ELSEWHERE = {"numpy", "scipy", "gymnasium", "torch", "pandas", "h5py", "stable_baselines3"} | sys.stdlib_module_names
 
 
 def module_name(path: Path) -> str:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from poise.envs.data.calibration.records import CalibrationRecord, load_calibration, undo_calibration
-from poise.envs.data.calibration.runs import nominal_calibration
+from poise.envs.hand.calibration_runs import nominal_calibration
 from poise.envs.hand.devices import HandDevice
 from poise.envs.hand.sensing import simulate_hand
 from poise.filters.arrays.array import TRIAXIAL

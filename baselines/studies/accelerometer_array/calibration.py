@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ....envs.data.calibration.channels import accelerometer_channel
-from ....envs.data.calibration.runs import (
+from ....envs.hand.calibration_runs import (
     ACCELEROMETER_MOUNTINGS,
     accelerometer_runs,
     gyroscope_runs,

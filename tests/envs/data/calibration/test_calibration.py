@@ -17,7 +17,8 @@ from poise.envs.data.calibration.records import (
     load_calibration,
     undo_calibration,
 )
-from poise.envs.data.calibration.runs import (
+from poise.envs.data.trajectory import Trajectory
+from poise.envs.hand.calibration_runs import (
     accelerometer_runs,
     built_with,
     gyroscope_runs,
@@ -25,7 +26,6 @@ from poise.envs.data.calibration.runs import (
     nominal_calibration,
     random_calibration,
 )
-from poise.envs.data.trajectory import Trajectory
 from poise.envs.hand.sensing import simulate_hand
 from poise.filters.arrays.array import CONTROLLER, OCTA, PLANAR, TRIAXIAL
 from poise.filters.arrays.files import read_array

@@ -12,16 +12,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from ....filters.arrays.array import AccelerometerArray
-from ....filters.core import rotation
-from ...hand.controller_gestures import BOTH_WAYS, DOWNWARDS, UPWARDS, RateTable
-from ...hand.devices import ArrayPreset, HandDevice, actual_array
-from ...hand.sensing import simulate_hand
-from ...sensors.ideal import STANDARD_GRAVITY, magnetic_field
-from ...sensors.noise_model import NoiseModel
-from .channels import accelerometer_channel, spatial_axes
-from .data import MagnetometerData, RateTableData, mounting_matrix
-from .records import CalibrationRecord, ChannelCalibration
+from ...filters.arrays.array import AccelerometerArray
+from ...filters.core import rotation
+from ..data.calibration.channels import accelerometer_channel, spatial_axes
+from ..data.calibration.data import MagnetometerData, RateTableData, mounting_matrix
+from ..data.calibration.records import CalibrationRecord, ChannelCalibration
+from ..sensors.ideal import STANDARD_GRAVITY, magnetic_field
+from ..sensors.noise_model import NoiseModel
+from .controller_gestures import BOTH_WAYS, DOWNWARDS, UPWARDS, RateTable
+from .devices import ArrayPreset, HandDevice, actual_array
+from .sensing import simulate_hand
 
 ACCELEROMETER_SCALE = 4e-3 * STANDARD_GRAVITY
 """m/s² per count: ADXL345, 4 mg."""

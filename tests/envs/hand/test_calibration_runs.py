@@ -7,7 +7,7 @@ import pytest
 
 from poise.envs.data.calibration.channels import accelerometer_record
 from poise.envs.data.calibration.records import CalibrationRecord, apply_calibration, undo_calibration
-from poise.envs.data.calibration.runs import accelerometer_runs, built_with, nominal_calibration, random_calibration
+from poise.envs.hand.calibration_runs import accelerometer_runs, built_with, nominal_calibration, random_calibration
 from poise.envs.hand.devices import HandDevice
 from poise.envs.hand.sensing import simulate_hand
 from poise.filters.arrays.array import OCTA
