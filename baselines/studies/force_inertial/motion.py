@@ -19,13 +19,9 @@ import numpy as np
 from ....filters.bicycle.force_inertial.axes import DOWN, UP_THE_TRUNK
 from ....filters.bicycle.force_inertial.filter import ForceInertial
 from ....filters.core import rotation
+from ..signals import DEG, STEP, Function, Waves, derivative, gauss_markov, second_derivative
 
 X, Y, Z = np.eye(3)
-DEG = math.pi / 180.0
-WAVES = 4
-STEP = 1e-3
-"""s, of the numerical derivatives (fourth order: exact to 1e-9)"""
-Function = Callable[[np.ndarray], np.ndarray]
 Course = Literal["indoor", "outdoor"]
 
 
@@ -82,31 +78,18 @@ class Motion:
 
     def yawed(self, t: np.ndarray) -> np.ndarray:
         """R to ground: quaternions ``(T, 4)``."""
-        return turn(Z, self.psi(t))
+        return rotation.from_axis_angle(Z, self.psi(t))
 
     def bicycle(self, t: np.ndarray) -> np.ndarray:
         """B to ground: quaternions ``(T, 4)``."""
-        return rotation.multiply(self.yawed(t), turn(X, self.phi_b(t)))
+        return rotation.multiply(self.yawed(t), rotation.from_axis_angle(X, self.phi_b(t)))
 
     def trunk(self, t: np.ndarray) -> np.ndarray:
         """Trunk to ground: quaternions ``(T, 4)``."""
-        leaning = rotation.multiply(self.yawed(t), turn(X, self.phi_h(t)))
-        return rotation.multiply(rotation.multiply(leaning, turn(Y, self.theta(t))), turn(X, self.phi(t)))
-
-
-def _waves(rng: np.random.Generator, deviation: float, low: float, high: float) -> tuple[Function, Function]:
-    """A sum of sines with a standard deviation, frequencies in Hz, and its integral."""
-    omega = 2.0 * math.pi * rng.uniform(low, high, WAVES)
-    phase = rng.uniform(0.0, 2.0 * math.pi, WAVES)
-    size = deviation * np.sqrt(2.0 * rng.dirichlet(np.full(WAVES, 3.0)))
-
-    def value(t: np.ndarray) -> np.ndarray:
-        return np.sum(size * np.sin(np.multiply.outer(t, omega) + phase), axis=-1)
-
-    def integral(t: np.ndarray) -> np.ndarray:
-        return np.sum(size / omega * (np.cos(phase) - np.cos(np.multiply.outer(t, omega) + phase)), axis=-1)
-
-    return value, integral
+        q = self.yawed(t)
+        for axis, angle in ((X, self.phi_h), (Y, self.theta), (X, self.phi)):
+            q = rotation.multiply(q, rotation.from_axis_angle(axis, angle(t)))
+        return q
 
 
 def draw_motion(rng: np.random.Generator, course: Course, errors: Errors, pitch: float = 60.0 * DEG) -> Motion:
@@ -124,46 +107,23 @@ def draw_motion(rng: np.random.Generator, course: Course, errors: Errors, pitch:
     if course not in ("indoor", "outdoor"):
         raise ValueError(f"course must be 'indoor' or 'outdoor', got {course!r}")
     indoor = course == "indoor"
-    lean, _ = _waves(rng, 4.0 * DEG if indoor else 3.0 * DEG, 0.2, 0.6)
-    bend, _ = _waves(rng, 4.0 * DEG if indoor else 3.0 * DEG, 0.2, 0.7)
-    tilt, _ = _waves(rng, errors.tilt, 0.05, 0.3)
-    wobble, _ = _waves(rng, 1.5 * DEG, 0.3, 0.9)
-    pace, _ = _waves(rng, 0.1 if indoor else 1.0, 0.03, 0.1)
-    turn, turned = _waves(rng, 0.06 if indoor else 0.25, 0.1 if indoor else 0.05, 0.4 if indoor else 0.25)
-    rate, speed = (-0.8, 2.0) if indoor else (0.0, 3.5)
+    lean = Waves.draw(rng, 4.0 * DEG if indoor else 3.0 * DEG, 0.2, 0.6)
+    bend = Waves.draw(rng, 4.0 * DEG if indoor else 3.0 * DEG, 0.2, 0.7, offset=pitch)
+    tilt = Waves.draw(rng, errors.tilt, 0.05, 0.3)
+    wobble = Waves.draw(rng, 1.5 * DEG, 0.3, 0.9)
+    yaw_rate, speed = (-0.8, 2.0) if indoor else (0.0, 3.5)
+    pace = Waves.draw(rng, 0.1 if indoor else 1.0, 0.03, 0.1, offset=speed)
+    turning = Waves.draw(
+        rng, 0.06 if indoor else 0.25, 0.1 if indoor else 0.05, 0.4 if indoor else 0.25, offset=yaw_rate
+    )
 
     def roll(t: np.ndarray) -> np.ndarray:
-        return wobble(t) + (-5.2 * DEG if indoor else 0.8 * np.arctan(speed * turn(t) / 9.8))
+        return wobble(t) + (-5.2 * DEG if indoor else 0.8 * np.arctan(speed * turning(t) / 9.8))
 
     def side(t: np.ndarray) -> np.ndarray:
         return lean(t) + (-20.0 * DEG if indoor else 0.5 * roll(t))
 
-    return Motion(
-        side,
-        lambda t: pitch + bend(t),
-        tilt,
-        roll,
-        lambda t: rate * t + turned(t),
-        lambda t: speed + pace(t),
-    )
-
-
-def derivative(function: Function, t: np.ndarray) -> np.ndarray:
-    """First derivative of a function of time, fourth order."""
-    h = STEP
-    return (8.0 * (function(t + h) - function(t - h)) - (function(t + 2.0 * h) - function(t - 2.0 * h))) / (12.0 * h)
-
-
-def second_derivative(function: Function, t: np.ndarray) -> np.ndarray:
-    """Second derivative, fourth order."""
-    h = STEP
-    near, far = function(t + h) + function(t - h), function(t + 2.0 * h) + function(t - 2.0 * h)
-    return (16.0 * near - far - 30.0 * function(t)) / (12.0 * h * h)
-
-
-def turn(axis: np.ndarray, angle: np.ndarray | float) -> np.ndarray:
-    """Quaternions ``(..., 4)`` of turns by ``angle`` ``(...)`` about a unit vector."""
-    return rotation.exp(np.asarray(angle, dtype=float)[..., None] * axis)
+    return Motion(side, bend, tilt, roll, turning.integral, pace)
 
 
 def angular_velocity(orientation: Callable[[np.ndarray], np.ndarray], t: np.ndarray) -> np.ndarray:
@@ -215,7 +175,7 @@ def exact_readings(motion: Motion, t: np.ndarray, rider: ForceInertial, inertia:
         return second_derivative(lambda time: rotation.rotate(motion.trunk(time), height * X), t)
 
     seat = carried((rider.pivot_forward, 0.0, -rider.pivot_height))
-    imu = turn(Y, rider.imu_tilt)
+    imu = rotation.exp(rider.imu_tilt * Y)
     force = rider.trunk_mass * (seat + up(rider.trunk_height) - gravity)
     arm = rotation.rotate(motion.trunk(t), rider.trunk_height * X)
 
@@ -258,18 +218,13 @@ def simulate(
     exact = exact_readings(motion, t, rider, errors.inertia)
     moment = exact.moment.copy()
     for axis in range(3):
-        moment[:, axis] += _waves(rng, errors.disturbance, 0.05, 1.0)[0](t)
-    # Gauss–Markov bias, exactly discretised
-    keep = math.exp(-rider.dt / errors.bias_time)
-    bias = np.empty((len(t), 3))
-    bias[0] = errors.bias * rng.standard_normal(3)
-    for k in range(1, len(t)):
-        bias[k] = keep * bias[k - 1] + errors.bias * math.sqrt(1.0 - keep * keep) * rng.standard_normal(3)
+        moment[:, axis] += Waves.draw(rng, errors.disturbance, 0.05, 1.0)(t)
+    bias = gauss_markov(rng.standard_normal((len(t), 3)), errors.bias, errors.bias_time, rider.dt)
 
     def noisy(values: np.ndarray, deviation: float) -> np.ndarray:
         return values + deviation * rng.standard_normal(values.shape)
 
-    post = turn(Y, rider.post_tilt)
+    post = rotation.exp(rider.post_tilt * Y)
     sensor = rider.post_length * np.array([math.sin(rider.post_tilt), 0.0, math.cos(rider.post_tilt)])
     wrench = [rotation.rotate_back(post, part) for part in (exact.force, moment - np.cross(sensor, exact.force))]
     # three cells share the vertical force and the moments about the saddle point

@@ -8,7 +8,6 @@ vector of each interval divided by its length (as the environments do with ``sam
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -19,32 +18,9 @@ from ....filters.bicycle.geometry import RiderGeometry
 from ....filters.bicycle.relative_sensor import relative_orientation
 from ....filters.bicycle.two_gyro.filter import TwoGyro
 from ....filters.core import rotation
+from ..signals import DEG, Function, Waves, gauss_markov
 
-DEG = math.pi / 180.0
-Function = Callable[[np.ndarray], np.ndarray]
-
-
-@dataclass(frozen=True)
-class Waves:
-    """A sum of sines around a steady value; picklable."""
-
-    offset: float = 0.0
-    slope: float = 0.0
-    """per s"""
-    terms: tuple[tuple[float, float, float], ...] = ()
-    """amplitude, angular frequency (rad/s), phase of each"""
-
-    def __call__(self, time: np.ndarray) -> np.ndarray:
-        """Values ``(T,)``."""
-        value = self.offset + self.slope * time
-        for amplitude, frequency, phase in self.terms:
-            value = value + amplitude * np.sin(frequency * time + phase)
-        return value
-
-    def integral(self) -> Waves:
-        """Of waves without slope: zero offset, so that it is an angle whose rate this is."""
-        terms = tuple((a / w, w, phase - 0.5 * math.pi) for a, w, phase in self.terms)
-        return Waves(0.0, self.offset, terms)
+NOTHING = Waves()
 
 
 @dataclass(frozen=True)
@@ -68,7 +44,7 @@ class Bump:
     height: float
     time: float
     width: float
-    vibration: Waves = Waves()
+    vibration: Waves = NOTHING
 
     def __call__(self, time: np.ndarray) -> np.ndarray:
         """Angles ``(T,)``, rad."""
@@ -98,7 +74,7 @@ class Motion:
 
     yaw: Function
     roll: Function = ROLL
-    pitch: Function = Waves()
+    pitch: Function = NOTHING
     theta: tuple[Function, Function, Function] = THETA
 
     def orientations(self, time: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -114,10 +90,10 @@ def turning(rate: float) -> Motion:
 
 
 MOTIONS: dict[str, Motion] = {
-    "circle": Motion(Waves(30.0 * DEG, 0.0, ((12.0 * DEG, 0.4, 0.0), (4.0 * DEG, 1.7, 0.0))).integral()),
-    "sine": Motion(Waves(terms=((20.0 * DEG, 0.1 * math.pi, 0.0),)).integral()),
+    "circle": Motion(Waves(30.0 * DEG, 0.0, ((12.0 * DEG, 0.4, 0.0), (4.0 * DEG, 1.7, 0.0))).integral),
+    "sine": Motion(Waves(terms=((20.0 * DEG, 0.1 * math.pi, 0.0),)).integral),
     "vibration": Motion(
-        Waves(30.0 * DEG, 0.0, ((12.0 * DEG, 0.4, 0.0), (4.0 * DEG, 1.7, 0.0))).integral(), pitch=VIBRATION
+        Waves(30.0 * DEG, 0.0, ((12.0 * DEG, 0.4, 0.0), (4.0 * DEG, 1.7, 0.0))).integral, pitch=VIBRATION
     ),
     "pulses": Motion(Pulses(12.0 * DEG, 2.0, 8.0)),
     "straight": Motion(Waves()),
@@ -209,7 +185,7 @@ def simulate(
     names = (("bicycle", "bicycle_imu", errors.platform_gyroscope), ("trunk", "trunk_imu", errors.body_gyroscope))
     for index, (body, place, noise) in enumerate(names):
         turn = rotation.log(rotation.multiply(rotation.conjugate(before[index]), after[index]))
-        bias = markov(len(time), dt, errors, rng)
+        bias = bias_of(len(time), dt, errors, rng)
         white = noise * rng.standard_normal(bias.shape)
         measurements[f"{place}/gyr"] = turn / (back + ahead) + bias + white
         truth[f"{place}/gyroscope_bias"] = bias
@@ -224,11 +200,8 @@ def simulate(
     return Trajectory(time, measurements, truth, np.ones(len(time), bool), metadata)
 
 
-def markov(length: int, dt: float, errors: Errors, rng: np.random.Generator) -> np.ndarray:
+def bias_of(length: int, dt: float, errors: Errors, rng: np.random.Generator) -> np.ndarray:
     """Biases ``(length, 3)`` of a gyroscope: a Markov process from a start of its own, equations (2) and (10)."""
-    from scipy.signal import lfilter
-
-    kept = 1.0 - dt / errors.bias_time
-    drive = errors.bias_drift * math.sqrt(2.0 * dt / errors.bias_time) * rng.standard_normal((length, 3))
-    drive[0] = errors.bias * rng.standard_normal(3)
-    return np.asarray(lfilter([1.0], [1.0, -kept], drive, axis=0))
+    normal = rng.standard_normal((length, 3))
+    normal[0] = rng.standard_normal(3)
+    return gauss_markov(normal, errors.bias_drift, errors.bias_time, dt, errors.bias)

@@ -20,6 +20,7 @@ from ....filters.core.backend import Array, namespace
 from ....filters.core.consistency import Consistency, consistency, nees
 from ....filters.core.kalman import KalmanFilter
 from ....filters.core.quantity import Channel, Measurement
+from ..signals import gauss_markov
 from .motion import IDEAL, ExactRide
 
 PARTS = {"roll": slice(0, 2), "trunk and arms": [*range(2, 11), *range(14, 17)], "right leg": slice(11, 14)}
@@ -72,6 +73,10 @@ def simulate(
     measurements = {
         name: np.stack([ride.measurements[name] for ride in rides], axis=1) for name in rides[0].measurements
     }
+    processes = {
+        1: (model.yaw_acceleration_deviation, model.yaw_acceleration_time),
+        3: (model.relative_acceleration_deviation, model.relative_acceleration_time),
+    }
     names = ["bicycle/roll", None, "trunk/angles", None]
     names += [f"{joint}_{side}/angles" for side in ("right", "left") for joint in ("shoulder", "hip")]
     length = len(rides[0])
@@ -79,7 +84,7 @@ def simulate(
         [
             np.stack([ride.truth[name] for ride in rides], axis=1)
             if name
-            else _gauss_markov(model, rng, length, runs, size)
+            else gauss_markov(rng.standard_normal((length, runs, size)), *processes[size], model.dt)
             for name, size in zip(names, (1, 1, 3, 3, 3, 3, 3, 3), strict=True)
         ],
         axis=-1,
@@ -113,17 +118,6 @@ def simulate(
         covariances.append(state.covariance)
         squares.append(estimate.nis)
     return np.array(states) - truth[1:], np.array(covariances), np.array(squares)
-
-
-def _gauss_markov(model: WholeBody, rng: np.random.Generator, length: int, runs: int, size: int) -> np.ndarray:
-    """The filter's own process: of yaw acceleration (size 1) or of the relative acceleration (size 3)."""
-    kind = "yaw" if size == 1 else "relative"
-    deviation, time = (getattr(model, f"{kind}_acceleration_{part}") for part in ("deviation", "time"))
-    keep = math.exp(-model.dt / time)
-    values = [deviation * rng.standard_normal((runs, size))]
-    for _ in range(length - 1):
-        values.append(keep * values[-1] + deviation * math.sqrt(1.0 - keep * keep) * rng.standard_normal((runs, size)))
-    return np.array(values)
 
 
 def consistencies(

@@ -18,10 +18,9 @@ from ....filters.bicycle.geometry import RiderGeometry
 from ....filters.bicycle.whole_body.linkage import SIDES, SIGNS, RiderLinkage, paper_axes, seat_moments
 from ....filters.bicycle.whole_body.start import hip_angles, limb_frame, shoulder_angles
 from ....filters.core import rotation
+from ..signals import DEG, Waves, derivative, second_derivative
 
 GRAVITY = 9.80665
-STEP = 1e-3
-"""s, of the differences"""
 MOST_REACH = 0.998
 """of the straight arm"""
 COURSES = ("indoor", "outdoor", "held")
@@ -60,31 +59,6 @@ IDEAL = SensorErrors(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0)
 
 
 @dataclass(frozen=True)
-class Waves:
-    """A smooth function of time: a constant and sines."""
-
-    mean: float
-    amplitudes: np.ndarray
-    rates: np.ndarray
-    phases: np.ndarray
-
-    @classmethod
-    def draw(cls, rng: np.random.Generator, mean: float, deviation: float, low: float, high: float) -> Waves:
-        """Three sines between two frequencies (Hz) of the given standard deviation in all."""
-        rates = 2.0 * np.pi * rng.uniform(low, high, 3)
-        return cls(mean, np.full(3, deviation * math.sqrt(2.0 / 3.0)), rates, rng.uniform(0.0, 2.0 * np.pi, 3))
-
-    def __call__(self, t: np.ndarray) -> np.ndarray:
-        """Values at times."""
-        return self.mean + np.sum(self.amplitudes * np.sin(t[..., None] * self.rates + self.phases), axis=-1)
-
-    def integral(self, t: np.ndarray) -> np.ndarray:
-        """Of the values from time 0."""
-        parts = self.amplitudes / self.rates * (np.cos(self.phases) - np.cos(t[..., None] * self.rates + self.phases))
-        return self.mean * t + np.sum(parts, axis=-1)
-
-
-@dataclass(frozen=True)
 class ExactRide:
     """One motion.
 
@@ -108,26 +82,27 @@ class ExactRide:
         if self.course not in COURSES:
             raise ValueError(f"course must be one of {COURSES}, got {self.course!r}")
         rng = np.random.default_rng(np.random.SeedSequence(self.seed).spawn(2)[0])
-        deg, still = math.pi / 180.0, 1.0 - (self.course == "held")
+        indoor, still = self.course == "indoor", 1.0 - (self.course == "held")
         speed, yaw = {"indoor": (1.0, 0.4), "outdoor": (3.2, 0.0), "held": (2.0, 0.0)}[self.course]
-        lively = {"indoor": 0.1, "outdoor": 1.5, "held": 0.0}[self.course]
-        draw = Waves.draw
-        flexion = -self.geometry.trunk_flexion
+        lively, turning = {"indoor": (0.1, 0.03), "outdoor": (1.5, 0.18), "held": (0.0, 0.0)}[self.course]
+
+        def draw(mean: float, std: float, low: float, high: float) -> Waves:
+            return Waves.draw(rng, std, low, high, offset=mean, count=3, equal=True)
+
         functions = {
-            "speed": draw(rng, speed, 0.5 * lively, 0.02, 0.06),
-            "yaw": draw(rng, yaw, {"indoor": 0.03, "outdoor": 0.18, "held": 0.0}[self.course], 0.04, 0.15),
-            "sway": draw(rng, 0.0, 0.5 * deg * still, 0.2, 0.8),
-            "flexion": draw(rng, flexion, 2.5 * deg * still, 0.05, 0.4),
-            "lean": draw(rng, 0.0, 3.0 * deg * still, 0.05, 0.5),
+            "speed": draw(speed, 0.5 * lively, 0.02, 0.06),
+            "yaw": draw(yaw, turning, 0.04, 0.15),
+            "sway": draw(0.0, 0.5 * DEG * still, 0.2, 0.8),
+            "flexion": draw(-self.geometry.trunk_flexion, 2.5 * DEG * still, 0.05, 0.4),
+            "lean": draw(0.0, 3.0 * DEG * still, 0.05, 0.5),
             # shoulders follow the handlebar, or the outer arm would not reach
-            "twist": draw(rng, {"indoor": 0.12}.get(self.course, 0.0), 3.0 * deg * still, 0.05, 0.5),
-            "steer": draw(rng, {"indoor": 0.26}.get(self.course, 0.0), 0.08 * still, 0.1, 0.6),
-            "cadence": draw(rng, 5.0 * still, 0.6 * still, 0.02, 0.1),
+            "twist": draw(0.12 if indoor else 0.0, 3.0 * DEG * still, 0.05, 0.5),
+            "steer": draw(0.26 if indoor else 0.0, 0.08 * still, 0.1, 0.6),
+            "cadence": draw(5.0 * still, 0.6 * still, 0.02, 0.1),
         }
         for side in SIDES:
             for limb in ("arm", "leg"):
-                mean = self.swivel * rng.standard_normal()
-                functions[f"{limb}_{side}"] = draw(rng, mean, self.swivel * still, 0.01, 0.05)
+                functions[f"{limb}_{side}"] = draw(self.swivel * rng.standard_normal(), self.swivel * still, 0.01, 0.05)
         object.__setattr__(self, "functions", functions)
         object.__setattr__(self, "linkage", RiderLinkage.for_rider(self.geometry))
 
@@ -183,53 +158,43 @@ class ExactRide:
     def rates(self, t: np.ndarray) -> dict[str, np.ndarray]:
         """Absolute rate ``(..., 3)`` of every body in its axes (the paper's)."""
 
-        def matrices(at: np.ndarray) -> dict[str, np.ndarray]:
+        def matrices(at: np.ndarray) -> np.ndarray:
             frame, pose = self.frame(at), self.pose(at)
             trunk = frame @ rotation.euler_matrix("zxy", pose["trunk/angles"])
-            found = {"bicycle_imu": frame, "trunk_imu": trunk}
-            for side in SIDES:
-                found[f"upper_arm_{side}"] = trunk @ rotation.euler_matrix("yxy", pose[f"shoulder_{side}/angles"])
-                found[f"thigh_{side}"] = frame @ rotation.euler_matrix("zxy", pose[f"hip_{side}/angles"])
-            return found
+            limbs = [
+                part @ rotation.euler_matrix(order, pose[f"{joint}_{side}/angles"])
+                for side in SIDES
+                for part, order, joint in ((trunk, "yxy", "shoulder"), (frame, "zxy", "hip"))
+            ]
+            return np.stack([frame, trunk, *limbs])
 
-        at = [matrices(t + k * STEP) for k in (-2, -1, 0, 1, 2)]
-        rates = {}
-        for name in at[0]:
-            slope = (at[0][name] - 8.0 * at[1][name] + 8.0 * at[3][name] - at[4][name]) / (12.0 * STEP)
-            W = at[2][name].mT @ slope
-            rates[name] = 0.5 * np.stack(
-                [W[..., 2, 1] - W[..., 1, 2], W[..., 0, 2] - W[..., 2, 0], W[..., 1, 0] - W[..., 0, 1]], axis=-1
-            )
-        return rates
+        # skew-symmetric matrix of the rate: Rᵀ dR/dt
+        W = matrices(t).mT @ derivative(matrices, t)
+        rates = 0.5 * np.stack(
+            [W[..., 2, 1] - W[..., 1, 2], W[..., 0, 2] - W[..., 2, 0], W[..., 1, 0] - W[..., 0, 1]], axis=-1
+        )
+        names = ("bicycle_imu", "trunk_imu", *(f"{part}_{side}" for side in SIDES for part in ("upper_arm", "thigh")))
+        return dict(zip(names, rates, strict=True))
 
     def forces(self, t: np.ndarray) -> dict[str, np.ndarray]:
         """Specific force in bicycle axes (the paper's) at the bicycle's IMU, the pivot and the trunk's IMU."""
-        g, link = self.geometry, self.linkage
-        places = {
-            "bicycle_imu": lambda at: paper_axes(np.array(g.bicycle_imu)) + np.zeros((*at.shape, 3)),
-            "pivot": lambda at: paper_axes(np.array(g.trunk_pivot)) + np.zeros((*at.shape, 3)),
-            "trunk_imu": lambda at: (
-                link.point(g.trunk_pivot, "left", at)
-                + rotation.euler_matrix("zxy", self.trunk(at)) @ paper_axes(np.array(g.trunk_imu))
-            ),
-        }
-        f, frame = self.functions, self.frame(t)
-        yaw, speed, rate = f["yaw"].integral(t), f["speed"](t), f["yaw"](t)
-        thrust = (f["speed"](t + STEP) - f["speed"](t - STEP)) / (2.0 * STEP)
+        f, g, link = self.functions, self.geometry, self.linkage
+        fixed = [paper_axes(np.array(place)) for place in (g.bicycle_imu, g.trunk_pivot)]
+
+        def places(at: np.ndarray) -> np.ndarray:
+            """Of the three points against the rear contact, axes that do not turn ``(3, ..., 3)``."""
+            moved = rotation.euler_matrix("zxy", self.trunk(at)) @ paper_axes(np.array(g.trunk_imu))
+            points = [*(place + 0.0 * moved for place in fixed), link.point(g.trunk_pivot, "left", at) + moved]
+            return (self.frame(at) @ np.stack(points)[..., None])[..., 0]
+
+        # the rear contact moves ahead and is led along the path; a specific force holds gravity too
+        yaw = f["yaw"].integral(t)
         ahead = np.stack([np.cos(yaw), 0.0 * yaw, -np.sin(yaw)], axis=-1)
         left = np.stack([-np.sin(yaw), 0.0 * yaw, -np.cos(yaw)], axis=-1)
-        contact = thrust[..., None] * ahead + (speed * rate)[..., None] * left
-        weights = (-1.0, 16.0, -30.0, 16.0, -1.0)
-        forces = {}
-        for name, place in places.items():
-            acceleration = contact + np.array([0.0, GRAVITY, 0.0])
-            for k, weight in zip((-2, -1, 0, 1, 2), weights, strict=True):
-                at = t + k * STEP
-                acceleration = (
-                    acceleration + weight / (12.0 * STEP**2) * (self.frame(at) @ place(at)[..., None])[..., 0]
-                )
-            forces[name] = (frame.mT @ acceleration[..., None])[..., 0]
-        return forces
+        contact = derivative(f["speed"], t)[..., None] * ahead + (f["speed"](t) * f["yaw"](t))[..., None] * left
+        acceleration = contact + np.array([0.0, GRAVITY, 0.0]) + second_derivative(places, t)
+        forces = (self.frame(t).mT @ acceleration[..., None])[..., 0]
+        return dict(zip(("bicycle_imu", "pivot", "trunk_imu"), forces, strict=True))
 
     def _on_trunk(self, t: np.ndarray, forces: dict[str, np.ndarray]) -> np.ndarray:
         """Specific force at the trunk's IMU in trunk axes ``(..., 3)``."""

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from poise.baselines.studies.two_gyro.motion import DEG, IDEAL, MOTIONS, Errors, Pulses, markov, simulate
+from poise.baselines.studies.two_gyro.motion import DEG, IDEAL, MOTIONS, Errors, Pulses, bias_of, simulate
 from poise.filters.bicycle.two_gyro.truth import true_angles, true_states
 from poise.filters.core import rotation
 
@@ -59,7 +59,7 @@ def test_errors_have_their_size():
 
 def test_biases_are_a_markov_process():
     errors = Errors(bias=0.3 * DEG, bias_drift=0.1 * DEG, bias_time=5.0)
-    draws = np.stack([markov(4001, 0.01, errors, np.random.default_rng(seed)) for seed in range(300)])
+    draws = np.stack([bias_of(4001, 0.01, errors, np.random.default_rng(seed)) for seed in range(300)])
     np.testing.assert_allclose(draws[:, 0].std(), 0.3 * DEG, rtol=0.07)
     np.testing.assert_allclose(draws[:, -1].std(), 0.1 * DEG, rtol=0.07)
     product = np.mean(draws[:, -1] * draws[:, -501])
