@@ -6,10 +6,8 @@ import hashlib
 import json
 import re
 import sys
-import zlib
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +17,11 @@ from ...envs.batch_record import record_episode
 from ...envs.data.storage import load_trajectory
 from ...envs.data.trajectory import Trajectory
 from ...envs.record import plain
-from ..code_version import code_version
+from ...filters.support.files import write_text
+from ...filters.support.parallel import in_parallel
+from ...filters.support.resume import is_kept, keep, kept
+from ...filters.support.seeds import named_seed
+from ...filters.support.version import code_version
 
 RIDER = "poise/RiderBicycle-v0"
 
@@ -62,25 +64,9 @@ class Study:
         if not 1.0 <= self.duration < float("inf"):
             raise ValueError(f"duration must be at least 1 s and finite, got {self.duration}")
 
-    @cached_property
-    def version(self) -> str:
-        """The code that computes; a folder that another version has worked in gives a notice on standard error."""
-        now, path = code_version(), self.folder / "code.txt"
-        before = path.read_text(encoding="utf-8").strip() if path.exists() else None
-        if before not in (None, now):
-            print(
-                f"{self.folder} holds results of poise {before}; this is poise {now}: they are computed again",
-                file=sys.stderr,
-            )
-        if before != now:
-            self.folder.mkdir(parents=True, exist_ok=True)
-            path.write_text(f"{now}\n", encoding="utf-8")
-        return now
-
     def seed_of(self, *names: str | int) -> int:
         """A seed below 2³² that depends on the root seed and on the names only."""
-        words = [zlib.crc32(str(name).encode()) for name in names]
-        return int(np.random.SeedSequence([self.seed, *words]).generate_state(1)[0])
+        return named_seed(self.seed, *names)
 
     def rides(self, scenario: str, suite: str | Sequence[str], **settings: Any) -> list[Trajectory]:
         """The rides of :meth:`ride_files`, which says what may be set.
@@ -161,15 +147,15 @@ class Study:
     def _recorded(
         self, env_id: str, label: str, settings: Mapping[str, Any], wanted: list[tuple[str, int, dict[str, Any]]]
     ) -> list[Path]:
-        folder = self.folder / "rides" / f"{slug(label)}-{digest([env_id, plain(settings), self.version])}"
+        origin = [env_id, plain(settings), code_version("filters", "envs")]
+        folder = self.folder / "rides" / f"{slug(label)}-{digest(origin)}"
         paths = [folder / f"{slug(name)}.h5" for name, _, _ in wanted]
         jobs = [
             (env_id, options, seed, path)
             for path, (_, seed, options) in zip(paths, wanted, strict=True)
             if not path.exists()
         ]
-        for _ in self._parallel(record_episode, jobs, label, "ride"):
-            pass
+        self._compute(record_episode, jobs, label, "ride")
         return paths
 
     def cached(self, key: str, function: Callable[..., Any], *args: Any) -> Any:
@@ -181,8 +167,7 @@ class Study:
             args: what it takes; if they change (as pickled), the result is computed again.
 
         Raises:
-            ValueError: the key belongs to another function.
-            TypeError: the result is nothing that JSON knows.
+            TypeError: the result is not one of JSON's types.
         """
         return self.map(key, function, [args], bar=False)[0]
 
@@ -196,67 +181,46 @@ class Study:
             bar: show a bar.
 
         Raises:
-            ValueError: the key belongs to another function.
-            TypeError: a result is nothing that JSON knows.
+            TypeError: a result is not one of JSON's types.
         """
         import joblib
 
-        name = f"{function.__module__}:{function.__qualname__}"
         folder = self.folder / "cache" / slug(key)
         tasks = [
-            (folder / f"{index:04d}.json", name, f"{self.version} {joblib.hash(job)}", function, job)
+            (
+                folder / f"{index:04d}.json",
+                {"function": name_of(function), "arguments": joblib.hash(job)},
+                function,
+                job,
+            )
             for index, job in enumerate(jobs)
         ]
-        missing = [task for task in tasks if not is_finished(*task[:3])]
-        for _ in self._parallel(compute, missing, key if bar else None, "job"):
+        missing = [task for task in tasks if not is_kept(*task[:2])]
+        self._compute(compute, missing, key if bar else "", "job")
+        return [kept(task[0]) for task in tasks]
+
+    def _compute(self, function: Callable[..., Any], jobs: Sequence[tuple[Any, ...]], label: str, unit: str) -> None:
+        """Call a function that leaves files, several at a time; say it if another version has worked in the folder."""
+        path, now = self.folder / "code.txt", code_version()
+        before = path.read_text(encoding="utf-8").strip() if path.exists() else None
+        if before not in (None, now):
+            text = f"{self.folder} holds results of poise {before}; this is poise {now}: they are computed again"
+            print(text, file=sys.stderr)
+        if before != now:
+            write_text(path, f"{now}\n")
+        label = label if self.progress else ""
+        for _ in in_parallel(function, jobs, self.processes, label=label, unit=unit):
             pass
-        return [json.loads(task[0].read_text(encoding="utf-8"))["result"] for task in tasks]
-
-    def _parallel(
-        self, function: Callable[..., Any], jobs: Sequence[tuple[Any, ...]], label: str | None, unit: str
-    ) -> Iterator[Any]:
-        """Results as they are finished."""
-        from tqdm import tqdm
-
-        quiet = label is None or not self.progress or not jobs
-        with tqdm(total=len(jobs), desc=label, unit=unit, disable=quiet) as bar:
-            for result in in_processes(function, jobs, self.processes):
-                yield result
-                bar.update()
 
 
-def in_processes(function: Callable[..., Any], jobs: Sequence[tuple[Any, ...]], processes: int) -> Iterator[Any]:
-    """Results as they are finished; one process or a single job needs no other process."""
-    if processes == 1 or len(jobs) < 2:
-        yield from (function(*job) for job in jobs)
-        return
-    from joblib import Parallel, delayed
-
-    workers = min(processes, len(jobs))
-    yield from Parallel(n_jobs=workers, return_as="generator_unordered")(delayed(function)(*job) for job in jobs)
+def name_of(function: Callable[..., Any]) -> str:
+    """Module and name."""
+    return f"{function.__module__}:{function.__qualname__}"
 
 
-def compute(path: Path, name: str, origin: str, function: Callable[..., Any], job: tuple[Any, ...]) -> None:
-    """Call and keep the result in a file, which appears whole or not at all."""
-    text = json.dumps({"function": name, "origin": origin, "result": function(*job)}, default=as_list)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    part = path.with_suffix(".part")
-    part.write_text(text, encoding="utf-8")
-    part.replace(path)
-
-
-def is_finished(path: Path, name: str, origin: str) -> bool:
-    """Whether the file holds the result of this function from this origin: version of the code and its arguments.
-
-    Raises:
-        ValueError: it is the result of another function.
-    """
-    if not path.exists():
-        return False
-    kept = json.loads(path.read_text(encoding="utf-8"))
-    if kept["function"] != name:
-        raise ValueError(f"key {path.parent.name!r} belongs to {kept['function']}, not to {name}: choose another key")
-    return kept.get("origin") == origin
+def compute(path: Path, key: dict[str, Any], function: Callable[..., Any], job: tuple[Any, ...]) -> None:
+    """Call and keep the result in a file."""
+    keep(path, key, function(*job), default=as_list)
 
 
 def as_list(value: Any) -> Any:
