@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import math
 from dataclasses import dataclass
 
 import tyro
 
 from .main import run_command
+from .output import Output
 
 
 @dataclass
@@ -21,13 +21,12 @@ class Args:
     deviation: float = 1.0
     """σ_a of one accelerometer, m/s² per sample; gains are multiplied by it"""
     json: bool = False
-    """print machine-readable text instead of tables"""
+    """print one JSON document instead of tables"""
 
 
 def run(args: Args) -> int:
     """Print the report."""
     from ..filters.arrays.files import describe_array, load_array
-    from .tables import print_table
 
     if not 0.0 < args.deviation < math.inf:
         raise ValueError(f"deviation must be positive and finite (m/s²), got {args.deviation}")
@@ -39,18 +38,18 @@ def run(args: Args) -> int:
         "accelerometers": array.size,
         "rank": array.rank,
         "of": array.A.shape[1],
-        "condition number": condition if math.isfinite(condition) else None if args.json else "infinite",
+        "condition number": condition if math.isfinite(condition) else "infinite",
         "redundancy": array.redundancy,
     }
-    if args.json:
-        print(json.dumps(summary | {"quantities": rows}))
-        return 0
-    print_table([summary], f"{array.name}: {array.size} accelerometers", digits=4)
-    print_table(rows, f"standard deviations for {args.deviation:g} m/s² of noise a sample")
-    if array.rank < array.A.shape[1]:
-        print("What is not determined needs other sensors (a gyroscope) or a model of the motion.")
-    if array.redundancy == 0:
-        print("No redundancy: the fault of an accelerometer cannot be told from motion.")
+    with Output("array", args) as out:
+        out.add(summary=summary | {"condition number": condition})
+        out.show([summary], f"{array.name}: {array.size} accelerometers", digits=4)
+        out.show(rows, f"standard deviations for {args.deviation:g} m/s² of noise a sample")
+        out.rows(rows)
+        if array.rank < array.A.shape[1]:
+            out.say("What is not determined needs other sensors (a gyroscope) or a model of the motion.")
+        if array.redundancy == 0:
+            out.say("No redundancy: the fault of an accelerometer cannot be told from motion.")
     return 0
 
 

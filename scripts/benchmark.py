@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from .main import run_command
+from .output import Output
 
 
 @dataclass
@@ -29,7 +30,7 @@ class Args:
     runs: Path = Path("runs")
     """where the run folder goes"""
     json: bool = False
-    """print machine-readable rows instead of tables"""
+    """print one JSON document instead of tables"""
 
 
 def run(args: Args) -> int:
@@ -41,34 +42,33 @@ def run(args: Args) -> int:
     from ..baselines.studies.external_acceleration.simulation import compare_modes
     from ..envs.data.formats.load import load_recording, recording_files
     from .experiment import start_run
-    from .report import draw_example, print_comparison, print_progress, provenance
-    from .tables import markdown_table, print_table
+    from .report import draw_example, print_comparison, provenance
+    from .tables import markdown_table
 
     recorded = [load_recording(path) for path in recording_files(args.recordings)]
     chosen = contenders(args.estimators, {*HAND_CHANNELS, *(name for each in recorded for name in each.measurements)})
     folder = start_run("benchmark", args, args.seed, args.runs)
     sections: dict[str, str] = {}
     tables = []
-    print_progress(args.json, f"simulating {4 * args.episodes} episodes of poise/HandMotion-v0 in PyBullet")
-    data = {"simulation": simulated(args.seed, args.episodes, sensors=args.sensors)}
-    if recorded:
-        data["recordings"] = recorded
-    for name, trajectories in data.items():
-        table = evaluate(chosen, trajectories, reference=args.reference, progress=not args.json)
-        tables.append(table)
-        folder.write_results(pandas.concat(tables))
-        sections |= print_comparison(table, folder, as_json=args.json, groups=groups_of(trajectories), name=name)
-        sections |= draw_example(table, trajectories, chosen, folder, name)
-    if args.trials:
-        print_progress(args.json, f"the three tests of the external-acceleration paper, {args.trials} trials each")
-        rows = compare_modes(range(args.trials))
-        title = "external-acceleration, tests A to C of the paper, RMS in deg (levels in m/s²)"
-        sections[title] = markdown_table(rows)
-        if not args.json:
-            print_table(rows, title)
-    sections["Provenance"] = provenance(folder)
-    report = folder.write_report("poise benchmark", sections)
-    print_progress(args.json, f"report: {report}")
+    with Output("benchmark", args) as out:
+        out.say(f"simulating {4 * args.episodes} episodes of poise/HandMotion-v0 in PyBullet")
+        data = {"simulation": simulated(args.seed, args.episodes, sensors=args.sensors)}
+        if recorded:
+            data["recordings"] = recorded
+        for name, trajectories in data.items():
+            table = evaluate(chosen, trajectories, reference=args.reference, progress=True)
+            tables.append(table)
+            folder.write_results(pandas.concat(tables))
+            sections |= print_comparison(table, folder, out, groups=groups_of(trajectories), name=name)
+            sections |= draw_example(table, trajectories, chosen, folder, name)
+        if args.trials:
+            out.say(f"the three tests of the external-acceleration paper, {args.trials} trials each")
+            rows = compare_modes(range(args.trials))
+            title = "external-acceleration, tests A to C of the paper, RMS in deg (levels in m/s²)"
+            sections[title] = markdown_table(rows)
+            out.table(rows, title)
+        sections["Provenance"] = provenance(folder)
+        out.report(folder.write_report("poise benchmark", sections))
     return 0
 
 

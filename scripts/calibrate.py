@@ -10,7 +10,6 @@ frame: rotation between a tracker's frame and the device; columns bx, by, bz (ax
 
 from __future__ import annotations
 
-import json
 import math
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,6 +19,7 @@ import numpy as np
 import tyro
 
 from .main import run_command
+from .output import Output
 
 if TYPE_CHECKING:
     from ..envs.data.calibration.records import CalibrationRecord
@@ -56,7 +56,7 @@ class Args:
     raw: Path | None = None
     """folder for the simulated runs as CSV files, with their true record: examples of the format"""
     json: bool = False
-    """print the record instead of tables"""
+    """print one JSON document instead of tables"""
 
 
 def run(args: Args) -> int:
@@ -71,26 +71,22 @@ def run(args: Args) -> int:
         raise ValueError("raw is where --simulate leaves its runs: it needs --simulate")
     if args.seed < 0:
         raise ValueError(f"seed must be 0 or more, got {args.seed}")
-    if args.sensor == "frame":
-        return run_frame(args)
-    found, truth = calibrate(args)
-    earlier = load_calibration(args.record) if args.record.is_file() else CalibrationRecord({})
-    earlier.merged(found).save(args.record)
-    if args.json:
-        print(json.dumps(found.describe()))
-        return 0
-    show(found, truth)
-    print(f"record: {args.record}")
+    with Output("calibrate", args) as out:
+        found, truth = (frame(args), None) if args.sensor == "frame" else calibrate(args, out)
+        earlier = load_calibration(args.record) if args.record.is_file() else CalibrationRecord({})
+        earlier.merged(found).save(args.record)
+        show(found, truth, out)
+        out.add(record=found.describe(), path=str(args.record))
+        out.say(f"record: {args.record}")
     return 0
 
 
-def calibrate(args: Args) -> tuple[CalibrationRecord, CalibrationRecord | None]:
+def calibrate(args: Args, out: Output) -> tuple[CalibrationRecord, CalibrationRecord | None]:
     """The record found, and the true one of simulated runs."""
     from ..envs.data.calibration import channels as channels
     from ..envs.data.calibration.data import MagnetometerData, RateTableData, read_magnetometer, read_rate_table
     from ..envs.hand import calibration_runs as runs
     from ..filters.arrays.files import load_array
-    from .report import print_progress
 
     array, files = load_array(args.array), list(args.files)
     truth = runs.random_calibration(array, args.seed) if args.simulate else None
@@ -118,14 +114,15 @@ def calibrate(args: Args) -> tuple[CalibrationRecord, CalibrationRecord | None]:
     if truth is not None and args.raw is not None:
         data.save(args.raw / f"{args.sensor}.csv")
         truth.save(args.raw / "true-calibration.json")
-        print_progress(args.json, f"simulated runs: {args.raw / f'{args.sensor}.csv'}")
+        out.say(f"simulated runs: {args.raw / f'{args.sensor}.csv'}")
     return found, truth
 
 
-def show(found: CalibrationRecord, truth: CalibrationRecord | None) -> None:
+def show(found: CalibrationRecord, truth: CalibrationRecord | None, out: Output) -> None:
     """Tables of what was found."""
-    from .tables import print_table
-
+    if "frame" in found.details:
+        details = found.details["frame"]
+        out.say(f"tracker to device: {details['tracker_to_device']}, residual {details['residual_deg']:.3f}°")
     for name, calibration in found.channels.items():
         details = found.details[name]
         if "axes" not in details:
@@ -134,9 +131,9 @@ def show(found: CalibrationRecord, truth: CalibrationRecord | None) -> None:
                 for key, value in details.items()
                 if isinstance(value, bool | int | float)
             ]
-            print_table(rows, f"{name}: ellipsoid and alignment", digits=4)
+            out.table(rows, f"{name}: ellipsoid and alignment", digits=4)
         else:
-            print_table(
+            out.table(
                 [row(number, axis) for number, axis in enumerate(details["axes"], 1)], f"{name}, {calibration.unit}"
             )
         if truth is None:
@@ -144,7 +141,7 @@ def show(found: CalibrationRecord, truth: CalibrationRecord | None) -> None:
         true = next((one for key, one in truth.channels.items() if key.split("/")[-1] == name.split("/")[-1]), None)
         if true is not None:
             matrix, right = np.array(calibration.matrix), np.array(true.matrix)
-            print(
+            out.say(
                 f"against the truth: matrix {np.abs(matrix @ np.linalg.inv(right) - np.eye(len(right))).max():.1e} "
                 f"(relative), offset {np.abs(np.array(calibration.offset) - np.array(true.offset)).max():.1e} "
                 f"{calibration.unit}"
@@ -161,10 +158,10 @@ def row(number: int, axis: dict[str, Any]) -> dict[str, Any]:
     return shown | {name: axis[name] for name in ("residual", "largest", "samples", "discarded")}
 
 
-def run_frame(args: Args) -> int:
+def frame(args: Args) -> CalibrationRecord:
     """Rotation from the tracker's frame to the device."""
     from ..envs.data.calibration.data import read_axes
-    from ..envs.data.calibration.records import CalibrationRecord, load_calibration
+    from ..envs.data.calibration.records import CalibrationRecord
     from ..filters.arrays.calibration.frame import align_axes
     from ..filters.core import rotation
 
@@ -177,16 +174,7 @@ def run_frame(args: Args) -> int:
         "residual_deg": float(np.degrees(fit.residual)),
         "singular_values": fit.singular_values.tolist(),
     }
-    earlier = load_calibration(args.record) if args.record.is_file() else CalibrationRecord({})
-    earlier.merged(CalibrationRecord({}, {"frame": details})).save(args.record)
-    print(
-        json.dumps(details)
-        if args.json
-        else f"tracker to device: {quaternion}, residual {details['residual_deg']:.3f}°"
-    )
-    if not args.json:
-        print(f"record: {args.record}")
-    return 0
+    return CalibrationRecord({}, {"frame": details})
 
 
 if __name__ == "__main__":

@@ -8,6 +8,7 @@ from pathlib import Path
 import tyro
 
 from .main import run_command
+from .output import Output
 
 
 @dataclass
@@ -29,7 +30,7 @@ class Args:
     runs: Path = Path("runs")
     """where the run folder goes"""
     json: bool = False
-    """print machine-readable rows instead of tables"""
+    """print one JSON document instead of tables"""
 
 
 def run(args: Args) -> int:
@@ -39,7 +40,7 @@ def run(args: Args) -> int:
     from ..baselines.registry import list_estimators
     from ..envs.data.formats.load import load_recording, recording_files
     from .experiment import start_run
-    from .report import draw_example, print_comparison, print_progress, provenance
+    from .report import draw_example, print_comparison, provenance
 
     paths = recording_files(args.recordings)
     if not paths:
@@ -50,13 +51,14 @@ def run(args: Args) -> int:
 
         trajectories = [imu_of(trajectory, args.place) for trajectory in trajectories]
     names = tuple(list_estimators()) if args.estimators == ("all",) else args.estimators
-    table = evaluate(list(names), trajectories, reference=args.reference, progress=not args.json)
+    table = evaluate(list(names), trajectories, reference=args.reference, progress=True)
     folder = start_run("evaluate", args, args.seed, args.runs)
     folder.write_results(table)
-    sections = print_comparison(table, folder, as_json=args.json, groups=groups_of(trajectories))
-    sections |= draw_example(table, trajectories, {name: name for name in names}, folder, "recordings")
-    sections["Provenance"] = provenance(folder)
-    print_progress(args.json, f"report: {folder.write_report('poise evaluate', sections)}")
+    with Output("evaluate", args) as out:
+        sections = print_comparison(table, folder, out, groups=groups_of(trajectories))
+        sections |= draw_example(table, trajectories, {name: name for name in names}, folder, "recordings")
+        sections["Provenance"] = provenance(folder)
+        out.report(folder.write_report("poise evaluate", sections))
     return 0
 
 

@@ -13,22 +13,21 @@ from __future__ import annotations
 
 import csv
 import dataclasses
-import enum
 import io
+import json
 import platform
 import subprocess
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from ..filters.support.files import write_json as write_plain_json
 from ..filters.support.files import write_text
 from ..filters.support.parallel import processors
+from ..filters.support.resume import refuse_changes
 from ..filters.support.version import ROOT, code_version, package_version
-from .tables import markdown_table, records
+from .tables import jsonable, markdown_table, records
 
 COLUMNS = ("estimator", "trajectory", "quantity", "metric", "value", "unit")
 """Columns of ``results.csv``."""
@@ -46,6 +45,10 @@ PACKAGES = (
     "imufusion",
 )
 """Packages whose versions can change a result."""
+
+
+NO_RESULT = frozenset({"resume", "runs", "processes", "json", "export"})
+"""Arguments of commands that no result depends on."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -98,6 +101,33 @@ def start_run(command: str, args: Any, seed: int, root: str | Path = "runs") -> 
     write_json(folder / "args.json", {"command": command, "seed": seed, "args": args})
     write_json(folder / "versions.json", {"started": now.isoformat(timespec="seconds"), **versions()})
     return run
+
+
+def open_run(command: str, args: Any, may_differ: Collection[str] = ()) -> Run:
+    """Start a run, or resume the one in the folder ``args.resume``.
+
+    Args:
+        command: name of the command.
+        args: its arguments, a dataclass instance with ``seed``, ``runs`` and ``resume``.
+        may_differ: arguments that a resumed run need not share with what is there, besides :data:`NO_RESULT`.
+
+    Raises:
+        FileNotFoundError: there is no such run.
+        ValueError: it is a run of another command or of other arguments.
+    """
+    if args.resume is None:
+        return start_run(command, args, args.seed, args.runs)
+    path = args.resume / "args.json"
+    if not path.exists():
+        raise FileNotFoundError(f"there is no run in {args.resume}")
+    try:
+        found = json.loads(path.read_text(encoding="utf-8"))
+        before = {**found["args"], "command": found["command"]}
+    except (KeyError, TypeError, ValueError):
+        raise ValueError(f"{path} does not say how the run was started: start a new one") from None
+    now = {**jsonable(args), "command": command}
+    refuse_changes(args.resume, before, now, [name for name in now if name not in {*NO_RESULT, *may_differ}])
+    return Run(args.resume, command, args.seed)
 
 
 def new_folder(parent: Path, name: str) -> Path:
@@ -171,29 +201,6 @@ def _git(checkout: Path, *words: str) -> str:
     return subprocess.run(
         ["git", "-C", str(checkout), *words], capture_output=True, text=True, check=True, timeout=10
     ).stdout.strip()
-
-
-def jsonable(value: Any) -> Any:
-    """Return ``value`` in JSON's types: dataclasses by field, paths and non-finite numbers as text, arrays as lists."""
-    if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        return {field.name: jsonable(getattr(value, field.name)) for field in dataclasses.fields(value)}
-    if isinstance(value, Mapping):
-        return {str(key): jsonable(item) for key, item in value.items()}
-    if isinstance(value, enum.Enum):
-        return value.name
-    if isinstance(value, np.ndarray | np.generic):
-        return jsonable(value.tolist())
-    if isinstance(value, set | frozenset):
-        return sorted((jsonable(item) for item in value), key=str)
-    if isinstance(value, list | tuple):
-        return [jsonable(item) for item in value]
-    if value is None or isinstance(value, bool | int | str):
-        return value
-    if isinstance(value, float):
-        return value if np.isfinite(value) else str(value)
-    if isinstance(value, type) or callable(value):
-        return f"{value.__module__}.{value.__qualname__}" if hasattr(value, "__qualname__") else repr(value)
-    return str(value)
 
 
 def write_json(path: Path, value: Any) -> Path:

@@ -9,7 +9,10 @@ from typing import Annotated, Any
 
 import tyro
 
+from ..filters.support.names import unknown
+from ..filters.support.parallel import progress_bar
 from .main import run_command
+from .output import Output
 
 
 @dataclass
@@ -28,6 +31,8 @@ class Args:
     """episodes played at a time"""
     options: tuple[str, ...] = ()
     """arguments of the environment, as name=value (gesture=fast rate=200)"""
+    json: bool = False
+    """print one JSON document instead of tables"""
 
 
 def environment_id(name: str) -> str:
@@ -43,7 +48,7 @@ def environment_id(name: str) -> str:
     for candidate in (name, *(id_ for id_ in known if id_.rsplit("-v", 1)[0] == f"poise/{words}")):
         if candidate in known:
             return candidate
-    raise ValueError(f"unknown environment {name!r}; there are {', '.join(known)}")
+    raise ValueError(unknown("environment", name, known))
 
 
 def option(text: str) -> tuple[str, Any]:
@@ -63,22 +68,22 @@ def option(text: str) -> tuple[str, Any]:
 
 def run(args: Args) -> int:
     """Record and say where the files are."""
-    from tqdm import tqdm
-
     from ..envs.batch_record import record_episodes
 
     env_id = environment_id(args.environment)
-    with tqdm(total=args.episodes, desc=f"record {env_id}", unit="episode") as bar:
-        paths = record_episodes(
-            env_id,
-            args.folder,
-            episodes=args.episodes,
-            seed=args.seed,
-            options=dict(option(text) for text in args.options),
-            processes=args.processes,
-            report=lambda path: bar.update(),
-        )
-    print(f"{len(paths)} episodes in {args.folder}")
+    with Output("record", args) as out:
+        with progress_bar(args.episodes, f"record {env_id}", "episode") as bar:
+            paths = record_episodes(
+                env_id,
+                args.folder,
+                episodes=args.episodes,
+                seed=args.seed,
+                options=dict(option(text) for text in args.options),
+                processes=args.processes,
+                report=lambda path: bar.update(),
+            )
+        out.rows({"episode": index, "file": str(path)} for index, path in enumerate(paths))
+        out.say(f"{len(paths)} episodes in {args.folder}")
     return 0
 
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import json
 import statistics
-import sys
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from .experiment import Run
-from .tables import markdown_table, print_table, records
+from .output import Output
+from .tables import markdown_table
 
 if TYPE_CHECKING:
     import pandas
@@ -92,14 +92,14 @@ def skipped_text(table: pandas.DataFrame) -> str:
 
 
 def print_comparison(
-    table: pandas.DataFrame, run: Run, *, as_json: bool = False, groups: Mapping[str, str] | None = None, name: str = ""
+    table: pandas.DataFrame, run: Run, out: Output, *, groups: Mapping[str, str] | None = None, name: str = ""
 ) -> dict[str, str]:
     """Print a comparison and draw its bars.
 
     Args:
         table: from :func:`poise.evaluate`.
         run: where the figures go.
-        as_json: print rows as JSON, one a line, and no tables.
+        out: where tables and rows go.
         groups: trajectory → column of the wide tables.
         name: of the data (simulation, recordings), in titles and file names.
 
@@ -109,15 +109,10 @@ def print_comparison(
     from ..baselines.plots import rms_bars, save
 
     sections = {}
-    if as_json:
-        for row in records(table):
-            print(
-                json.dumps(row, allow_nan=False) if row["value"] == row["value"] else json.dumps({**row, "value": None})
-            )
+    out.rows(table, name or None)
     for title, rows in wide_tables(table, groups).items():
         heading = f"{name}: {title}" if name else title
-        if not as_json:
-            print_table([narrow(row) for row in rows], heading)
+        out.show([narrow(row) for row in rows], heading)
         sections[heading] = markdown_table(rows)
     found = list(parts(table))
     for _, metric, part in found:
@@ -131,8 +126,7 @@ def print_comparison(
     skipped = skipped_text(table)
     if skipped:
         sections[f"{name}: not run".lstrip(": ")] = skipped
-        if not as_json:
-            print(f"not run:\n{skipped}")
+        out.say(f"not run:\n{skipped}")
     return sections
 
 
@@ -170,11 +164,6 @@ def draw_example(
     figure = error_curves(trajectory, estimates, kinds, f"{name}: {trajectory.name}, best estimator of each kind")
     path = save(figure, run.figures / f"{name}-over-time.png")
     return {f"Figure: {name} over time": f"![{name} over time]({path.relative_to(run.folder)})"}
-
-
-def print_progress(as_json: bool, text: str) -> None:
-    """Say what is going on, away from machine-readable output."""
-    print(text, file=sys.stderr if as_json else sys.stdout, flush=True)
 
 
 def provenance(run: Run) -> str:

@@ -7,7 +7,6 @@ run's folder; an interrupted study goes on with --resume.
 from __future__ import annotations
 
 import dataclasses
-import json
 import os
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,14 +14,12 @@ from typing import TYPE_CHECKING, Any
 
 import tyro
 
-from .experiment import Run
+from .experiment import Run, open_run
 from .main import run_command
+from .output import Output
 
 if TYPE_CHECKING:
     from ..baselines.studies.report import Entry, Report
-
-SAME = ("paper", "quick", "seed", "seeds", "subjects", "duration", "recordings")
-"""Arguments that a resumed run must share with what is there."""
 
 
 @dataclass
@@ -50,7 +47,7 @@ class Args:
     runs: Path = Path("runs")
     """where the run folder goes"""
     json: bool = False
-    """print machine-readable rows instead of tables"""
+    """print one JSON document instead of tables"""
 
 
 def run(args: Args) -> int:
@@ -59,7 +56,6 @@ def run(args: Args) -> int:
     from ..baselines.studies.kit import Study
     from ..baselines.studies.report import Report
     from ..envs.bicycle.rider.anthropometry import SUBJECTS
-    from .report import print_progress
 
     reproduce = find_paper(args.paper)
     args = filled(args)
@@ -72,17 +68,18 @@ def run(args: Args) -> int:
     shared = ("quick", "seed", "subjects", "seeds", "duration", "processes", "recordings")
     settings: dict[str, Any] = {name: getattr(args, name) for name in shared}
     Study(Path(), **settings)
-    folder = begun(args)
+    folder = open_run("reproduce", args)
     study = Study(folder.folder.resolve(), **settings)
+    with Output("reproduce", args) as out:
 
-    def publish(entry: Entry) -> None:
-        show(entry, as_json=args.json)
-        write(args, folder, report)
+        def publish(entry: Entry) -> None:
+            show(entry, out)
+            write(args, folder, report)
 
-    report = Report(folder.folder, publish)
-    reproduce(study, report)
-    folder.write_results(report.results)
-    print_progress(args.json, f"report: {write(args, folder, report)}")
+        report = Report(folder.folder, publish)
+        reproduce(study, report)
+        folder.write_results(report.results)
+        out.report(write(args, folder, report))
     return 0
 
 
@@ -99,49 +96,22 @@ def filled(args: Args) -> Args:
     )
 
 
-def begun(args: Args) -> Run:
-    """A new run, or the one that is gone on with.
-
-    Raises:
-        FileNotFoundError: there is no such run.
-        ValueError: it has other arguments.
-    """
-    from .experiment import jsonable, start_run
-
-    if args.resume is None:
-        return start_run("reproduce", args, args.seed, args.runs)
-    path = args.resume / "args.json"
-    if not path.exists():
-        raise FileNotFoundError(f"there is no run in {args.resume}")
-    try:
-        before = dict(json.loads(path.read_text(encoding="utf-8"))["args"])
-    except (KeyError, TypeError, ValueError):
-        raise ValueError(f"{path} does not say how the run was begun: start a new one") from None
-    for name in SAME:
-        if before.get(name) != jsonable(getattr(args, name)):
-            raise ValueError(f"{args.resume} was begun with {name} {before.get(name)}, not {getattr(args, name)}")
-    return Run(args.resume, "reproduce", args.seed)
-
-
-def show(entry: Entry, *, as_json: bool) -> None:
-    """Print one entry."""
-    from .tables import print_table
-
-    if as_json:
-        for row in entry.rows:
-            print(json.dumps({"table": entry.title, **row}, default=str), flush=True)
-    elif entry.rows:
-        print_table(entry.rows, entry.title)
-        print(f"{entry.text}\n" if entry.text else "", flush=True)
+def show(entry: Entry, out: Output) -> None:
+    """Print one entry; the document gets its rows, and figures as they are named."""
+    if entry.rows:
+        out.table(entry.rows, entry.title)
+        text = entry.text
     elif entry.figure is not None:
-        print(f"figure: {entry.figure} ({entry.title})\n", flush=True)
+        text = f"figure: {entry.figure} ({entry.title})"
     else:
-        print("\n".join(part for part in (entry.title, entry.text) if part) + "\n", flush=True)
+        text = "\n".join(part for part in (entry.title, entry.text) if part)
+    if not out.as_json:
+        out.say(f"{text}\n" if text else "")
 
 
 def write(args: Args, folder: Run, report: Report) -> Path:
     """Write ``report.md`` with all entries so far."""
-    from .experiment import write_text
+    from ..filters.support.files import write_text
     from .report import provenance
     from .tables import markdown_table
 

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from .experiment import COLUMNS, Run
+from ..filters.support.parallel import progress_bar
+from .experiment import COLUMNS, Run, open_run
 from .main import run_command
+from .output import Output
 
 if TYPE_CHECKING:
     from ..baselines.studies.rides.statistics import RideStatistics
@@ -73,20 +74,18 @@ class Args:
     checks: bool = False
     """instead of the table of rides, check the physics and compare filters of one IMU on some rides (minutes)"""
     json: bool = False
-    """print machine-readable rows instead of tables"""
+    """print one JSON document instead of tables"""
 
 
 def run(args: Args) -> int:
     """Ride, print both tables, draw one ride, and leave a run folder; 1 if anybody fell."""
-    from tqdm import tqdm
-
     from ..baselines.studies.rides.reports import comparison
     from ..baselines.studies.rides.statistics import ride_all
     from ..envs.bicycle.course.scenarios import list_scenarios
     from ..envs.bicycle.course.scenarios import scenario as known
     from ..envs.bicycle.rider.anthropometry import SUBJECTS
-    from .report import print_progress, provenance
-    from .tables import markdown_table, print_table
+    from .report import provenance
+    from .tables import markdown_table
 
     if args.checks:
         return checked(args)
@@ -95,11 +94,11 @@ def run(args: Args) -> int:
         known(name)
     if not args.subjects or not all(0 <= subject < len(SUBJECTS) for subject in args.subjects):
         raise ValueError(f"subjects must be numbers from 0 to {len(SUBJECTS) - 1}, got {list(args.subjects)}")
-    folder = begun(args)
+    folder = open_run("rides", args, may_differ=("scenarios", "subjects"))
     seeds = ride_seeds(args.seed, len(SUBJECTS))
     rides: list[RideStatistics] = []
     total = len(scenarios) * len(args.subjects)
-    with tqdm(total=total, desc=f"ride {args.duration:g} s, {args.fidelity}", unit="ride") as bar:
+    with progress_bar(total, f"ride {args.duration:g} s, {args.fidelity}", "ride") as bar:
         for found in ride_all(
             folder.folder / "rides",
             scenarios,
@@ -119,44 +118,40 @@ def run(args: Args) -> int:
         table = [{title: value for title, value in row.items() if title != SHOWN["gap_max"]} for row in table]
     papers = comparison(rides)
     titles = (f"{total} rides of {args.duration:g} s, {args.fidelity} rider", "Beside the papers, range over riders")
-    if args.json:
-        print("\n".join(json.dumps(asdict(each)) for each in rides))
-    else:
-        print_table(table, titles[0], console=wide())
-        print_table(papers, titles[1], console=wide())
-    sections = {titles[0]: markdown_table(table), titles[1]: markdown_table(papers)}
-    sections |= drawn(args, folder, scenarios, seeds)
-    sections["Provenance"] = provenance(folder)
     upright = sum(each.upright for each in rides)
-    print_progress(args.json, f"{upright} of {total} rides upright")
-    print_progress(args.json, f"report: {folder.write_report('poise rides', sections)}")
+    with Output("rides", args) as out:
+        out.rows(rides)
+        out.show(table, titles[0], console=wide())
+        out.show(papers, titles[1], console=wide())
+        sections = {titles[0]: markdown_table(table), titles[1]: markdown_table(papers)}
+        sections |= drawn(args, folder, scenarios, seeds)
+        sections["Provenance"] = provenance(folder)
+        out.say(f"{upright} of {total} rides upright")
+        out.report(folder.write_report("poise rides", sections))
     return 0 if upright == total else 1
 
 
 def checked(args: Args) -> int:
     """Print physical checks and the errors of filters of one IMU, and leave a report."""
-    from tqdm import tqdm
-
     from ..baselines.studies.rides.checks import all_checks
     from ..baselines.studies.rides.inclinations import inclination_rows
     from .experiment import start_run
-    from .report import print_progress, provenance
-    from .tables import markdown_table, print_table
+    from .report import provenance
+    from .tables import markdown_table, records
 
     folder = start_run("rides", args, args.seed, args.runs)
-    tables = {
-        "Physical checks": [each._asdict() for each in tqdm(all_checks(), desc="physical checks", unit="check")],
-        "RMS errors of inclination, deg, of filters of one IMU": list(
-            tqdm(inclination_rows(), desc="filters of one IMU", unit="ride")
-        ),
-    }
-    for title, rows in tables.items():
-        if args.json:
-            print("\n".join(json.dumps(row) for row in rows))
-        else:
-            print_table(rows, title, console=wide())
-    sections = {title: markdown_table(rows) for title, rows in tables.items()} | {"Provenance": provenance(folder)}
-    print_progress(args.json, f"report: {folder.write_report('poise rides --checks', sections)}")
+    with Output("rides", args) as out:
+        sections = {}
+        for title, found in (
+            ("Physical checks", all_checks()),
+            ("RMS errors of inclination, deg, of filters of one IMU", inclination_rows()),
+        ):
+            out.say(f"computing: {title}")
+            rows = records(found)
+            out.table(rows, title, console=wide())
+            sections[title] = markdown_table(rows)
+        sections["Provenance"] = provenance(folder)
+        out.report(folder.write_report("poise rides --checks", sections))
     return 0
 
 
@@ -171,27 +166,6 @@ def drawn(args: Args, folder: Run, scenarios: Sequence[str], seeds: Mapping[tupl
     title = f"{scenario}, subject {subject}: {seconds:g} s"
     save(ride_signals(ride, title), folder.figures / "signals.png")
     return {f"Figure: {title}": "![signals](figures/signals.png)"}
-
-
-def begun(args: Args) -> Run:
-    """A new run, or the one that is gone on with.
-
-    Raises:
-        FileNotFoundError: there is no such folder.
-        ValueError: the rides in it have another duration, fidelity or seed.
-    """
-    from .experiment import jsonable, start_run
-
-    if args.resume is None:
-        return start_run("rides", args, args.seed, args.runs)
-    path = args.resume / "args.json"
-    if not path.exists():
-        raise FileNotFoundError(f"there is no run in {args.resume}")
-    before = json.loads(path.read_text(encoding="utf-8"))["args"]
-    for name in ("duration", "fidelity", "seed"):
-        if before[name] != jsonable(getattr(args, name)):
-            raise ValueError(f"{args.resume} has rides with {name} {before[name]}, not {getattr(args, name)}")
-    return Run(args.resume, "rides", args.seed)
 
 
 def ride_seeds(seed: int, riders: int) -> dict[tuple[str, int], int]:

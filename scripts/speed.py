@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import asdict, dataclass
 from typing import Literal
 
 from .main import run_command
+from .output import Output
 
 
 @dataclass
@@ -22,7 +22,7 @@ class Args:
     )
     """parts to measure; bicycle and arrays are families of filters"""
     json: bool = False
-    """print machine-readable rows instead of tables"""
+    """print one JSON document instead of tables"""
 
 
 def run(args: Args) -> int:
@@ -33,17 +33,15 @@ def run(args: Args) -> int:
     from ..baselines.speed.environments import environment_speeds
     from ..baselines.speed.families import FAMILIES, family_speeds
     from ..baselines.speed.filters import filter_speeds, latencies
-    from .tables import print_table
 
     parts = {"filters": filter_speeds, "latency": latencies, "environments": environment_speeds}
     parts |= {family: partial(family_speeds, family) for family in FAMILIES}
-    for name in args.what:
-        for group, rows in groupby(parts[name](), key=lambda speed: speed.group):
-            table = [asdict(row) for row in rows]
-            if args.json:
-                print("\n".join(json.dumps(row) for row in table), flush=True)
-            else:
-                print_table(table, group, columns=("what", "rate", "unit", "ratio"))
+    with Output("speed", args) as out:
+        for name in args.what:
+            for group, rows in groupby(parts[name](), key=lambda speed: speed.group):
+                table = [asdict(row) for row in rows]
+                out.rows(table)
+                out.show(table, group, columns=("what", "rate", "unit", "ratio"))
     return 0
 
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
+import enum
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -35,6 +36,34 @@ def _record(row: Any) -> dict[str, Any]:
     if dataclasses.is_dataclass(row) and not isinstance(row, type):
         return {field.name: getattr(row, field.name) for field in dataclasses.fields(row)}
     raise TypeError(f"a row is a mapping, a named tuple or a dataclass instance, not {type(row).__name__}")
+
+
+def jsonable(value: Any, infinite: Callable[[float], Any] = str) -> Any:
+    """Return ``value`` in JSON's types: dataclasses by field, paths as text, arrays as lists.
+
+    Args:
+        value: anything.
+        infinite: what stands for a number that is not finite; its text by default.
+    """
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        return {field.name: jsonable(getattr(value, field.name), infinite) for field in dataclasses.fields(value)}
+    if isinstance(value, Mapping):
+        return {str(key): jsonable(item, infinite) for key, item in value.items()}
+    if isinstance(value, enum.Enum):
+        return value.name
+    if isinstance(value, np.ndarray | np.generic):
+        return jsonable(value.tolist(), infinite)
+    if isinstance(value, set | frozenset):
+        return sorted((jsonable(item, infinite) for item in value), key=str)
+    if isinstance(value, list | tuple):
+        return [jsonable(item, infinite) for item in value]
+    if value is None or isinstance(value, bool | int | str):
+        return value
+    if isinstance(value, float):
+        return value if np.isfinite(value) else infinite(value)
+    if isinstance(value, type) or callable(value):
+        return f"{value.__module__}.{value.__qualname__}" if hasattr(value, "__qualname__") else repr(value)
+    return str(value)
 
 
 def cell(value: Any, digits: int = 3) -> str:

@@ -8,7 +8,8 @@ from datetime import date
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from .experiment import Run, start_run, versions
+from .experiment import open_run, versions
+from .output import Output
 
 if TYPE_CHECKING:
     import pandas
@@ -48,6 +49,8 @@ class Gru:
     """file to which the weights are written too"""
     runs: Path = Path("runs")
     """where the run folder goes"""
+    json: bool = False
+    """print one JSON document instead of tables"""
 
 
 def run_gru(args: Gru) -> int:
@@ -64,19 +67,21 @@ def run_gru(args: Gru) -> int:
         dataset = LearnedDataset.from_trajectories(own[:kept], config.frame)
         if kept < len(own):
             validation = LearnedDataset.from_trajectories(own[kept:], config.frame)
-    folder = start_run("train", args, args.seed, args.runs) if args.resume is None else resumed(args)
-    result = train(
-        config, folder.folder, dataset=dataset, validation=validation, resume=args.resume is not None, progress=True
-    )
-    estimator = estimator_of(result, config)
-    table = test(estimator, config, args.test_episodes)
-    folder.write_results(table)
-    card = card_of(args, config, result, table)
-    path = save_weights(folder.folder / "gru", result.arrays, card)
-    print(f"weights: {path}")
-    if args.export is not None:
-        print(f"weights: {save_weights(args.export, result.arrays, card)}")
-    print_means(means(table))
+    folder = open_run("train", args, may_differ=("test_episodes",))
+    with Output("train", args) as out:
+        result = train(
+            config, folder.folder, dataset=dataset, validation=validation, resume=args.resume is not None, progress=True
+        )
+        estimator = estimator_of(result, config)
+        table = test(estimator, config, args.test_episodes, out)
+        folder.write_results(table)
+        card = card_of(args, config, result, table)
+        path = save_weights(folder.folder / "gru", result.arrays, card)
+        out.say(f"weights: {path}")
+        if args.export is not None:
+            out.say(f"weights: {save_weights(args.export, result.arrays, card)}")
+        print_means(means(table), out)
+        out.add(run=str(folder.folder), card=card)
     return 0
 
 
@@ -91,18 +96,6 @@ def training_config(args: Gru) -> TrainingConfig:
         config = replace(config, episodes=96, validation_episodes=16, epochs=4, units=32, batch=16, curriculum=quick)
     given = {name: getattr(args, name) for name in ("episodes", "epochs", "units")}
     return replace(config, seed=args.seed, **{name: value for name, value in given.items() if value is not None})
-
-
-def resumed(args: Gru) -> Run:
-    """The run that is gone on with.
-
-    Raises:
-        FileNotFoundError: there is no such folder.
-    """
-    assert args.resume is not None
-    if not args.resume.is_dir():
-        raise FileNotFoundError(f"there is no run folder {args.resume}")
-    return Run(args.resume, "train", args.seed)
 
 
 def load_all(paths: tuple[Path, ...]) -> list[Trajectory]:
@@ -127,7 +120,7 @@ def estimator_of(result: TrainingResult, config: TrainingConfig) -> LearnedEstim
     return LearnedEstimator(GruNetwork.from_arrays(result.arrays), config.frame)
 
 
-def test(estimator: LearnedEstimator, config: TrainingConfig, episodes: int) -> pandas.DataFrame:
+def test(estimator: LearnedEstimator, config: TrainingConfig, episodes: int, out: Output) -> pandas.DataFrame:
     """Errors on episodes that training never saw, beside those of others and of the front end alone."""
     from ..baselines.evaluation import evaluate
 
@@ -140,7 +133,7 @@ def test(estimator: LearnedEstimator, config: TrainingConfig, episodes: int) -> 
     contenders |= {name: name for name in CONTENDERS}
     table = evaluate(contenders, test_trajectories(config, episodes), progress=True)
     for name, reason in dict.fromkeys((name, reason) for name, _, reason in table.attrs["skipped"]):
-        print(f"not compared with {name}: {reason}")
+        out.say(f"not compared with {name}: {reason}")
     return table[table["metric"] == "inclination"]
 
 
@@ -168,16 +161,14 @@ def means(table: pandas.DataFrame) -> dict[str, dict[str, dict[str, float]]]:
     return groups
 
 
-def print_means(groups: dict[str, dict[str, dict[str, float]]]) -> None:
+def print_means(groups: dict[str, dict[str, dict[str, float]]], out: Output) -> None:
     """A table on the terminal: an estimator a row, a group a column."""
-    from .tables import print_table
-
     estimators = list(next(iter(groups.values())))
     rows = [
         {"estimator": name, **{group: values[name]["mean_deg"] for group, values in groups.items() if name in values}}
         for name in estimators
     ]
-    print_table(rows, "Inclination error on unseen simulated episodes, mean of RMS, deg")
+    out.table(rows, "Inclination error on unseen simulated episodes, mean of RMS, deg")
 
 
 def card_of(args: Gru, config: TrainingConfig, result: TrainingResult, table: pandas.DataFrame) -> dict[str, Any]:

@@ -12,9 +12,11 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 import tyro
 
+from ..filters.support.parallel import progress_bar
 from ..filters.support.seeds import child_seed
-from .experiment import Run, start_run, versions
+from .experiment import Run, open_run, versions
 from .main import run_command
+from .output import Output
 
 if TYPE_CHECKING:
     from ..baselines.gain_policy.constant_gains import ConstantGains
@@ -54,6 +56,8 @@ class Args:
     """file to which the weights are written too"""
     runs: Path = Path("runs")
     """where the run folder goes"""
+    json: bool = False
+    """print one JSON document instead of tables"""
 
 
 def run(args: Args) -> int:
@@ -70,28 +74,31 @@ def run(args: Args) -> int:
     recorded = load_all(args.recordings)
     if recorded:
         sets["recorded"] = recorded
-    folder = start_run("tune", args, args.seed, args.runs) if args.resume is None else resumed(args.resume, args.seed)
-    motions = TRAINING_MOTIONS.draw_many(config.seed, min(config.trajectories, 48))
-    print(f"searching constant gains of {args.filter} on {len(motions)} trajectories")
-    samples, refinements = (64, 60) if args.preset == "shipped" else (16, 20)
-    guesses = () if config.centre is None else (config.centre,)
-    constant = best_constant_gains(
-        tuned, motions, guesses=guesses, samples=samples, refinements=refinements, seed=args.seed
-    )
-    candidates = {"published": GainPolicy.neutral(tuned), "constant": GainPolicy.constant(tuned, constant.action)}
-    if args.method == "ppo":
-        candidates["policy"] = train(args, folder, constant.action)
-    rows = compare(tuned, candidates, sets)
-    for trajectories in sets.values():
-        rows += hindsight_rows(tuned, trajectories, constant)
-    folder.write_results(rows)
-    summary = means(rows, sets)
-    print_summary(summary, args.filter)
-    final = candidates["policy" if args.method == "ppo" else "constant"]
-    card = card_of(args, final, constant, summary)
-    print(f"weights: {final.save(folder.folder / 'policy', card)}")
-    if args.export is not None:
-        print(f"weights: {final.save(args.export, card)}")
+    folder = open_run("tune", args, may_differ=("steps", "test_trajectories", "recordings"))
+    with Output("tune", args) as out:
+        motions = TRAINING_MOTIONS.draw_many(config.seed, min(config.trajectories, 48))
+        out.say(f"searching constant gains of {args.filter} on {len(motions)} trajectories")
+        samples, refinements = (64, 60) if args.preset == "shipped" else (16, 20)
+        guesses = () if config.centre is None else (config.centre,)
+        constant = best_constant_gains(
+            tuned, motions, guesses=guesses, samples=samples, refinements=refinements, seed=args.seed
+        )
+        candidates = {"published": GainPolicy.neutral(tuned), "constant": GainPolicy.constant(tuned, constant.action)}
+        if args.method == "ppo":
+            candidates["policy"] = train(args, folder, constant.action)
+        rows = compare(tuned, candidates, sets)
+        for trajectories in sets.values():
+            rows += hindsight_rows(tuned, trajectories, constant)
+        folder.write_results(rows)
+        summary = means(rows, sets)
+        title = f"Inclination error of {args.filter}, mean of RMS over trajectories, deg"
+        out.table([{"gains": name, **values} for name, values in summary.items()], title)
+        final = candidates["policy" if args.method == "ppo" else "constant"]
+        card = card_of(args, final, constant, summary)
+        out.say(f"weights: {final.save(folder.folder / 'policy', card)}")
+        if args.export is not None:
+            out.say(f"weights: {final.save(args.export, card)}")
+        out.add(run=str(folder.folder), card=card)
     return 0
 
 
@@ -123,28 +130,15 @@ def load_all(paths: tuple[Path, ...]) -> list[Trajectory]:
     return usable
 
 
-def resumed(folder: Path, seed: int) -> Run:
-    """The run that is gone on with.
-
-    Raises:
-        FileNotFoundError: there is no such folder.
-    """
-    if not folder.is_dir():
-        raise FileNotFoundError(f"there is no run folder {folder}")
-    return Run(folder, "tune", seed)
-
-
 def train(args: Args, folder: Run, start: np.ndarray) -> GainPolicy:
     """Train a policy from a constant action, with a bar; the best look at validation trajectories is kept."""
-    from tqdm import tqdm
-
     from ..baselines.gain_policy.constant_gains import policy_errors
     from ..baselines.gain_policy.training import TRAINING_MOTIONS, train_policy
     from ..filters.adaptation.gains import tunable_filter
 
     config, kalman = training_config(args), tunable_filter(args.filter)
     unseen = TRAINING_MOTIONS.draw_many(child_seed(args.seed, VALIDATION_SEED), min(24, config.trajectories))
-    with tqdm(total=config.steps, desc=f"tune {args.filter}", unit="step") as bar:
+    with progress_bar(config.steps, f"tune {args.filter}", "step") as bar:
 
         def report(progress: Mapping[str, float]) -> None:
             bar.update(int(progress["steps"]) - bar.n)
@@ -210,14 +204,6 @@ def means(rows: list[dict[str, Any]], sets: Mapping[str, Sequence[Trajectory]]) 
             if values:
                 table.setdefault(estimator, {})[group] = round(float(np.mean(values)), 4)
     return table
-
-
-def print_summary(summary: Mapping[str, Mapping[str, float]], filter: str) -> None:
-    """A table on the terminal: gains a row, a set of trajectories a column."""
-    from .tables import print_table
-
-    rows = [{"gains": name, **values} for name, values in summary.items()]
-    print_table(rows, f"Inclination error of {filter}, mean of RMS over trajectories, deg")
 
 
 def card_of(

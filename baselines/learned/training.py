@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field
@@ -159,6 +160,7 @@ def train(
                     print(
                         f"epoch {trainer.epoch}/{config.epochs}: training {entry['training_deg']:.3f}°, "
                         f"held out {entry['validation_deg']:.3f}°",
+                        file=sys.stderr,
                         flush=True,
                     )
         finally:

@@ -9,6 +9,7 @@ from poise.filters.arrays.array import planar_controller
 from poise.scripts.array import Args
 from poise.scripts.experiment import start_run
 from poise.scripts.main import main
+from poise.scripts.output import Output
 from poise.scripts.report import print_comparison, wide_tables
 
 
@@ -27,10 +28,11 @@ def test_report_of_a_file_as_json(tmp_path, capsys):
     described = planar_controller(0.1).describe()
     path.write_text(json.dumps({name: described[name] for name in ("positions", "axes")}))
     assert main(["array", str(path), "--deviation", "0.3", "--json"]) == 0
-    report = json.loads(capsys.readouterr().out)
+    document = json.loads(capsys.readouterr().out)
+    report = document["summary"]
     assert (report["array"], report["rank"], report["of"]) == ("short", 4, 4)
     # σ_a / (√2 r)
-    deviation = {row["quantity"]: row["deviation"] for row in report["quantities"]}["alpha"]
+    deviation = {row["quantity"]: row["deviation"] for row in document["rows"]}["alpha"]
     assert abs(deviation - 0.3 / (2**0.5 * 0.1)) < 1e-9
 
 
@@ -70,6 +72,6 @@ def test_evaluate_shows_estimators_that_give_no_angle(tmp_path, capsys):
     assert second == "angular_rate: RMS distance, rad/s"
     assert tables[second][0]["estimator"] == "a"
     run = start_run("evaluate", Args("octa"), 0, tmp_path)
-    sections = print_comparison(pandas.DataFrame(rows), run)
+    sections = print_comparison(pandas.DataFrame(rows), run, Output("evaluate", None))
     assert "0.8" in capsys.readouterr().out
     assert "Figure: angular_rate-distance" in sections

@@ -35,7 +35,7 @@ def test_one_record_gathers_all_sensors(folder):
 def test_files_give_what_the_simulation_gave(folder, tmp_path, capsys):
     words = ["calibrate", "accelerometer", str(folder / "raw" / "accelerometer.csv")]
     assert main([*words, "--record", str(tmp_path / "a.json"), "--json"]) == 0
-    printed = json.loads(capsys.readouterr().out)
+    printed = json.loads(capsys.readouterr().out)["record"]
     assert printed["channels"]["imu/acc"] == load_calibration(folder / "record.json").describe()["channels"]["imu/acc"]
     words = ["calibrate", "gyroscope", str(folder / "raw" / "gyroscope.csv"), "--record", str(tmp_path / "a.json")]
     assert main(words) == 0
@@ -59,7 +59,7 @@ def test_evaluate_applies_a_record(folder, tmp_path, capsys):
         words = ["evaluate", str(tmp_path / "raw.h5"), "--estimators", "mekf", "--json"]
         capsys.readouterr()
         assert main([*words, "--runs", str(tmp_path / "runs"), "--calibration", str(path)]) == 0
-        rows = [json.loads(line) for line in capsys.readouterr().out.splitlines() if line.startswith("{")]
+        rows = json.loads(capsys.readouterr().out)["rows"]
         errors[name] = rows[0]["value"]
     assert errors["found"] < 0.3 * errors["nominal"]
 
@@ -68,7 +68,7 @@ def test_frame(tmp_path, capsys):
     path = tmp_path / "axes.csv"
     path.write_text("bx,by,bz,ox,oy,oz\n1,0,0,0,1,0\n0,1,0,-1,0,0\n0,0,1,0,0,1\n")
     assert main(["calibrate", "frame", str(path), "--record", str(tmp_path / "f.json"), "--json"]) == 0
-    printed = json.loads(capsys.readouterr().out)
+    printed = json.loads(capsys.readouterr().out)["record"]["details"]["frame"]
     np.testing.assert_allclose(printed["tracker_to_device"], [np.sqrt(0.5), 0, 0, -np.sqrt(0.5)], atol=1e-12)
     path.write_text("bx,by,bz,ox,oy,oz\n1,0,0,0,1,0\n0,1,0,1,0,0\n0,0,1,0,0,1\n")
     assert main(["calibrate", "frame", str(path), "--record", str(tmp_path / "f.json")]) == 2
@@ -125,7 +125,7 @@ def test_simulated_runs_do_not_spoil_machine_readable_output(tmp_path, capsys):
     words = ["--simulate", "--hold", "0.3", "--raw", str(tmp_path / "raw"), "--record", str(tmp_path / "r.json")]
     assert main(["calibrate", "gyroscope", *words, "--json"]) == 0
     output = capsys.readouterr()
-    assert set(json.loads(output.out)["channels"]) == {"imu/gyr"}
+    assert set(json.loads(output.out)["record"]["channels"]) == {"imu/gyr"}
     assert "simulated runs" in output.err
 
 

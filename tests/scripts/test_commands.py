@@ -84,10 +84,19 @@ def test_benchmark_compares_and_reports(episodes, tmp_path, capsys):
     words = ["benchmark", "--episodes", "1", "--trials", "1", "--runs", str(tmp_path), *estimators]
     assert main([*words, "--recordings", str(episodes / "hand_motion_0000.h5"), "--json"]) == 0
     captured = capsys.readouterr()
-    rows = [json.loads(line) for line in captured.out.splitlines()]
-    assert all(tuple(row) == COLUMNS for row in rows)
-    assert {row["trajectory"] for row in rows} == {"slow-1", "fast-1", "severe-1", "mixed-1", "hand_motion_0000"}
     (folder,) = (tmp_path / "benchmark").iterdir()
+    document = json.loads(captured.out)
+    assert {name: document[name] for name in ("command", "seed", "run")} == {
+        "command": "benchmark",
+        "seed": 0,
+        "run": str(folder),
+    }
+    parts = {row["table"] for row in document["rows"]}
+    assert {"simulation", "recordings"} < parts
+    assert len(parts) == 3
+    rows = [row for row in document["rows"] if row["table"] in ("simulation", "recordings")]
+    assert all(tuple(row) == ("table", *COLUMNS) for row in rows)
+    assert {row["trajectory"] for row in rows} == {"slow-1", "fast-1", "severe-1", "mixed-1", "hand_motion_0000"}
     report = (folder / "report.md").read_text()
     pictures = re.findall(r"!\[[^]]*\]\(([^)]*)\)", report)
     assert len(pictures) >= 6

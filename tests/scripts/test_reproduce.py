@@ -76,7 +76,7 @@ def test_an_interrupted_study_goes_on_and_refuses_other_arguments(tmp_path, caps
     assert start(tmp_path, "--resume", str(folder)) == 0
     assert files == {path: path.stat().st_mtime_ns for path in files}
     assert start(tmp_path, "--resume", str(folder), "--seed", "3") == 2
-    assert "was begun with seed 0, not 3" in capsys.readouterr().err
+    assert "was started with seed 0, not 3" in capsys.readouterr().err
     assert start(tmp_path, "--resume", str(tmp_path / "nothing")) == 2
 
 
@@ -84,7 +84,7 @@ def test_an_interrupted_study_goes_on_and_refuses_other_arguments(tmp_path, caps
 def test_a_folder_that_is_no_run_is_not_gone_on_with(text, tmp_path, capsys):
     (tmp_path / "args.json").write_text(text)
     assert start(tmp_path, "--resume", str(tmp_path)) == 2
-    assert "does not say how the run was begun" in capsys.readouterr().err
+    assert "does not say how the run was started" in capsys.readouterr().err
 
 
 def test_a_file_in_the_place_of_the_run_folder_is_explained(tmp_path, capsys):
@@ -95,8 +95,7 @@ def test_a_file_in_the_place_of_the_run_folder_is_explained(tmp_path, capsys):
 
 def test_rows_are_machine_readable(tmp_path, capsys):
     assert start(tmp_path, "--json") == 0
-    lines = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
-    assert lines[1] == {"table": "Squares", "number": 1, "square": 1}
+    assert json.loads(capsys.readouterr().out)["rows"][1] == {"table": "Squares", "number": 1, "square": 1}
 
 
 @pytest.mark.parametrize(

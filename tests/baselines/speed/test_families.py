@@ -49,7 +49,7 @@ def test_samples_are_repeated_forth_and_back():
 @pytest.mark.usefixtures("_hurry")
 def test_the_command_knows_the_families(capsys):
     assert main(["speed", "--what", "bicycle", "arrays", "--json"]) == 0
-    rows = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    rows = json.loads(capsys.readouterr().out)["rows"]
     groups = {row["group"].split(" (")[0] for row in rows}
     assert groups == {"platform-gyro", "planar-mean"}
     for group in {row["group"] for row in rows}:

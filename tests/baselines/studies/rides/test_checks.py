@@ -46,7 +46,10 @@ def test_the_command_prints_both_tables(monkeypatch, tmp_path, capsys):
     monkeypatch.setattr(ride_checks, "all_checks", lambda: iter([one]))
     monkeypatch.setattr(ride_inclinations, "inclination_rows", lambda: iter([{"scenario": "slow", "tilt": "1.0"}]))
     assert main(["rides", "--checks", "--json", "--runs", str(tmp_path)]) == 0
-    rows = [json.loads(line) for line in capsys.readouterr().out.splitlines() if line.startswith("{")]
-    assert rows == [one._asdict(), {"scenario": "slow", "tilt": "1.0"}]
+    rows = json.loads(capsys.readouterr().out)["rows"]
+    assert [{name: row[name] for name in row if name != "table"} for row in rows] == [
+        one._asdict(),
+        {"scenario": "slow", "tilt": "1.0"},
+    ]
     (folder,) = (tmp_path / "rides").iterdir()
     assert "Physical checks" in (folder / "report.md").read_text(encoding="utf-8")
