@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import ast
+import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
 import tyro
 
-from ..filters.support.names import unknown
+from ..filters.support.names import look_up
 from ..filters.support.parallel import progress_bar
 from .main import run_command
 from .output import Output
@@ -39,16 +40,17 @@ def environment_id(name: str) -> str:
     """The registered id of ``hand-motion`` or ``poise/HandMotion-v0``.
 
     Raises:
-        ValueError: there is none; the message lists those that can be recorded.
+        ValueError: there is none; the message lists those that there are.
     """
     import gymnasium
 
-    known = sorted(name for name in gymnasium.registry if name.startswith("poise/"))
-    words = "".join(word.capitalize() for word in name.split("-"))
-    for candidate in (name, *(id_ for id_ in known if id_.rsplit("-v", 1)[0] == f"poise/{words}")):
-        if candidate in known:
-            return candidate
-    raise ValueError(unknown("environment", name, known))
+    short = {short_name(id_): id_ for id_ in sorted(gymnasium.registry) if id_.startswith("poise/")}
+    return name if name in short.values() else look_up("environment", name, short)
+
+
+def short_name(env_id: str) -> str:
+    """``hand-motion`` of ``poise/HandMotion-v0``."""
+    return re.sub(r"(?<=[a-z])(?=[A-Z])", "-", env_id.split("/")[-1].rsplit("-v", 1)[0]).lower()
 
 
 def option(text: str) -> tuple[str, Any]:
