@@ -26,6 +26,9 @@ COLOURS = {
 }
 """Kind of estimator → colour."""
 
+TRUTH_COLOR = "black"
+"""Of what is true, in every figure."""
+
 
 def new_figure(width: float, height: float, rows: int = 1, columns: int = 1) -> tuple[Figure, list[Any]]:
     """A figure in inches, drawn without a screen, with ``rows`` × ``columns`` axes, row by row."""
@@ -40,6 +43,11 @@ def new_figure(width: float, height: float, rows: int = 1, columns: int = 1) -> 
         ax.grid(axis="both", color="#e4e6ea", linewidth=0.7)
         ax.set_axisbelow(True)
     return figure, list(axes)
+
+
+def legend_above(ax: Any) -> None:
+    """Put the legend above the axes, off the curves."""
+    ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=6, frameon=False, fontsize=8, borderaxespad=0.1)
 
 
 def save(figure: Figure, path: Path) -> Path:
