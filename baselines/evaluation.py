@@ -14,10 +14,10 @@ from ..filters.core import rotation
 from ..filters.core.consistency import consistency
 from ..filters.core.estimator import Estimator, run
 from ..filters.core.metrics import score
+from ..filters.core.model import Equations, equations_of
 from ..filters.core.quantity import ORIENTATION, RELATIVE_ORIENTATION, UP, Estimate, Quantity
 from ..filters.support.parallel import progress_bar
 from .registry import make_estimator
-from .rider_estimators import make_for, true_quantities
 
 if TYPE_CHECKING:
     import pandas
@@ -40,8 +40,8 @@ def evaluate(
 
     Args:
         estimators: names (see :func:`poise.list_estimators`), estimators, or a mapping label → name or estimator.
-            Each is adjusted to the sampling interval of each trajectory; of a recorded ride, those that are named are
-            told rider and bicycle (:func:`poise.baselines.rider_estimators.make_for`).
+            Each is adjusted to the sampling interval of each trajectory; those that are named are configured with the
+            rider, bicycle or device that its metadata describe (:func:`poise.make_estimator`).
         trajectories: trajectories, or paths of recordings.
         reference: estimator that stands in for the truth of trajectories that know none. Such rows name it in
             ``metric`` (``inclination to mekf-9``): they show agreement, not error.
@@ -121,9 +121,9 @@ def label_of(estimator: Estimator[Any]) -> str:
 
 
 def fitted(contender: str | Estimator[Any], trajectory: Trajectory) -> Estimator[Any]:
-    """An estimator at the trajectory's sampling interval; one that is only named is told who rides, if it can be."""
+    """An estimator at the trajectory's sampling interval; one that is named is configured with its metadata."""
     if isinstance(contender, str):
-        return make_for(contender, trajectory)
+        return make_estimator(contender, dt=trajectory.dt, metadata=trajectory.metadata)
     return at_interval(contender, trajectory.dt)
 
 
@@ -166,7 +166,8 @@ def errors(
 ) -> list[tuple[str, str, float, str]]:
     """Rows (quantity, metric, value, unit) of one run."""
     pose = with_up(estimate.pose)
-    derived = true_quantities(estimator, trajectory.truth)
+    equations = equations_of(estimator)
+    derived = equations.truth(trajectory.truth) if isinstance(equations, Equations) else {}
     if derived:
         trajectory = trajectory.replace(truth={**derived, **trajectory.truth})
     outputs = {quantity.name: quantity for quantity in (UP, *estimator.outputs)}

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 COLOURS = {
     "filter": "#1f5fa8",
-    "reference": "#6d737c",
+    "baseline": "#6d737c",
     "learned": "#c2571a",
     "adaptive": "#2c8c5a",
     "external": "#b08d1a",
@@ -75,7 +75,7 @@ def rms_bars(
     positions = np.arange(len(means))[::-1]
     limit = min(limit, 1.15 * float(means.max()))
     for position, (name, mean) in zip(positions, means.items(), strict=True):
-        colour = COLOURS.get(kinds.get(str(name), ""), COLOURS["reference"])
+        colour = COLOURS.get(kinds.get(str(name), ""), COLOURS["baseline"])
         ax.barh(position, min(mean, limit), height=0.62, color=colour, alpha=0.85)
         values = chosen.loc[chosen["estimator"] == name, "value"]
         inside = values[values <= limit]
@@ -131,7 +131,7 @@ def error_curves(
         style = styles[used.get(kind, 0) % len(styles)]
         used[kind] = used.get(kind, 0) + 1
         per_tick = error(UP, with_up(estimate.pose)[UP.name], truth) * DEGREES
-        colour = COLOURS.get(kind, COLOURS["reference"])
+        colour = COLOURS.get(kind, COLOURS["baseline"])
         errors.plot(time, per_tick, color=colour, linestyle=style, linewidth=0.9, label=label)
     errors.set_ylabel("inclination error, deg")
     errors.set_xlabel("time, s")

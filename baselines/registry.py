@@ -1,33 +1,66 @@
-"""Every estimator by name: filters and references of the ground floor, learned ones, filters with a gain policy.
+"""Every estimator by name: the filters, learned estimators, and filters whose gains a policy sets.
 
-The only place where names turn into estimators. The tables hold texts; an estimator is imported when it is made.
+The only place where names turn into estimators.
 """
 
 from __future__ import annotations
 
-import importlib
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
 from ..filters.core.estimator import Estimator
-from ..filters.registry import CATALOGUE
-from ..filters.registry import make as make_filter
+from ..filters.registry import FILTERS, Entry, Kind
 from ..filters.support.names import look_up
 
-Kind = Literal["filter", "reference", "learned", "adaptive", "external"]
+TRAINED: dict[str, Entry] = {
+    "external-acceleration+policy": Entry(
+        "baselines.gain_policy.adaptive:shipped",
+        "adaptive",
+        "external-acceleration, gains set by a policy trained with PPO",
+        "this package",
+        {"weights": "external_acceleration_policy"},
+        "filters.imu.external_acceleration:ExternalAcceleration",
+    ),
+    "bounded-motion+policy": Entry(
+        "baselines.gain_policy.adaptive:shipped",
+        "adaptive",
+        "bounded-motion, gains set by a policy trained with PPO",
+        "this package",
+        {"weights": "bounded_motion_policy"},
+        "filters.imu.bounded_motion:BoundedMotion",
+    ),
+    "gru": Entry(
+        "baselines.learned.estimator:shipped",
+        "learned",
+        "recurrent network, trained on simulated hand motion",
+        "this package",
+        describes="baselines.learned.estimator:LearnedEstimator",
+    ),
+}
+"""Name → estimator with shipped weights."""
+
+KINDS: dict[Kind, str] = {
+    "filter": "published or this package's",
+    "adaptive": "a filter whose gains a policy sets",
+    "learned": "a trained network",
+    "baseline": "a classical reference without tuning",
+    "external": "another package's, if that is installed",
+}
+"""Kind → what it is, in the order of lists."""
 
 
 @dataclass(frozen=True)
 class EstimatorInfo:
-    """What :func:`list_estimators` tells of an estimator.
+    """One estimator in :func:`list_estimators`.
 
     Attributes:
         name: for :func:`make_estimator`.
-        kind: ``filter`` (published or ours), ``reference`` (what everybody knows), ``learned``, ``adaptive`` (a filter
-            whose gains a policy sets), ``external`` (another package's, if that is installed).
-        description: one line.
+        kind: one of :data:`KINDS`.
+        description: what it estimates and how, in one line.
         channels: channels that it needs.
-        outputs: quantities that it gives.
+        outputs: quantities that it estimates.
+        source: where it was published.
     """
 
     name: str
@@ -35,66 +68,28 @@ class EstimatorInfo:
     description: str
     channels: tuple[str, ...]
     outputs: tuple[str, ...]
-
-
-@dataclass(frozen=True)
-class Trained:
-    """An estimator with shipped weights: what is listed of it, and the function ``module:name`` that makes it."""
-
-    info: EstimatorInfo
-    factory: str
-
-
-def _trained(name: str, kind: Kind, description: str, outputs: tuple[str, ...], factory: str) -> Trained:
-    return Trained(EstimatorInfo(name, kind, description, ("imu/gyr", "imu/acc"), outputs), factory)
-
-
-TRAINED: dict[str, Trained] = {
-    item.info.name: item
-    for item in (
-        _trained(
-            "gru",
-            "learned",
-            "recurrent network, trained on simulated hand motion",
-            ("up",),
-            "learned.estimator:shipped",
-        ),
-        _trained(
-            "external-acceleration+policy",
-            "adaptive",
-            "external-acceleration, gains set by a policy trained with PPO",
-            CATALOGUE["external-acceleration"].outputs,
-            "gain_policy.adaptive:shipped_external_acceleration",
-        ),
-        _trained(
-            "bounded-motion+policy",
-            "adaptive",
-            "bounded-motion, gains set by a policy trained with PPO",
-            CATALOGUE["bounded-motion"].outputs,
-            "gain_policy.adaptive:shipped_bounded_motion",
-        ),
-    )
-}
+    source: str
 
 
 def list_estimators() -> dict[str, EstimatorInfo]:
-    """All estimators by name: kind, description, channels that they need, quantities that they give."""
-    filters = {
-        name: EstimatorInfo(name, entry.kind, entry.description, entry.channels, entry.outputs)
-        for name, entry in CATALOGUE.items()
+    """All estimators by name: kind, description, channels that they need, quantities that they estimate, source."""
+    listed = {
+        name: EstimatorInfo(name, entry.kind, entry.description, entry.channels, entry.outputs, entry.source)
+        for name, entry in {**FILTERS, **TRAINED}.items()
     }
-    listed = filters | {name: item.info for name, item in TRAINED.items()}
-    order = ("filter", "adaptive", "learned", "reference", "external")
-    return dict(sorted(listed.items(), key=lambda item: order.index(item[1].kind)))
+    return dict(sorted(listed.items(), key=lambda item: list(KINDS).index(item[1].kind)))
 
 
-def make_estimator(name: str, **parameters: Any) -> Estimator[Any]:
+def make_estimator(name: str, *, metadata: Mapping[str, Any] | None = None, **parameters: Any) -> Estimator[Any]:
     """Make an estimator.
 
     Args:
         name: see :func:`list_estimators`.
+        metadata: of the recording that it shall run on (``trajectory.metadata``): a filter that can be is configured
+            with the rider's anthropometry, the bicycle's geometry or the device's array that they describe.
         parameters: ``dt``, the sampling interval in s (0.01 by default), and constants of the method, by the names of
-            its dataclass fields: ``make_estimator("external-acceleration", mode=3, dt=1 / 286)``.
+            its dataclass fields: ``make_estimator("external-acceleration", mode=3, dt=1 / 286)``. They win over
+            ``metadata``.
 
     Returns:
         The estimator, ready for :func:`poise.run`.
@@ -103,8 +98,4 @@ def make_estimator(name: str, **parameters: Any) -> Estimator[Any]:
         ValueError: an unknown name or parameter (the message lists the valid ones), or a value out of its range.
         ImportError: the package that an external estimator wraps is not installed.
     """
-    look_up("estimator", name, list_estimators())
-    if name in TRAINED:
-        module, function = TRAINED[name].factory.split(":")
-        return getattr(importlib.import_module(f".{module}", __package__), function)(**parameters)
-    return make_filter(name, **parameters)
+    return look_up("estimator", name, {**FILTERS, **TRAINED}).make(name, parameters, metadata)

@@ -15,8 +15,6 @@ from gymnasium import spaces
 from ..filters.adaptation.features import InnovationFeatures
 from ..filters.adaptation.gains import gain_sizes, tunable_filter
 from ..filters.adaptation.tuned import TunedFilter, TunedState
-from ..filters.bicycle.geometry import RiderGeometry
-from ..filters.bicycle.told import told, true_quantities
 from ..filters.core.kalman import KalmanFilter
 from ..filters.core.metrics import error
 from ..filters.core.quantity import Estimate, Quantity
@@ -36,7 +34,8 @@ class GainTuningEnv(gymnasium.Env[np.ndarray, np.ndarray]):
 
     Args:
         filter: name of a Kalman filter with gains (:func:`poise.list_estimators`), or such a filter; it must read a
-            gyroscope. A filter of rides is told who rides, where the trajectory says so.
+            gyroscope. It is configured with the rider and bicycle, or the device,
+            that the trajectory's metadata describe.
         gains: names of the gains to be tuned, in the order of the action; None for all.
         quantity: output of the filter whose error counts; None for ``up``, or the filter's first output.
         interval: time from decision to decision, s, rounded to ticks.
@@ -68,7 +67,7 @@ class GainTuningEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             raise ValueError(f"render_mode must be None: there is nothing to see, got {render_mode!r}")
         names = None if gains is None else tuple(gains)
         self.tuned = TunedFilter.of(tunable_filter(filter), names, InnovationFeatures(interval))
-        self._untold = self.tuned.kalman
+        self._published = self.tuned.kalman
         self.quantity = scored_quantity(self.tuned.kalman, quantity)
         self.reward_kind, self.consistency, self.render_mode = reward, float(consistency), render_mode
         size, actions = self.tuned.observation_size, self.tuned.actions
@@ -91,10 +90,8 @@ class GainTuningEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         missing = [name for name in channels if name not in trajectory.measurements]
         if missing:
             raise ValueError(f"trajectory {trajectory.name!r} lacks the channels {missing} that the filter reads")
-        kalman = self._untold.with_dt(trajectory.dt)
-        described = trajectory.metadata.get("geometry")
-        if described is not None:
-            kalman = told(kalman, RiderGeometry.read(described))
+        kalman = self._published.with_dt(trajectory.dt)
+        kalman = replace(kalman, model=kalman.model.configured(trajectory.metadata))
         self.tuned = replace(self.tuned, kalman=kalman)
         self._measurements = {name: trajectory.measurements[name] for name in channels}
         self._truth = true_values(trajectory, self.quantity, kalman)
@@ -315,7 +312,7 @@ def true_values(trajectory: Trajectory, quantity: Quantity, kalman: KalmanFilter
         ValueError: the trajectory does not know it.
     """
     if quantity.name not in trajectory.truth:
-        derived = true_quantities((quantity,), kalman.model, trajectory.truth)
+        derived = kalman.model.truth(trajectory.truth)
         if quantity.name in derived:
             return derived[quantity.name]
     return trajectory.truth_of(quantity.name)

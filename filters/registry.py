@@ -1,43 +1,27 @@
-"""Every estimator of this floor by name: what it is called, what it reads and gives, how it is made.
+"""Every filter by name: which class it is, and what the class cannot know of itself.
 
-The table holds texts only, so listing it imports nothing; modules (and packages that are wrapped) are loaded when an
-estimator is made.
+Channels, outputs and parameters are read from the classes. Listing them imports modules of this layer (NumPy only);
+packages that are wrapped are loaded when an estimator is made. A layer above adds entries of the same type
+(:mod:`poise.baselines.registry`).
 """
 
 from __future__ import annotations
 
 import importlib
-from collections.abc import Mapping
+import inspect
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields
+from functools import cached_property
 from typing import Any, Literal
 
 from .core.estimator import Estimator
+from .core.kalman import KalmanFilter
+from .core.model import Equations, Model, Recurrence
+from .core.observer import Observer
 from .support.names import look_up
 
-SIX = ("imu/gyr", "imu/acc")
-NINE = (*SIX, "imu/mag")
-PLANAR = ("planar/gyr", "array/acc")
-RELATIVE = ("up", "relative_orientation")
-TWO_GYRO = ("bicycle_imu/gyr", "trunk_imu/gyr", "relative/orientation")
-TWO_GYRO_ANGLES = ("bicycle/roll", "two-gyro/relative_angles")
-FORCE_INERTIAL = (
-    *("bicycle_imu/gyr", "bicycle_imu/acc", "trunk_imu/gyr", "trunk_imu/acc"),
-    *("seat/wrench", "seat/load_cells", "handlebar/force", "wheel/speed"),
-)
-FORCE_INERTIAL_ANGLES = ("bicycle/roll", "force-inertial/trunk_angles")
-LIMBS = tuple(f"{part}_{side}" for part in ("upper_arm", "thigh") for side in ("right", "left"))
-WHOLE_BODY = (
-    *(f"{place}/gyr" for place in ("bicycle_imu", "trunk_imu", *LIMBS)),
-    *("bicycle_imu/acc", "trunk_imu/acc", "seat/load_cells", "wheel/speed", "steer/angle", "crank/angle"),
-)
-WHOLE_BODY_ANGLES = (
-    "bicycle/roll",
-    "trunk/angles",
-    *(f"{joint}_{side}/angles" for side in ("right", "left") for joint in ("shoulder", "hip")),
-    *(f"{joint}_{side}/flexion" for side in ("right", "left") for joint in ("elbow", "knee")),
-)
-WORLD = ("orientation", "up")
-ARRAY_ORIENTATION = (*WORLD, "angular_rate", "external_acceleration", "virtual_position")
+Kind = Literal["filter", "adaptive", "learned", "baseline", "external"]
+ROOT = __package__.rpartition(".")[0]
 
 
 @dataclass(frozen=True)
@@ -45,203 +29,245 @@ class Entry:
     """One estimator.
 
     Attributes:
-        factory: ``module:class`` in this package; a model, a recurrence or an estimator.
-        kind: ``filter`` (published or ours), ``reference`` (what everybody knows), ``external`` (another package's).
-        description: one line.
-        channels: names of what it reads.
-        outputs: names of what it gives.
-        recursion: what runs the equations: ``KalmanFilter``, ``Observer``, or None for what is an estimator itself.
+        factory: a class of equations, a class of estimators, or a function that makes an estimator; or where it is,
+            ``package.module:name`` below the root of this package.
+        kind: ``filter`` (published or this package's), ``adaptive`` (a filter whose gains a policy sets), ``learned``,
+            ``baseline`` (a classical reference without tuning), ``external`` (another package's).
+        description: what it estimates and how, in one line.
+        source: where it was published.
         fixed: parameters that the name stands for; they cannot be given.
+        describes: the class whose channels and outputs are those of the estimator, where ``factory`` is a function.
     """
 
-    factory: str
-    kind: Literal["filter", "reference", "external"]
+    factory: str | Callable[..., Any]
+    kind: Kind
     description: str
-    channels: tuple[str, ...]
-    outputs: tuple[str, ...]
-    recursion: Literal["KalmanFilter", "Observer"] | None = None
+    source: str
     fixed: Mapping[str, Any] = field(default_factory=dict)
+    describes: str | type = ""
 
-    def load(self) -> type:
-        """The class of the equations or of the estimator."""
-        module, name = self.factory.split(":")
-        return getattr(importlib.import_module(f".{module}", __package__), name)
+    @cached_property
+    def made_by(self) -> Callable[..., Any]:
+        """The class or function that makes the estimator or its equations."""
+        return _load(self.factory)
+
+    @property
+    def runner(self) -> type | None:
+        """What runs the equations: ``KalmanFilter``, ``Observer``, or None for a complete estimator."""
+        if isinstance(self.made_by, type) and issubclass(self.made_by, Model):
+            return KalmanFilter
+        return Observer if isinstance(self.made_by, type) and issubclass(self.made_by, Recurrence) else None
+
+    @cached_property
+    def channels(self) -> tuple[str, ...]:
+        """Names of the channels that it needs."""
+        return self._names("channels")
+
+    @cached_property
+    def outputs(self) -> tuple[str, ...]:
+        """Names of the quantities that it estimates."""
+        return self._names("outputs")
+
+    def _names(self, attribute: str) -> tuple[str, ...]:
+        described = _load(self.describes) if self.describes else self.made_by
+        found = getattr(described, attribute)
+        if isinstance(found, property):  # depends on parameters
+            found = getattr(described(**self.fixed), attribute)
+        return tuple(each.name for each in found)
+
+    def make(self, name: str, parameters: Mapping[str, Any], metadata: Mapping[str, Any] | None = None) -> Any:
+        """The estimator; ``name`` is for messages. See :func:`make`."""
+        signature = inspect.signature(self.made_by).parameters
+        own, outer = set(signature) - set(self.fixed), set()
+        if self.runner:
+            outer = {item.name for item in fields(self.runner)} - {"model"}
+        unknown = sorted(set(parameters) - own - outer)
+        if unknown and not any(each.kind is each.VAR_KEYWORD for each in signature.values()):
+            raise ValueError(f"unknown parameters {unknown} of {name!r}; there are {sorted(own | outer)}")
+        given = {key: value for key, value in parameters.items() if key not in outer}
+        if metadata and isinstance(self.made_by, type) and issubclass(self.made_by, Equations):
+            found = self.made_by.parameters_from(metadata)
+            # a name that fixes the device stands for another one than that of the recording
+            given = given if set(found) & set(self.fixed) else found | given
+        made = self.made_by(**given, **self.fixed)
+        if self.kind == "external":
+            made.load()
+        if self.runner:
+            return self.runner(made, **{key: value for key, value in parameters.items() if key in outer})
+        return made
 
 
-def _filter(factory: str, description: str, channels: tuple[str, ...], outputs: tuple[str, ...]) -> Entry:
-    return Entry(factory, "filter", description, channels, outputs, "KalmanFilter")
+def _load(place: Any) -> Any:
+    if not isinstance(place, str):
+        return place
+    module, name = place.split(":")
+    return getattr(importlib.import_module(f"{ROOT}.{module}"), name)
 
 
-def _reference(factory: str, description: str, channels: tuple[str, ...], outputs: tuple[str, ...]) -> Entry:
-    return Entry(factory, "reference", description, channels, outputs, "Observer")
+HE = "He, thesis, Université Laval"
+THIS = "this package"
+TWO_GYRO = "Zhang, Chen, Yi et al."
+FORCE_INERTIAL = "Zhang, Chen, Yi 2013"
+WHOLE_BODY = "Zhang, Chen, Yi, Liu, Pan 2016"
+MAHONY = "Mahony, Hamel, Pflimlin 2008"
+WITH_MAGNETOMETER = "the same with a magnetometer"
 
-
-def _external(factory: str, axes: int, description: str, bias: bool) -> Entry:
-    outputs = (WORLD if axes == 9 else RELATIVE) + (("gyroscope_bias",) if bias else ())
-    return Entry(factory, "external", description, NINE[: axes // 3], outputs, None, {"axes": axes})
-
-
-CATALOGUE: dict[str, Entry] = {
-    "external-acceleration": _filter(
-        "imu.external_acceleration:ExternalAcceleration",
-        "Lee, Park, Robinovitch 2012: vertical and external acceleration; mode=1, 2 or 3",
-        SIX,
-        ("up", "external_acceleration"),
+FILTERS: dict[str, Entry] = {
+    "external-acceleration": Entry(
+        "filters.imu.external_acceleration:ExternalAcceleration",
+        "filter",
+        "inclination and external acceleration; mode=1, 2 or 3",
+        "Lee, Park, Robinovitch 2012",
     ),
-    "mekf": _filter(
-        "imu.mekf:MEKF", "multiplicative extended Kalman filter with gyroscope bias", SIX, (*RELATIVE, "gyroscope_bias")
+    "mekf": Entry(
+        "filters.imu.mekf:MEKF",
+        "filter",
+        "multiplicative extended Kalman filter with gyroscope bias",
+        "Lefferts, Markley, Shuster 1982",
     ),
-    "mekf-9": _filter(
-        "imu.mekf:MEKF9", "the same with the heading of a magnetometer", NINE, (*WORLD, "gyroscope_bias")
-    ),
-    "bounded-motion": _filter(
-        "imu.bounded_motion:BoundedMotion",
+    "mekf-9": Entry("filters.imu.mekf:MEKF9", "filter", "the same with the heading of a magnetometer", THIS),
+    "bounded-motion": Entry(
+        "filters.imu.bounded_motion:BoundedMotion",
+        "filter",
         "accelerates, but does not go anywhere: velocity near zero as pseudo-measurement",
-        SIX,
-        (*RELATIVE, "gyroscope_bias", "external_acceleration"),
+        THIS,
     ),
-    "bounded-motion-9": _filter(
-        "imu.bounded_motion:BoundedMotion9",
-        "the same with the heading of a magnetometer",
-        NINE,
-        (*WORLD, "gyroscope_bias", "external_acceleration"),
+    "bounded-motion-9": Entry(
+        "filters.imu.bounded_motion:BoundedMotion9", "filter", "the same with the heading of a magnetometer", THIS
     ),
-    "array-orientation": _filter(
-        "arrays.spatial.orientation:ArrayOrientation",
-        'He: orientation from an accelerometer array; array="controller", "octa" or your own',
-        ("imu/gyr", "array/acc", "imu/mag"),
-        ARRAY_ORIENTATION,
+    "array-orientation": Entry(
+        "filters.arrays.spatial.orientation:ArrayOrientation",
+        "filter",
+        'orientation from an accelerometer array; array="controller", "octa" or your own',
+        HE,
     ),
     "array-orientation-imu": Entry(
-        "arrays.spatial.orientation:ArrayOrientation",
+        "filters.arrays.spatial.orientation:ArrayOrientation",
         "filter",
         "the same with the accelerometer of one IMU",
-        NINE,
-        ARRAY_ORIENTATION,
-        "KalmanFilter",
+        HE,
         {"array": "triaxial"},
     ),
     "array-rate": Entry(
-        "arrays.rate:ArrayRate",
+        "filters.arrays.rate:ArrayRate",
         "filter",
-        "He: angular rate from twelve accelerometers; method=weighted, time-integration, polynomial-roots or parsa",
-        ("array/acc",),
-        ("angular_rate", "angular_rate_covariance", "array-rate/weights"),
-        "Observer",
+        "angular rate from twelve accelerometers; method=weighted, time-integration, polynomial-roots or parsa",
+        HE,
     ),
-    "planar-orientation": _filter(
-        "arrays.planar.orientation:PlanarOrientation",
-        "He: angle in a vertical plane; method=extended (on the specific force) or linear (on the tilt angle)",
-        PLANAR,
-        ("planar/angle",),
+    "planar-orientation": Entry(
+        "filters.arrays.planar.orientation:PlanarOrientation",
+        "filter",
+        "angle in a vertical plane; method=extended (on the specific force) or linear (on the tilt angle)",
+        HE,
     ),
-    "planar-pose": _filter(
-        "arrays.planar.pose:PlanarPose",
-        "He: complete pose in a vertical plane, from accelerometers alone",
-        PLANAR[1:],
-        ("planar/angle", "planar/angular_rate"),
+    "planar-pose": Entry(
+        "filters.arrays.planar.pose:PlanarPose",
+        "filter",
+        "complete pose in a vertical plane, from accelerometers alone",
+        HE,
     ),
     "planar-unscented": Entry(
-        "arrays.planar.unscented:PlanarUnscented",
+        "filters.arrays.planar.unscented:PlanarUnscented",
         "filter",
-        "He: angle in a vertical plane by the unscented filter of the package filterpy",
-        PLANAR,
-        ("planar/angle",),
+        "angle in a vertical plane by the unscented filter of the package filterpy",
+        HE,
     ),
     "planar-mean": Entry(
-        "arrays.planar.mean:PlanarMean",
+        "filters.arrays.planar.mean:PlanarMean",
         "filter",
-        "He: angle in a vertical plane; method=weighted mean of the other two, integration or tilt",
-        PLANAR,
-        ("planar/angle",),
-        "Observer",
+        "angle in a vertical plane; method=weighted mean of the other two, integration or tilt",
+        HE,
     ),
-    "marins": _filter(
-        "imu.marins:Marins",
-        "Marins et al. 2001: quaternion by Gauss-Newton, then a Kalman filter",
-        NINE,
-        (*WORLD, "angular_rate"),
+    "marins": Entry(
+        "filters.imu.marins:Marins", "filter", "quaternion by Gauss-Newton, then a Kalman filter", "Marins et al. 2001"
     ),
-    "two-gyro": _filter(
-        "bicycle.two_gyro.filter:TwoGyro",
-        "Zhang et al.: roll of a bicycle, attitude of the trunk; two gyroscopes and a camera; model=sigma1 or sigma2",
+    "two-gyro": Entry(
+        "filters.bicycle.two_gyro.filter:TwoGyro",
+        "filter",
+        "roll of a bicycle, attitude of the trunk; two gyroscopes and a camera; model=sigma1 or sigma2",
         TWO_GYRO,
-        (*TWO_GYRO_ANGLES, "two-gyro/body_up", "trunk_imu/gyroscope_bias", "two-gyro/platform_bias"),
     ),
-    "two-gyro-integration": _reference(
-        "bicycle.platform_gyro:TwoGyroIntegration",
-        "both gyroscopes integrated, nothing else",
+    "force-inertial": Entry(
+        "filters.bicycle.force_inertial.filter:ForceInertial",
+        "filter",
+        "roll of a bicycle, angles of the trunk; two IMUs, forces at seat and handlebar",
+        FORCE_INERTIAL,
+    ),
+    "whole-body": Entry(
+        "filters.bicycle.whole_body.filter:WholeBody",
+        "filter",
+        "a rider's trunk, arms and legs from six gyroscopes and the constraints at hands and feet",
+        WHOLE_BODY,
+    ),
+    "odometry-aided": Entry(
+        "filters.bicycle.odometry_aided:OdometryAided",
+        "filter",
+        "roll and pitch of a bicycle from its IMU and the wheel's speed: the wheel rolls and does not slide",
+        THIS,
+    ),
+    "two-gyro-integration": Entry(
+        "filters.bicycle.platform_gyro:TwoGyroIntegration",
+        "baseline",
+        "both gyroscopes integrated, no update",
         TWO_GYRO,
-        TWO_GYRO_ANGLES,
     ),
     "platform-gyro": Entry(
-        "bicycle.platform_gyro:PlatformGyro",
-        "reference",
+        "filters.bicycle.platform_gyro:PlatformGyro",
+        "baseline",
         "roll from the bicycle's gyroscope alone: pitch rate near zero as pseudo-measurement",
-        TWO_GYRO[:1],
-        ("bicycle/roll", "platform-gyro/bias"),
-        "KalmanFilter",
+        THIS,
     ),
-    "force-inertial": _filter(
-        "bicycle.force_inertial.filter:ForceInertial",
-        "Zhang, Chen, Yi 2013: roll of a bicycle, angles of the trunk; two IMUs, forces at seat and handlebar",
+    "force-inertial-integration": Entry(
+        "filters.bicycle.force_inertial.integration:ForceInertialIntegration",
+        "baseline",
+        "gyroscopes integrated from the angles that the first forces determine",
         FORCE_INERTIAL,
-        (*FORCE_INERTIAL_ANGLES, "trunk_imu/gyroscope_bias"),
     ),
-    "force-inertial-integration": _reference(
-        "bicycle.force_inertial.integration:ForceInertialIntegration",
-        "the same gyroscopes integrated from the angles that the first forces tell",
-        FORCE_INERTIAL,
-        FORCE_INERTIAL_ANGLES,
-    ),
-    "whole-body": _filter(
-        "bicycle.whole_body.filter:WholeBody",
-        "Zhang et al. 2016: a rider's trunk, arms and legs from six gyroscopes and what hands and feet hold",
+    "whole-body-integration": Entry(
+        "filters.bicycle.whole_body.integration:WholeBodyIntegration",
+        "baseline",
+        "six gyroscopes integrated, no update",
         WHOLE_BODY,
-        WHOLE_BODY_ANGLES,
     ),
-    "whole-body-integration": _reference(
-        "bicycle.whole_body.integration:WholeBodyIntegration",
-        "the same gyroscopes integrated, nothing else",
-        WHOLE_BODY,
-        WHOLE_BODY_ANGLES,
+    "gyroscope-integration": Entry(
+        "filters.imu.classical:GyroscopeIntegration",
+        "baseline",
+        "gyroscope alone, from the first inclination",
+        "textbook",
     ),
-    "odometry-aided": _filter(
-        "bicycle.odometry_aided:OdometryAided",
-        "roll and pitch of a bicycle from its IMU and the wheel's speed: the wheel rolls and does not slide",
-        ("bicycle_imu/gyr", "bicycle_imu/acc", "wheel/speed"),
-        ("bicycle/roll", "bicycle/pitch", "bicycle_imu/gyroscope_bias"),
+    "tilt": Entry("filters.imu.classical:Tilt", "baseline", "accelerometer alone, sample by sample", "textbook"),
+    "mahony": Entry(
+        "filters.imu.classical:Mahony",
+        "baseline",
+        "explicit complementary filter with bias, published gains",
+        MAHONY,
     ),
-    "gyroscope-integration": _reference(
-        "imu.classical:GyroscopeIntegration", "gyroscope alone, from the first inclination", SIX, RELATIVE
-    ),
-    "tilt": _reference("imu.classical:Tilt", "accelerometer alone, sample by sample", ("imu/acc",), ("up",)),
-    "mahony": _reference(
-        "imu.classical:Mahony", "Mahony, Hamel, Pflimlin 2008, published gains", SIX, (*RELATIVE, "gyroscope_bias")
-    ),
-    "mahony-9": _reference("imu.classical:Mahony9", "the same with a magnetometer", NINE, (*WORLD, "gyroscope_bias")),
-    "vqf": _external("external.packages:VQF", 6, "VQF, Laidig and Seel 2023, causal form (package vqf)", True),
-    "vqf-9": _external("external.packages:VQF", 9, "the same with a magnetometer (package vqf)", True),
-    "imufusion": _external("external.packages:IMUFusion", 6, "Fusion of x-io Technologies (package imufusion)", False),
-    "imufusion-9": _external(
-        "external.packages:IMUFusion", 9, "the same with a magnetometer (package imufusion)", False
-    ),
-    "ahrs-madgwick": _external("external.ahrs:AHRSMadgwick", 6, "Madgwick 2010 (package ahrs)", False),
-    "ahrs-madgwick-9": _external("external.ahrs:AHRSMadgwick", 9, "the same with a magnetometer (package ahrs)", False),
-    "ahrs-mahony": _external("external.ahrs:AHRSMahony", 6, "Mahony et al. 2008 (package ahrs)", True),
-    "ahrs-mahony-9": _external("external.ahrs:AHRSMahony", 9, "the same with a magnetometer (package ahrs)", True),
-    "ahrs-ekf": _external("external.ahrs:AHRSEKF", 6, "extended Kalman filter on the quaternion (package ahrs)", False),
-    "ahrs-ekf-9": _external("external.ahrs:AHRSEKF", 9, "the same with a magnetometer (package ahrs)", False),
+    "mahony-9": Entry("filters.imu.classical:Mahony9", "baseline", WITH_MAGNETOMETER, MAHONY),
+    **{
+        f"{name}{suffix}": Entry(
+            f"filters.external.{place}", "external", f"{text} (package {place.split(':')[0]})", source, {"axes": axes}
+        )
+        for name, place, description, source in (
+            ("vqf", "vqf:VQF", "VQF, causal form", "Laidig, Seel 2023"),
+            ("imufusion", "imufusion:IMUFusion", "Fusion of x-io Technologies", "Madgwick 2014"),
+            ("ahrs-madgwick", "ahrs:AHRSMadgwick", "gradient descent", "Madgwick 2010"),
+            ("ahrs-mahony", "ahrs:AHRSMahony", "explicit complementary filter", MAHONY),
+            ("ahrs-ekf", "ahrs:AHRSEKF", "extended Kalman filter on the quaternion", "documentation of ahrs"),
+        )
+        for suffix, axes, text in (("", 6, description), ("-9", 9, WITH_MAGNETOMETER))
+    },
 }
+"""Name → filter. A new one is an entry here; its class says the rest."""
 
 
-def make(name: str, **parameters: Any) -> Estimator[Any]:
-    """Make an estimator of this floor.
+def make(name: str, *, metadata: Mapping[str, Any] | None = None, **parameters: Any) -> Estimator[Any]:
+    """Make a filter.
 
     Args:
-        name: a key of :data:`CATALOGUE`.
+        name: a key of :data:`FILTERS`.
+        metadata: of a recording; the filter is configured with the person, vehicle or device that they describe.
         parameters: fields of the equations (``dt``, noises …) and of what runs them (``compiled``,
-        ``keep_covariance``).
+            ``keep_covariance``); they win over ``metadata``.
 
     Returns:
         The estimator.
@@ -251,27 +277,11 @@ def make(name: str, **parameters: Any) -> Estimator[Any]:
             refused.
         ImportError: the package that is wrapped is not installed.
     """
-    entry = look_up("estimator", name, CATALOGUE)
-    equations = entry.load()
-    recursion = _recursion(entry)
-    own = {item.name for item in fields(equations)} - set(entry.fixed)
-    outer = {item.name for item in fields(recursion)} - {"model"} if recursion else set()
-    unknown = sorted(set(parameters) - own - outer)
-    if unknown:
-        raise ValueError(f"unknown parameters {unknown} of {name!r}; there are {sorted(own | outer)}")
-    made = equations(**{key: value for key, value in parameters.items() if key in own}, **entry.fixed)
-    if recursion is None:
-        return made
-    return recursion(made, **{key: value for key, value in parameters.items() if key in outer})
+    return look_up("estimator", name, FILTERS).make(name, parameters, metadata)
 
 
-def _recursion(entry: Entry) -> type | None:
-    if entry.recursion == "KalmanFilter":
-        from .core.kalman import KalmanFilter
-
-        return KalmanFilter
-    if entry.recursion == "Observer":
-        from .core.observer import Observer
-
-        return Observer
-    return None
+def name_of(equations: Equations) -> str | None:
+    """The name under which equations are registered; None if they are not."""
+    kind = type(equations)
+    place = f"{kind.__module__.removeprefix(f'{ROOT}.')}:{kind.__qualname__}"
+    return next((name for name, entry in FILTERS.items() if entry.factory in (kind, place)), None)

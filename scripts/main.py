@@ -44,6 +44,7 @@ class Command(NamedTuple):
 
 
 COMMANDS: dict[str, Command] = {
+    "list": Command(".list", "estimators, environments, sensors, gestures, scenarios, file formats by name"),
     "record": Command(".record", "record trajectories of an environment into files"),
     "rides": Command(".rides", "ride every scenario with every rider; numbers beside those of the papers"),
     "train": Command(".train", "train a learned estimator"),

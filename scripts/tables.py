@@ -16,6 +16,9 @@ from rich.text import Text
 PIPE_WIDTH = 120
 """Columns of a table that does not go to a terminal."""
 
+LONGEST_NAME = 60
+"""Characters up to which a text stays on one line of a printed table."""
+
 
 def records(rows: Iterable[Any]) -> list[dict[str, Any]]:
     """Return rows as dictionaries.
@@ -96,11 +99,12 @@ def rich_table(
     names = _columns(data, columns)
     table = Table(title=title, title_justify="left")
     for name in names:
-        # Long headings of numbers break into lines; names stay whole.
+        # Long headings of numbers and sentences break into lines; names stay whole.
         if _numeric(data, name):
             table.add_column(name, justify="right", overflow="fold")
         else:
-            table.add_column(name, no_wrap=True)
+            longest = max((len(cell(record.get(name))) for record in data), default=0)
+            table.add_column(name, no_wrap=longest <= LONGEST_NAME)
     for record in data:
         # Text, so that a name in brackets is no markup.
         table.add_row(*(Text(cell(record.get(name), digits)) for name in names))

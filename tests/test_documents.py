@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-import poise
+from poise.scripts.list import LISTS, PLACED, updated
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCUMENTS = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
@@ -29,12 +29,15 @@ def test_links_lead_somewhere(path):
         assert target.startswith("http") or (path.parent / target).exists(), target
 
 
-def test_the_table_of_estimators_is_that_of_the_package():
-    text = (ROOT / "docs" / "estimators.md").read_text(encoding="utf-8")
-    listed = dict(re.findall(r"^\| `([^`]+)` \| ([a-z]+) \|", text, re.MULTILINE))
-    assert listed == {name: info.kind for name, info in poise.list_estimators().items()}
-    for info in poise.list_estimators().values():
-        assert info.description in text
+@pytest.mark.parametrize("path", DOCUMENTS, ids=lambda path: path.name)
+def test_lists_are_those_of_the_package(path):
+    text = path.read_text(encoding="utf-8")
+    assert updated(text) == text, f"run: poise list --update {path.relative_to(ROOT)}"
+
+
+def test_every_list_is_in_a_document():
+    texts = [path.read_text(encoding="utf-8") for path in DOCUMENTS]
+    assert {name for text in texts for name in PLACED.findall(text)} == set(LISTS)
 
 
 def test_the_table_of_environments_is_that_of_the_package():

@@ -161,13 +161,3 @@ def shipped(weights: str, dt: float = 0.01, **parameters: Any) -> AdaptiveEstima
     if unknown:
         raise ValueError(f"unknown parameters {unknown}; {type(model).__name__} has {sorted(known)}")
     return replace(estimator, filter=replace(estimator.filter, model=replace(model, **parameters)))
-
-
-def shipped_external_acceleration(dt: float = 0.01, **parameters: Any) -> AdaptiveEstimator:
-    """The external-acceleration filter with its shipped policy; see :func:`shipped`."""
-    return shipped("external_acceleration_policy", dt, **parameters)
-
-
-def shipped_bounded_motion(dt: float = 0.01, **parameters: Any) -> AdaptiveEstimator:
-    """The bounded-motion filter with its shipped policy; see :func:`shipped`."""
-    return shipped("bounded_motion_policy", dt, **parameters)

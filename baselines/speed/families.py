@@ -12,9 +12,8 @@ import numpy as np
 
 from ...filters.core.estimator import Estimator, run, run_by_steps
 from ...filters.core.kalman import KalmanFilter
-from ...filters.core.model import Model
+from ...filters.core.model import Model, equations_of
 from ..registry import list_estimators, make_estimator
-from ..rider_estimators import equations_of
 from .filters import Speed, measure
 from .fixtures import example
 
@@ -38,7 +37,7 @@ FAMILIES: dict[str, tuple[str, ...]] = {
         "planar-mean",
     ),
 }
-"""Part of ``poise speed`` → estimators; those that the zoo has not are left out."""
+"""Part of ``poise speed`` → estimators; those that the registry lacks are left out."""
 
 SAMPLES = 200
 """of an example; longer sequences repeat it"""

@@ -32,7 +32,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core.kalman import KalmanFilter
-from ..core.quantity import Estimate
+from ..core.quantity import GRAVITY, Estimate
 from ..core.rotation import cross
 
 STREAMS = ("innovation", "gyr", "acc", "external", "lean")
@@ -185,7 +185,7 @@ class InnovationFeatures:
         gyroscope, accelerometer = stream_channels(kalman)
         gyr = np.asarray(measurements[gyroscope], dtype=float)
         acc = np.full_like(gyr, np.nan) if accelerometer is None else np.asarray(measurements[accelerometer], float)
-        gravity = getattr(kalman.model, "gravity", 9.81)
+        gravity = getattr(kalman.model, "gravity", GRAVITY)
         innovation = np.asarray(estimate.innovation)
         # A whitened innovation is exactly 0 where there was nothing to compare.
         innovation = np.where((innovation != 0.0).any(axis=-1, keepdims=True), innovation, np.nan)

@@ -1,43 +1,27 @@
-r"""What an agent may choose: bounded actions, one for each gain of a filter, that are log factors on its constants.
+"""What an agent may choose: bounded actions, one for each gain of a filter, that are log factors on its constants.
 
 An action lies in [−1, 1]; 0 is the published tuning, exactly. Between 0 and ±1 the log factor is linear, with a slope
-of its own on each side (:class:`GainRange`). Variances may change by 10^±1.5 unless a model has a reason for less.
-
-The constant c_a of :mod:`poise.filters.imu.external_acceleration` has one. A steady tilt error e looks like an
-acceleration g e there: it shrinks the innovation to (1 − c_a) g e and raises the variance M to at least c_a² g² e² / 3.
-With the steady covariance P = Δt σ_G √M / g of small gains, the correction that results,
-
-    (1 − c_a) g e · Δt σ_G / √M  ≤  Δt · √3 σ_G (1 − c_a) / c_a,
-
-does not grow with e. A gyroscope that drifts faster than √3 σ_G (1 − c_a) / c_a carries the attitude away for good: the
-filter is locked out. :func:`log_gains` therefore keeps c_a so low that a drift of :data:`FOLLOWED_DRIFT` can be
-followed at the σ_G of the same action, and below :data:`LARGEST_C_A` in any case.
+of its own on each side (:class:`GainRange`). Variances may change by 10^±1.5 unless a gain declares ``bounds``; a model
+may limit gains further where together they would be unsafe (:meth:`poise.filters.core.model.Equations.limited`).
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..core.kalman import KalmanFilter
 from ..core.model import Model, parameters_of
-from ..imu.external_acceleration import ExternalAcceleration
-from ..registry import CATALOGUE, make
+from ..registry import make, name_of
 
 DECADES = 1.5
 """Powers of ten by which a variance may change either way.
 
 In the external-acceleration filter the ratio of its two variances sets the time constant, 0.1 s as published: it can
 change from 3 ms to 3 s, beyond which a biased gyroscope costs more than any acceleration."""
-LARGEST_C_A = 0.5
-"""Highest c_a that an action reaches; from 0.7 any bias of the gyroscope can lock the filter out."""
-SMALLEST_C_A = 1e-3
-"""Lowest c_a that an action reaches; as good as none."""
-FOLLOWED_DRIFT = math.radians(1.0)
-"""rad/s: gyroscope error that the external-acceleration filter must be able to follow at every action."""
 
 
 @dataclass(frozen=True)
@@ -63,36 +47,23 @@ class GainRange:
 
 
 def tunable_filter(filter: str | KalmanFilter) -> KalmanFilter:
-    """The filter of a name, or the filter itself.
+    """The filter of a name, without covariances, or the filter itself.
 
     Args:
-        filter: a Kalman filter of :data:`poise.filters.registry.CATALOGUE` that has gains, by name or made.
+        filter: a Kalman filter with gains, or the name of one in :data:`poise.filters.registry.FILTERS`.
 
     Raises:
-        ValueError: unknown name, or something that is no filter with gains.
+        ValueError: unknown name, or something that is not a Kalman filter with gains.
     """
-    names = [name for name, entry in CATALOGUE.items() if entry.recursion == "KalmanFilter"]
-    if isinstance(filter, str):
-        if filter not in names:
-            raise ValueError(f"unknown filter {filter!r}; known are {', '.join(names)}, or give a KalmanFilter")
-        made = make(filter, keep_covariance=False)
-        assert isinstance(made, KalmanFilter)
-        if not made.gains:
-            raise ValueError(f"filter must have gains to be tuned, {filter!r} has none")
-        return made
-    if not isinstance(filter, KalmanFilter) or not filter.gains:
-        raise ValueError(f"filter must be one of {', '.join(names)} or a KalmanFilter with gains, got {filter!r}")
-    return filter
+    made = make(filter) if isinstance(filter, str) else filter
+    if not isinstance(made, KalmanFilter) or not made.gains:
+        raise ValueError(f"filter must be a Kalman filter with gains, made or by name, got {filter!r}")
+    return replace(made, keep_covariance=False) if isinstance(filter, str) else made
 
 
-def filter_name(filter: str | KalmanFilter) -> str:
-    """Name by which a filter is known here, or the name of its model's class."""
-    if isinstance(filter, str):
-        tunable_filter(filter)
-        return filter
-    model = type(tunable_filter(filter).model)
-    place = f"{model.__module__.partition('.filters.')[2]}:{model.__qualname__}"
-    return next((name for name, entry in CATALOGUE.items() if entry.factory == place), model.__name__)
+def filter_name(filter: KalmanFilter) -> str:
+    """Name by which a filter is registered, or the name of its model's class."""
+    return name_of(filter.model) or type(filter.model).__name__
 
 
 def gain_ranges(kalman: KalmanFilter, gains: Sequence[str] | None = None) -> tuple[GainRange, ...]:
@@ -113,8 +84,10 @@ def gain_ranges(kalman: KalmanFilter, gains: Sequence[str] | None = None) -> tup
 
 
 def _range(model: Model, name: str) -> GainRange:
-    if isinstance(model, ExternalAcceleration) and name == "c_a" and model.c_a > 0.0:
-        lower, upper = (math.log(bound / model.c_a) for bound in (SMALLEST_C_A, LARGEST_C_A))
+    """Between the bounds that the gain declares, which reach to the published value at least; else :data:`DECADES`."""
+    gain = model.gains[name]
+    if gain.bounds is not None and (value := parameters_of(model)[gain.parameter]) > 0.0:
+        lower, upper = (math.log(bound / value) / gain.power for bound in gain.bounds)
         return GainRange(name, min(lower, 0.0), max(upper, 0.0))
     reach = DECADES * math.log(10.0)
     return GainRange(name, -reach, reach)
@@ -140,26 +113,7 @@ def log_gains(model: Model, ranges: Sequence[GainRange], action: np.ndarray) -> 
     bounded = np.minimum(np.maximum(action, -1.0), 1.0)
     reach = np.where(bounded < 0.0, [-part.lower for part in ranges], [part.upper for part in ranges])
     factors = bounded * reach
-    gains = {part.gain: factors[..., index] for index, part in enumerate(ranges)}
-    if isinstance(model, ExternalAcceleration) and "c_a" in gains and model.c_a > 0.0:
-        gains["c_a"] = np.minimum(gains["c_a"], np.log(_safe_c_a(model, gains) / model.c_a))
-    return gains
-
-
-def _safe_c_a(model: ExternalAcceleration, gains: Mapping[str, np.ndarray]) -> np.ndarray:
-    """Largest c_a that still follows a drift, as derived in the head of this file."""
-    power = model.gains["process"].power
-    noise = model.gyroscope_noise * np.exp(power * np.asarray(gains.get("process", 0.0)))
-    safe = np.minimum(followable_c_a(noise), LARGEST_C_A)
-    published = min(followable_c_a(model.gyroscope_noise), LARGEST_C_A)
-    # A tuning that was published beyond the limit stays reachable: the zero action changes nothing.
-    return safe * max(1.0, model.c_a / published)
-
-
-def followable_c_a(gyroscope_noise: np.ndarray | float) -> np.ndarray | float:
-    """c_a at which a drift of :data:`FOLLOWED_DRIFT` is the fastest that σ_G = ``gyroscope_noise`` (rad/s) follows."""
-    reach = math.sqrt(3.0) * gyroscope_noise
-    return reach / (reach + FOLLOWED_DRIFT)
+    return model.limited({part.gain: factors[..., index] for index, part in enumerate(ranges)})
 
 
 def gain_sizes(model: Model, gains: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:

@@ -1,12 +1,14 @@
-"""Arrays of accelerometers from names, JSON files and plain data."""
+"""Arrays of accelerometers from names, JSON files, plain data and the metadata of recordings."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
+from ..core.model import Equations
 from .array import ARRAYS, AccelerometerArray, PlanarArray
 
 
@@ -31,6 +33,23 @@ def read_array(described: Mapping[str, Any]) -> AccelerometerArray:
             ) from None
     kind = PlanarArray if all(len(row) == 2 for row in tables["positions"]) else AccelerometerArray
     return kind(tables["positions"], tables["axes"], str(described.get("name", "array")), tables["reference"][0])
+
+
+class ArrayEquations(Equations):
+    """Equations with a field ``array`` that a recording's device can determine."""
+
+    @classmethod
+    def parameters_from(cls, metadata: Mapping[str, Any]) -> dict[str, Any]:
+        """The array of ``metadata["device"]``, and whether it has a gyroscope, where the equations have that field."""
+        device = metadata.get("device")
+        # recordings of one IMU may name their sensor here
+        described = device.get("array") if isinstance(device, Mapping) else None
+        if described is None:
+            return {}
+        parameters: dict[str, Any] = {"array": read_array(described)}
+        if "gyroscope" in device and any(field.name == "gyroscope" for field in fields(cls)):
+            parameters["gyroscope"] = bool(device["gyroscope"])
+        return parameters
 
 
 def load_array(source: str | Path) -> AccelerometerArray:

@@ -38,15 +38,16 @@ Scale and alignment errors remain. The first rate must be known.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar, Literal, get_args
+from typing import ClassVar, Literal
 
 import numpy as np
 
 from ..core.backend import Array, constant, expand, namespace
 from ..core.matrices import solve_positive
-from ..core.model import Recurrence
+from ..core.model import Recurrence, check_positive
 from ..core.quantity import ANGULAR_RATE, GYROSCOPE, Channel, Measurement, Quantity
 from .array import OCTA, AccelerometerArray
+from .files import ArrayEquations
 from .products import product_jacobian, products, symmetric
 from .symmetric_matrix import diagonal, largest_eigenpair
 
@@ -112,7 +113,7 @@ def parsa_step(rate: Array, xi: Array) -> Array:
 
 
 @dataclass(frozen=True)
-class ArrayRate(Recurrence):
+class ArrayRate(ArrayEquations, Recurrence):
     """The weighted method, and the three that it is compared with.
 
     State: ω (3); for the weighted method also Σ/σ_a² (9), w (3), (S + Sᵀ)/σ_a² (9), β̂ (3), p/σ_a² and u/σ_a² (3 each).
@@ -145,15 +146,7 @@ class ArrayRate(Recurrence):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.method not in get_args(Method):
-            raise ValueError(f"method must be one of {get_args(Method)}, got {self.method!r}")
-        if self.variant not in get_args(Variant):
-            raise ValueError(f"variant must be one of {get_args(Variant)}, got {self.variant!r}")
-        if self.start not in ("known", "gyroscope"):
-            raise ValueError(f"start must be 'known' or 'gyroscope', got {self.start!r}")
-        for name in ("accelerometer_noise", "bias_time"):
-            if getattr(self, name) <= 0.0:
-                raise ValueError(f"{name} must be positive, got {getattr(self, name)}")
+        check_positive(self, "accelerometer_noise", "bias_time")
         if self.array.dimension != 3 or self.array.rank < 12:
             raise ValueError(
                 f"array {self.array.name!r} must be spatial and of rank 12 to tell an angular rate by itself, "

@@ -1,4 +1,4 @@
-"""Rider and bicycle in numbers: what a filter is told about the person and the machine it looks at.
+"""Anthropometry of a rider and geometry of a bicycle, and how filters are configured with them.
 
 The frame is the bicycle's: origin on the ground under the rear hub of the upright bicycle, x forward, y left, z up. The
 trunk's frame has its origin in the lumbar joint and z up the trunk. The right side mirrors the left (y changes sign).
@@ -10,6 +10,8 @@ import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
 from typing import Any, Self
+
+from ..core.model import Equations
 
 Point = tuple[float, float, float]
 ARM_MASS = 0.0494
@@ -106,6 +108,16 @@ class RiderGeometry:
         return {name: list(value) if isinstance(value, tuple) else value for name, value in asdict(self).items()}
 
     @classmethod
+    def of(cls, metadata: Mapping[str, Any]) -> Self:
+        """The geometry that a recording's metadata hold; the default person's if they hold none.
+
+        Raises:
+            ValueError: they hold something that is not a geometry.
+        """
+        described = metadata.get("geometry")
+        return cls() if described is None else cls.read(described)
+
+    @classmethod
     def read(cls, described: Mapping[str, Any]) -> Self:
         """From what :meth:`describe` gave (``trajectory.metadata["geometry"]``).
 
@@ -141,3 +153,28 @@ POSITIVE = frozenset(
     ]
 )
 """Fields that must be positive."""
+
+
+class RiderEquations(Equations):
+    """Equations that are configured with a rider's anthropometry and a bicycle's geometry."""
+
+    @classmethod
+    def rider_parameters(cls, geometry: RiderGeometry) -> dict[str, Any]:
+        """The parameters that the geometry determines, by field: those of the same name unless a subclass says more."""
+        names = {field.name for field in fields(cls)} & {field.name for field in fields(geometry)}
+        return {name: getattr(geometry, name) for name in names}
+
+    @classmethod
+    def for_rider(cls, geometry: RiderGeometry, **parameters: Any) -> Self:
+        """The equations for one rider and bicycle.
+
+        Args:
+            geometry: of rider and bicycle.
+            parameters: other fields; they win over those of the geometry.
+        """
+        return cls(**(cls.rider_parameters(geometry) | parameters))
+
+    @classmethod
+    def parameters_from(cls, metadata: Mapping[str, Any]) -> dict[str, Any]:
+        """What ``metadata["geometry"]`` of a recorded ride determines."""
+        return {} if metadata.get("geometry") is None else cls.rider_parameters(RiderGeometry.of(metadata))

@@ -29,11 +29,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar
 
 from ..core.backend import Array, constant, expand, namespace
-from ..core.model import Gain, Model
-from ..core.quantity import Channel, Measurement, Quantity
+from ..core.model import Gain, Model, check_positive
+from ..core.quantity import GRAVITY, Channel, Measurement, Quantity
 from ..core.rotation import cross, level, normalize, roll_pitch, rotate, rotate_back, skew, to_matrix, up_in_body
 from ..imu.strapdown import (
     UNIT,
@@ -45,7 +45,7 @@ from ..imu.strapdown import (
     process_noise,
     transition,
 )
-from .geometry import RiderGeometry
+from .geometry import RiderEquations, RiderGeometry
 
 COUNTS = 1024
 """a turn of the wheel's encoder (256 lines, quadrature)"""
@@ -55,7 +55,7 @@ BIAS = Quantity("bicycle_imu/gyroscope_bias", "vector", 3, "rad/s")
 
 
 @dataclass(frozen=True)
-class OdometryAided(Model):
+class OdometryAided(RiderEquations, Model):
     """Roll (to the right positive) and pitch (nose down positive) of the bicycle, and the bias of its gyroscope.
 
     State: q (4), b (3), v (3), seconds since the last accelerometer sample.
@@ -99,7 +99,7 @@ class OdometryAided(Model):
     """s: for how long the last accelerometer sample stands in for missing ones"""
     lost_noise: float = 2.0
     """m/s²/√Hz: of the velocity beyond that"""
-    gravity: float = 9.81
+    gravity: float = GRAVITY
     """g, m/s²"""
 
     channels: ClassVar[tuple[Channel, ...]] = (
@@ -122,21 +122,18 @@ class OdometryAided(Model):
     def __post_init__(self) -> None:
         """Refuse what cannot be divided by, and measurements without noise."""
         super().__post_init__()
-        for name in ("wheel_step", "lateral_slip", "vertical_slip", "jump"):
-            if not getattr(self, name) > 0.0:
-                raise ValueError(f"{name} must be positive, got {getattr(self, name)}")
+        check_positive(self, "wheel_step", "lateral_slip", "vertical_slip", "jump")
 
     @classmethod
-    def for_rider(cls, geometry: RiderGeometry, **parameters: Any) -> Self:
-        """The filter on a bicycle: places of its sensors; ``parameters`` win."""
+    def rider_parameters(cls, geometry: RiderGeometry) -> dict[str, Any]:
+        """Where the IMU is mounted, and how far the wheel rolls between two counts of its encoder."""
         forward, _, height = geometry.bicycle_imu
-        told = {
+        return {
             "imu_forward": forward,
             "imu_height": height,
             "imu_tilt": geometry.bicycle_imu_tilt,
             "wheel_step": 2.0 * math.pi * geometry.wheel_radius / COUNTS,
         }
-        return cls(**{**told, **parameters})
 
     def prior(self, z: Measurement) -> tuple[Array, Array]:
         """Steady riding along the wheel: what is felt less ω × v is gravity; heading and bias zero."""

@@ -10,17 +10,19 @@ The body and the camera are not needed for that: what the paper's filter gains b
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar
 
 from ..core.backend import Array, constant, expand, namespace
-from ..core.model import Gain, Model, Recurrence
+from ..core.model import Gain, Model, Recurrence, check_positive
 from ..core.quantity import Channel, Measurement, Quantity
 from ..core.rotation import conjugate, exp, from_euler_xyz, multiply, normalize, to_euler_zyx
-from .geometry import RiderGeometry
+from .geometry import RiderEquations, RiderGeometry
 from .parameter_matrices import diagonal, zero_where_known
 from .relative_sensor import relative_angles
 from .two_gyro.kinematics import SIGNS, level_constraint, platform_rate
+from .two_gyro.truth import true_angles
 
 DEG = math.pi / 180.0
 ROLL = Quantity("bicycle/roll", "angle", 1, "rad")
@@ -29,7 +31,7 @@ PLATFORM_GYROSCOPE = Channel("bicycle_imu/gyr", 3, "rad/s")
 
 
 @dataclass(frozen=True)
-class PlatformGyro(Model):
+class PlatformGyro(RiderEquations, Model):
     """Extended Kalman filter on (8) with (5) as pseudo-measurement: the platform's gyroscope alone.
 
     State: φ, bias (3, paper's axes: x forward, y right, z down). The pseudo-measurement's noise is that of the
@@ -70,14 +72,12 @@ class PlatformGyro(Model):
     def __post_init__(self) -> None:
         """Refuse what cannot be divided by."""
         super().__post_init__()
-        for name in ("gyroscope_noise", "bias_time"):
-            if not getattr(self, name) > 0.0:
-                raise ValueError(f"{name} must be positive, got {getattr(self, name)}")
+        check_positive(self, "gyroscope_noise", "bias_time")
 
     @classmethod
-    def for_rider(cls, geometry: RiderGeometry, **parameters: Any) -> Self:
-        """The filter for a bicycle: how its sensor is mounted; ``parameters`` are other fields."""
-        return cls(**{"imu_tilt": geometry.bicycle_imu_tilt, **parameters})
+    def rider_parameters(cls, geometry: RiderGeometry) -> dict[str, Any]:
+        """How the sensor is mounted on the bicycle."""
+        return {"imu_tilt": geometry.bicycle_imu_tilt}
 
     def prior(self, z: Measurement) -> tuple[Array, Array]:
         """Roll as told, no bias."""
@@ -113,7 +113,7 @@ class PlatformGyro(Model):
 
 
 @dataclass(frozen=True)
-class TwoGyroIntegration(Recurrence):
+class TwoGyroIntegration(RiderEquations, Recurrence):
     """Both gyroscopes integrated, from the first frame of the camera and a roll that is told; nothing corrects.
 
     The rotation vector of each interval turns platform and body exactly if the axis stays within the interval.
@@ -135,9 +135,9 @@ class TwoGyroIntegration(Recurrence):
     state_size: ClassVar[int] = 8
 
     @classmethod
-    def for_rider(cls, geometry: RiderGeometry, **parameters: Any) -> Self:
-        """The integration for a bicycle: how its sensor is mounted; ``parameters`` are other fields."""
-        return cls(**{"imu_tilt": geometry.bicycle_imu_tilt, **parameters})
+    def rider_parameters(cls, geometry: RiderGeometry) -> dict[str, Any]:
+        """How the sensor is mounted on the bicycle."""
+        return {"imu_tilt": geometry.bicycle_imu_tilt}
 
     def prior(self, z: Measurement) -> Array:
         """Roll as told, no pitch, and what the camera sees."""
@@ -161,3 +161,8 @@ class TwoGyroIntegration(Recurrence):
             "bicycle/roll": to_euler_zyx(x[..., :4])[2][..., None],
             "two-gyro/relative_angles": relative_angles(x[..., 4:]),
         }
+
+    def truth(self, truth: Mapping[str, Any]) -> dict[str, Any]:
+        """Roll and relative angles, from the orientations of bicycle and trunk."""
+        orientations = {"bicycle/orientation", "trunk/orientation"}
+        return true_angles(truth, imu_tilt=self.imu_tilt) if orientations <= set(truth) else {}

@@ -9,10 +9,11 @@ run on NumPy, on torch and, traced once, as compiled code.
 from __future__ import annotations
 
 import copy
+import functools
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields, replace
-from typing import Any, ClassVar, Self, TypeVar
+from typing import Any, ClassVar, Literal, Self, TypeVar, get_args, get_origin, get_type_hints
 
 from .backend import Array
 from .quantity import Channel, Measurement, Quantity
@@ -29,6 +30,8 @@ class Gain:
         power: the field is multiplied by ``exp(power * log_factor)``. 0.5 for a standard deviation: the log factor then
             scales the variance, that is Q or R.
         maximum: the scaled field never exceeds this.
+        bounds: smallest and largest value of the scaled field that a gain policy may choose; None for a range of powers
+            of ten (:data:`poise.filters.adaptation.gains.DECADES`).
         description: what the gain does, in one line.
     """
 
@@ -36,6 +39,7 @@ class Gain:
     power: float = 0.5
     maximum: float = math.inf
     description: str = ""
+    bounds: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True)
@@ -60,7 +64,10 @@ class Equations:
     gains: ClassVar[Mapping[str, Gain]] = {}
 
     def __post_init__(self) -> None:
-        """Refuse parameters that are not finite numbers and intervals that are not positive."""
+        """Refuse parameters that are not finite numbers, choices that there are not, and intervals of no length."""
+        for name, choices in _choices(type(self)).items():
+            if getattr(self, name) not in choices:
+                raise ValueError(f"{name} must be one of {choices}, got {getattr(self, name)!r}")
         for field in fields(self):
             value = getattr(self, field.name)
             if isinstance(value, int) and isinstance(field.default, float):
@@ -82,6 +89,37 @@ class Equations:
     def with_dt(self, dt: float) -> Self:
         """The same equations for another sampling interval."""
         return replace(self, dt=float(dt))
+
+    @classmethod
+    def parameters_from(cls, metadata: Mapping[str, Any]) -> dict[str, Any]:
+        """The parameters that a recording's metadata determine, by field: of the person, the vehicle or the device.
+
+        Raises:
+            ValueError: the metadata describe something that cannot be.
+        """
+        return {}
+
+    def configured(self, metadata: Mapping[str, Any]) -> Self:
+        """The same equations for the person, vehicle or device that a recording's metadata describe.
+
+        Parameters that differ from their defaults were chosen by the caller, and stay.
+        """
+        found = type(self).parameters_from(metadata)
+        usual = type(self)() if found else self
+        return replace(
+            self, **{name: value for name, value in found.items() if getattr(self, name) == getattr(usual, name)}
+        )
+
+    def limited(self, gains: dict[str, Any]) -> dict[str, Any]:
+        """Log factors ``(*batch,)`` by gain, lowered where together they would make a filter unsafe; as given here."""
+        return gains
+
+    def truth(self, truth: Mapping[str, Any]) -> dict[str, Any]:
+        """True values ``(T, size)`` of outputs that only these equations define, from the truth of a recording.
+
+        Outputs that recordings name alike need no entry; where the truth lacks what is needed, the result is empty.
+        """
+        return {}
 
 
 @dataclass(frozen=True)
@@ -134,14 +172,39 @@ class Recurrence(Equations):
         raise NotImplementedError
 
 
-def check_choice(name: str, value: str, choices: tuple[str, ...]) -> None:
-    """Refuse a text that is none of ``choices``.
+def equations_of(estimator: Any) -> Any:
+    """The equations inside a filter, an observer or an adaptive filter; the estimator itself if it has none."""
+    for name in ("filter", "model"):
+        inner = getattr(estimator, name, None)
+        # equations may have a parameter of one of these names
+        if hasattr(inner, "channels"):
+            return equations_of(inner)
+    return estimator
+
+
+@functools.cache
+def _choices(model: type[Equations]) -> dict[str, tuple[Any, ...]]:
+    """Field → the values that its annotation as a ``Literal`` allows."""
+    try:
+        hints = get_type_hints(model)
+    except NameError:  # an annotation names something that is not there when the program runs
+        return {}
+    return {name: get_args(hint) for name, hint in hints.items() if get_origin(hint) is Literal}
+
+
+def check_positive(model: Equations, *names: str, or_zero: tuple[str, ...] = ()) -> None:
+    """Refuse parameters (numbers or tuples of them) that are not positive, or negative where zero is allowed.
 
     Raises:
-        ValueError: names the parameter, the value and the choices.
+        ValueError: names the parameter and its value.
     """
-    if value not in choices:
-        raise ValueError(f"{name} must be one of {choices}, got {value!r}")
+    for name in (*names, *or_zero):
+        value = getattr(model, name)
+        smallest = min(value) if isinstance(value, tuple) else value
+        if name in or_zero and smallest < 0.0:
+            raise ValueError(f"{name} must not be negative, got {value}")
+        if name in names and smallest <= 0.0:
+            raise ValueError(f"{name} must be positive, got {value}")
 
 
 def checked_quaternion(name: str, value: Any) -> tuple[float, ...]:

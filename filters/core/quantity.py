@@ -16,6 +16,12 @@ Measurement = Mapping[str, Array]
 """Channel name → array ``(..., size)``; NaN where a channel brought no sample at this tick."""
 
 
+GRAVITY = 9.81
+"""m/s²: gravity as papers and theses round it; the default of the filters."""
+STANDARD_GRAVITY = 9.80665
+"""m/s²: one g_n, the unit in which sensors are calibrated and simulated."""
+
+
 @dataclass(frozen=True)
 class Channel:
     """A stream of samples: its name, its width and its unit."""

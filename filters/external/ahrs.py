@@ -1,6 +1,6 @@
-"""The classical filters of the package ``ahrs`` behind the protocol of this one: Madgwick, Mahony, extended Kalman.
+"""The classical filters of the package ``ahrs`` with the interface of this one: Madgwick, Mahony, extended Kalman.
 
-See :mod:`poise.filters.external.packages` for what all wrappers do alike. The package's filters start from an attitude
+See :mod:`poise.filters.external.wrapper` for what all wrappers do alike. The package's filters start from an attitude
 in frames that differ from filter to filter; here all start from the first complete sample: inclination from the
 accelerometer, heading from the magnetometer (zero without). Their memory is explicit. They are written in plain Python:
 expect 0.1 ms a sample.
@@ -16,7 +16,7 @@ import numpy as np
 
 from ..core.rotation import conjugate, level, multiply, normalize
 from ..imu.magnetic_heading import align, norm_and_dip
-from .packages import QUARTER_TURN, ExternalPackage
+from .wrapper import QUARTER_TURN, ExternalPackage
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,7 @@ class AHRSFilter(ExternalPackage):
     package: ClassVar[str] = "ahrs"
 
     def _filters(self) -> Any:
-        self._import()
+        self.load()
         import ahrs.filters
 
         return ahrs.filters

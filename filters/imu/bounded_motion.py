@@ -38,6 +38,7 @@ from ..core.model import Gain, Model
 from ..core.quantity import (
     ACCELEROMETER,
     EXTERNAL_ACCELERATION,
+    GRAVITY,
     GYROSCOPE,
     GYROSCOPE_BIAS,
     MAGNETOMETER,
@@ -97,7 +98,7 @@ class BoundedMotion(Model):
     """m/s"""
     hold: float = 0.05
     """s: for how long the last accelerometer sample stands in for missing ones"""
-    gravity: float = 9.81
+    gravity: float = GRAVITY
     """g, m/s²"""
 
     channels: ClassVar[tuple[Channel, ...]] = (GYROSCOPE, ACCELEROMETER)

@@ -22,18 +22,38 @@ would be that of ε, which falls as c_a grows. The printed first-order rotation 
 100 Hz; ``exact_rotation`` replaces it by the exponential. The text never says how to start: here Z₀ = y_A/‖y_A‖,
 P₀ = 10⁻² I, sensor at rest.
 
+c_a is what a gain policy must not choose freely. A steady tilt error e looks like an acceleration g e: it shrinks the
+innovation to (1 − c_a) g e and raises the variance M to at least c_a² g² e² / 3. With the steady covariance
+P = Δt σ_G √M / g of small gains, the correction that results,
+
+    (1 − c_a) g e · Δt σ_G / √M  ≤  Δt · √3 σ_G (1 − c_a) / c_a,
+
+does not grow with e. A gyroscope that drifts faster than √3 σ_G (1 − c_a) / c_a carries the attitude away for good: the
+filter is locked out. :meth:`ExternalAcceleration.limited` therefore keeps c_a so low that a drift of
+:data:`FOLLOWED_DRIFT` can be followed at the σ_G of the same action, and below :data:`LARGEST_C_A` in any case.
+
 Not estimated: heading, gyroscope bias. Sustained acceleration cannot be told from tilt.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
-from typing import ClassVar, Literal
+from typing import Any, ClassVar, Literal
+
+import numpy as np
 
 from ..core.backend import Array, constant, expand, namespace
 from ..core.model import Gain, Model
 from ..core.quantity import ACCELEROMETER, EXTERNAL_ACCELERATION, GYROSCOPE, UP, Measurement
 from ..core.rotation import exp_matrix, norm, normalize, skew
+
+LARGEST_C_A = 0.5
+"""Highest c_a that a gain policy reaches; from 0.7 any bias of the gyroscope can lock the filter out."""
+SMALLEST_C_A = 1e-3
+"""Lowest c_a that a gain policy reaches; as good as none."""
+FOLLOWED_DRIFT = math.radians(1.0)
+"""rad/s: gyroscope error that the filter must be able to follow whatever a gain policy chooses."""
 
 
 @dataclass(frozen=True)
@@ -75,16 +95,12 @@ class ExternalAcceleration(Model):
     gains: ClassVar = {
         "process": Gain("gyroscope_noise", description="process variance σ_G²"),
         "measurement": Gain("accelerometer_noise", description="measurement variance σ_A²"),
-        "c_a": Gain("c_a", power=1.0, maximum=1.0, description="constant of the acceleration model"),
+        "c_a": Gain("c_a", 1.0, 1.0, "constant of the acceleration model", (SMALLEST_C_A, LARGEST_C_A)),
     }
 
     def __post_init__(self) -> None:
-        """Refuse a mode, a sample or a c_a that the paper does not know."""
+        """Refuse a c_a out of its range."""
         super().__post_init__()
-        if self.mode not in (1, 2, 3):
-            raise ValueError(f"mode must be 1, 2 or 3, got {self.mode!r}")
-        if self.gyroscope_sample not in ("current", "previous"):
-            raise ValueError(f"gyroscope_sample must be 'current' or 'previous', got {self.gyroscope_sample!r}")
         if not 0.0 <= self.c_a <= 1.0:
             raise ValueError(f"c_a must lie in [0, 1], got {self.c_a}")
 
@@ -143,6 +159,17 @@ class ExternalAcceleration(Model):
         """The upward vertical and the external acceleration, both in sensor coordinates."""
         return {"up": x[..., :3], "external_acceleration": x[..., 3:6]}
 
+    def limited(self, gains: dict[str, Any]) -> dict[str, Any]:
+        """c_a so low that a drift of the gyroscope can be followed, as derived in the head of this file."""
+        if "c_a" not in gains or self.c_a <= 0.0:
+            return gains
+        noise = self.gyroscope_noise * np.exp(self.gains["process"].power * np.asarray(gains.get("process", 0.0)))
+        safe = np.minimum(followable_c_a(noise), LARGEST_C_A)
+        published = min(followable_c_a(self.gyroscope_noise), LARGEST_C_A)
+        # A tuning that was published beyond the limit stays reachable: the zero action changes nothing.
+        safe = safe * max(1.0, self.c_a / published)
+        return gains | {"c_a": np.minimum(gains["c_a"], np.log(safe / self.c_a))}
+
     def _is_static(self, y: Array) -> Array:
         xp = namespace(y)
         deviation = xp.abs(norm(y) - expand(self.gravity, 1))
@@ -153,3 +180,9 @@ class ExternalAcceleration(Model):
     def _static_samples(self, x: Array, y: Array) -> Array:
         """Length of the run of static samples that ends now, ``(..., 1)``."""
         return (x[..., 6:] + 1.0) * self._is_static(y)
+
+
+def followable_c_a(gyroscope_noise: Any) -> Any:
+    """c_a at which a drift of :data:`FOLLOWED_DRIFT` is the fastest that σ_G = ``gyroscope_noise`` (rad/s) follows."""
+    reach = math.sqrt(3.0) * gyroscope_noise
+    return reach / (reach + FOLLOWED_DRIFT)

@@ -38,7 +38,7 @@ from typing import ClassVar, Literal
 
 from ..core.backend import Array, constant, expand, namespace
 from ..core.matrices import block_diagonal, block_matrix, solve_positive
-from ..core.model import Gain, Model, check_choice, checked_quaternion
+from ..core.model import Gain, Model, checked_quaternion
 from ..core.quantity import (
     ACCELEROMETER,
     ANGULAR_RATE,
@@ -103,8 +103,6 @@ class Marins(Model):
     def __post_init__(self) -> None:
         """Refuse what is no start, and what must be positive and is not."""
         super().__post_init__()
-        check_choice("start", self.start, ("samples", "given"))
-        check_choice("field", self.field, ("start", "given"))
         object.__setattr__(self, "start_orientation", checked_quaternion("start_orientation", self.start_orientation))
         for name in ("quaternion_deviation", "gyroscope_deviation", "rate_deviation", "rate_time"):
             if getattr(self, name) <= 0.0:

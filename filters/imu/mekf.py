@@ -36,6 +36,7 @@ from ..core.backend import Array, constant, expand, namespace
 from ..core.model import Gain, Model
 from ..core.quantity import (
     ACCELEROMETER,
+    GRAVITY,
     GYROSCOPE,
     GYROSCOPE_BIAS,
     MAGNETOMETER,
@@ -72,7 +73,7 @@ class MEKF(Model):
     """rad"""
     bias_prior: float = 8.727e-3
     """rad/s (0.5 °/s)"""
-    gravity: float = 9.81
+    gravity: float = GRAVITY
     """g, m/s²"""
 
     channels: ClassVar[tuple[Channel, ...]] = (GYROSCOPE, ACCELEROMETER)

@@ -61,7 +61,7 @@ def test_missing_channels_and_packages_are_listed_not_fatal(trajectory, monkeypa
     def missing(name, **parameters):
         raise ImportError("pip install vqf")
 
-    monkeypatch.setattr("poise.baselines.rider_estimators.make_estimator", missing)
+    monkeypatch.setattr("poise.baselines.evaluation.make_estimator", missing)
     assert evaluate("vqf", trajectory).attrs["skipped"] == [("vqf", trajectory.name, "pip install vqf")]
 
 

@@ -10,9 +10,6 @@ from poise.envs.hand.trajectories import HandTrajectories
 from poise.filters.adaptation.features import InnovationFeatures
 from poise.filters.adaptation.gains import (
     DECADES,
-    FOLLOWED_DRIFT,
-    LARGEST_C_A,
-    followable_c_a,
     gain_ranges,
     gain_sizes,
     log_gains,
@@ -22,7 +19,12 @@ from poise.filters.adaptation.tuned import TunedFilter
 from poise.filters.core.kalman import KalmanFilter
 from poise.filters.core.metrics import direction_error
 from poise.filters.imu.bounded_motion import BoundedMotion
-from poise.filters.imu.external_acceleration import ExternalAcceleration
+from poise.filters.imu.external_acceleration import (
+    FOLLOWED_DRIFT,
+    LARGEST_C_A,
+    ExternalAcceleration,
+    followable_c_a,
+)
 
 FILTERS = ("external-acceleration", "bounded-motion")
 FAMILIES = ("constant", "random")
@@ -156,8 +158,8 @@ def test_recordings_are_read_from_files(tmp_path, trajectory):
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        ({"filter": "kalman"}, "unknown filter 'kalman'; known are external-acceleration"),
-        ({"filter": 3}, "filter must be one of"),
+        ({"filter": "kalman"}, "unknown estimator 'kalman'"),
+        ({"filter": 3}, "filter must be a Kalman filter"),
         ({"gains": ("process", "cheek")}, "gains must be different ones of"),
         ({"gains": ()}, "gains must be different ones of"),
         ({"quantity": "position"}, "quantity must be one of"),

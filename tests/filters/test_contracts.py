@@ -1,4 +1,4 @@
-"""What every estimator of the catalogue promises, whatever its method and whatever it reads."""
+"""What every registered filter promises, whatever its method and whatever it reads."""
 
 from __future__ import annotations
 
@@ -14,27 +14,25 @@ import torch
 from poise.filters.core import metrics, rotation
 from poise.filters.core.estimator import Estimator, run, run_by_steps
 from poise.filters.core.quantity import Estimate
-from poise.filters.registry import CATALOGUE, make
+from poise.filters.registry import FILTERS, make
 
 Data = dict[str, np.ndarray]
 Motion = Callable[..., Data]
 
-OWN = [name for name, entry in CATALOGUE.items() if entry.recursion]
+OWN = [name for name, entry in FILTERS.items() if entry.runner]
 SINGLE_IMU = [
     name
-    for name, entry in CATALOGUE.items()
+    for name, entry in FILTERS.items()
     if {"imu/acc"} <= set(entry.channels) <= {"imu/gyr", "imu/acc", "imu/mag"} and "up" in entry.outputs
 ]
 STRAPDOWN = [
     name
     for name in SINGLE_IMU
     # where the angular rate is a state, it follows the gyroscope with a lag
-    if "imu/gyr" in CATALOGUE[name].channels and "angular_rate" not in CATALOGUE[name].outputs
+    if "imu/gyr" in FILTERS[name].channels and "angular_rate" not in FILTERS[name].outputs
 ]
 TURNED = [
-    name
-    for name in SINGLE_IMU
-    if "imu/gyr" in CATALOGUE[name].channels and "angular_rate" not in CATALOGUE[name].outputs
+    name for name in SINGLE_IMU if "imu/gyr" in FILTERS[name].channels and "angular_rate" not in FILTERS[name].outputs
 ]
 """Methods whose attitude turns as the gyroscope says; others estimate the rate from it."""
 # Rounding is amplified by what a filter feeds back; the network of an external package computes in single precision.
@@ -63,13 +61,13 @@ def assert_same(first: Estimate, second: Estimate, tolerance: float = ROUNDING) 
 
 def made(name: str, **parameters: Any) -> Estimator[Any]:
     """An estimator, or a skipped test where the package that it wraps is missing."""
-    entry = CATALOGUE[name]
+    entry = FILTERS[name]
     if entry.kind == "external":
-        pytest.importorskip(entry.load().package)  # type: ignore[attr-defined]
+        pytest.importorskip(entry.made_by.package)  # type: ignore[attr-defined]
     return make(name, **parameters)
 
 
-@pytest.fixture(params=list(CATALOGUE))
+@pytest.fixture(params=list(FILTERS))
 def name(request: pytest.FixtureRequest) -> str:
     return str(request.param)
 
@@ -79,12 +77,14 @@ def estimator(name: str) -> Estimator[Any]:
     return made(name, dt=0.01)
 
 
-def test_catalogue_tells_the_truth(name: str, estimator: Estimator[Any], motion: Motion) -> None:
-    entry = CATALOGUE[name]
+def test_an_entry_says_what_the_estimator_reads_and_estimates(
+    name: str, estimator: Estimator[Any], motion: Motion
+) -> None:
+    entry = FILTERS[name]
     assert isinstance(estimator, Estimator)
     assert entry.channels == tuple(channel.name for channel in estimator.channels)
-    assert entry.outputs == tuple(quantity.name for quantity in estimator.outputs)
     estimate = run(estimator, motion(estimator, 0))
+    assert tuple(estimate.pose) == tuple(quantity.name for quantity in estimator.outputs)
     assert set(estimate.pose) == set(entry.outputs)
     for quantity in estimator.outputs:
         assert estimate.pose[quantity.name].shape == (80, quantity.size)
@@ -254,7 +254,7 @@ def test_a_drop_out_leaves_the_gyroscope(name: str, motion: Motion) -> None:
         up = rotation.rotate_back(rotation.exp(turn), up)
     error = float(metrics.direction_error(pose["up"][-1], up))
     # First-order integration in other packages, rest detection and the low-pass of VQF are theirs.
-    assert error < (0.05 if CATALOGUE[name].kind == "external" else 1e-9)
+    assert error < (0.05 if FILTERS[name].kind == "external" else 1e-9)
 
 
 def test_unknown_names_and_parameters_are_refused() -> None:

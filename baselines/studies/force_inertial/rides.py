@@ -16,12 +16,12 @@ from ....filters.analysis.bounds import posterior_bound
 from ....filters.bicycle.force_inertial.axes import true_angles
 from ....filters.bicycle.force_inertial.filter import ForceInertial
 from ....filters.bicycle.force_inertial.integration import ForceInertialIntegration
+from ....filters.bicycle.geometry import RiderGeometry
 from ....filters.core import rotation
 from ....filters.core.consistency import nees
 from ....filters.core.kalman import KalmanFilter
 from ....filters.core.observer import Observer
 from ...plots import new_figure
-from ...rider_estimators import geometry_or_usual
 from ..kit import Study, load_ride
 from ..report import DEVIATION, Report
 from .motion import DEG
@@ -113,19 +113,19 @@ def assess(path: Path) -> dict[str, Any]:
     """All numbers of one ride."""
     ride = load_ride(path)
     samples, truth, time = samples_of(ride)
-    told = geometry_or_usual(ride)
-    model = ForceInertial.for_rider(told, dt=ride.dt)
+    geometry = RiderGeometry.of(ride.metadata)
+    model = ForceInertial.for_rider(geometry, dt=ride.dt)
     found: dict[str, Any] = {"subject": ride.metadata.get("subject"), "filters": {}, "sources": {}}
     for name, options in FILTERS.items():
-        pose = KalmanFilter(ForceInertial.for_rider(told, dt=ride.dt, **options)).run(samples).pose
+        pose = KalmanFilter(ForceInertial.for_rider(geometry, dt=ride.dt, **options)).run(samples).pose
         found["filters"][name] = rms_after(errors_of(pose, truth), time)
     rng = np.random.default_rng(zlib.crc32(path.stem.encode()))
-    tape = ForceInertial.for_rider(measured(told, rng), dt=ride.dt)
+    tape = ForceInertial.for_rider(measured(geometry, rng), dt=ride.dt)
     found["filters"]["geometry measured"] = rms_after(errors_of(KalmanFilter(tape).run(samples).pose, truth), time)
     for source in SOURCES:
         pose = KalmanFilter(model).run(better_sensors(ride, model, source)).pose
         found["sources"][source] = rms_after(errors_of(pose, truth), time)
-    integrated = Observer(ForceInertialIntegration.for_rider(told, dt=ride.dt)).run(samples).pose
+    integrated = Observer(ForceInertialIntegration.for_rider(geometry, dt=ride.dt)).run(samples).pose
     estimate = KalmanFilter(model).run(samples)
     drift = {"integration": errors_of(integrated, truth), "this filter": errors_of(estimate.pose, truth)}
     found["drift"] = {
@@ -253,10 +253,11 @@ def _figure(report: Report, scenario: str, path: Path) -> None:
     """Estimates and truth of the first ride, beside integration."""
     ride = load_ride(path)
     samples, truth, time = samples_of(ride)
-    told = geometry_or_usual(ride)
+    geometry = RiderGeometry.of(ride.metadata)
+    integration = Observer(ForceInertialIntegration.for_rider(geometry, dt=ride.dt))
     poses = {
-        "integration": (Observer(ForceInertialIntegration.for_rider(told, dt=ride.dt)).run(samples).pose, "#b9bec7"),
-        "filter": (KalmanFilter(ForceInertial.for_rider(told, dt=ride.dt)).run(samples).pose, "#1f5fa8"),
+        "integration": (integration.run(samples).pose, "#b9bec7"),
+        "filter": (KalmanFilter(ForceInertial.for_rider(geometry, dt=ride.dt)).run(samples).pose, "#1f5fa8"),
     }
     figure, axes = new_figure(8.0, 7.0, 4)
     for index, (ax, name) in enumerate(zip(axes, ANGLES, strict=True)):

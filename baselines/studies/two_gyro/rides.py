@@ -11,6 +11,7 @@ import numpy as np
 
 from ....envs.data.trajectory import Trajectory
 from ....filters.analysis.bounds import posterior_bound, with_gaps
+from ....filters.bicycle.geometry import RiderGeometry
 from ....filters.bicycle.platform_gyro import PlatformGyro, TwoGyroIntegration
 from ....filters.bicycle.two_gyro.filter import TwoGyro
 from ....filters.bicycle.two_gyro.truth import true_angles, true_states
@@ -19,7 +20,6 @@ from ....filters.core.consistency import nees
 from ....filters.core.kalman import KalmanFilter
 from ....filters.core.observer import Observer
 from ....filters.core.quantity import Estimate
-from ...rider_estimators import geometry_or_usual
 from ..kit import Study, load_ride
 from ..report import DEVIATION, Report
 from .motion import DEG
@@ -78,7 +78,7 @@ def without_errors(
         body: ``trunk`` or ``disk``.
     """
     samples = dict(ride.measurements)
-    tilt = geometry_or_usual(ride).bicycle_imu_tilt
+    tilt = RiderGeometry.of(ride.metadata).bicycle_imu_tilt
     second = "trunk_imu" if body == "trunk" else "disk"
     places = {"bicycle_imu": ("bicycle", rotation.exp(np.array([0.0, -tilt, 0.0]))), second: (body, None)}
     for place, (frame, mounted) in places.items():
@@ -111,13 +111,13 @@ def errors_of(pose: Mapping[str, np.ndarray], truth: Mapping[str, np.ndarray]) -
 
 def estimates(ride: Trajectory) -> dict[str, Estimate]:
     """Every filter on the ride as it was recorded."""
-    told, dt = geometry_or_usual(ride), ride.dt
+    geometry, dt = RiderGeometry.of(ride.metadata), ride.dt
     found = {
-        name: KalmanFilter(TwoGyro.for_rider(told, dt=dt, **options)).run(ride.measurements)
+        name: KalmanFilter(TwoGyro.for_rider(geometry, dt=dt, **options)).run(ride.measurements)
         for name, options in FILTERS.items()
     }
-    found[ALONE] = KalmanFilter(PlatformGyro.for_rider(told, dt=dt)).run(ride.measurements)
-    found[INTEGRATED] = Observer(TwoGyroIntegration.for_rider(told, dt=dt)).run(ride.measurements)
+    found[ALONE] = KalmanFilter(PlatformGyro.for_rider(geometry, dt=dt)).run(ride.measurements)
+    found[INTEGRATED] = Observer(TwoGyroIntegration.for_rider(geometry, dt=dt)).run(ride.measurements)
     found[ZERO] = Estimate({"bicycle/roll": np.zeros((len(ride), 1))})
     return found
 
@@ -135,7 +135,7 @@ def summary(errors: Mapping[str, np.ndarray], time: np.ndarray) -> dict[str, flo
 def assess(path: Path) -> dict[str, Any]:
     """All numbers of one ride."""
     ride = load_ride(path)
-    truth, time, told = true_angles(ride.truth), ride.time, geometry_or_usual(ride)
+    truth, time, geometry = true_angles(ride.truth), ride.time, RiderGeometry.of(ride.metadata)
     found: dict[str, Any] = {"subject": ride.metadata.get("subject"), "ended": ride.metadata.get("ended")}
     found["length"] = float(time[-1])
     rate = ride.truth["bicycle/angular_rate"][:, 2] / DEG
@@ -150,7 +150,7 @@ def assess(path: Path) -> dict[str, Any]:
     found["sources"] = {}
     for name, options in SOURCES.items():
         samples = without_errors(ride, **options)
-        estimate = KalmanFilter(TwoGyro.for_rider(told, dt=ride.dt)).run(samples)
+        estimate = KalmanFilter(TwoGyro.for_rider(geometry, dt=ride.dt)).run(samples)
         found["sources"][name] = summary(errors_of(estimate.pose, truth), time)
     found["bound"] = efficiency(ride, truth)
     return found
@@ -177,7 +177,7 @@ def efficiency(ride: Trajectory, truth: Mapping[str, np.ndarray]) -> dict[str, l
 
     The bound knows white noise and drifting biases, no alignment error of the camera, so that is taken away.
     """
-    model = TwoGyro.for_rider(geometry_or_usual(ride), dt=ride.dt, orientation_noise=FRAME)
+    model = TwoGyro.for_rider(RiderGeometry.of(ride.metadata), dt=ride.dt, orientation_noise=FRAME)
     errors = errors_of(KalmanFilter(model).run(without_errors(ride, camera="white")).pose, truth)
     exact = with_gaps(without_errors(ride, gyroscopes="exact", camera="exact"), ride.measurements)
     orientations = {name: ride.truth[name] for name in ("bicycle/orientation", "trunk/orientation")}

@@ -19,7 +19,7 @@ difference φ̄ − φ̃: angles themselves (``wrapped=False``, print) cannot be
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar, Literal, get_args
+from typing import ClassVar, Literal
 
 from ...core.backend import Array, expand, namespace
 from ...core.model import Recurrence
@@ -42,11 +42,6 @@ class PlanarMean(PlanarEquations, Recurrence):
     """the error of the last gyroscope sample is in the last estimate already"""
 
     state_size: ClassVar[int] = 3
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if self.method not in get_args(Method):
-            raise ValueError(f"method must be one of {get_args(Method)}, got {self.method!r}")
 
     @property
     def channels(self) -> tuple[Channel, ...]:  # type: ignore[override]

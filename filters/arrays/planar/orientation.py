@@ -28,10 +28,11 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from ...core.backend import Array, constant, expand, namespace
-from ...core.model import Equations, Gain, Model
-from ...core.quantity import Channel, Measurement, Quantity
+from ...core.model import Gain, Model
+from ...core.quantity import GRAVITY, Channel, Measurement, Quantity
 from ...core.rotation import wrap
 from ..array import PLANAR, AccelerometerArray
+from ..files import ArrayEquations
 
 PLANAR_GYROSCOPE = Channel("planar/gyr", 1, "rad/s")
 """Angular rate about the normal of the plane, counter-clockwise."""
@@ -43,7 +44,7 @@ UNKNOWN_ANGLE = math.pi**2 / 3.0
 
 
 @dataclass(frozen=True)
-class PlanarEquations(Equations):
+class PlanarEquations(ArrayEquations):
     """Parameters and readings that the planar methods share.
 
     Raises:
@@ -65,15 +66,13 @@ class PlanarEquations(Equations):
     """σ_a, m/s² per sample (section 3.4.1)"""
     inertial_acceleration: float = 10.0
     """σ_b̈, m/s² per axis: how hard the controller is accelerated, inflated as it is no white noise"""
-    gravity: float = 9.81
+    gravity: float = GRAVITY
     """g, m/s²"""
 
     outputs: ClassVar[tuple[Quantity, ...]] = (PLANAR_ANGLE,)
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.start not in ("tilt", "known"):
-            raise ValueError(f"start must be 'tilt' or 'known', got {self.start!r}")
         if self.array.dimension != 2 or not self.array.determined[:2].all():
             raise ValueError(
                 f"array {self.array.name!r} must be planar and determine the specific force, got dimension "
@@ -135,11 +134,6 @@ class PlanarOrientation(PlanarEquations, Model):
         "measurement": Gain("inertial_acceleration", description="variance σ_b̈² of the inertial acceleration"),
     }
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if self.method not in ("extended", "linear"):
-            raise ValueError(f"method must be 'extended' or 'linear', got {self.method!r}")
-
     @property
     def residual_size(self) -> int:  # type: ignore[override]
         """Numbers in the residual."""
@@ -185,7 +179,7 @@ class PlanarOrientation(PlanarEquations, Model):
         return {PLANAR_ANGLE.name: x}
 
 
-def planar_force(angle: Any, acceleration: Any, gravity: float = 9.81) -> np.ndarray:
+def planar_force(angle: Any, acceleration: Any, gravity: float = GRAVITY) -> np.ndarray:
     """c̈ = Qᵀ(b̈ − g) ``(..., 2)``: what a point feels in body axes, m/s².
 
     Args:

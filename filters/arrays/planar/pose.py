@@ -22,7 +22,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import ClassVar, Literal, get_args
+from typing import ClassVar, Literal
 
 import numpy as np
 
@@ -77,8 +77,6 @@ class PlanarPose(PlanarEquations, Model):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.form not in get_args(Form):
-            raise ValueError(f"form must be one of {get_args(Form)}, got {self.form!r}")
         if self.form == "printed-noise" and not self.array.size == self.array.rank == 4:
             raise ValueError(
                 f"form 'printed-noise' fits four accelerometers of rank 4, {self.array.name!r} has {self.array.size} "

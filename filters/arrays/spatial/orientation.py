@@ -48,10 +48,11 @@ import numpy as np
 
 from ...core.backend import Array, constant, expand, namespace
 from ...core.matrices import block_diagonal, block_matrix
-from ...core.model import Gain, Model, check_choice, checked_quaternion
+from ...core.model import Gain, Model, check_positive, checked_quaternion
 from ...core.quantity import (
     ANGULAR_RATE,
     EXTERNAL_ACCELERATION,
+    GRAVITY,
     GYROSCOPE,
     MAGNETOMETER,
     ORIENTATION,
@@ -63,6 +64,7 @@ from ...core.quantity import (
 from ...core.rotation import exp_matrix, from_matrix, nearest_matrix, normalize, rotate, skew, to_matrix
 from ...imu.magnetic_heading import align, field_direction, known
 from ..array import ARRAYS, AccelerometerArray, recorded_channel
+from ..files import ArrayEquations
 from ..products import product_jacobian, products
 from .virtual_controller import VIRTUAL_POSITION, advance
 
@@ -71,7 +73,7 @@ ORTHOGONAL_PAIRS = ((1, 2), (2, 0), (0, 1))
 
 
 @dataclass(frozen=True)
-class ArrayOrientation(Model):
+class ArrayOrientation(ArrayEquations, Model):
     """The extended Kalman filter of chapter 5, its tilt-sensor and integration variants, and the virtual controller.
 
     State: rows of Q (9), α (3), ω (3), unit field in the world (3), velocity and position of the virtual controller
@@ -131,7 +133,7 @@ class ArrayOrientation(Model):
     (1.2° of tilt) settles at 5 cm"""
     velocity_damping: float = 2.0
     """K_d,v of the virtual controller, 1/s; our choice"""
-    gravity: float = 9.81
+    gravity: float = GRAVITY
     """g, m/s²"""
     gravity_sign: float = 1.0
     """−1 expects gravity of the readings as (5.17), (5.25), (5.30) print it; to show the erratum"""
@@ -156,16 +158,11 @@ class ArrayOrientation(Model):
             object.__setattr__(self, "array", ARRAYS[self.array])
         if self.geometry.dimension != 3:
             raise ValueError(f"array must be spatial, got the planar array {self.geometry.name!r}")
-        check_choice("method", self.method, ("fusion", "tilt", "integration"))
-        check_choice("start", self.start, ("samples", "given"))
-        check_choice("field", self.field, ("start", "given"))
         if self.method == "integration" and not self.gyroscope:
             raise ValueError("gyroscope must be True where method is 'integration': nothing else is integrated")
         for name in ("start_orientation", "magnetometer_mounting"):
             object.__setattr__(self, name, checked_quaternion(name, getattr(self, name)))
-        for name in ("position_damping", "velocity_damping"):
-            if getattr(self, name) <= 0.0:
-                raise ValueError(f"{name} must be positive (1/s), got {getattr(self, name)}")
+        check_positive(self, "position_damping", "velocity_damping")
 
     @property
     def geometry(self) -> AccelerometerArray:

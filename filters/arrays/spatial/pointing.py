@@ -12,6 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...core.backend import Array, namespace
+from ...core.quantity import GRAVITY
 from ...core.rotation import rotate
 
 
@@ -28,7 +29,7 @@ def pointing_angles(q: Array) -> tuple[Array, Array]:
     return xp.atan2(e[..., 2], xp.sqrt(e[..., 0] ** 2 + e[..., 1] ** 2)), xp.atan2(e[..., 0], e[..., 1])
 
 
-def tilt_error_bound(acceleration: Array, gravity: float = 9.81) -> Array:
+def tilt_error_bound(acceleration: Array, gravity: float = GRAVITY) -> Array:
     """Largest error ``(...)`` of the vertical, rad, if an accelerometer reading is taken for gravity.
 
     arcsin(|b̈| / g) (5.63), reached where b̈ is perpendicular to the *reading*; the printed arctangent holds where b̈ is

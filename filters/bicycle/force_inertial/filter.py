@@ -111,13 +111,6 @@ class ForceInertial(ForceInertialParameters, Model):
         "shoulder": Gain("shoulder_noise", description="variance of the shoulders' tilt"),
     }
 
-    def __post_init__(self) -> None:
-        """Refuse an option that there is not."""
-        super().__post_init__()
-        for name, known in OPTIONS.items():
-            if getattr(self, name) not in known:
-                raise ValueError(f"{name} must be one of {known}, got {getattr(self, name)!r}")
-
     @classmethod
     def published(cls, **parameters: Any) -> Self:
         """The paper's rider: a point mass that turns about a point of the seat (table I; the rest is not published)."""
@@ -321,16 +314,6 @@ class ForceInertial(ForceInertialParameters, Model):
         return rows([[entry if (i, j) == (0, 3) else H[..., i, j] for j in range(7)] for i in range(4)])
 
 
-OPTIONS = {
-    "acceleration": ("gyroscope", "accelerometer"),
-    "torque_model": ("dynamic", "static"),
-    "torque_reading": ("exact", "without-z", "printed"),
-    "roll_model": ("apparent-vertical", "printed", "none"),
-    "handlebar_load": ("each", "sum", "none"),
-    "form": ("corrected", "printed"),
-    "jacobian": ("full", "partial"),
-    "gyroscope_sample": ("current", "previous"),
-}
 PUBLISHED: dict[str, float] = {
     "dt": 0.02,
     "gravity": 9.8,

@@ -1,4 +1,4 @@
-"""What the force/inertial filter is told: rider, bicycle, sensors, noises; the defaults are our usual rider's.
+"""Parameters of the force/inertial filter: rider, bicycle, sensors, noises; the defaults are a usual rider's.
 
 All places are from the trunk's pivot (the lumbar joint; a point of the seat in the paper), forward and up in the
 bicycle's axes, m.
@@ -7,12 +7,14 @@ bicycle's axes, m.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Self
+from typing import Any
 
-from ...core.model import Equations
-from ...core.quantity import Channel
-from ..geometry import RiderGeometry
+from ...core.model import check_positive
+from ...core.quantity import GRAVITY, Channel
+from ..geometry import RiderEquations, RiderGeometry
+from .axes import true_angles
 from .forces import Masses, Pedals, SeatSensors
 from .rider import rider_parameters
 
@@ -30,12 +32,12 @@ CHANNELS = (
 
 
 @dataclass(frozen=True)
-class ForceInertialParameters(Equations):
+class ForceInertialParameters(RiderEquations):
     """Numbers that filter and integration share."""
 
     dt: float = 0.02
     """s; the paper's 50 Hz"""
-    gravity: float = 9.81
+    gravity: float = GRAVITY
     """m/s²"""
     imu_tilt: float = 10.0 * DEG
     """α, nose up (table I)"""
@@ -134,17 +136,18 @@ class ForceInertialParameters(Equations):
         """Refuse what cannot be divided by."""
         super().__post_init__()
         positive = ("trunk_mass", "trunk_height", "trunk_imu_height", "imu_forward", "bias_time", "cells_long")
-        for name in (*positive, "torque_noise", "roll_noise", "shoulder_noise"):
-            if not getattr(self, name) > 0.0:
-                raise ValueError(f"{name} must be positive, got {getattr(self, name)}")
-        for name in ("gyroscope_filter", "speed_filter", "carried_mass", "trunk_across", "trunk_along"):
-            if getattr(self, name) < 0.0:
-                raise ValueError(f"{name} must not be negative, got {getattr(self, name)}")
+        noises = ("torque_noise", "roll_noise", "shoulder_noise")
+        or_zero = ("gyroscope_filter", "speed_filter", "carried_mass", "trunk_across", "trunk_along")
+        check_positive(self, *positive, *noises, or_zero=or_zero)
 
     @classmethod
-    def for_rider(cls, geometry: RiderGeometry, **parameters: Any) -> Self:
-        """Told the person and the bicycle; ``parameters`` go over what the geometry says."""
-        return cls(**(rider_parameters(geometry) | parameters))
+    def rider_parameters(cls, geometry: RiderGeometry) -> dict[str, Any]:
+        """Lengths and masses of the rider, places of the sensors."""
+        return rider_parameters(geometry)
+
+    def truth(self, truth: Mapping[str, Any]) -> dict[str, Any]:
+        """The trunk's angles in the paper's frame, from the orientations of bicycle and trunk."""
+        return true_angles(truth) if {"bicycle/orientation", "trunk/orientation"} <= set(truth) else {}
 
     def masses(self) -> Masses:
         """What sits on the seat."""

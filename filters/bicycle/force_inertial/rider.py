@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...core.quantity import GRAVITY
 from ..geometry import ARM_MASS, RiderGeometry
 
 LEG_MASS = 0.1986
@@ -107,14 +108,14 @@ class Leg(NamedTuple):
     """of the pedal on the foot that holds the leg, N"""
 
 
-def resting_legs(geometry: RiderGeometry, gravity: float = 9.81) -> RestingLegs:
+def resting_legs(geometry: RiderGeometry, gravity: float = GRAVITY) -> RestingLegs:
     """Statics of two legs whose hips, knees and pedals are hinges without friction, over a turn of the cranks."""
     leg = resting_leg(geometry, np.linspace(0.0, 2.0 * np.pi, 72, endpoint=False), gravity)
     (forward, up), (back, down) = leg.centre.mean(axis=0), 2.0 * leg.push.mean(axis=0)
     return RestingLegs(float(forward), float(up), float(down), float(back))
 
 
-def resting_leg(geometry: RiderGeometry, crank: np.ndarray, gravity: float = 9.81) -> Leg:
+def resting_leg(geometry: RiderGeometry, crank: np.ndarray, gravity: float = GRAVITY) -> Leg:
     """Statics of one leg.
 
     Args:

@@ -28,10 +28,10 @@ from typing import Any, Literal, Self
 
 from ...core.backend import Array, constant, expand, namespace
 from ...core.matrices import block_diagonal, block_matrix
-from ...core.model import Gain, Model
+from ...core.model import Gain, Model, check_positive
 from ...core.quantity import Channel, Measurement, Quantity
 from ...core.rotation import rotate_back, wrap
-from ..geometry import Point, RiderGeometry
+from ..geometry import Point, RiderEquations, RiderGeometry
 from ..parameter_matrices import diagonal, times, values, zero_where_known, zeros
 from ..platform_gyro import ROLL
 from ..relative_sensor import MarkerPlaces, marker_distances, relative_angles, relative_orientation
@@ -48,6 +48,7 @@ from .kinematics import (
     substitution,
     substitution_derivative,
 )
+from .truth import true_angles
 
 DEG = math.pi / 180.0
 RELATIVE_ANGLES = Quantity("two-gyro/relative_angles", "angle", 3, "rad")
@@ -60,7 +61,7 @@ TRUNK = MarkerPlaces.of_trunk(RiderGeometry())
 
 
 @dataclass(frozen=True)
-class TwoGyro(Model):
+class TwoGyro(RiderEquations, Model):
     """The paper's extended Kalman filter, with both of its models.
 
     It reads ``bicycle_imu/gyr``, ``trunk_imu/gyr`` (or ``disk/gyr``) and the camera, whose frames may be rare.
@@ -132,44 +133,33 @@ class TwoGyro(Model):
     """m in the bicycle frame: from where the markers are seen"""
 
     def __post_init__(self) -> None:
-        """Refuse unknown words, and negative or vanishing standard deviations."""
+        """Refuse negative or vanishing standard deviations, and a constraint on Σ2."""
         super().__post_init__()
-        for name, words in WORDS.items():
-            if getattr(self, name) not in words:
-                raise ValueError(f"{name} must be one of {', '.join(words)}, got {getattr(self, name)!r}")
-        for name in POSITIVE:
-            value = getattr(self, name)
-            if min(value if isinstance(value, tuple) else (value,)) <= 0.0:
-                raise ValueError(f"{name} must be positive, got {value}")
-        for name in NOT_NEGATIVE:
-            if getattr(self, name) < 0.0:
-                raise ValueError(f"{name} must not be negative, got {getattr(self, name)}")
+        noises = ("body_gyroscope_noise", "platform_gyroscope_noise", "orientation_noise", "distance_noise")
+        drifts = ("constraint_noise", "body_bias_drift", "platform_bias_drift", "process_scale")
+        rough = ("zero_yaw_guard", "pitch_rate_noise", "roll_rate_noise")
+        times = ("body_bias_time", "platform_bias_time")
+        check_positive(self, *noises, *times, "roll_prior", "angle_prior", or_zero=(*drifts, *rough))
         if self.constraint and self.model != "sigma1":
             raise ValueError(f"constraint needs the bias of every axis, so model='sigma1', got {self.model!r}")
 
     @classmethod
-    def for_rider(cls, geometry: RiderGeometry, **parameters: Any) -> Self:
-        """The filter for a person: tilt of the sensor, usual posture, places of the markers on the back.
-
-        Args:
-            geometry: of rider and bicycle.
-            parameters: other fields.
-        """
+    def rider_parameters(cls, geometry: RiderGeometry) -> dict[str, Any]:
+        """Tilt of the sensor, usual posture, places of the markers on the back."""
         places = MarkerPlaces.of_trunk(geometry)
-        told = {
+        return {
             "imu_tilt": geometry.bicycle_imu_tilt,
             "initial_angles": (0.0, -geometry.trunk_flexion, 0.0),
             "pivot": places.pivot,
             "markers": places.markers,
             "viewpoints": places.viewpoints,
         }
-        return cls(**{**told, **parameters})
 
     @classmethod
     def for_disk(cls, **parameters: Any) -> Self:
         """The filter for ``poise/BicycleFixture-v0``: its markers, the slower gyroscope of the disk, a longer start."""
         places = MarkerPlaces.of_disk()
-        told = {
+        usual = {
             "body": "disk",
             "sensor": "distances",
             "body_gyroscope_noise": (0.03 * DEG,) * 3,
@@ -181,7 +171,7 @@ class TwoGyro(Model):
             "markers": places.markers,
             "viewpoints": places.viewpoints,
         }
-        return cls(**{**told, **parameters})
+        return cls(**{**usual, **parameters})
 
     # ---- what depends on the options ---------------------------------------------------------------------------------
 
@@ -301,6 +291,11 @@ class TwoGyro(Model):
             platform.name: x[..., 7:] * used,
         }
 
+    def truth(self, truth: Mapping[str, Any]) -> dict[str, Any]:
+        """Roll or pitch, θ, the body's vertical and the platform's biases, from the orientations of both bodies."""
+        orientations = {"bicycle/orientation", f"{self.body}/orientation"}
+        return true_angles(truth, self.body, self.imu_tilt, self.used_axes) if orientations <= set(truth) else {}
+
     # ---- parts -------------------------------------------------------------------------------------------------------
 
     @property
@@ -368,32 +363,3 @@ class TwoGyro(Model):
         drifts += [(self.platform_bias_drift, self.platform_bias_time)] * self.platform_rates
         biases = diagonal([2.0 * drift**2 / time for drift, time in drifts], 0.0 * x[..., :1])
         return expand(self.dt * self.process_scale**2, 2) * block_diagonal([L @ L.mT, biases])
-
-
-WORDS: dict[str, tuple[str, ...]] = {
-    "model": ("sigma1", "sigma2"),
-    "platform": ("bicycle", "segway"),
-    "body": ("trunk", "disk"),
-    "sensor": ("orientation", "distances"),
-    "integration": ("euler", "midpoint"),
-    "gyroscope_sample": ("current", "previous", "midpoint"),
-}
-POSITIVE = (
-    "body_gyroscope_noise",
-    "platform_gyroscope_noise",
-    "orientation_noise",
-    "distance_noise",
-    "body_bias_time",
-    "platform_bias_time",
-    "roll_prior",
-    "angle_prior",
-)
-NOT_NEGATIVE = (
-    "constraint_noise",
-    "body_bias_drift",
-    "platform_bias_drift",
-    "process_scale",
-    "zero_yaw_guard",
-    "pitch_rate_noise",
-    "roll_rate_noise",
-)

@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from ...core.rotation import conjugate, multiply, to_euler_zyx, up_in_body
 from ..relative_sensor import relative_angles
-from .filter import DEG, TwoGyro
 from .kinematics import in_paper_axes, platform_rate
+
+if TYPE_CHECKING:
+    from .filter import TwoGyro
 
 
 def true_angles(
     truth: Mapping[str, np.ndarray],
     body: Literal["trunk", "disk"] = "trunk",
-    imu_tilt: float = 10.0 * DEG,
+    imu_tilt: float = math.radians(10.0),
     used_axes: tuple[int, ...] = (0, 2),
 ) -> dict[str, np.ndarray]:
     """Quantity of :class:`.TwoGyro` → ``(T, size)``.

@@ -31,11 +31,11 @@ the frame, held ankles.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, ClassVar, Literal, Self
+from typing import Any, ClassVar, Literal
 
 from ...core.backend import Array, constant, expand, namespace
-from ...core.model import Gain, Model
-from ...core.quantity import Measurement
+from ...core.model import Gain, Model, check_positive
+from ...core.quantity import STANDARD_GRAVITY, Measurement
 from ...core.rotation import cross, euler_axes, euler_matrix, norm, skew
 from ..geometry import Point, RiderGeometry
 from . import constraints as limb_constraints
@@ -148,7 +148,7 @@ class WholeBody(RiderLinkage, Model):
     """m/s²: variances are multiplied by 1 + ((peak − threshold) / scale)²"""
     shock_time: float = 0.3
     """s, in which the peak decays"""
-    gravity: float = 9.80665
+    gravity: float = STANDARD_GRAVITY
     """m/s²"""
 
     state_size: ClassVar[int] = 33
@@ -163,29 +163,18 @@ class WholeBody(RiderLinkage, Model):
     }
 
     def __post_init__(self) -> None:
-        """Refuse what is not a choice."""
+        """Refuse unknown or repeated constraints, and what cannot be divided by."""
         super().__post_init__()
         object.__setattr__(self, "constraints", tuple(self.constraints))
         if not set(self.constraints) <= set(CONSTRAINTS) or len(set(self.constraints)) < len(self.constraints):
             raise ValueError(f"constraints must be different ones of {CONSTRAINTS}, got {self.constraints}")
-        for name in POSITIVE:
-            if not getattr(self, name) > 0.0:
-                raise ValueError(f"{name} must be positive, got {getattr(self, name)}")
-        choices = {
-            "knee_axis": ("x", "y"),
-            "lateral": ("corrected", "sign", "printed"),
-            "torque": ("seat_force", "printed"),
-            "sampling": ("interval", "instant"),
-        }
-        for name, allowed in choices.items():
-            if getattr(self, name) not in allowed:
-                raise ValueError(f"{name} must be one of {allowed}, got {getattr(self, name)!r}")
+        check_positive(self, *POSITIVE)
 
     @classmethod
-    def for_rider(cls, geometry: RiderGeometry, **parameters: Any) -> Self:
-        """The filter told about a person and a bicycle; ``parameters`` win over what the geometry says."""
+    def rider_parameters(cls, geometry: RiderGeometry) -> dict[str, Any]:
+        """Lengths and places of the linkage, and what of the rider's mass the seat carries."""
         turning, sitting = seat_moments(geometry)
-        return super().for_rider(geometry, **({"turning_moment": turning, "sitting_moment": sitting} | parameters))
+        return super().rider_parameters(geometry) | {"turning_moment": turning, "sitting_moment": sitting}
 
     @property
     def residual_size(self) -> int:  # type: ignore[override]

@@ -11,16 +11,15 @@ The paper's angles are the environment's: Θ is ``trunk/angles``, Φ ``shoulder_
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
-from typing import Any, ClassVar, Self
+from dataclasses import dataclass
+from typing import Any, ClassVar
 
 import numpy as np
 
 from ...core.backend import Array, constant, namespace
-from ...core.model import Equations
 from ...core.quantity import Channel, Measurement, Quantity
 from ...core.rotation import elementary_matrix, euler_matrix, exp, rotate
-from ..geometry import ARM_MASS, Point, RiderGeometry
+from ..geometry import ARM_MASS, Point, RiderEquations, RiderGeometry
 from . import constraints as limb_constraints
 from . import start as whole_body_start
 
@@ -84,7 +83,7 @@ def true_angles(truth: Mapping[str, Any]) -> dict[str, np.ndarray]:
 
 
 @dataclass(frozen=True)
-class RiderLinkage(Equations):
+class RiderLinkage(RiderEquations):
     """Geometry of rider and bicycle (m, environment's axes), the start, the angles of elbows and knees.
 
     State: φ (1), yaw acceleration (1), Θ (3), a_ts (3), Φ_r (3), Ψ_r (3), Φ_l (3), Ψ_l (3), steering and crank angle as
@@ -133,17 +132,6 @@ class RiderLinkage(Equations):
     channels: ClassVar[tuple[Channel, ...]] = CHANNELS
     outputs: ClassVar[tuple[Quantity, ...]] = OUTPUTS
     state_size: ClassVar[int] = 22
-
-    @classmethod
-    def for_rider(cls, geometry: RiderGeometry, **parameters: Any) -> Self:
-        """The equations told about a person and a bicycle.
-
-        Args:
-            geometry: lengths and places.
-            parameters: other fields; they win over the geometry's.
-        """
-        names = {field.name for field in fields(cls)} & {field.name for field in fields(geometry)}
-        return cls(**({name: getattr(geometry, name) for name in names} | parameters))
 
     @property
     def knee_to_pedal(self) -> Any:

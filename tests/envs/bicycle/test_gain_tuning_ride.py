@@ -112,7 +112,7 @@ def test_the_geometry_of_the_episode_reaches_the_filter():
     ("arguments", "words"),
     [
         ({"place": "thigh_left"}, "place must be one of"),
-        ({"filter": "kalman"}, "unknown filter 'kalman'"),
+        ({"filter": "kalman"}, "unknown estimator 'kalman'"),
         ({"scenario": "moon"}, "scenario must be one of"),
         ({"scenario": ()}, "at least one scenario"),
         ({"subject": 9}, "subject"),

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from poise.baselines.rider_estimators import geometry_or_usual
 from poise.baselines.studies.force_inertial.consistency import FREE, forces_for, ideal_consistency
 from poise.baselines.studies.force_inertial.motion import NO_ERRORS, Errors, draw_motion, simulate
 from poise.baselines.studies.force_inertial.rides import better_sensors, rms_after, samples_of
@@ -17,6 +16,7 @@ from poise.baselines.studies.report import Report
 from poise.envs.bicycle.environment import RiderBicycleEnv
 from poise.envs.record import record
 from poise.filters.bicycle.force_inertial.filter import ForceInertial
+from poise.filters.bicycle.geometry import RiderGeometry
 from poise.filters.core.kalman import KalmanFilter
 
 
@@ -66,7 +66,7 @@ def test_sensors_without_errors_are_the_environment_s():
         rides.append(record(env, seed=3))
         env.close()
     noisy, ideal = rides
-    model = ForceInertial.for_rider(geometry_or_usual(noisy))
+    model = ForceInertial.for_rider(RiderGeometry.of(noisy.metadata))
     found, (wanted, _, _) = better_sensors(noisy, model, "force sensors: exact"), samples_of(ideal)
     for name in ("seat/wrench", "handlebar/force"):
         length = min(len(found[name]), len(wanted[name]))

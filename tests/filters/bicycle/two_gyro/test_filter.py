@@ -322,7 +322,7 @@ def test_geometry_is_told():
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"model": "sigma3"}, "model must be one of sigma1, sigma2"),
+        ({"model": "sigma3"}, "model must be one of .*'sigma1', 'sigma2'"),
         ({"platform": "kayak"}, "platform must be"),
         ({"orientation_noise": 0.0}, "orientation_noise must be positive"),
         ({"pitch_rate_noise": -1.0}, "must not be negative"),

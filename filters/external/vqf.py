@@ -1,0 +1,70 @@
+"""VQF (package ``vqf``) with the interface of this package."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from ..core.backend import to_numpy
+from ..core.estimator import check_measurements, run_by_steps
+from ..core.quantity import GYROSCOPE, Estimate
+from .wrapper import ExternalPackage
+
+
+@dataclass(frozen=True)
+class VQF(ExternalPackage):
+    """VQF in its causal form, with bias estimation, rest detection and rejection of magnetic disturbances.
+
+    D. Laidig, T. Seel, "VQF: Highly accurate IMU orientation estimation with bias estimation and magnetic disturbance
+    rejection", Information Fusion 91, 2023, doi 10.1016/j.inffus.2022.10.014. Its memory is explicit: a dictionary.
+    """
+
+    tau_acc: float = 3.0
+    """s: time constant of the low-pass that finds the vertical"""
+    tau_mag: float = 9.0
+    """s: time constant of the correction of the heading"""
+
+    package: ClassVar[str] = "vqf"
+    gives_bias: ClassVar[bool] = True
+
+    def _engine(self) -> Any:
+        return self.load().VQF(self.dt, tauAcc=self.tau_acc, tauMag=self.tau_mag)
+
+    def begin(self, sample: np.ndarray) -> tuple[Any, np.ndarray]:
+        """The first sample is taken like every other."""
+        return self.advance(self._engine().state, sample)
+
+    def advance(self, memory: Any, sample: np.ndarray) -> tuple[Any, np.ndarray]:
+        """Restore, update by what is there, save."""
+        engine = self._engine()
+        engine.state = memory
+        output = self._update(engine, sample)
+        return engine.state, output
+
+    def _update(self, engine: Any, sample: np.ndarray) -> np.ndarray:
+        parts = [np.ascontiguousarray(part) for part in sample.reshape(-1, 3)]
+        for method, part in zip((engine.updateGyr, engine.updateAcc, engine.updateMag), parts, strict=False):
+            if np.isfinite(part).all():
+                method(part)
+        q = engine.getQuat9D() if self.axes == 9 else engine.getQuat6D()
+        return np.concatenate([q, engine.getBiasEstimate()[0]])
+
+    def run(self, measurements: Mapping[str, Any]) -> Estimate:
+        """As stepping, with the package's loop over whole sequences where every sample is there."""
+        arrays = check_measurements(self.channels, measurements, time_axis=True)
+        like = arrays[GYROSCOPE.name]
+        samples = np.concatenate([to_numpy(array) for array in arrays.values()], axis=-1, dtype=float)
+        if not np.isfinite(samples).all():
+            return run_by_steps(self, measurements)
+        length, shape = len(samples), (*tuple(like.shape[:-1]), 7)
+        sequences = np.moveaxis(samples.reshape(length, -1, self.axes), 1, 0)
+        outputs = np.empty((length, len(sequences), 7))
+        for index, sequence in enumerate(sequences):
+            parts = [np.ascontiguousarray(sequence[:, start : start + 3]) for start in range(0, self.axes, 3)]
+            result = self._engine().updateBatch(*parts)
+            outputs[:, index, :4] = result["quat9D" if self.axes == 9 else "quat6D"]
+            outputs[:, index, 4:] = result["bias"]
+        return self._estimate(outputs.reshape(shape), like)

@@ -1,0 +1,159 @@
+"""What there is: estimators, environments, sensors, gestures, scenarios of rides, file formats.
+
+Each list is read from the table that the package itself uses. Pages of the documentation hold these lists between
+``<!-- list: NAME -->`` and ``<!-- end of list -->``; ``--update`` writes them anew.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import tyro
+
+from .main import run_command
+from .output import Output
+from .tables import markdown_table
+
+Rows = list[dict[str, Any]]
+BEGIN, END = "<!-- list: {} -->", "<!-- end of list -->"
+PLACED = re.compile(r"<!-- list: ([a-z-]+) -->\n.*?<!-- end of list -->", re.DOTALL)
+"""A list in a page, with its name."""
+
+
+@dataclass
+class Args:
+    """Arguments of ``poise list``."""
+
+    lists: tyro.conf.Positional[tuple[str, ...]] = ()
+    """which lists: estimators, environments, sensors, gestures, scenarios, formats; all if none is named"""
+    markdown: bool = False
+    """print the tables in Markdown, as the documentation has them"""
+    update: tuple[Path, ...] = ()
+    """pages whose lists are written anew, for instance `poise list --update docs/*.md`"""
+    json: bool = False
+    """print one JSON document instead of tables"""
+
+
+def run(args: Args) -> int:
+    """Print the lists, or write them into pages."""
+    from ..filters.support.names import look_up
+
+    chosen = {name: look_up("list", name, LISTS) for name in args.lists or LISTS}
+    for page in args.update:
+        page.write_text(updated(page.read_text(encoding="utf-8")), encoding="utf-8")
+    if args.update:
+        return 0
+    with Output("list", args) as out:
+        for name, rows in chosen.items():
+            if args.markdown and not args.json:
+                out.say(f"{placed(name)}\n")
+            else:
+                out.rows(rows(), name)
+                out.show(rows(), name, ["name", *[key for key in rows()[0] if key in ("kind", "unit", "description")]])
+    return 0
+
+
+def placed(name: str) -> str:
+    """One list in Markdown with the marks around it."""
+    rows = [{**row, "name": f"`{row['name']}`"} for row in LISTS[name]()]
+    return f"{BEGIN.format(name)}\n{markdown_table(rows)}\n{END}"
+
+
+def updated(page: str) -> str:
+    """The text of a page with its lists written anew.
+
+    Raises:
+        ValueError: the page marks a list that does not exist.
+    """
+    unknown = sorted(set(PLACED.findall(page)) - set(LISTS))
+    if unknown:
+        raise ValueError(f"unknown lists {unknown}; there are {sorted(LISTS)}")
+    return PLACED.sub(lambda found: placed(found[1]), page)
+
+
+def estimators() -> Rows:
+    """Every estimator: kind, what it is, channels, outputs, source."""
+    from ..baselines.registry import list_estimators
+
+    return [
+        {
+            "name": info.name,
+            "kind": info.kind,
+            "description": info.description,
+            "channels": short(info.channels),
+            "outputs": short(info.outputs),
+            "source": info.source,
+        }
+        for info in list_estimators().values()
+    ]
+
+
+def environments() -> Rows:
+    """Every environment with the first sentence of its specification."""
+    import importlib
+
+    from ..envs import ENTRY_POINTS
+
+    rows = []
+    for name, place in ENTRY_POINTS.items():
+        module, kind = place.split(":")
+        described = getattr(importlib.import_module(module), kind).__doc__
+        rows.append({"name": name, "description": first_sentence(described)})
+    return rows
+
+
+def sensors() -> Rows:
+    """Every preset of a sensor: a device by its data sheet, or the errors of a published study."""
+    from ..envs.hand.devices import ARRAY_PRESETS
+    from ..envs.sensors.presets import PRESETS
+
+    kinds = ((PRESETS, "inertial sensor"), (ARRAY_PRESETS, "accelerometer array"))
+    return [{"name": each.name, "kind": kind, "description": each.source} for some, kind in kinds for each in some]
+
+
+def gestures() -> Rows:
+    """Every motion of a hand with the first sentence of its configuration."""
+    from ..envs.hand.gestures import GESTURES
+
+    return [{"name": name, "description": first_sentence(type(each).__doc__)} for name, each in GESTURES.items()]
+
+
+def scenarios() -> Rows:
+    """Every scenario of a ride."""
+    from ..envs.bicycle.course.scenarios import SCENARIOS
+
+    return [{"name": name, "description": each.summary} for name, each in SCENARIOS.items()]
+
+
+def formats() -> Rows:
+    """Every file format that :func:`poise.load_recording` reads."""
+    from ..envs.data.formats.load import FORMATS
+
+    return [{"name": each.name, "description": first_sentence(each.load.__doc__)} for each in FORMATS]
+
+
+LISTS: Mapping[str, Callable[[], Rows]] = {
+    function.__name__: function for function in (estimators, environments, sensors, gestures, scenarios, formats)
+}
+"""Name → rows."""
+
+
+def first_sentence(text: str | None) -> str:
+    """The first sentence of a docstring, on one line."""
+    paragraph = " ".join((text or "").strip().split("\n\n")[0].split())
+    sentence = re.split(r"(?<=\.)\s", paragraph)[0].rstrip(".")
+    return re.sub(r":\w+:`[~.]*([^`]+)`", r"`\1`", sentence).replace("``", "`")
+
+
+def short(names: Iterable[str]) -> str:
+    """Names on one line; ``imu/`` is understood, and both sides of a body are one name."""
+    seen = [re.sub(r"_(left|right)(?=/)", "_{left,right}", name.removeprefix("imu/")) for name in names]
+    return ", ".join(dict.fromkeys(seen))
+
+
+if __name__ == "__main__":
+    run_command("list")
