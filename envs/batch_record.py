@@ -9,8 +9,7 @@ from typing import Any
 
 from ..filters.support.parallel import in_parallel
 from ..filters.support.seeds import child_seeds
-from .data.storage import load_trajectory
-from .data.trajectory import Trajectory
+from .data.trajectory import Trajectory, load_trajectory
 
 
 def episode_path(folder: Path, env_id: str, index: int) -> Path:

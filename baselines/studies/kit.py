@@ -14,8 +14,7 @@ from typing import Any
 import numpy as np
 
 from ...envs.batch_record import record_episode
-from ...envs.data.storage import load_trajectory
-from ...envs.data.trajectory import Trajectory
+from ...envs.data.trajectory import Trajectory, load_trajectory
 from ...envs.record import plain
 from ...filters.support.files import write_text
 from ...filters.support.parallel import in_parallel

@@ -15,12 +15,12 @@ rate is aliased. This suits estimators that use the accelerometer in the attitud
 
 from __future__ import annotations
 
-from typing import Literal, NamedTuple
+from collections.abc import Mapping
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
 from ...filters.core import rotation
-from .trajectory import Trajectory
 
 LONGEST_STEP = 1.5
 """Samples of one sensor that are further apart than so many of its intervals have lost one between them."""
@@ -33,22 +33,20 @@ class Samples(NamedTuple):
     knots: np.ndarray
 
 
-def resample(trajectory: Trajectory, rate: float, sampling: Literal["interval", "instant"] = "interval") -> Trajectory:
-    """Resample to ``rate`` on the uniform grid that starts at the first tick.
+def resampled_fields(
+    old: np.ndarray,
+    channels: Mapping[str, np.ndarray],
+    truth: Mapping[str, np.ndarray],
+    mask: np.ndarray,
+    rate: float,
+    sampling: Literal["interval", "instant"] = "interval",
+) -> dict[str, Any]:
+    """Fields of a trajectory on the uniform grid of ``rate`` in Hz that starts at the first tick.
 
     By intervals, strapdown integration of the result passes through the attitudes of the original, and through its
     velocities, interpolated between old ticks. Nothing is filtered beyond the mean over an interval. At a higher rate
-    samples are repeated: no information is added.
-
-    Args:
-        trajectory: with uniform or other ticks.
-        rate: Hz.
-        sampling: what a sample is, the mean over the interval that ends at its tick or the value at its tick.
-
-    Returns:
-        The new trajectory. A sample is NaN if its interval overlaps a missing one, or an old neighbour is missing.
-        Orientations are interpolated on the great circle, other truth linearly, both NaN beside unknown truth. A tick
-        is scored if both its old neighbours are.
+    samples are repeated: no information is added. Arguments are those of
+    :meth:`poise.envs.data.trajectory.Trajectory.resampled`, stamps ``old`` strictly increasing.
 
     Raises:
         ValueError: ``rate`` is not positive and finite, or ``sampling`` unknown.
@@ -57,26 +55,25 @@ def resample(trajectory: Trajectory, rate: float, sampling: Literal["interval", 
         raise ValueError(f"sampling must be 'interval' or 'instant', got {sampling!r}")
     if not 0.0 < rate < np.inf:
         raise ValueError(f"rate must be a positive number of Hz, got {rate}")
-    old = trajectory.time
     # The tolerance keeps the last tick when the ratio of the rates is a whole number.
     count = int(np.floor((old[-1] - old[0]) * rate + 1e-6)) + 1
     new = old[0] + np.arange(count) / rate
     left, right, weight = neighbours(old, new)
-    channels = trajectory.measurements
     if sampling == "interval":
         edges = np.concatenate([[new[0] - 1.0 / rate], new])
-        samples = {name: samples_of(values, old, trajectory.dt, edges) for name, values in channels.items()}
+        samples = {
+            name: samples_of(values, old, own_interval(old, 1.0 / rate), edges) for name, values in channels.items()
+        }
         measurements = {name: joined(name, samples, edges) for name in channels if not name.endswith("orientation")}
     else:
         measurements = {}
     interpolated = {name: at_instants(name, channels[name], old, new) for name in channels if name not in measurements}
-    return trajectory.replace(
-        time=new,
-        measurements={name: (measurements | interpolated)[name] for name in channels},
-        truth={name: between(name, values[left], values[right], weight) for name, values in trajectory.truth.items()},
-        mask=trajectory.mask[left] & trajectory.mask[right],
-        metadata=trajectory.metadata | {"rate": float(rate), "resampled_from": 1.0 / trajectory.dt},
-    )
+    return {
+        "time": new,
+        "measurements": {name: (measurements | interpolated)[name] for name in channels},
+        "truth": {name: between(name, values[left], values[right], weight) for name, values in truth.items()},
+        "mask": mask[left] & mask[right],
+    }
 
 
 def neighbours(old: np.ndarray, new: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -7,33 +7,48 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 
 from ...filters.core import rotation
+from .clock import Clock, check_interval, fit_clock
+from .resampling import resampled_fields
+from .storage import read_trajectory_file, write_trajectory_file
 
 DERIVED_FROM_ORIENTATION = {"up": rotation.up_in_body, "relative_orientation": lambda orientation: orientation}
 """Truth that an orientation contains: quantity name → function of the quaternions ``(T, 4)``."""
+UNIT_QUANTITIES = {"orientation": 4, "up": 3}
+"""Truth of unit length, by the last part of its name, and its size."""
+UNIT_TOLERANCE = 0.02
+INERTIAL = ("gyr", "acc", "mag")
+"""Kinds of channels whose sampling interval must be that of an inertial sensor."""
 
 
 @dataclass(frozen=True, eq=False)
 class Trajectory:
     """A sequence of measurements with the truth, where it is known.
 
+    Arrays are copied and read-only. Masked entries become NaN. Truth that must have unit length (orientations, ``up``)
+    and has not, such as the zeros of a tracker that lost its body, becomes NaN with a warning.
+
     Attributes:
-        time: ``(T,)`` s, strictly increasing.
+        time: ``(T,)`` s, the stamps as recorded, not decreasing: they may jitter, have gaps, and be shared by the
+            samples of a packet. :meth:`on_grid` is what estimators run on.
         measurements: channel name (``place/kind``) → ``(T, size)``; NaN where a channel brought no sample.
         truth: quantity name → ``(T, size)``; NaN where unknown; may be empty.
         mask: ``(T,)`` bool, the ticks that are scored; all of them by default.
-        metadata: JSON-able description: name, environment, sensors, seed, version, rate, source, licence, …
+        metadata: JSON-able description: name, environment, sensors, seed, version, rate, source, licence, …;
+            ``nominal_rate`` in Hz is the device's own statement and decides the grid of irregular stamps.
 
     Raises:
-        ValueError: an argument has the wrong shape or type, time does not increase, there is no tick or no channel,
-            a value is infinite, or the metadata are not JSON-able.
+        ValueError: an argument has the wrong shape or type, time decreases or stands still, there is no tick or no
+            channel, a value is infinite, or the metadata are not JSON-able.
     """
 
     time: np.ndarray
@@ -50,20 +65,21 @@ class Trajectory:
             raise ValueError(
                 f"time must be finite, got {time[~np.isfinite(time)][0]} at tick {first(~np.isfinite(time))}"
             )
-        backwards = np.diff(time) <= 0.0
+        backwards = np.diff(time) < 0.0 if time[-1] > time[0] else np.diff(time) <= 0.0
         if backwards.any():
             tick = first(backwards) + 1
-            raise ValueError(f"time must increase strictly, got {time[tick]} s at tick {tick} after {time[tick - 1]} s")
+            raise ValueError(f"time must increase, got {time[tick]} s at tick {tick} after {time[tick - 1]} s")
         measurements = columns("measurements", self.measurements, len(time))
         if not measurements:
             raise ValueError("measurements must hold at least one channel, got none")
-        mask = np.ones(len(time), bool) if self.mask is None else np.asarray(self.mask)
+        mask = np.ones(len(time), bool) if self.mask is None else np.array(np.ma.filled(self.mask, False))
         if mask.dtype != bool or mask.shape != time.shape:
             raise ValueError(f"mask must be bool of shape ({len(time)},), got {mask.dtype} of shape {mask.shape}")
+        mask.flags.writeable = False
         values = {
             "time": time,
             "measurements": measurements,
-            "truth": columns("truth", self.truth, len(time)),
+            "truth": unit_or_unknown(columns("truth", self.truth, len(time))),
             "mask": mask,
             "metadata": check_metadata(self.metadata),
         }
@@ -75,23 +91,101 @@ class Trajectory:
         """``metadata["name"]``, or ``"trajectory"``."""
         return str(self.metadata.get("name", "trajectory"))
 
-    @property
-    def dt(self) -> float:
-        """Sampling interval, s: the median; of a single tick ``1 / metadata["rate"]``.
+    @cached_property
+    def clock(self) -> Clock:
+        """The uniform grid behind the stamps, see :func:`~poise.envs.data.clock.fit_clock`.
 
         Raises:
-            ValueError: there is a single tick, and the metadata name no rate.
+            ValueError: no sampling rate explains the stamps; or there is a single tick, and the metadata name no rate.
         """
-        if len(self.time) > 1:
-            return float(np.median(np.diff(self.time)))
-        if "rate" not in self.metadata:
+        nominal = self.metadata.get("nominal_rate")
+        if len(self) > 1:
+            try:
+                return fit_clock(self.time, nominal)
+            except ValueError as reason:
+                raise ValueError(f"{self.name}: {reason}") from None
+        rate = nominal or self.metadata.get("rate")
+        if rate is None:
             raise ValueError(f"{self.name} has a single tick and no rate in its metadata: its interval is unknown")
-        return 1.0 / float(self.metadata["rate"])
+        return Clock(1.0 / float(rate), float(self.time[0]), np.zeros(1, int), 0.0, 0)
+
+    @property
+    def dt(self) -> float:
+        """Sampling interval, s, fitted to all stamps; of a single tick ``1 / metadata["rate"]``.
+
+        Raises:
+            ValueError: see :attr:`clock`.
+        """
+        return self.clock.interval
 
     @property
     def uniform(self) -> bool:
-        """Whether every interval is within 1 % of ``dt``, as estimators suppose."""
-        return bool(np.all(np.abs(np.diff(self.time) / self.dt - 1.0) < 0.01)) if len(self) > 1 else True
+        """Whether the stamps are a uniform grid (to 1 % of an interval), so that :meth:`on_grid` changes nothing."""
+        if len(self) == 1:
+            return True
+        steps = np.diff(self.time)
+        typical = float(np.median(steps))
+        return typical > 0.0 and bool(np.all(np.abs(steps / typical - 1.0) < 0.01)) and self.clock.missing == 0
+
+    def on_grid(self) -> Trajectory:
+        """The trajectory on its uniform grid: what estimators, which know one interval, run on.
+
+        Gaps become ticks of NaN that are not scored, jitter is taken for jitter of the stamps, and the samples of a
+        packet lie in the interval before its stamp. Rows that repeat stamp and values of the row before are dropped.
+        An exact grid is returned as it is.
+
+        Raises:
+            ValueError: no sampling rate explains the stamps, or the rate is none of an inertial sensor: the message
+                names the unit that time seems to have.
+        """
+        if len(self) == 1:
+            return self
+        kept = self._without_repeats()
+        clock = kept.clock
+        if any(name.rsplit("/", 1)[-1] in INERTIAL for name in self.measurements):
+            check_interval(clock.interval, self.time)
+        if kept.uniform:
+            return kept
+        length = int(clock.index[-1]) + 1
+
+        def spread(arrays: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+            grids = {name: np.full((length, values.shape[1]), np.nan) for name, values in arrays.items()}
+            for name, values in arrays.items():
+                grids[name][clock.index] = values
+            return grids
+
+        mask = np.zeros(length, bool)
+        mask[clock.index] = kept.mask
+        found = {"missing": clock.missing, "jitter": clock.jitter, "packets": clock.packets}
+        if clock.packets > 0.01 * len(self):
+            warnings.warn(
+                f"{self.name}: {clock.packets} time stamps are shared by several samples; these are spread over the "
+                f"interval before the stamp, {1.0 / clock.interval:.4g} Hz",
+                stacklevel=2,
+            )
+        if clock.missing > length / 3:
+            warnings.warn(
+                f"{self.name}: {clock.missing} of {length} samples at {1.0 / clock.interval:.4g} Hz are missing; if it "
+                "is not the device's rate, name it in metadata['nominal_rate']",
+                stacklevel=2,
+            )
+        return self.replace(
+            time=clock.start + clock.interval * np.arange(length),
+            measurements=spread(kept.measurements),
+            truth=spread(kept.truth),
+            mask=mask,
+            metadata=self.metadata | {"rate": 1.0 / clock.interval, "clock": found},
+        )
+
+    def _without_repeats(self) -> Trajectory:
+        """Without rows that equal the row before, stamp and values alike."""
+        repeated = np.append(False, np.diff(self.time) == 0.0)
+        if not repeated.any():
+            return self
+        for values in self.measurements.values():
+            same = (values[1:] == values[:-1]) | (np.isnan(values[1:]) & np.isnan(values[:-1]))
+            repeated[1:] &= same.all(axis=1)
+        return self._rows(np.flatnonzero(~repeated)) if repeated.any() else self
 
     @property
     def quantities(self) -> tuple[str, ...]:
@@ -120,11 +214,19 @@ class Trajectory:
             raise ValueError(f"a trajectory is cut by [a:b] in steps of one, got [{ticks}]; resample to thin it out")
         if len(self.time[ticks]) == 0:
             raise ValueError(f"{ticks} leaves no tick of the {len(self)} of {self.name}")
+        return self._rows(ticks)
+
+    def __repr__(self) -> str:
+        known = f", truth {', '.join(self.truth)}" if self.truth else ""
+        span = f"{self.time[0]:.6g} to {self.time[-1]:.6g} s"
+        return f"Trajectory({self.name!r}, {len(self)} ticks, {span}, channels {', '.join(self.measurements)}{known})"
+
+    def _rows(self, rows: Any) -> Trajectory:
         return self.replace(
-            time=self.time[ticks],
-            measurements={name: values[ticks] for name, values in self.measurements.items()},
-            truth={name: values[ticks] for name, values in self.truth.items()},
-            mask=self.mask[ticks],
+            time=self.time[rows],
+            measurements={name: values[rows] for name, values in self.measurements.items()},
+            truth={name: values[rows] for name, values in self.truth.items()},
+            mask=self.mask[rows],
         )
 
     def replace(self, **changes: Any) -> Trajectory:
@@ -132,16 +234,77 @@ class Trajectory:
         return dataclasses.replace(self, **changes)
 
     def resampled(self, rate: float, sampling: Literal["interval", "instant"] = "interval") -> Trajectory:
-        """The same motion at another rate in Hz, see :func:`~poise.envs.data.resampling.resample`."""
-        from .resampling import resample
+        """Resample to ``rate`` in Hz on the uniform grid that starts at the first tick.
 
-        return resample(self, rate, sampling)
+        See :mod:`poise.envs.data.resampling` for what is kept.
+
+        Args:
+            rate: Hz.
+            sampling: what a sample is, the mean over the interval that ends at its tick or the value at its tick.
+
+        Returns:
+            The new trajectory. A sample is NaN if its interval overlaps a missing one, or an old neighbour is missing.
+            Orientations are interpolated on the great circle, other truth linearly, both NaN beside unknown truth. A
+            tick is scored if both its old neighbours are.
+
+        Raises:
+            ValueError: ``rate`` is not positive and finite, or ``sampling`` unknown.
+        """
+        if (np.diff(self.time) <= 0.0).any():
+            return self.on_grid().resampled(rate, sampling)
+        fields = resampled_fields(self.time, self.measurements, self.truth, self.mask, rate, sampling)
+        old_rate = 1.0 / float(np.median(np.diff(self.time))) if len(self) > 1 else 1.0 / self.dt
+        return self.replace(**fields, metadata=self.metadata | {"rate": float(rate), "resampled_from": old_rate})
 
     def save(self, path: str | Path) -> Path:
-        """Write the trajectory to an HDF5 file, see :func:`~poise.envs.data.storage.save_trajectory`."""
-        from .storage import save_trajectory
+        """Write the trajectory to an HDF5 file, see :mod:`poise.envs.data.storage`.
 
-        return save_trajectory(self, path)
+        Args:
+            path: the file, by custom ``*.h5``; missing folders are made. A file that was there before stays whole
+                until the new one is complete.
+
+        Returns:
+            The path.
+
+        Raises:
+            ValueError: a name cannot be stored, such as channels ``a`` and ``a/b`` together.
+            OSError: the folder cannot be written.
+        """
+        return write_trajectory_file(
+            Path(path), self.time, self.mask, {"measurements": self.measurements, "truth": self.truth}, self.metadata
+        )
+
+
+def load_trajectory(path: str | Path) -> Trajectory:
+    """Read a trajectory that :meth:`Trajectory.save` wrote.
+
+    Raises:
+        FileNotFoundError: there is no such file.
+        ValueError: it is another kind of file, of a newer version, truncated or damaged.
+    """
+    path = Path(path)
+    fields = read_trajectory_file(path)
+    try:
+        return Trajectory(**fields)
+    except ValueError as reason:
+        raise ValueError(f"{path}: {reason}") from None
+
+
+def unit_or_unknown(truth: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Truth that must have unit length, with NaN in rows that have not."""
+    for name, values in truth.items():
+        if UNIT_QUANTITIES.get(name.rsplit("/", 1)[-1].removeprefix("relative_")) != values.shape[1]:
+            continue
+        wrong = np.abs(np.linalg.norm(values, axis=1) - 1.0) > UNIT_TOLERANCE
+        if wrong.any():
+            warnings.warn(
+                f"truth[{name!r}] must have unit length or be NaN; {wrong.sum()} of {len(wrong)} rows have not (the "
+                f"first at tick {first(wrong)}: {values[first(wrong)].tolist()}) and count as unknown",
+                stacklevel=4,
+            )
+            truth[name] = np.where(wrong[:, None], np.nan, values)
+            truth[name].flags.writeable = False
+    return truth
 
 
 def first(flags: np.ndarray) -> int:
@@ -150,14 +313,33 @@ def first(flags: np.ndarray) -> int:
 
 
 def real_array(name: str, values: Any) -> np.ndarray:
-    """``values`` as a float64 array; a ValueError that names them if they are no real numbers."""
+    """``values`` as a read-only float64 array of our own; masked entries are NaN.
+
+    Raises:
+        ValueError: names the values if they are not real numbers.
+    """
     try:
-        array = np.asarray(values)
+        array = np.asanyarray(values)
     except ValueError as reason:
         raise ValueError(f"{name} must be an array of real numbers: {reason}") from None
     if array.dtype.kind not in "fiub":
         raise ValueError(f"{name} must be an array of real numbers, got dtype {array.dtype}")
-    return array.astype(float, copy=False)
+    if not constant(array):
+        array = np.array(np.ma.filled(array.astype(float), np.nan), dtype=float, subok=False)
+        array.flags.writeable = False
+    return array
+
+
+def constant(array: np.ndarray) -> bool:
+    """Whether nobody can change a float64 array, so that it need not be copied: all its owners are read-only."""
+    owner: Any = array
+    while isinstance(owner, np.ndarray):
+        if owner.flags.writeable or type(owner) is not np.ndarray:
+            return False
+        if owner.base is None:
+            return array.dtype == float
+        owner = owner.base
+    return False
 
 
 def columns(argument: str, arrays: Mapping[str, Any], length: int) -> dict[str, np.ndarray]:

@@ -7,7 +7,7 @@ import pandas
 import pytest
 
 from poise.baselines.evaluation import COLUMNS
-from poise.envs.data.storage import load_trajectory
+from poise.envs.data.trajectory import load_trajectory
 from poise.filters.support.seeds import child_seed
 from poise.scripts.main import main
 from poise.scripts.record import environment_id, option

@@ -10,7 +10,7 @@ from poise.baselines.evaluation import COLUMNS
 from poise.baselines.studies.rides.reports import REPORTED, comparison
 from poise.baselines.studies.rides.statistics import RideStatistics, ride, trunk_lean
 from poise.envs.bicycle.course.scenarios import list_scenarios
-from poise.envs.data.storage import load_trajectory
+from poise.envs.data.trajectory import load_trajectory
 from poise.filters.core import rotation
 from poise.scripts.main import main
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..calibration.records import CalibrationRecord, apply_calibration
-from ..storage import FORMAT, is_trajectory_file, load_trajectory
-from ..trajectory import Trajectory
+from ..storage import FORMAT, is_trajectory_file
+from ..trajectory import Trajectory, load_trajectory
 from .broad import is_broad, load_broad
 from .dot import is_dot, load_dot
 

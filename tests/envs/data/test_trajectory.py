@@ -12,8 +12,7 @@ import h5py
 import numpy as np
 import pytest
 
-from poise.envs.data.storage import load_trajectory
-from poise.envs.data.trajectory import Trajectory
+from poise.envs.data.trajectory import Trajectory, load_trajectory
 from poise.envs.record import record
 from poise.filters.core import rotation
 
@@ -47,7 +46,7 @@ def assert_same(a: Trajectory, b: Trajectory) -> None:
     [
         ({"time": np.zeros((0,))}, "at least one tick"),
         ({"time": np.zeros((20, 1))}, r"time must have shape \(T,\).*\(20, 1\)"),
-        ({"time": np.zeros(20)}, "increase strictly, got 0.0 s at tick 1"),
+        ({"time": np.zeros(20)}, "time must increase, got 0.0 s at tick 1"),
         ({"time": np.append(np.arange(19.0), np.nan)}, "time must be finite, got nan at tick 19"),
         ({"time": ["a"] * 20}, "time must be an array of real numbers"),
         ({"measurements": {}}, "at least one channel"),
@@ -87,6 +86,45 @@ def test_interval_name_length_and_default_mask():
         trajectory.time = np.zeros(3)
 
 
+def test_arrays_are_copied_and_read_only():
+    gyr, mask = np.zeros((20, 3)), np.ones(20, bool)
+    trajectory = make(measurements={"imu/gyr": gyr}, mask=mask)
+    gyr[:], mask[:] = 7.0, False
+    assert (trajectory.measurements["imu/gyr"] == 0.0).all()
+    assert trajectory.mask.all()
+    for array in (trajectory.time, trajectory.mask, trajectory.measurements["imu/gyr"], trajectory.truth["position"]):
+        with pytest.raises(ValueError, match="read-only"):
+            array[0] = 0
+    assert trajectory[3:].measurements["imu/gyr"].base is not None, "a part shares what nobody can change"
+
+
+@pytest.mark.parametrize("dtype", [float, int, np.float32])
+def test_masked_entries_are_missing(dtype):
+    values = np.ma.masked_array(np.full((20, 3), 999, dtype), mask=np.arange(60).reshape(20, 3) == 7)
+    kept = make(measurements={"imu/acc": values}).measurements["imu/acc"]
+    np.testing.assert_array_equal(np.isnan(kept), values.mask)
+    assert type(kept) is np.ndarray
+    with pytest.raises(ValueError, match="time must be finite"):
+        make(time=np.ma.masked_equal(np.arange(20.0), 5.0))
+    assert not make(mask=np.ma.masked_array(np.ones(20, bool), mask=np.arange(20) == 4)).mask[4]
+
+
+@pytest.mark.parametrize("name", ["orientation", "up", "relative_orientation", "head/orientation"])
+def test_truth_is_of_unit_length_or_unknown(name):
+    values = np.tile([0.6, 0.0, 0.8] if name == "up" else [0.6, 0.0, 0.8, 0.0], (20, 1))
+    values[4:6], values[9] = 0.0, 1.5 * values[9]
+    with pytest.warns(UserWarning, match=rf"truth\['{name}'\].*3 of 20 rows.*tick 4.*unknown"):
+        truth = make(truth={name: values}).truth[name]
+    np.testing.assert_array_equal(np.flatnonzero(np.isnan(truth).all(axis=1)), [4, 5, 9])
+    np.testing.assert_array_equal(truth[:4], values[:4])
+
+
+def test_the_representation_is_one_line():
+    assert repr(make()) == (
+        "Trajectory('test', 20 ticks, 0.5 to 0.69 s, channels imu/gyr, imu/acc, truth orientation, position)"
+    )
+
+
 def test_cutting_keeps_time_and_refuses_what_leaves_nothing():
     trajectory = make()
     part = trajectory[5:-3]
@@ -103,8 +141,8 @@ def test_up_follows_from_the_orientation():
     trajectory = make()
     np.testing.assert_allclose(trajectory.truth_of("up"), rotation.up_in_body(trajectory.truth["orientation"]))
     assert trajectory.quantities == ("orientation", "position", "up", "relative_orientation")
-    known = make(truth={"up": np.ones((20, 3))})
-    np.testing.assert_array_equal(known.truth_of("up"), np.ones((20, 3)))
+    known = make(truth={"up": np.tile([0.0, 0.6, 0.8], (20, 1))})
+    np.testing.assert_array_equal(known.truth_of("up"), np.tile([0.0, 0.6, 0.8], (20, 1)))
     with pytest.raises(ValueError, match=r"no 'velocity'; known are \['orientation'"):
         trajectory.truth_of("velocity")
 
@@ -149,6 +187,67 @@ def test_files_that_are_none_are_refused(tmp_path):
         file.attrs["format_version"] = 99
     with pytest.raises(ValueError, match="version 99 is newer"):
         load_trajectory(path)
+
+
+@pytest.mark.parametrize("what", ["external link", "soft link", "external storage", "virtual", "size", "depth"])
+def test_hostile_files_are_refused(tmp_path, what):
+    """Nothing outside the file is read, and nothing is allocated that the file cannot hold."""
+    secret = tmp_path / "secret"
+    secret.write_bytes(np.arange(60.0).tobytes())
+    path = make().save(tmp_path / "a.h5")
+    with h5py.File(tmp_path / "other.h5", "w") as file:
+        file["gyr"] = np.ones((20, 3))
+    with h5py.File(path, "a") as file:
+        file.attrs["format_version"] = 1
+        group = file["measurements/imu"]
+        del group["gyr"]
+        if what == "external link":
+            group["gyr"] = h5py.ExternalLink(str(tmp_path / "other.h5"), "gyr")
+        elif what == "soft link":
+            group["gyr"] = h5py.SoftLink("/measurements/imu/acc")
+        elif what == "external storage":
+            group.create_dataset("gyr", (20, 3), float, external=[(str(secret), 0, 480)])
+        elif what == "virtual":
+            layout = h5py.VirtualLayout((20, 3), float)
+            layout[:] = h5py.VirtualSource(str(tmp_path / "other.h5"), "gyr", (20, 3))
+            group.create_virtual_dataset("gyr", layout)
+        elif what == "size":
+            group.create_dataset("gyr", (2**40, 3), float, chunks=(1024, 3), compression="gzip")
+        else:
+            group.create_group("/".join("abcdefghijklmnopqrst"))
+    message = (
+        "Link: links to other places"
+        if "link" in what
+        else {"size": "declares the shape", "depth": "nested"}.get(what, "outside the file")
+    )
+    with pytest.raises(ValueError, match=rf"a\.h5: .*{message}"):
+        load_trajectory(path)
+
+
+def test_names_attributes_and_metadata_have_a_checksum_and_old_files_are_read(tmp_path):
+    def change(file: h5py.File, how: str) -> None:
+        if how == "group":
+            file.move("measurements/imu", "measurements/imv")
+        elif how == "channel":
+            file.move("measurements/imu/gyr", "measurements/imu/acd")
+        elif how == "attribute":
+            file["time"].attrs["unit"] = "ms"
+        elif how == "metadata":
+            text = file["metadata"].asstr()[()]
+            del file["metadata"]
+            file["metadata"] = text.replace("test", "best")
+
+    for how in ("group", "channel", "attribute", "metadata"):
+        path = make().save(tmp_path / f"{how}.h5")
+        with h5py.File(path, "a") as file:
+            change(file, how)
+        with pytest.raises(ValueError, match="do not match their checksum"):
+            load_trajectory(path)
+        with h5py.File(path, "a") as file:
+            del file.attrs["digest"]
+            file.attrs["format_version"] = 1
+        assert len(load_trajectory(path)) == 20
+    assert list(load_trajectory(make().save(tmp_path / "order.h5")).measurements) == ["imu/gyr", "imu/acc"]
 
 
 def test_a_flipped_bit_is_noticed(tmp_path):
