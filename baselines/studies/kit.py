@@ -185,13 +185,9 @@ class Study:
         import joblib
 
         folder = self.folder / "cache" / slug(key)
+        name = f"{function.__module__}:{function.__qualname__}"
         tasks = [
-            (
-                folder / f"{index:04d}.json",
-                {"function": name_of(function), "arguments": joblib.hash(job)},
-                function,
-                job,
-            )
+            (folder / f"{index:04d}.json", {"function": name, "arguments": joblib.hash(job)}, function, job)
             for index, job in enumerate(jobs)
         ]
         missing = [task for task in tasks if not is_kept(*task[:2])]
@@ -210,11 +206,6 @@ class Study:
         label = label if self.progress else ""
         for _ in in_parallel(function, jobs, self.processes, label=label, unit=unit):
             pass
-
-
-def name_of(function: Callable[..., Any]) -> str:
-    """Module and name."""
-    return f"{function.__module__}:{function.__qualname__}"
 
 
 def compute(path: Path, key: dict[str, Any], function: Callable[..., Any], job: tuple[Any, ...]) -> None:

@@ -12,10 +12,15 @@ from ....filters.bicycle.two_gyro.filter import TwoGyro
 from ....filters.bicycle.two_gyro.truth import true_angles
 from ....filters.core.kalman import KalmanFilter
 from ....filters.core.quantity import Estimate
+from ...plots import TRUTH_COLOR, legend_above, new_figure
+from ..claims import Claim
 from ..kit import Study
 from ..report import Report
-from .motion import DEG
-from .rides import ALONE, errors_of, summary, without_errors
+from ..ride_study import MEAN, SETTLED, ZERO, mean_of, rounded, windowed
+from ..sensors import without_errors
+from ..signals import DEG
+from .figures import COLOURS
+from .rides import ALONE, RIDES
 
 CHANNELS = ["bicycle_imu/gyr", "disk/gyr", "relative/distances", "relative/orientation"]
 FILTERS: dict[str, dict[str, Any]] = {
@@ -24,17 +29,22 @@ FILTERS: dict[str, dict[str, Any]] = {
     "Σ2, orientation": {"sensor": "orientation"},
     "Σ1, orientation": {"sensor": "orientation", "model": "sigma1"},
 }
+SENSORS: dict[str, dict[str, tuple[str, ...]]] = {
+    "paper": {},
+    "gyroscopes: no bias": {"unbiased": ("bicycle_imu/gyr", "disk/gyr")},
+    "gyroscopes: no errors": {"exact": ("bicycle_imu/gyr", "disk/gyr")},
+}
 START = 10.0 * DEG
-"""rad: standard deviation of the roll at the start, which the filters are not told"""
+"""rad: standard deviation of the roll at the start, which the filters do not know"""
 
 
-def estimates(ride: Trajectory, samples: dict[str, np.ndarray]) -> dict[str, Estimate]:
+def estimates(push: Trajectory, samples: dict[str, np.ndarray]) -> dict[str, Estimate]:
     """Every filter on one push."""
     found = {
-        name: KalmanFilter(TwoGyro.for_disk(dt=ride.dt, roll_prior=START, **options)).run(samples)
+        name: KalmanFilter(TwoGyro.for_disk(dt=push.dt, roll_prior=START, **options)).run(samples)
         for name, options in FILTERS.items()
     }
-    found[ALONE] = KalmanFilter(PlatformGyro(dt=ride.dt, roll_prior=START, pitch_rate_noise=0.1 * DEG)).run(samples)
+    found[ALONE] = KalmanFilter(PlatformGyro(dt=push.dt, roll_prior=START, pitch_rate_noise=0.1 * DEG)).run(samples)
     return found
 
 
@@ -43,65 +53,73 @@ def fixture(study: Study, report: Report) -> None:
     count = 2 if study.quick else 10
     options = {"suite": CHANNELS, "duration": study.duration}
     pushes = study.episodes("poise/BicycleFixture-v0", count, name="fixture", options=options)
-    rows = []
-    variants = {
-        "paper": {},
-        "gyroscopes: no bias": {"gyroscopes": "unbiased"},
-        "gyroscopes: no errors": {"gyroscopes": "exact"},
-    }
-    for sensors, taken in variants.items():
+    rows, means = [], {}
+    for sensors, changes in SENSORS.items():
         found: dict[str, list[dict[str, float]]] = {}
         for push in pushes:
             truth = true_angles(push.truth, "disk")
-            for name, estimate in estimates(push, without_errors(push, body="disk", **taken)).items():
-                found.setdefault(name, []).append(summary(errors_of(estimate.pose, truth), push.time))
-        for name, parts in found.items():
-            row: dict[str, Any] = {"sensors": sensors, "filter": name}
-            for key, label in (("θ1", "θ1"), ("θ2", "θ2"), ("θ3", "θ3"), ("φ", "φ"), ("end", "φ, last 20 s")):
-                values = [part[key] for part in parts if key in part]
-                row[label] = round(float(np.mean(values)), 2) if values else None
-            rows.append(row)
+            every = estimates(push, without_errors(push, **changes))
+            errors = {name: RIDES.errors(each.pose, truth) for name, each in every.items()}
+            if sensors == "paper":
+                errors |= RIDES.baselines(push, truth)
+            for name, each in errors.items():
+                late = windowed({"φ, last 20 s": each["φ"]}, push.time, max(SETTLED, push.time[-1] - 20.0))
+                found.setdefault(name, []).append(windowed(each, push.time, SETTLED) | late)
+        means[sensors] = {name: mean_of(parts) for name, parts in found.items()}
+        rows += [{"sensors": sensors, "filter": name, **rounded(row)} for name, row in means[sensors].items()]
+    angles = ("θ1", "θ2", "θ3", "φ", "φ, last 20 s")
     report.table(
         "Fixture (figures 6 to 8)",
-        rows,
-        f"Mean RMS in deg of {count} pushes from 10 s on; the filters start with roll 0 wherever the bicycle is. "
-        "Claims: Σ2 follows, Σ1 starts to drift, θ does not drift. Three distances from one camera see two of three "
-        "rotations at an instant, motion the third; the camera's orientation has an alignment error of its own (1°). "
-        "The platform's gyroscope alone, which nothing but (5) corrects, has the smallest error of the roll: the push "
-        "has no pitch at all.",
+        [{name: row.get(name) for name in ("sensors", "filter", *angles)} for row in rows],
+        f"Mean RMS in deg of {count} pushes from {SETTLED:g} s on; the filters start with roll 0 wherever the bicycle "
+        "is. Three distances from one camera see two of three rotations at an instant, motion the third; the camera's "
+        "orientation has an alignment error of its own (1°). The push has no pitch at all.",
     )
+    report.claims("Fixture: what the paper says, and what holds here", claims(means["paper"]))
     report.figure(
         "fixture", figure(pushes[0]), "Figures 6 to 8: one push", "Distances; thin: three standard deviations."
     )
 
 
+def claims(means: dict[str, dict[str, float]]) -> list[Claim]:
+    """What figures 6 to 8 show."""
+    late = {name: row["φ, last 20 s"] for name, row in means.items() if name != MEAN}
+    found = []
+    for sensor in ("distances", "orientation"):
+        ours, other = late[f"Σ2, {sensor}"], late[f"Σ1, {sensor}"]
+        found.append(
+            Claim.less(f"{sensor}: Σ2 follows the roll, Σ1 is more than twice as wrong", ours, other, factor=0.5)
+        )
+        theta = max(means[f"Σ2, {sensor}"][f"θ{i}"] for i in (1, 2, 3))
+        found.append(Claim.less(f"{sensor}: θ stays below 3°", theta, 3.0))
+    found.append(Claim.less("Σ2 beats a roll of zero", late["Σ2, distances"], late[ZERO]))
+    found.append(Claim.best("The platform's gyroscope alone has the smallest error of the roll", ALONE, late))
+    return found
+
+
 def figure(push: Trajectory) -> Any:
     """Roll, its error, and relative angles."""
-    from ...plots import new_figure
-
     truth, every = true_angles(push.truth, "disk"), estimates(push, push.measurements)
-    drawn, axes = new_figure(7.5, 8.0, 4)
-    colours = {"Σ2, distances": "#1f5fa8", "Σ1, distances": "#c2571a", ALONE: "#2c8c5a"}
-    axes[0].plot(push.time, truth["bicycle/roll"] / DEG, color="black", linewidth=1.2, label="true")
-    for name, colour in colours.items():
-        axes[0].plot(push.time, every[name].pose["bicycle/roll"] / DEG, color=colour, linewidth=0.9, label=name)
-        error = errors_of(every[name].pose, truth)["φ"]
-        axes[1].plot(push.time, error, color=colour, linewidth=0.9, label=name)
+    errors = {name: RIDES.errors(each.pose, truth) for name, each in every.items()}
+    drawn, axes = new_figure(7.5, 8.5, 5)
+    true = {angle: truth[name][:, part] / DEG for angle, (name, part) in RIDES.angles.items()}
+    for name, kind in (("Σ2, distances", "Σ2"), ("Σ1, distances", "Σ1"), (ALONE, ALONE)):
+        color, error = COLOURS[kind], errors[name]["φ"]
+        axes[0].plot(push.time, true["φ"] + error, color=color, linewidth=0.9, label=name)
+        axes[1].plot(push.time, error, color=color, linewidth=0.9, label=name)
         covariance = every[name].covariance
         assert covariance is not None
-        deviation = 3.0 * np.sqrt(covariance[:, 0, 0]) / DEG
+        band = 3.0 * np.sqrt(covariance[:, 0, 0]) / DEG
         for sign in (-1.0, 1.0):
-            axes[1].plot(push.time, sign * deviation, color=colour, linewidth=0.5, alpha=0.6)
-    axes[0].set(ylabel="φ, deg", title="pushed bicycle with a turning disk")
+            axes[1].plot(push.time, sign * band, color=color, linewidth=0.5, alpha=0.6)
+    for ax, angle in zip((axes[0], *axes[2:]), ("φ", "θ1", "θ2", "θ3"), strict=True):
+        ax.plot(push.time, true[angle], color=TRUTH_COLOR, linewidth=1.2, label="truth", zorder=1)
+        if angle != "φ":
+            estimate = true[angle] + errors["Σ2, distances"][angle]
+            ax.plot(push.time, estimate, color=COLOURS["Σ2"], linewidth=0.9, label="Σ2, distances")
+        ax.set_ylabel(f"{angle}, deg")
     axes[1].set(ylabel="error of φ, deg", ylim=(-15.0, 15.0))
-    theta = truth["two-gyro/relative_angles"] / DEG
-    found = every["Σ2, distances"].pose["two-gyro/relative_angles"] / DEG
-    for index, (colour, label) in enumerate(zip(("#1f5fa8", "#c2571a", "#2c8c5a"), ("θ1", "θ2", "θ3"), strict=True)):
-        ax = axes[2] if index < 2 else axes[3]
-        ax.plot(push.time, theta[:, index], color="black", linewidth=1.2)
-        ax.plot(push.time, found[:, index], color=colour, linewidth=0.9, label=label)
-    axes[2].set(ylabel="θ1, θ2, deg")
-    axes[3].set(ylabel="θ3, deg", xlabel="time, s (black: true)")
+    axes[-1].set_xlabel("time, s")
     for ax in axes:
-        ax.legend(frameon=False, ncols=4, loc="upper right", fontsize=8)
+        legend_above(ax)
     return drawn

@@ -1,6 +1,6 @@
 r"""Exact ranks of the two-gyroscope paper's observability argument (17)–(22), by Lie derivatives in rational numbers.
 
-The printed gradients {h, L_f0 h, L_f5 h, L_f5 f0 h} have rank 8, not 9: a common rate about the vertical in both
+The published gradients {h, L_f0 h, L_f5 h, L_f5 f0 h} have rank 8, not 9: a common rate about the vertical in both
 gyroscopes (δb_z^p = 1, δb^h = R_PHᵀ [0, tan φ, 1]) is not told apart. L_f0 f1 h in the place of the last closes the
 gap, so the conclusion stands.
 """
@@ -14,15 +14,15 @@ from ....filters.analysis.observability import exact_rank, lie_gradients
 if TYPE_CHECKING:
     import sympy
 
-PRINTED = ((), ("f0",), ("f5",), ("f5", "f0"))
+PUBLISHED = ((), ("f0",), ("f5",), ("f5", "f0"))
 """Lie derivatives of h in (20)."""
 STACKS: dict[str, tuple[tuple[str, ...], ...]] = {
-    "h, L_f0, L_f5": PRINTED[:3],
-    "+ L_f5 f0 (printed)": PRINTED,
-    "+ L_f0 f5": (*PRINTED[:3], ("f0", "f5")),
-    "+ both orders": (*PRINTED, ("f0", "f5")),
-    "h, L_f0, L_f5, L_f0 f1": (*PRINTED[:3], ("f0", "f1")),
-    "printed + L_f0 f1": (*PRINTED, ("f0", "f1")),
+    "h, L_f0, L_f5": PUBLISHED[:3],
+    "+ L_f5 f0 (as published)": PUBLISHED,
+    "+ L_f0 f5": (*PUBLISHED[:3], ("f0", "f5")),
+    "+ both orders": (*PUBLISHED, ("f0", "f5")),
+    "h, L_f0, L_f5, L_f0 f1": (*PUBLISHED[:3], ("f0", "f1")),
+    "as published + L_f0 f1": (*PUBLISHED, ("f0", "f1")),
 }
 """What is stacked in each line of the table."""
 POINT = {"phi": "1/7", "t1": "2/9", "t2": "-3/11", "t3": "1/5"}

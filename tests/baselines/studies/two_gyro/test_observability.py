@@ -15,12 +15,12 @@ def test_ranks():
     assert list(study.ranks().values()) == [7, 8, 8, 8, 9, 9]
 
 
-def test_what_the_printed_gradients_miss():
+def test_what_the_published_gradients_miss():
     """A common rate about the vertical in both gyroscopes is their null vector; it is seen by L_f0 f1 h."""
     fields, output, state = study.equations("sigma2")
     angles, values = study.point()
     v = study.symbols()
-    _, printed = exact_rank(lie_gradients(fields, output, state, study.PRINTED), angles, values)
+    _, printed = exact_rank(lie_gradients(fields, output, state, study.PUBLISHED), angles, values)
     _, added = exact_rank(lie_gradients(fields, output, state, [("f0", "f1")]), angles, values)
     turns = [sympy.rot_axis1(-v["t1"]), sympy.rot_axis2(-v["t2"]), sympy.rot_axis3(-v["t3"])]
     relative = turns[0] * turns[1] * turns[2]

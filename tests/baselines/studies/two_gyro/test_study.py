@@ -9,14 +9,18 @@ import pytest
 
 from poise.baselines.studies.kit import Study
 from poise.baselines.studies.report import Report
+from poise.baselines.studies.ride_study import windowed
+from poise.baselines.studies.sensors import without_errors
 from poise.baselines.studies.two_gyro.bounds import bound
 from poise.baselines.studies.two_gyro.motion import DEG, IDEAL, MOTIONS, Errors, simulate
-from poise.baselines.studies.two_gyro.rides import errors_of, summary, without_errors
+from poise.baselines.studies.two_gyro.rides import RIDES
 from poise.baselines.studies.two_gyro.simulation import Case, final_consistency, outcome
 from poise.baselines.studies.two_gyro.study import reproduce
 from poise.filters.bicycle.geometry import RiderGeometry
 from poise.filters.bicycle.two_gyro.truth import true_angles
 from poise.filters.core import rotation
+
+GYROSCOPES, CAMERA = ("bicycle_imu/gyr", "trunk_imu/gyr"), "relative/orientation"
 
 
 def test_errors_are_taken_away():
@@ -24,10 +28,10 @@ def test_errors_are_taken_away():
     errors = Errors(camera_interval=4)
     ride = simulate(MOTIONS["circle"], 5.0, 0.01, errors, np.random.default_rng(0))
     ideal = simulate(MOTIONS["circle"], 5.0, 0.01, replace(IDEAL, camera_interval=4))
-    exact = without_errors(ride, gyroscopes="exact", camera="exact")
+    exact = without_errors(ride, exact=(*GYROSCOPES, CAMERA))
     for name, samples in ideal.measurements.items():
         np.testing.assert_allclose(exact[name][1:], samples[1:], atol=1e-9)
-    unbiased = without_errors(ride, gyroscopes="unbiased")
+    unbiased = without_errors(ride, unbiased=GYROSCOPES)
     for place in ("bicycle_imu", "trunk_imu"):
         white = unbiased[f"{place}/gyr"] - ideal.measurements[f"{place}/gyr"]
         np.testing.assert_allclose(white.std(axis=0), 0.1 * DEG, rtol=0.15)
@@ -40,26 +44,27 @@ def test_errors_are_taken_away():
         measurements={**ideal.measurements, "relative/orientation": off},
         truth={**ideal.truth, "relative/orientation_bias": np.tile(turned, (len(ideal), 1))},
     )
-    found = without_errors(biased, camera="white")["relative/orientation"]
+    found = without_errors(biased, unbiased=(CAMERA,))["relative/orientation"]
     np.testing.assert_allclose(found, ideal.measurements["relative/orientation"], atol=1e-12)
 
 
 def test_a_tilted_gyroscope_stays_tilted():
     ride = simulate(MOTIONS["circle"], 1.0, 0.01)
     tilted = ride.replace(metadata={"geometry": RiderGeometry().describe()})
-    level, mounted = (without_errors(each, gyroscopes="exact")["bicycle_imu/gyr"] for each in (ride, tilted))
+    level, mounted = (without_errors(each, exact=GYROSCOPES)["bicycle_imu/gyr"] for each in (ride, tilted))
     turn = rotation.exp(np.array([0.0, -RiderGeometry().bicycle_imu_tilt, 0.0]))
     np.testing.assert_allclose(rotation.rotate(turn, mounted), level, atol=1e-12)
 
 
-def test_errors_and_their_summary():
+def test_errors_and_their_windows():
     ride = simulate(MOTIONS["circle"], 30.0, 0.1)
     truth = true_angles(ride.truth)
     pose = {name: truth[name] + 2.0 * DEG for name in ("bicycle/roll", "two-gyro/relative_angles")}
     pose["bicycle/roll"][:50] += 1.0
-    found = summary(errors_of(pose, truth), ride.time)
-    assert found == pytest.approx({"θ1": 2.0, "θ2": 2.0, "θ3": 2.0, "φ": 2.0, "end": 2.0, "peak": 2.0})
-    assert np.isnan(summary(errors_of(pose, truth), ride.time / 10.0)["φ"])
+    errors = RIDES.errors(pose, truth)
+    assert windowed(errors, ride.time, 10.0) == pytest.approx({"θ1": 2.0, "θ2": 2.0, "θ3": 2.0, "φ": 2.0})
+    assert windowed(errors, ride.time, 0.0)["φ"] > 20.0
+    assert np.isnan(windowed(errors, ride.time / 10.0, 10.0)["φ"])
 
 
 def test_a_simulated_case():
@@ -92,4 +97,6 @@ def test_the_whole_study(tmp_path):
     table = next(entry.rows for entry in report.entries if entry.title == "Where the errors come from")
     roll = {row["sensors"]: row["φ"] for row in table}
     assert roll["no errors"] < 0.2
+    claims = [row for entry in report.entries for row in entry.rows if "statement" in row]
+    assert {row["holds"] for row in claims} >= {True, False}
     assert all(entry.figure.stat().st_size > 10_000 for entry in report.entries if entry.figure is not None)
