@@ -64,7 +64,7 @@ def run(args: Args) -> int:
     """Tune, compare with the published tuning and the best constant gains, and write what was found."""
     from ..baselines.gain_policy.constant_gains import best_constant_gains
     from ..baselines.gain_policy.policy import GainPolicy
-    from ..baselines.gain_policy.training import TRAINING_MOTIONS
+    from ..baselines.gain_policy.config import TRAINING_MOTIONS
     from ..filters.adaptation.gains import tunable_filter
     from ..filters.adaptation.tuned import TunedFilter
 
@@ -104,7 +104,7 @@ def run(args: Args) -> int:
 
 def training_config(args: Args) -> Any:
     """The configuration that the arguments ask for."""
-    from ..baselines.gain_policy.training import shipped_config
+    from ..baselines.gain_policy.config import shipped_config
 
     if args.preset == "shipped":
         config = shipped_config(args.filter)
@@ -133,7 +133,7 @@ def load_all(paths: tuple[Path, ...]) -> list[Trajectory]:
 def train(args: Args, folder: Run, start: np.ndarray) -> GainPolicy:
     """Train a policy from a constant action, with a bar; the best look at validation trajectories is kept."""
     from ..baselines.gain_policy.constant_gains import policy_errors
-    from ..baselines.gain_policy.training import TRAINING_MOTIONS, train_policy
+    from ..baselines.gain_policy.training import train_policy
     from ..filters.adaptation.gains import tunable_filter
 
     config, kalman = training_config(args), tunable_filter(args.filter)

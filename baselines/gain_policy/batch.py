@@ -6,6 +6,7 @@ environment after the other. Observations, actions and rewards are the same numb
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Sequence
 from typing import Any
@@ -15,17 +16,14 @@ from gymnasium import spaces
 from stable_baselines3.common.vec_env import VecEnv
 
 from ...envs.data.trajectory import Trajectory
-from ...envs.gain_tuning import scored_quantity
 from ...filters.adaptation.tuned import TunedFilter, TunedState
 from ...filters.core.metrics import error
-from ...filters.core.quantity import Quantity
+from .stack import TrajectoryStack
 
 AHEAD = (1, 10, 40)
 """Decisions over which the critic looks ahead."""
 PRIVILEGED = 2 + 2 * len(AHEAD)
 """Numbers at the end of an observation that only the critic may see."""
-
-
 SMALL_ERROR = math.radians(0.2)
 """Added to the error that relative rewards are divided by."""
 
@@ -34,63 +32,47 @@ class RateGroup:
     """Episodes that advance together: same rate, one row each.
 
     Args:
-        tuned: the filter.
-        trajectories: to draw from, all of one rate; the shortest decides about the length of all.
+        stack: the trajectories that episodes are drawn from.
         rows: number of episodes.
         generator: of the choice of trajectories.
-        quantity: what is scored.
-        reference: action whose error the reward is relative to.
+        reference: constant action whose error the reward is relative to.
         error_scale: see :class:`TuningBatch`, rad.
         relative: likewise.
     """
 
     def __init__(
         self,
-        tuned: TunedFilter,
-        trajectories: Sequence[Trajectory],
+        stack: TrajectoryStack,
         rows: int,
         generator: np.random.Generator,
-        quantity: Quantity,
         reference: np.ndarray,
         error_scale: float,
         relative: bool,
     ) -> None:
-        self.tuned, self.error_scale = tuned.with_dt(trajectories[0].dt), error_scale
-        self.rows, self.generator, self.quantity = rows, generator, quantity
-        self.episode = min(len(trajectory) for trajectory in trajectories) // self.tuned.ticks
-        length = self.episode * self.tuned.ticks
-        self.channels = {
-            channel.name: np.stack([trajectory.measurements[channel.name][:length] for trajectory in trajectories])
-            for channel in tuned.kalman.channels
-        }
-        self.truth = np.stack([trajectory.truth_of(quantity.name)[:length] for trajectory in trajectories])
-        self.scored = np.stack([trajectory.mask[:length] for trajectory in trajectories])
-        gains = self.tuned.gains(reference)
-        estimates = (
-            self.tuned.kalman.run(self._sequence(i), gains).pose[quantity.name] for i in range(len(self.truth))
-        )
-        errors = [error(quantity, estimate, truth) for estimate, truth in zip(estimates, self.truth, strict=True)]
-        self.reference = self._cost(np.stack(errors))
-        usual = np.nanmean(np.where(self.scored, self.reference, np.nan), axis=1)
-        self.weight = 1.0 / (usual + SMALL_ERROR) if relative else np.full(len(self.truth), np.degrees(1.0))
-        self.known = self._foresight(trajectories)
+        self.stack, self.tuned, self.error_scale = stack, stack.tuned, error_scale
+        self.rows, self.generator = rows, generator
+        self.reference = self._cost(stack.errors(reference))
+        # Contiguous rows, so that the sums below have one order whatever the layout of the stack.
+        by_trajectory = np.ascontiguousarray(np.where(stack.mask, self.reference, np.nan).T)
+        mean = np.nanmean(by_trajectory, axis=1)
+        self.weight = 1.0 / (mean + SMALL_ERROR) if relative else np.full(len(mean), np.degrees(1.0))
+        self.foresight = self._foresight()
         self.start()
 
-    def _foresight(self, trajectories: Sequence[Trajectory]) -> np.ndarray:
-        """What is known of every decision beforehand ``(trajectories, decisions + 1, PRIVILEGED - 1)``.
+    def _foresight(self) -> np.ndarray:
+        """What is known of every decision beforehand ``(N, decisions + 1, PRIVILEGED - 1)``.
 
         The gyroscope's bias, and over each of :data:`AHEAD` the mean cost of the reference and the mean acceleration.
         """
-        per_decision = (len(trajectories), self.episode, self.tuned.ticks)
-        length = self.episode * self.tuned.ticks
-        none = np.zeros((length, 3))
+        ticks, length = self.tuned.ticks, len(self.reference)
+        absent = np.zeros((length, 3))
         bias, force = (
-            np.stack([np.linalg.norm(t.truth.get(name, none)[:length], axis=-1) for t in trajectories])
+            np.stack([np.linalg.norm(t.truth.get(name, absent)[:length], axis=-1) for t in self.stack.trajectories])
             for name in ("gyroscope_bias", "external_acceleration")
         )
-        columns = [np.log1p(np.degrees(bias[:, :: self.tuned.ticks]))]
-        for values in (np.degrees(self.reference), force):
-            means = np.nan_to_num(values).reshape(per_decision).mean(axis=-1)
+        columns = [np.log1p(np.degrees(bias[:, ::ticks]))]
+        for values in (np.degrees(np.ascontiguousarray(self.reference.T)), force):
+            means = np.nan_to_num(values).reshape(len(values), self.stack.decisions, ticks).mean(axis=-1)
             columns += [np.log1p(mean_ahead(means, ahead)) for ahead in AHEAD]
         table = np.stack(columns, axis=-1)
         return np.concatenate([table, table[:, -1:]], axis=1)
@@ -101,21 +83,18 @@ class RateGroup:
             return errors
         return self.error_scale * np.log1p(errors / self.error_scale)
 
-    def _sequence(self, index: int) -> dict[str, np.ndarray]:
-        return {name: values[index] for name, values in self.channels.items()}
-
     def start(self) -> None:
         """Begin all episodes; the first ones end at random times, so that later ones do not end together."""
-        self.trajectory = self.generator.integers(len(self.truth), size=self.rows)
+        self.trajectory = self.generator.integers(len(self.weight), size=self.rows)
         self.decision = np.zeros(self.rows, int)
-        self.end = self.generator.integers(1, self.episode + 1, size=self.rows)
-        self.fresh = self.tuned.init({name: values[self.trajectory, 0] for name, values in self.channels.items()})
-        self.state, self.error = self.fresh, np.zeros(self.rows)
+        self.end = self.generator.integers(1, self.stack.decisions + 1, size=self.rows)
+        self.initial = self.tuned.init({name: values[0, self.trajectory] for name, values in self.stack.channels.items()})
+        self.state, self.error = self.initial, np.zeros(self.rows)
 
     def observe(self) -> np.ndarray:
         """Observations, and what only the critic may see ``(rows, n + PRIVILEGED)``."""
         own = np.log1p(np.degrees(self.error))[:, None]
-        parts = [self.tuned.observe(self.state), self.known[self.trajectory, self.decision], own]
+        parts = [self.tuned.observe(self.state), self.foresight[self.trajectory, self.decision], own]
         return np.concatenate(parts, axis=-1).astype(np.float32)
 
     def step(self, actions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -125,12 +104,13 @@ class RateGroup:
             Observations at the end of the interval, see :meth:`observe`, rewards ``(rows,)``, and which
             episodes are over ``(rows,)``; :meth:`restart` begins these anew.
         """
-        ticks = self.decision * self.tuned.ticks + np.arange(self.tuned.ticks)[:, None]
-        chunk = {name: values[self.trajectory, ticks] for name, values in self.channels.items()}
+        stack, quantity = self.stack, self.stack.quantity
+        now = self.decision * self.tuned.ticks + np.arange(self.tuned.ticks)[:, None], self.trajectory
+        chunk = {name: values[now] for name, values in stack.channels.items()}
         estimate, self.state = self.tuned.advance(self.tuned.decide(self.state, actions), chunk)
-        errors = error(self.quantity, estimate.pose[self.quantity.name], self.truth[self.trajectory, ticks])
-        gained = self.reference[self.trajectory, ticks] - self._cost(errors)
-        counted = self.scored[self.trajectory, ticks] & np.isfinite(gained)
+        errors = error(quantity, estimate.pose[quantity.name], stack.truth[now])
+        gained = self.reference[now] - self._cost(errors)
+        counted = stack.mask[now] & np.isfinite(gained)
         gains = np.where(counted, gained, 0.0).sum(axis=0) / np.maximum(counted.sum(axis=0), 1)
         rewards = gains * self.weight[self.trajectory]
         self.decision, self.error = self.decision + 1, np.nan_to_num(errors[-1])
@@ -140,8 +120,8 @@ class RateGroup:
         """Begin new episodes in the rows ``over`` ``(rows,)`` bool."""
         count = int(over.sum())
         self.trajectory = self.trajectory.copy()
-        self.trajectory[over] = self.generator.integers(len(self.truth), size=count)
-        self.decision[over], self.end[over], self.error[over] = 0, self.episode, 0.0
+        self.trajectory[over] = self.generator.integers(len(self.weight), size=count)
+        self.decision[over], self.end[over], self.error[over] = 0, self.stack.decisions, 0.0
 
         def mixed(new: np.ndarray, old: np.ndarray) -> np.ndarray:
             if new.ndim == 0:
@@ -149,10 +129,27 @@ class RateGroup:
             return np.where(over.reshape(-1, *(1,) * (new.ndim - 1)), new, old)
 
         self.state = TunedState(
-            type(self.fresh.filter)(*map(mixed, self.fresh.filter, self.state.filter)),
-            type(self.fresh.memory)(*map(mixed, self.fresh.memory, self.state.memory)),
-            mixed(self.fresh.action, self.state.action),
+            type(self.initial.filter)(*map(mixed, self.initial.filter, self.state.filter)),
+            type(self.initial.memory)(*map(mixed, self.initial.memory, self.state.memory)),
+            mixed(self.initial.action, self.state.action),
         )
+
+    def snapshot(self) -> dict[str, Any]:
+        """All that changes while episodes run: arrays, and the generator as JSON."""
+        return {
+            "generator": json.dumps(self.generator.bit_generator.state),
+            "rows": [np.array(array) for array in (self.trajectory, self.decision, self.end, self.error)],
+            "state": [np.array(array) for array in (*self.state.filter, *self.state.memory, self.state.action)],
+        }
+
+    def restore(self, snapshot: dict[str, Any]) -> None:
+        """Go on from a :meth:`snapshot` as if nothing had happened in between."""
+        self.generator.bit_generator.state = json.loads(snapshot["generator"])
+        self.trajectory, self.decision, self.end, self.error = (np.array(array) for array in snapshot["rows"])
+        arrays = [np.array(array) for array in snapshot["state"]]
+        split = len(self.initial.filter)
+        filter, memory = type(self.initial.filter)(*arrays[:split]), type(self.initial.memory)(*arrays[split:-1])
+        self.state = TunedState(filter, memory, arrays[-1])
 
 
 def mean_ahead(values: np.ndarray, ahead: int) -> np.ndarray:
@@ -167,8 +164,7 @@ class TuningBatch(VecEnv):
     """A Stable-Baselines3 vector environment over a fixed set of trajectories.
 
     An observation is that of the registered environment, followed by :data:`PRIVILEGED` numbers that take the truth
-    or the future to know: for the critic (:mod:`.asymmetric`), whose value is a baseline and reaches
-    no policy.
+    or the future to know: for the critic (:mod:`.actor_critic`), whose value is a baseline and reaches no policy.
 
     The reward is the mean error of a constant ``reference`` action over the interval minus that of the agent, in
     degrees.
@@ -176,7 +172,7 @@ class TuningBatch(VecEnv):
     Args:
         tuned: the filter, what may be chosen of it and what is seen.
         trajectories: drawn from with replacement; every rate among them gets its share of the episodes.
-        envs: episodes that run at a time, at least one for each rate.
+        n_envs: episodes that run at a time, at least one for each rate.
         seed: of the choice of trajectories.
         quantity: output that is scored; None for ``up``.
         reference: action ``(k,)``; None for the published tuning.
@@ -186,14 +182,14 @@ class TuningBatch(VecEnv):
             hard trajectories count the same.
 
     Raises:
-        ValueError: fewer ``envs`` than rates.
+        ValueError: fewer ``n_envs`` than rates.
     """
 
     def __init__(
         self,
         tuned: TunedFilter,
         trajectories: Sequence[Trajectory],
-        envs: int,
+        n_envs: int,
         *,
         seed: int = 0,
         quantity: str | None = None,
@@ -201,34 +197,41 @@ class TuningBatch(VecEnv):
         error_scale: float = math.inf,
         relative: bool = False,
     ) -> None:
-        groups: dict[int, list[Trajectory]] = {}
-        for trajectory in trajectories:
-            groups.setdefault(round(1e6 * trajectory.dt), []).append(trajectory)
-        if not groups or envs < len(groups):
-            raise ValueError(f"envs must be at least the number of rates ({len(groups)}, not 0), got {envs}")
-        rows = [len(part) for part in np.array_split(np.arange(envs), len(groups))]
-        generators = np.random.default_rng(seed).spawn(len(groups))
-        output = scored_quantity(tuned.kalman, quantity)
+        stacks = TrajectoryStack.by_rate(tuned, trajectories, quantity)
+        if not stacks or n_envs < len(stacks):
+            raise ValueError(f"n_envs must be at least the number of rates ({len(stacks)}, not 0), got {n_envs}")
+        rows = [len(part) for part in np.array_split(np.arange(n_envs), len(stacks))]
+        generators = np.random.default_rng(seed).spawn(len(stacks))
         action = np.zeros(tuned.actions) if reference is None else np.asarray(reference, float)
         self.groups = [
-            RateGroup(tuned, part, count, generator, output, action, math.radians(error_scale), relative)
-            for part, count, generator in zip(groups.values(), rows, generators, strict=True)
+            RateGroup(stack, count, generator, action, math.radians(error_scale), relative)
+            for stack, count, generator in zip(stacks, rows, generators, strict=True)
         ]
         self.bounds = np.cumsum([0, *rows])
-        self.tuned, self.actions = tuned, np.zeros((envs, tuned.actions))
-        self.returns = np.zeros(envs)
+        self.tuned, self.actions = tuned, np.zeros((n_envs, tuned.actions))
+        self.returns = np.zeros(n_envs)
         super().__init__(
-            envs,
+            n_envs,
             spaces.Box(-np.inf, np.inf, (tuned.observation_size + PRIVILEGED,), np.float32),
             spaces.Box(-1.0, 1.0, (tuned.actions,), np.float32),
         )
 
     def privileged_statistics(self) -> tuple[np.ndarray, np.ndarray]:
-        """Mean and deviation of the numbers that only the critic may see, each ``(PRIVILEGED,)``."""
-        known = np.concatenate([group.known.reshape(-1, PRIVILEGED - 1) for group in self.groups])
+        """Mean and standard deviation of the numbers that only the critic may see, each ``(PRIVILEGED,)``."""
+        known = np.concatenate([group.foresight.reshape(-1, PRIVILEGED - 1) for group in self.groups])
         # The agent's own error is not known beforehand; it is about that of the reference.
         table = np.concatenate([known, known[:, 1:2]], axis=1)
         return table.mean(axis=0), table.std(axis=0) + 1e-3
+
+    def snapshot(self) -> dict[str, Any]:
+        """All that changes while episodes run, for :meth:`restore`."""
+        return {"returns": self.returns.copy(), "groups": [group.snapshot() for group in self.groups]}
+
+    def restore(self, snapshot: dict[str, Any]) -> None:
+        """Go on from a :meth:`snapshot` of a batch that was made with the same arguments."""
+        self.returns = np.array(snapshot["returns"])
+        for group, kept in zip(self.groups, snapshot["groups"], strict=True):
+            group.restore(kept)
 
     def reset(self) -> np.ndarray:
         """Begin all episodes."""

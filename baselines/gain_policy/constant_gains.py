@@ -38,14 +38,9 @@ class ConstantGains:
         return self.scores[0]
 
     @property
-    def hindsight(self) -> np.ndarray:
-        """Least error of any action tried on each trajectory ``(trajectories,)``, rad; only the truth tells it."""
+    def oracle(self) -> np.ndarray:
+        """Least error of any action tried on each trajectory ``(trajectories,)``, rad: a bound that needs the truth."""
         return np.min(self.scores, axis=0)
-
-    @property
-    def hindsight_actions(self) -> np.ndarray:
-        """The action of :attr:`hindsight` for each trajectory ``(trajectories, k)``."""
-        return self.tried[np.argmin(self.scores, axis=0)]
 
 
 def best_constant_gains(
@@ -88,9 +83,9 @@ def best_constant_gains(
 
     neutral = evaluate(np.zeros(tuned.actions))
     if not np.isfinite(neutral):
-        raise ValueError("some trajectory has no tick with a known truth that is scored")
-    spread = 2.0 * qmc.Sobol(tuned.actions, rng=np.random.default_rng(seed)).random(samples) - 1.0 if samples else []
-    values = [neutral, *(evaluate(point) for point in spread), *(evaluate(np.asarray(point)) for point in guesses)]
+        raise ValueError("trajectories must have scored samples with a known truth; some trajectory has none")
+    points = 2.0 * qmc.Sobol(tuned.actions, rng=np.random.default_rng(seed)).random(samples) - 1.0 if samples else []
+    values = [neutral, *(evaluate(point) for point in points), *(evaluate(np.asarray(point)) for point in guesses)]
     if refinements:
         start = tried[int(np.argmin(values))]
         # Steps inwards, so that the first simplex lies in the box.

@@ -1,4 +1,4 @@
-"""A gain policy: a small network from what a filter sees of itself to its gains, run by NumPy alone."""
+"""A gain policy: a small network from a filter's own statistics to its gains, evaluated with NumPy alone."""
 
 from __future__ import annotations
 
@@ -64,6 +64,23 @@ class GainPolicy:
         return cls(tuned.name, tuned.ranges, tuned.features, ((weight, np.asarray(action, float)),))
 
     @classmethod
+    def of_network(cls, tuned: TunedFilter, linear: Sequence[Any], mean: np.ndarray, std: np.ndarray) -> GainPolicy:
+        """The linear layers of a torch network whose input is ``(observation - mean) / std``.
+
+        Args:
+            tuned: the filter that it sets.
+            linear: ``torch.nn.Linear`` layers, with tanh between them.
+            mean: ``(n,)`` of the observations.
+            std: their standard deviations ``(n,)``.
+        """
+        layers: list[Layer] = [
+            (layer.weight.detach().numpy().astype(float), layer.bias.detach().numpy().astype(float)) for layer in linear
+        ]
+        weight, bias = layers[0]
+        layers[0] = (weight / std, bias - (weight / std) @ mean)
+        return cls(tuned.name, tuned.ranges, tuned.features, tuple(layers))
+
+    @classmethod
     def neutral(cls, tuned: TunedFilter) -> GainPolicy:
         """The published tuning."""
         return cls.constant(tuned, np.zeros(tuned.actions))
@@ -99,11 +116,11 @@ class GainPolicy:
 
         Raises:
             FileNotFoundError: there is none.
-            ValueError: the weights are damaged or are no gain policy.
+            ValueError: the weights are damaged or are not a gain policy.
         """
         arrays, card = load_weights(path_or_name)
         if card.get("kind") != KIND:
-            raise ValueError(f"{path_or_name} is no {KIND} but {card.get('kind')!r}")
+            raise ValueError(f"{path_or_name} is not a {KIND} but {card.get('kind')!r}")
         try:
             ranges = tuple(
                 GainRange(entry["gain"], float(entry["lower"]), float(entry["upper"])) for entry in card["gains"]

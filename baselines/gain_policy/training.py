@@ -1,4 +1,4 @@
-"""Train a gain policy by proximal policy optimisation (Stable-Baselines3) and export it to plain arrays.
+"""Train a gain policy by proximal policy optimisation (stable-baselines3); a stopped training resumes bit by bit.
 
 The motions are simulated (:class:`poise.envs.hand.trajectories.HandTrajectories`), a fixed set drawn from a seed.
 First the best constant gains are searched; the network starts from them and is rewarded for what it gains over them,
@@ -7,127 +7,43 @@ which changes no optimal policy but takes most of the variance away, since both 
 
 from __future__ import annotations
 
+import hashlib
 import json
+import random
 import time
+from collections import deque
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ...envs.data.trajectory import Trajectory
-from ...envs.hand.gestures import Mixed
-from ...envs.hand.trajectories import HandTrajectories
-from ...envs.sensors.presets import sensor_preset
 from ...filters.adaptation.features import InnovationFeatures
 from ...filters.adaptation.gains import tunable_filter
 from ...filters.adaptation.tuned import TunedFilter
 from ...filters.core.kalman import KalmanFilter
+from ...filters.support.version import package_version
+from ..checkpoint import load_checkpoint, save_checkpoint
+from .config import TrainingConfig
 from .constant_gains import best_constant_gains
-from .hindsight import Chooser, fit_hindsight
+from .oracle_warm_start import fit_oracle
 from .policy import GainPolicy
 
-SUSTAINED = Mixed(lengths=(15.0, 40.0), rest_share=0.1, spread=0.5, single_share=0.25)
-"""Motion of one kind that lasts, beside the quick changes of ``mixed``."""
+if TYPE_CHECKING:
+    from stable_baselines3.common.vec_env import VecNormalize
 
-VIBRATING = replace(
-    sensor_preset("st-lsm6dsox"),
-    name="vibrating",
-    source="st-lsm6dsox on something that vibrates",
-    accelerometer=replace(sensor_preset("st-lsm6dsox").accelerometer, white_noise=0.1),
-    gyroscope=replace(sensor_preset("st-lsm6dsox").gyroscope, white_noise=1e-3),
-)
-"""A sensor that shakes at frequencies beyond those of a hand, at 100 Hz by 1 m/s² and 0.6 °/s."""
+    from .actor_critic import GainPPO
+    from .batch import TuningBatch
 
-TRAINING_MOTIONS = HandTrajectories(
-    gestures=("mixed", "mixed", "mixed", SUSTAINED, SUSTAINED, "slow", "fast", "severe", "rest"),
-    rates=(100.0, 286.0),
-    sensors=("paper-hand", "xsens-mtw-awinda", "st-lsm6dsox", VIBRATING),
-    grade=(0.1, 1.0),
-    duration=60.0,
-)
-"""What shipped policies are trained on."""
+CHECKPOINT = "checkpoint.pt"
+"""File of the run folder that a stopped training resumes from."""
+LOOKS = 6
+"""How often a training with a validation looks at its policy, about."""
 
-CHECKPOINT, STATISTICS, PROGRESS = "model.zip", "statistics.pkl", "progress.json"
-"""Files of a checkpoint in the run folder."""
-
-
-@dataclass(frozen=True)
-class TrainingConfig:
-    """How a policy is trained."""
-
-    filter: str = "external-acceleration"
-    """name of the filter"""
-    gains: tuple[str, ...] | None = None
-    """gains that the policy sets; None for all of the filter"""
-    interval: float = 0.1
-    """s from decision to decision"""
-    motions: HandTrajectories = field(default=TRAINING_MOTIONS)
-    """what is simulated"""
-    trajectories: int = 240
-    """number of simulated trajectories to train on"""
-    seed: int = 0
-    """root of all randomness"""
-    steps: int = 1_000_000
-    """decisions in total"""
-    envs: int = 256
-    """episodes at a time"""
-    rollout: int = 64
-    """decisions of each episode between two updates"""
-    batch: int = 4096
-    """decisions in a gradient step"""
-    epochs: int = 8
-    """passes over a rollout, fewer if the policy has changed enough"""
-    learning_rate: float = 1e-4
-    """at the start; falls linearly to a tenth"""
-    discount: float = 0.995
-    """factor a decision; 0.995 looks 20 s ahead at 10 decisions a second, as a biased gyroscope takes time to show"""
-    trace: float = 0.95
-    """λ of generalised advantage estimation"""
-    error_scale: float = 5.0
-    """deg: errors far above it count by their logarithm in the reward"""
-    hidden: tuple[int, ...] = (64, 64)
-    """units of the hidden layers"""
-    spread: float = 0.1
-    """standard deviation of the actions at the start, about"""
-    persistence: int = 32
-    """decisions for which the exploration stays the same function of what is seen; a filter forgets single ones"""
-    hindsight: int = 150
-    """trajectories on which the first policy is fitted to hindsight; 0 starts from the constant gains"""
-    centre: tuple[float, ...] | None = None
-    """action around which hindsight looks; None for the best constant gains"""
-    search: int = 64
-    """points of the search for constant gains, the reference of the reward; 0 takes the published tuning"""
-
-    def __post_init__(self) -> None:
-        for name in ("trajectories", "steps", "envs", "rollout", "batch", "epochs"):
-            if getattr(self, name) < 1:
-                raise ValueError(f"{name} must be at least 1, got {getattr(self, name)}")
-        if not 0.0 <= self.discount < 1.0:
-            raise ValueError(f"discount must lie in [0, 1), got {self.discount}")
-        if self.hindsight < 0 or self.search < 0 or self.spread <= 0.0 or self.learning_rate <= 0.0:
-            raise ValueError("hindsight and search must not be negative, spread and learning_rate must be positive")
-        if not self.error_scale > 0.0:
-            raise ValueError(f"error_scale must be positive degrees, got {self.error_scale}")
-
-    def describe(self) -> dict[str, Any]:
-        """Everything, as JSON knows it."""
-        values = {part.name: getattr(self, part.name) for part in fields(self)} | {"motions": self.motions.describe()}
-        return json.loads(json.dumps(values))
-
-
-def shipped_config(filter: str) -> TrainingConfig:
-    """The configuration that the shipped weights of a filter were trained with.
-
-    They begin from hindsight. Started from the best constant gains, the same number of steps wins little in simulation
-    and loses on recordings; from hindsight over the whole box of actions, the filter is lost in single motions.
-    """
-    if filter == "bounded-motion":
-        # The bias gain is left alone: motion that looks like a wandering bias is more frequent than one.
-        return TrainingConfig(filter=filter, gains=("process", "velocity"), centre=(0.0, 0.0))
-    # The valley in which the measurement variance does the work, and c_a, which trusts the filter's own error, little.
-    return TrainingConfig(filter=filter, centre=(-0.7, 0.7, -0.7))
+Report = Callable[[dict[str, float]], None]
+Validate = Callable[[GainPolicy], float]
 
 
 def train_policy(
@@ -138,10 +54,10 @@ def train_policy(
     start: np.ndarray | None = None,
     folder: str | Path | None = None,
     resume: bool = False,
-    report: Callable[[dict[str, float]], None] | None = None,
-    validate: Callable[[GainPolicy], float] | None = None,
+    report: Report | None = None,
+    validate: Validate | None = None,
 ) -> GainPolicy:
-    """Train a policy; the same arguments on the same machine give the same policy.
+    """Train a policy; the same arguments on the same machine give the same policy, interrupted and resumed or not.
 
     Args:
         config: what to do.
@@ -149,7 +65,7 @@ def train_policy(
         trajectories: to train on, instead of simulated ones.
         start: constant action ``(k,)`` to start from; None searches it, or takes that of the checkpoint.
         folder: where checkpoints and TensorBoard logs go; None keeps nothing.
-        resume: go on from the checkpoint in ``folder``, if there is one.
+        resume: continue from the checkpoint in ``folder``; a longer ``total_timesteps`` than before is allowed.
         report: called after every update with ``steps``, ``gain`` (share of the error that is saved) and ``seconds``.
         validate: gives a score of a policy, the less the better; the best of about six looks is returned, not the last.
 
@@ -157,219 +73,231 @@ def train_policy(
         The policy; its card holds the configuration, the training time and the constant gains that it started from.
 
     Raises:
-        ValueError: see :class:`TrainingConfig`; ``resume`` without a folder; checkpoint of another configuration.
+        ValueError: see :class:`TrainingConfig`; ``resume`` without a folder or a readable checkpoint; the checkpoint
+            belongs to another configuration, filter, set of trajectories or version of the package.
     """
     if resume and folder is None:
         raise ValueError("resume needs a folder with a checkpoint")
     import torch
-    from stable_baselines3.common.vec_env import VecNormalize
 
-    from .batch import TuningBatch
-
-    started = time.perf_counter()
     filter = tunable_filter(config.filter) if kalman is None else kalman
     tuned = TunedFilter.of(filter, config.gains, InnovationFeatures(config.interval))
     motions = config.motions.draw_many(config.seed, config.trajectories) if trajectories is None else list(trajectories)
     home = None if folder is None else Path(folder)
-    if home is not None:
-        home.mkdir(parents=True, exist_ok=True)
-    done = load_progress(home, config) if resume and home is not None else {}
-    if done:
-        start = np.asarray(done["constant"])
-    elif start is not None:
-        start = np.asarray(start, float)
-    elif config.search:
-        few = motions[:48]
-        effort: dict[str, Any] = {"samples": config.search, "refinements": config.search, "seed": config.seed}
-        start = best_constant_gains(tuned, few, **effort).action
-    else:
-        start = np.zeros(tuned.actions)
+    key = training_key(config, tuned, motions)
     threads = torch.get_num_threads()
     torch.set_num_threads(1)
     try:
-        scale = config.error_scale
-        batch = TuningBatch(
-            tuned, motions, config.envs, seed=config.seed, reference=start, error_scale=scale, relative=True
-        )
-        if done and home is not None:
-            env = VecNormalize.load(str(home / STATISTICS), batch)
+        if resume and home is not None:
+            state = load_checkpoint(home / CHECKPOINT, key)
+            start = state["start"]
+            training = PolicyTraining(config, tuned, motions, start, home, key, report, validate)
+            training.restore(state)
         else:
-            env = VecNormalize(batch, gamma=config.discount, clip_obs=1e6)
-        model = make_model(config, env, start, home if done else None, home)
-        if config.hindsight and not done:
-            centre = start if config.centre is None else np.asarray(config.centre)
-            first = fit_hindsight(tuned, motions[: config.hindsight], centre, hidden=config.hidden, seed=config.seed)
-            begin_with(model, env, first, batch)
-        callback = make_callback(config, tuned, start, home, report, validate, started, float(done.get("seconds", 0.0)))
-        remaining = config.steps - int(model.num_timesteps)
-        if remaining > 0:
-            model.learn(remaining, callback=callback, reset_num_timesteps=not done, tb_log_name="tensorboard")
+            start = starting_action(config, tuned, motions) if start is None else np.asarray(start, float)
+            training = PolicyTraining(config, tuned, motions, start, home, key, report, validate)
+            training.begin()
+        return training.finish()
     finally:
         torch.set_num_threads(threads)
-    policy = callback.best if callback.best is not None else export_policy(model, env, tuned)
-    seconds = time.perf_counter() - started + float(done.get("seconds", 0.0))
-    card = {
-        "training": config.describe(),
-        "constant_action": [float(value) for value in start],
-        "steps": int(model.num_timesteps),
-        "chosen_steps": int(model.num_timesteps if callback.best_steps is None else callback.best_steps),
-        "seconds": round(seconds, 1),
+
+
+def starting_action(config: TrainingConfig, tuned: TunedFilter, motions: list[Trajectory]) -> np.ndarray:
+    """The best constant gains ``(k,)`` on some of the motions, or the published ones if none are searched."""
+    if not config.gain_search:
+        return np.zeros(tuned.actions)
+    effort = config.gain_search
+    return best_constant_gains(tuned, motions[:48], samples=effort, refinements=effort, seed=config.seed).action
+
+
+def training_key(config: TrainingConfig, tuned: TunedFilter, motions: Sequence[Trajectory]) -> dict[str, Any]:
+    """What a checkpoint must agree with; not the length, so that a longer training can continue a shorter one."""
+    described = config.describe()
+    del described["total_timesteps"]
+    content = hashlib.sha256()
+    for trajectory in motions:
+        for name, values in sorted({**trajectory.measurements, **trajectory.truth, "mask": trajectory.mask}.items()):
+            content.update(name.encode())
+            content.update(np.ascontiguousarray(values))
+    return {
+        "config": described,
+        "filter": repr(tuned.kalman),
+        "trajectories": content.hexdigest()[:16],
+        "versions": {name: package_version(name) for name in ("torch", "stable-baselines3")},
     }
-    return replace(policy, card=json.loads(json.dumps(card)))
 
 
-def make_model(config: TrainingConfig, env: Any, start: np.ndarray, checkpoint: Path | None, logs: Path | None) -> Any:
-    """The PPO model, new or from a checkpoint; a new one begins with the constant action ``start``."""
-    import torch
-    from stable_baselines3 import PPO
-
-    from .asymmetric import AsymmetricPolicy
-    from .batch import PRIVILEGED
-
-    def learning_rate(remaining: float) -> float:
-        return config.learning_rate * (0.1 + 0.9 * remaining)
-
-    if checkpoint is not None:
-        return PPO.load(checkpoint / CHECKPOINT, env=env, device="cpu", custom_objects={"learning_rate": learning_rate})
-    size = config.envs * config.rollout
-    model = PPO(
-        AsymmetricPolicy,
-        env,
-        learning_rate=learning_rate,
-        n_steps=config.rollout,
-        batch_size=min(config.batch, size),
-        n_epochs=config.epochs,
-        gamma=config.discount,
-        gae_lambda=config.trace,
-        clip_range=0.2,
-        target_kl=0.01,
-        use_sde=True,
-        sde_sample_freq=config.persistence,
-        ent_coef=0.0,
-        policy_kwargs={
-            "seen": env.observation_space.shape[0] - PRIVILEGED,
-            "net_arch": list(config.hidden),
-            "activation_fn": torch.nn.Tanh,
-            # The noise is a linear function of the last hidden layer, whose tanh units have a mean square of about 0.3.
-            "log_std_init": float(np.log(config.spread / np.sqrt(0.3 * config.hidden[-1]))),
-        },
-        seed=config.seed,
-        device="cpu",
-        tensorboard_log=None if logs is None else str(logs),
-    )
-    with torch.no_grad():
-        parameters = dict(model.policy.action_net.named_parameters())
-        parameters["bias"].copy_(torch.as_tensor(0.95 * start))
-        parameters["weight"].mul_(0.1)
-    return model
-
-
-def begin_with(model: Any, env: Any, first: Chooser, batch: Any) -> None:
-    """Give the actor the weights of a network, and ``env`` the normalisation that it was trained with."""
-    import torch
-
-    modules = [*model.policy.mlp_extractor.policy_net, model.policy.action_net]
-    linear = [module for module in modules if hasattr(module, "weight")]
-    with torch.no_grad():
-        for mine, theirs in zip(linear, first.linear, strict=True):
-            mine.weight.copy_(theirs.weight)
-            mine.bias.copy_(theirs.bias)
-    privileged = batch.privileged_statistics()
-    env.obs_rms.mean = np.concatenate([first.mean, privileged[0]])
-    env.obs_rms.var = np.concatenate([first.deviation**2, privileged[1] ** 2])
-    # From here on the normalisation is part of the actor and must not drift.
-    env.obs_rms.count = 1e12
-
-
-def export_policy(model: Any, env: Any, tuned: TunedFilter) -> GainPolicy:
-    """The deterministic part of an SB3 policy as plain arrays, with the normalisation of ``env`` in the first layer.
+class PolicyTraining:
+    """Everything that changes during a training: model, normalisation, episodes, generators, the best policy so far.
 
     Args:
-        model: from :func:`make_model`.
-        env: its VecNormalize.
-        tuned: what it was trained on.
+        config: settings.
+        tuned: the filter, what may be chosen of it and what is seen.
+        motions: what is trained on.
+        start: constant action ``(k,)`` to start from, the reference of the reward.
+        home: folder of checkpoints and logs; None keeps nothing.
+        key: what a checkpoint must agree with.
+        report: see :func:`train_policy`.
+        validate: likewise.
     """
-    modules = [*model.policy.mlp_extractor.policy_net, model.policy.action_net]
-    linear = [module for module in modules if hasattr(module, "weight")]
-    layers = [(m.weight.detach().numpy().astype(float), m.bias.detach().numpy().astype(float)) for m in linear]
-    seen = tuned.observation_size
-    mean, deviation = env.obs_rms.mean[:seen], np.sqrt(env.obs_rms.var[:seen] + env.epsilon)
-    weight, bias = layers[0]
-    layers[0] = (weight / deviation, bias - (weight / deviation) @ mean)
-    return GainPolicy(tuned.name, tuned.ranges, tuned.features, tuple(layers))
 
+    def __init__(
+        self,
+        config: TrainingConfig,
+        tuned: TunedFilter,
+        motions: list[Trajectory],
+        start: np.ndarray,
+        home: Path | None,
+        key: dict[str, Any],
+        report: Report | None,
+        validate: Validate | None,
+    ) -> None:
+        from stable_baselines3.common.vec_env import VecNormalize
 
-def make_callback(
-    config: TrainingConfig,
-    tuned: TunedFilter,
-    start: np.ndarray,
-    home: Path | None,
-    report: Callable[[dict[str, float]], None] | None,
-    validate: Callable[[GainPolicy], float] | None,
-    started: float,
-    earlier: float,
-) -> Any:
-    """The callback that reports, validates and saves after every update."""
-    from stable_baselines3.common.callbacks import BaseCallback
+        from .actor_critic import make_model
+        from .batch import TuningBatch
 
-    class Watch(BaseCallback):
-        best: GainPolicy | None = None
-        best_steps: int | None = None
-        best_score = np.inf
-        looked = 0
+        self.config, self.tuned, self.motions, self.start = config, tuned, motions, start
+        self.home, self.key, self.report, self.validate = home, key, report, validate
+        self.started, self.earlier = time.perf_counter(), 0.0
+        self.batch: TuningBatch = TuningBatch(
+            *(tuned, motions, config.n_envs),
+            seed=config.seed,
+            reference=start,
+            error_scale=config.error_scale,
+            relative=True,
+        )
+        self.env: VecNormalize = VecNormalize(self.batch, gamma=config.gamma, clip_obs=1e6)
+        self.model: GainPPO = make_model(config, self.env, start, home)
+        self.best: GainPolicy | None = None
+        self.best_score, self.best_steps, self.looked = np.inf, 0, 0
 
-        def _on_rollout_start(self) -> None:
-            if self.num_timesteps == 0:
-                if validate is not None and config.hindsight:
-                    self._look()
-                return
-            seconds = time.perf_counter() - started + earlier
-            buffer: Any = self.model.ep_info_buffer or []
-            gain = float(np.mean([episode["r"] for episode in buffer])) if buffer else float("nan")
-            if validate is not None and self.num_timesteps - self.looked >= config.steps / 6:
-                self._look()
-            if report is not None:
-                report({"steps": float(self.num_timesteps), "gain": gain, "seconds": seconds})
-            if home is not None:
-                self.model.save(home / CHECKPOINT)
-                self.training_env.save(str(home / STATISTICS))  # type: ignore[attr-defined]
-                progress = {"config": config_key(config), "constant": start.tolist(), "seconds": seconds}
-                (home / PROGRESS).write_text(json.dumps(progress), encoding="utf-8")
+    @property
+    def steps(self) -> int:
+        """Decisions so far."""
+        return int(self.model.num_timesteps)
 
-        def _look(self) -> None:
-            self.looked = self.num_timesteps
-            policy = export_policy(self.model, self.training_env, tuned)
-            score = validate(policy) if validate is not None else 0.0
-            self.logger.record("validation/score", score)
-            if score < self.best_score:
-                self.best, self.best_score, self.best_steps = policy, score, self.num_timesteps
+    @property
+    def seconds(self) -> float:
+        """Training time so far, also that before interruptions."""
+        return time.perf_counter() - self.started + self.earlier
 
-        def _on_training_end(self) -> None:
-            if validate is not None:
-                self._look()
+    def begin(self) -> None:
+        """The oracle warm start, a first look at its policy, and the first observation."""
+        from .actor_critic import warm_start
 
-        def _on_step(self) -> bool:
-            return True
+        config = self.config
+        if config.warm_start:
+            centre = self.start if config.warm_start_centre is None else np.asarray(config.warm_start_centre)
+            motions = self.motions[: config.warm_start]
+            oracle = fit_oracle(self.tuned, motions, centre, net_arch=config.net_arch, seed=config.seed)
+            warm_start(self.model, self.env, oracle, self.batch)
+            self.look()
+        # As the model itself would at the start of `learn`, but a checkpoint can be written before it.
+        self.model._last_obs = self.env.reset()  # type: ignore[assignment]
+        self.model._last_episode_starts = np.ones(config.n_envs, dtype=bool)
+        self.save()
 
-    return Watch()
+    def finish(self) -> GainPolicy:
+        """Train to the end and give the policy."""
+        remaining = self.config.total_timesteps - self.steps
+        if remaining > 0:
+            self.model.after_update = self.after_update
+            self.model.learn(remaining, reset_num_timesteps=False, tb_log_name="tensorboard")
+            self.model.after_update = None
+        self.look()
+        policy = self.exported() if self.best is None else self.best
+        card = {
+            "training": self.config.describe(),
+            "constant_action": [float(value) for value in self.start],
+            "steps": self.steps,
+            "chosen_steps": self.steps if self.best is None else self.best_steps,
+            "seconds": round(self.seconds, 1),
+        }
+        return replace(policy, card=json.loads(json.dumps(card)))
 
+    def exported(self) -> GainPolicy:
+        """The policy of now."""
+        from .actor_critic import export_policy
 
-def config_key(config: TrainingConfig) -> dict[str, Any]:
-    """The configuration as JSON, without the length: a longer training may go on from a shorter one."""
-    plain = config.describe()
-    return {name: value for name, value in plain.items() if name != "steps"}
+        return export_policy(self.model, self.env, self.tuned)
 
+    def after_update(self) -> None:
+        """Look at the policy if it is time, report, and write a checkpoint."""
+        due = self.steps - self.looked >= self.config.total_timesteps / LOOKS
+        if due and self.steps < self.config.total_timesteps:
+            self.look()
+        if self.report is not None:
+            finished = self.model.ep_info_buffer or []
+            gain = float(np.mean([episode["r"] for episode in finished])) if finished else float("nan")
+            self.report({"steps": float(self.steps), "gain": gain, "seconds": self.seconds})
+        self.save()
 
-def load_progress(home: Path, config: TrainingConfig) -> dict[str, Any]:
-    """What the checkpoint in ``home`` says; empty if there is none.
+    def look(self) -> None:
+        """Score the policy of now, and keep it if it is the best so far."""
+        if self.validate is None:
+            return
+        self.looked = self.steps
+        policy = self.exported()
+        score = float(self.validate(policy))
+        if hasattr(self.model, "_logger"):
+            self.model.logger.record("validation/score", score)
+        if score < self.best_score:
+            self.best, self.best_score, self.best_steps = policy, score, self.steps
 
-    Raises:
-        ValueError: it belongs to another configuration.
-    """
-    path = home / PROGRESS
-    if not all((home / name).is_file() for name in (PROGRESS, CHECKPOINT, STATISTICS)):
-        return {}
-    progress = json.loads(path.read_text(encoding="utf-8"))
-    if progress["config"] != config_key(config):
-        raise ValueError(f"{home} holds a checkpoint of another configuration; choose another folder")
-    return progress
+    def save(self) -> None:
+        """Write a checkpoint, if there is a folder: everything that the rest of the training depends on."""
+        if self.home is None:
+            return
+        import torch
+
+        model, env = self.model, self.env
+        self.home.mkdir(parents=True, exist_ok=True)
+        name, keys, *rest = np.random.get_state()
+        normalisation = [env.obs_rms.mean, env.obs_rms.var, env.ret_rms.mean, env.ret_rms.var, env.returns]
+        state = {
+            "start": self.start,
+            "policy": model.policy.state_dict(),
+            "optimizer": model.policy.optimizer.state_dict(),
+            "counters": [self.steps, int(model._n_updates), self.looked, self.best_steps],
+            "episodes": [dict(episode) for episode in model.ep_info_buffer or []],
+            "observation": [model._last_obs, model._last_episode_starts],
+            "normalisation": normalisation,
+            "counts": [float(env.obs_rms.count), float(env.ret_rms.count)],
+            "batch": self.batch.snapshot(),
+            "best_score": float(self.best_score),
+            "best": None if self.best is None else [array for layer in self.best.layers for array in layer],
+            "generators": {
+                "torch": torch.get_rng_state(),
+                "numpy": [str(name), keys.astype(np.int64), json.dumps(rest)],
+                "python": json.dumps(random.getstate()),
+            },
+            "seconds": self.seconds,
+        }
+        save_checkpoint(self.home / CHECKPOINT, self.key, state)
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Continue from the state of a checkpoint as if there had been no interruption."""
+        import torch
+
+        model, env = self.model, self.env
+        model.policy.load_state_dict(state["policy"])
+        model.policy.optimizer.load_state_dict(state["optimizer"])
+        model.num_timesteps, model._n_updates, self.looked, self.best_steps = state["counters"]
+        model.ep_info_buffer = deque(state["episodes"], maxlen=model._stats_window_size)
+        model.ep_success_buffer = deque(maxlen=model._stats_window_size)
+        model._last_obs, model._last_episode_starts = state["observation"]
+        obs_rms, ret_rms = env.obs_rms, env.ret_rms
+        obs_rms.mean, obs_rms.var, ret_rms.mean, ret_rms.var, env.returns = state["normalisation"]
+        obs_rms.count, ret_rms.count = state["counts"]
+        self.batch.restore(state["batch"])
+        if state["best"] is not None:
+            layers = tuple(zip(state["best"][::2], state["best"][1::2], strict=True))
+            self.best = GainPolicy(self.tuned.name, self.tuned.ranges, self.tuned.features, layers)
+        self.best_score, self.earlier = state["best_score"], state["seconds"]
+        generators = state["generators"]
+        torch.set_rng_state(generators["torch"])
+        name, keys, rest = generators["numpy"]
+        np.random.set_state((name, keys, *json.loads(rest)))
+        kind, internal, gauss = json.loads(generators["python"])
+        random.setstate((kind, tuple(internal), gauss))

@@ -248,15 +248,13 @@ class Trainer:
     def save(self, path: Path) -> None:
         """Write a checkpoint in one move."""
         state = {
-            "config": json.dumps(asdict(self.config), sort_keys=True),
             "module": self.module.state_dict(),
             "optimizer": self.optimizer.state_dict(),
             "counters": [self.update, self.bad_steps, self.epoch, self.best_epoch],
             "history": self.history,
-            "best": {name: torch.from_numpy(array.copy()) for name, array in self.best.items()},
+            "best": self.best,
         }
-        with replacing(path) as part:
-            torch.save(state, part)
+        save_checkpoint(path, self.key, state)
 
     def restore(self, path: Path) -> None:
         """Go on from a checkpoint.
@@ -264,17 +262,11 @@ class Trainer:
         Raises:
             ValueError: there is none, or it belongs to another configuration.
         """
-        if not path.is_file():
-            raise ValueError(f"there is nothing to resume: no {path.name} in {path.parent}")
-        # weights_only: a checkpoint may come from elsewhere and must not run code
-        state = torch.load(path, weights_only=True)
-        if state["config"] != json.dumps(asdict(self.config), sort_keys=True):
-            raise ValueError(f"{path} was begun with another configuration; resume with the same arguments")
+        state = load_checkpoint(path, self.key)
         self.module.load_state_dict(state["module"])
         self.optimizer.load_state_dict(state["optimizer"])
         self.update, self.bad_steps, self.epoch, self.best_epoch = state["counters"]
-        self.history = state["history"]
-        self.best = {name: tensor.numpy() for name, tensor in state["best"].items()}
+        self.history, self.best = state["history"], state["best"]
 
 
 def validation_error(module: GruModule, dataset: LearnedDataset, size: int = 64, length: int = 1000) -> float:

@@ -139,7 +139,7 @@ def test_the_search_for_constant_gains_finds_a_wrong_tuning():
     found = best_constant_gains(wrong, trajectories, samples=8, refinements=15)
     assert found.score < 0.7 * found.neutral.mean()
     assert found.score == pytest.approx(np.mean(constant_errors(wrong, trajectories, found.action)))
-    assert np.all(found.hindsight <= found.scores + 1e-15)
+    assert np.all(found.oracle <= found.scores + 1e-15)
     np.testing.assert_allclose(found.neutral, constant_errors(wrong, trajectories, np.zeros(1)))
     again = best_constant_gains(wrong, trajectories, samples=8, refinements=15)
     np.testing.assert_array_equal(found.tried, again.tried)
@@ -157,7 +157,7 @@ def test_a_constant_policy_has_the_errors_of_constant_gains(name):
 @pytest.mark.parametrize(("name", "share"), [("external-acceleration", 0.9), ("bounded-motion", 1.0)])
 def test_shipped_policies_beat_the_published_tuning_and_the_best_constant_gains(name, share):
     """On motions that training never saw; the best constant gains are those that were found on the training's."""
-    from poise.baselines.gain_policy.training import TRAINING_MOTIONS
+    from poise.baselines.gain_policy.config import TRAINING_MOTIONS
 
     trajectories = TRAINING_MOTIONS.draw_many(HELD_OUT, 16)
     estimator = poise.make_estimator(f"{name}+policy")

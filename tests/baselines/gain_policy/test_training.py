@@ -1,4 +1,4 @@
-"""Training learns, is reproducible, can be interrupted, and exports what it trained."""
+"""Training learns, is reproducible, and exports what it trained."""
 
 import csv
 import dataclasses
@@ -8,9 +8,10 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
+from poise.baselines.gain_policy.config import TrainingConfig, shipped_config
 from poise.baselines.gain_policy.constant_gains import constant_errors, policy_errors
 from poise.baselines.gain_policy.policy import GainPolicy
-from poise.baselines.gain_policy.training import TrainingConfig, export_policy, make_model, shipped_config, train_policy
+from poise.baselines.gain_policy.training import train_policy
 from poise.envs.gain_tuning import ReplayGainEnv
 from poise.envs.hand.trajectories import HandTrajectories
 from poise.filters.adaptation.gains import tunable_filter
@@ -20,16 +21,16 @@ from poise.filters.core.kalman import KalmanFilter
 SMALL = TrainingConfig(
     filter="bounded-motion",
     gains=("velocity",),
-    steps=4096,
-    envs=16,
-    rollout=64,
-    batch=256,
-    search=0,
-    hindsight=0,
-    hidden=(16,),
+    total_timesteps=4096,
+    n_envs=16,
+    n_steps=64,
+    batch_size=256,
+    gain_search=0,
+    warm_start=0,
+    net_arch=(16,),
     learning_rate=3e-3,
-    discount=0.9,
-    spread=0.3,
+    gamma=0.9,
+    initial_std=0.3,
 )
 
 
@@ -46,14 +47,14 @@ def trajectories():
 
 
 def test_it_recovers_a_wrong_tuning(wrong, trajectories):
-    policy = train_policy(dataclasses.replace(SMALL, steps=12_288), kalman=wrong, trajectories=trajectories)
+    policy = train_policy(dataclasses.replace(SMALL, total_timesteps=12_288), kalman=wrong, trajectories=trajectories)
     unseen = HandTrajectories(("slow", "fast"), duration=10.0, rates=(50.0,)).draw_many(1, 6)
     neutral = constant_errors(TunedFilter.of(wrong), unseen, np.zeros(3)).mean()
     assert policy_errors(wrong, policy, unseen).mean() < 0.7 * neutral
 
 
 def test_equal_arguments_give_equal_policies_and_other_seeds_do_not(wrong, trajectories):
-    config = dataclasses.replace(SMALL, steps=1024)
+    config = dataclasses.replace(SMALL, total_timesteps=1024)
     one, two, three = (
         train_policy(dataclasses.replace(config, seed=seed), kalman=wrong, trajectories=trajectories)
         for seed in (0, 0, 1)
@@ -64,39 +65,16 @@ def test_equal_arguments_give_equal_policies_and_other_seeds_do_not(wrong, traje
     assert not np.array_equal(one.layers[0][0], three.layers[0][0])
 
 
-def test_an_interrupted_training_goes_on(wrong, trajectories, tmp_path):
-    short = dataclasses.replace(SMALL, steps=2048)
-    train_policy(short, kalman=wrong, trajectories=trajectories, folder=tmp_path)
-    assert (tmp_path / "progress.json").is_file()
-    assert list(tmp_path.rglob("events.out.tfevents*"))
-    steps = []
-    longer = train_policy(
-        SMALL,
-        kalman=wrong,
-        trajectories=trajectories,
-        folder=tmp_path,
-        resume=True,
-        report=lambda progress: steps.append(progress["steps"]),
-    )
-    assert longer.card["steps"] >= 4096
-    assert min(steps) >= 1024
-    with pytest.raises(ValueError, match="another configuration"):
-        train_policy(
-            dataclasses.replace(SMALL, seed=5), kalman=wrong, folder=tmp_path, resume=True, trajectories=trajectories
-        )
-    with pytest.raises(ValueError, match="needs a folder"):
-        train_policy(SMALL, resume=True)
-
-
 def test_the_exported_policy_is_the_trained_one(trajectories):
     from stable_baselines3.common.vec_env import VecNormalize
 
+    from poise.baselines.gain_policy.actor_critic import export_policy, make_model
     from poise.baselines.gain_policy.batch import TuningBatch
 
     tuned = TunedFilter.of(tunable_filter("external-acceleration"))
     env = VecNormalize(TuningBatch(tuned, trajectories, 16), clip_obs=1e6)
     model = make_model(
-        dataclasses.replace(SMALL, gains=None, hidden=(32, 32)), env, np.array([0.5, -0.5, 0.1]), None, None
+        dataclasses.replace(SMALL, gains=None, net_arch=(32, 32)), env, np.array([0.5, -0.5, 0.1])
     )
     model.learn(2048)
     env.training = False
@@ -117,8 +95,8 @@ def test_the_batch_is_the_registered_environment(trajectories):
     env = gym.make("poise/ReplayGain-v0", trajectory=one, reward="improvement")
     many, single = batch.reset()[0], env.reset(seed=0)[0]
     rng = np.random.default_rng(0)
-    batch.groups[0].end[:] = batch.groups[0].episode
-    for _ in range(batch.groups[0].episode):
+    batch.groups[0].end[:] = batch.groups[0].stack.decisions
+    for _ in range(batch.groups[0].stack.decisions):
         np.testing.assert_allclose(many[: tuned.observation_size], single, atol=1e-6)
         action = rng.uniform(-1.0, 1.0, 3).astype(np.float32)
         observations, rewards, overs, infos = batch.step(np.stack([action, action]))
@@ -126,7 +104,7 @@ def test_the_batch_is_the_registered_environment(trajectories):
         assert overs[0] == truncated
         np.testing.assert_allclose(rewards[0], np.degrees(reward), atol=1e-5)
         many = infos[0]["terminal_observation"] if overs[0] else observations[0]
-    fresh = batch.groups[0].tuned.observe(batch.groups[0].fresh)[0]
+    fresh = batch.groups[0].tuned.observe(batch.groups[0].initial)[0]
     np.testing.assert_allclose(observations[0, : tuned.observation_size], fresh)
 
 
@@ -134,11 +112,12 @@ def test_what_only_the_critic_knows_reaches_no_action(trajectories):
     import torch
     from stable_baselines3.common.vec_env import VecNormalize
 
+    from poise.baselines.gain_policy.actor_critic import make_model
     from poise.baselines.gain_policy.batch import PRIVILEGED, TuningBatch
 
     tuned = TunedFilter.of(tunable_filter("bounded-motion"))
     env = VecNormalize(TuningBatch(tuned, trajectories, 4))
-    model = make_model(dataclasses.replace(SMALL, gains=None), env, np.zeros(3), None, None)
+    model = make_model(dataclasses.replace(SMALL, gains=None), env, np.zeros(3))
     observation = torch.as_tensor(env.reset())
     other = observation.clone()
     other[:, -PRIVILEGED:] += 1.0
@@ -159,10 +138,10 @@ def test_stable_baselines_trains_on_the_registered_environment(trajectories):
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        ({"steps": 0}, "steps"),
-        ({"discount": 1.0}, "discount"),
-        ({"spread": 0.0}, "spread"),
-        ({"search": -1}, "search"),
+        ({"total_timesteps": 0}, "total_timesteps"),
+        ({"gamma": 1.0}, "gamma"),
+        ({"initial_std": 0.0}, "initial_std"),
+        ({"gain_search": -1}, "gain_search"),
         ({"error_scale": 0.0}, "error_scale"),
     ],
 )
@@ -191,7 +170,7 @@ def test_the_command_tunes_compares_and_exports(tmp_path, capsys):
     assert main(words) == 0
     folder = next((tmp_path / "runs" / "tune").iterdir())
     rows = list(csv.DictReader((folder / "results.csv").open()))
-    assert {row["estimator"] for row in rows} == {"published", "constant", "policy", "hindsight"}
+    assert {row["estimator"] for row in rows} == {"published", "constant", "policy", "oracle"}
     assert {row["trajectory"] for row in rows} >= {"hand-77-0"}
     card = json.loads((tmp_path / "mine.json").read_text())
     assert card["command"].startswith("poise tune external-acceleration --method ppo")
@@ -203,7 +182,7 @@ def test_the_command_tunes_compares_and_exports(tmp_path, capsys):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["external-acceleration", "bounded-motion"])
 def test_minutes_of_training_beat_the_best_constant_gains(name):
-    config = dataclasses.replace(shipped_config(name), steps=200_000, trajectories=96, hindsight=96)
+    config = dataclasses.replace(shipped_config(name), total_timesteps=200_000, trajectories=96, warm_start=96)
     policy = train_policy(config)
     unseen = config.motions.draw_many(4321, 16)
     tuned = TunedFilter.of(tunable_filter(name))

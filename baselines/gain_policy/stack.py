@@ -1,0 +1,68 @@
+"""Trajectories of one rate as arrays, so that a filter runs over all of them at once."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+
+from ...envs.data.trajectory import Trajectory
+from ...envs.gain_tuning import scored_quantity
+from ...filters.adaptation.tuned import TunedFilter
+from ...filters.core.metrics import error
+from ...filters.core.quantity import Quantity
+
+
+@dataclass(frozen=True, eq=False)
+class TrajectoryStack:
+    """N trajectories of one rate, cut to the D whole decisions of the shortest.
+
+    Attributes:
+        tuned: the filter at that rate.
+        trajectories: the N trajectories.
+        quantity: output of the filter that is scored.
+        channels: what the filter reads, channel → ``(T, N, size)``.
+        truth: true values of ``quantity`` ``(T, N, size)``.
+        mask: samples that are scored ``(T, N)``.
+        decisions: D; T is D times the samples from decision to decision.
+    """
+
+    tuned: TunedFilter
+    trajectories: tuple[Trajectory, ...]
+    quantity: Quantity
+    channels: dict[str, np.ndarray]
+    truth: np.ndarray
+    mask: np.ndarray
+    decisions: int
+
+    @classmethod
+    def of(cls, tuned: TunedFilter, trajectories: Sequence[Trajectory], quantity: str | None = None) -> Self:
+        """Stack trajectories of one rate; ``quantity`` None scores ``up``."""
+        tuned = tuned.with_dt(trajectories[0].dt)
+        output = scored_quantity(tuned.kalman, quantity)
+        decisions = min(len(trajectory) for trajectory in trajectories) // tuned.ticks
+        length = decisions * tuned.ticks
+        channels = {
+            channel.name: np.stack([trajectory.measurements[channel.name][:length] for trajectory in trajectories], 1)
+            for channel in tuned.kalman.channels
+        }
+        truth = np.stack([trajectory.truth_of(output.name)[:length] for trajectory in trajectories], 1)
+        mask = np.stack([trajectory.mask[:length] for trajectory in trajectories], 1)
+        return cls(tuned, tuple(trajectories), output, channels, truth, mask, decisions)
+
+    @classmethod
+    def by_rate(
+        cls, tuned: TunedFilter, trajectories: Sequence[Trajectory], quantity: str | None = None
+    ) -> list[Self]:
+        """One stack for each rate among the trajectories, in the order of their first appearance."""
+        rates: dict[int, list[Trajectory]] = {}
+        for trajectory in trajectories:
+            rates.setdefault(round(1e6 * trajectory.dt), []).append(trajectory)
+        return [cls.of(tuned, part, quantity) for part in rates.values()]
+
+    def errors(self, action: np.ndarray) -> np.ndarray:
+        """Error of constant gains at every sample ``(T, N)``, rad."""
+        pose = self.tuned.kalman.run(self.channels, self.tuned.gains(action)).pose[self.quantity.name]
+        return error(self.quantity, pose, self.truth)
