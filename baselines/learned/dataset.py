@@ -17,6 +17,7 @@ from ...filters.core.estimator import run
 from ...filters.core.observer import Observer
 from ...filters.support.files import replacing
 from ...filters.support.parallel import progress_bar
+from ...filters.support.version import code_version
 from .level_frame import FEATURES, VECTORS, LevelFrame
 from .recipe import Curriculum
 
@@ -133,6 +134,13 @@ class LearnedDataset:
             names = tuple(str(name) for name in file["names"])
             return cls(file["features"], file["vertical"], file["scored"], names)
 
+    def digest(self) -> str:
+        """Letters that tell data sets apart."""
+        content = hashlib.sha256()
+        for array in (self.features, self.vertical, self.scored):
+            content.update(np.ascontiguousarray(array))
+        return content.hexdigest()[:16]
+
     def windows(
         self, size: int, length: int, generator: np.random.Generator | None = None, *, turn: bool = True
     ) -> Iterator[Window]:
@@ -196,6 +204,7 @@ def turned(features: np.ndarray, vertical: np.ndarray, angles: np.ndarray) -> tu
 
 
 def recipe_digest(curriculum: Curriculum, seed: int, episodes: int, frame: LevelFrame) -> str:
-    """Name of a data set that says by which numbers it was made."""
+    """Name of a data set that depends on its settings and on the code that simulates it."""
     recipe = {"curriculum": asdict(curriculum), "seed": seed, "episodes": episodes, "frame": asdict(frame)}
+    recipe["code"] = code_version()
     return hashlib.sha256(json.dumps(recipe, sort_keys=True).encode()).hexdigest()[:16]

@@ -15,8 +15,8 @@ import numpy as np
 import torch
 from torch import nn
 
-from ...filters.support.files import replacing
 from ...filters.support.seeds import child_seed, child_seeds
+from ..checkpoint import load_checkpoint, save_checkpoint
 from .dataset import LearnedDataset
 from .gru_module import GruModule
 from .level_frame import LevelFrame
@@ -124,12 +124,12 @@ def train(
         folder: where data sets, checkpoints and the TensorBoard log go.
         dataset: what to train on, instead of simulated episodes.
         validation: what to choose the best epoch on, instead of simulated episodes.
-        resume: go on from the checkpoint in ``folder``, bit by bit as if there had been no interruption.
+        resume: continue from the checkpoint in ``folder``, bit by bit as if there had been no interruption.
         progress: show progress bars and a line an epoch.
 
     Raises:
-        ValueError: there is nothing to resume, or it was begun with another configuration; or the training has
-            finished and nothing is left to resume.
+        ValueError: there is nothing to resume, or it was started with another configuration, other data or another
+            version of the package.
         RuntimeError: loss or gradients were not finite several times in a row.
     """
     folder = Path(folder)
@@ -179,6 +179,7 @@ class Trainer:
 
     def __init__(self, config: TrainingConfig, dataset: LearnedDataset, seed: int) -> None:
         self.config = config
+        self.key = {"config": asdict(config), "data": dataset.digest()}
         self.module = GruModule(config.units, seed)
         self.optimizer = torch.optim.AdamW(
             self.module.parameters(), lr=config.learning_rate, weight_decay=config.weight_decay
@@ -246,7 +247,7 @@ class Trainer:
         self.history.append(entry)
 
     def save(self, path: Path) -> None:
-        """Write a checkpoint in one move."""
+        """Write a checkpoint."""
         state = {
             "module": self.module.state_dict(),
             "optimizer": self.optimizer.state_dict(),
@@ -257,10 +258,10 @@ class Trainer:
         save_checkpoint(path, self.key, state)
 
     def restore(self, path: Path) -> None:
-        """Go on from a checkpoint.
+        """Continue from a checkpoint.
 
         Raises:
-            ValueError: there is none, or it belongs to another configuration.
+            ValueError: see :func:`~poise.baselines.checkpoint.load_checkpoint`.
         """
         state = load_checkpoint(path, self.key)
         self.module.load_state_dict(state["module"])

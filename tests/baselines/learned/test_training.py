@@ -118,8 +118,10 @@ def test_only_the_same_training_is_resumed(data: tuple[LearnedDataset, LearnedDa
     with pytest.raises(ValueError, match="nothing to resume"):
         train(SMALL, tmp_path, dataset=data[0], validation=data[1], resume=True)
     train(replace(SMALL, epochs=1), tmp_path, dataset=data[0], validation=data[1])
-    with pytest.raises(ValueError, match="another configuration"):
+    with pytest.raises(ValueError, match=r"started with config\.epochs 1, not 2"):
         train(SMALL, tmp_path, dataset=data[0], validation=data[1], resume=True)
+    with pytest.raises(ValueError, match="started with data"):
+        train(replace(SMALL, epochs=1), tmp_path, dataset=leaning(32), validation=data[1], resume=True)
 
 
 def test_bad_numbers_change_nothing_and_end_a_training_at_last(data: tuple[LearnedDataset, LearnedDataset]) -> None:
