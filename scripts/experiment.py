@@ -16,11 +16,12 @@ import dataclasses
 import io
 import json
 import platform
+import shlex
 import subprocess
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from datetime import datetime
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..filters.support.files import write_json as write_plain_json
 from ..filters.support.files import write_text
@@ -28,6 +29,9 @@ from ..filters.support.parallel import processors
 from ..filters.support.resume import refuse_changes
 from ..filters.support.version import ROOT, code_version, package_version
 from .tables import jsonable, markdown_table, records
+
+if TYPE_CHECKING:
+    from ..envs.data.trajectory import Trajectory
 
 COLUMNS = ("estimator", "trajectory", "quantity", "metric", "value", "unit")
 """Columns of ``results.csv``."""
@@ -128,6 +132,37 @@ def open_run(command: str, args: Any, may_differ: Collection[str] = ()) -> Run:
     now = {**jsonable(args), "command": command}
     refuse_changes(args.resume, before, now, [name for name in now if name not in {*NO_RESULT, *may_differ}])
     return Run(args.resume, command, args.seed)
+
+
+def known_recordings(paths: Sequence[Path]) -> list[Trajectory]:
+    """Recordings of files and folders that know an orientation or the inclination.
+
+    Raises:
+        ValueError: paths are given but hold none.
+    """
+    from ..envs.data.formats.load import load_recording, recording_files
+
+    loaded = [load_recording(path) for path in recording_files(tuple(paths))]
+    known = [trajectory for trajectory in loaded if "up" in trajectory.quantities]
+    if paths and not known:
+        raise ValueError(f"recordings must know an orientation, none of {', '.join(map(str, paths))} does")
+    return known
+
+
+def command_line(command: str, args: Any, options: Sequence[str]) -> str:
+    """The command that gives the same again.
+
+    Args:
+        command: its name.
+        args: its arguments, a dataclass instance whose first field is the positional one.
+        options: fields that the result depends on; those that are None or empty are left out.
+    """
+    words = ["poise", command, getattr(args, dataclasses.fields(args)[0].name)]
+    for name in options:
+        value = getattr(args, name)
+        if value not in (None, ()):
+            words += [f"--{name.replace('_', '-')}", *map(str, value if isinstance(value, tuple) else (value,))]
+    return shlex.join(words)
 
 
 def new_folder(parent: Path, name: str) -> Path:

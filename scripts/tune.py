@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import date
@@ -14,11 +13,12 @@ import tyro
 
 from ..filters.support.parallel import progress_bar
 from ..filters.support.seeds import child_seed
-from .experiment import Run, open_run, versions
+from .experiment import Run, command_line, known_recordings, open_run, versions
 from .main import run_command
 from .output import Output
 
 if TYPE_CHECKING:
+    from ..baselines.gain_policy.config import TrainingConfig
     from ..baselines.gain_policy.constant_gains import ConstantGains
     from ..baselines.gain_policy.policy import GainPolicy
     from ..envs.data.trajectory import Trajectory
@@ -62,16 +62,16 @@ class Args:
 
 def run(args: Args) -> int:
     """Tune, compare with the published tuning and the best constant gains, and write what was found."""
+    from ..baselines.gain_policy.config import TRAINING_MOTIONS
     from ..baselines.gain_policy.constant_gains import best_constant_gains
     from ..baselines.gain_policy.policy import GainPolicy
-    from ..baselines.gain_policy.config import TRAINING_MOTIONS
     from ..filters.adaptation.gains import tunable_filter
     from ..filters.adaptation.tuned import TunedFilter
 
     config = training_config(args)
     tuned = TunedFilter.of(tunable_filter(args.filter), config.gains)
     sets = {"simulated": TRAINING_MOTIONS.draw_many(child_seed(args.seed, TEST_SEED), args.test_trajectories)}
-    recorded = load_all(args.recordings)
+    recorded = known_recordings(args.recordings)
     if recorded:
         sets["recorded"] = recorded
     folder = open_run("tune", args, may_differ=("steps", "test_trajectories", "recordings"))
@@ -79,7 +79,7 @@ def run(args: Args) -> int:
         motions = TRAINING_MOTIONS.draw_many(config.seed, min(config.trajectories, 48))
         out.say(f"searching constant gains of {args.filter} on {len(motions)} trajectories")
         samples, refinements = (64, 60) if args.preset == "shipped" else (16, 20)
-        guesses = () if config.centre is None else (config.centre,)
+        guesses = () if config.warm_start_centre is None else (config.warm_start_centre,)
         constant = best_constant_gains(
             tuned, motions, guesses=guesses, samples=samples, refinements=refinements, seed=args.seed
         )
@@ -88,7 +88,7 @@ def run(args: Args) -> int:
             candidates["policy"] = train(args, folder, constant.action)
         rows = compare(tuned, candidates, sets)
         for trajectories in sets.values():
-            rows += hindsight_rows(tuned, trajectories, constant)
+            rows += oracle_rows(tuned, trajectories, constant)
         folder.write_results(rows)
         summary = means(rows, sets)
         title = f"Inclination error of {args.filter}, mean of RMS over trajectories, deg"
@@ -102,32 +102,16 @@ def run(args: Args) -> int:
     return 0
 
 
-def training_config(args: Args) -> Any:
+def training_config(args: Args) -> TrainingConfig:
     """The configuration that the arguments ask for."""
     from ..baselines.gain_policy.config import shipped_config
 
     if args.preset == "shipped":
         config = shipped_config(args.filter)
     else:
-        config = replace(shipped_config(args.filter), steps=QUICK_STEPS, trajectories=48, hindsight=24)
-    given = {name: getattr(args, name) for name in ("steps", "trajectories")}
+        config = replace(shipped_config(args.filter), total_timesteps=QUICK_STEPS, trajectories=48, warm_start=24)
+    given = {"total_timesteps": args.steps, "trajectories": args.trajectories}
     return replace(config, seed=args.seed, **{name: value for name, value in given.items() if value is not None})
-
-
-def load_all(paths: tuple[Path, ...]) -> list[Trajectory]:
-    """Recordings of files and folders that know an orientation or the vertical.
-
-    Raises:
-        ValueError: paths are given but hold none.
-    """
-    from ..envs.data.formats.load import load_recording, recording_files
-
-    files = recording_files(paths)
-    loaded = [load_recording(path) for path in files]
-    usable = [trajectory for trajectory in loaded if "up" in trajectory.quantities]
-    if paths and not usable:
-        raise ValueError(f"no recording with a known orientation in {', '.join(map(str, paths))}")
-    return usable
 
 
 def train(args: Args, folder: Run, start: np.ndarray) -> GainPolicy:
@@ -137,8 +121,8 @@ def train(args: Args, folder: Run, start: np.ndarray) -> GainPolicy:
     from ..filters.adaptation.gains import tunable_filter
 
     config, kalman = training_config(args), tunable_filter(args.filter)
-    unseen = TRAINING_MOTIONS.draw_many(child_seed(args.seed, VALIDATION_SEED), min(24, config.trajectories))
-    with progress_bar(config.steps, f"tune {args.filter}", "step") as bar:
+    unseen = config.motions.draw_many(child_seed(args.seed, VALIDATION_SEED), min(24, config.trajectories))
+    with progress_bar(config.total_timesteps, f"tune {args.filter}", "step") as bar:
 
         def report(progress: Mapping[str, float]) -> None:
             bar.update(int(progress["steps"]) - bar.n)
@@ -168,17 +152,17 @@ def compare(
     ]
 
 
-def hindsight_rows(
+def oracle_rows(
     tuned: TunedFilter, trajectories: Sequence[Trajectory], constant: ConstantGains, points: int = 32
 ) -> list[dict[str, Any]]:
-    """Errors of the best constant gains of each trajectory, chosen knowing the truth: a bound, no method."""
+    """Errors of the best constant gains of each trajectory, chosen with the truth known: a bound, not a method."""
     from ..baselines.gain_policy.constant_gains import constant_errors
 
     # The first that were tried lie evenly in the box; those at the end crowd around the best.
     actions = [constant.action, *constant.tried[:points]]
     errors = np.stack([constant_errors(tuned, trajectories, action) for action in actions])
     return [
-        row("hindsight", trajectory, value) for trajectory, value in zip(trajectories, errors.min(axis=0), strict=True)
+        row("oracle", trajectory, value) for trajectory, value in zip(trajectories, errors.min(axis=0), strict=True)
     ]
 
 
@@ -215,7 +199,7 @@ def card_of(
         "description": f"sets the gains of the {args.filter} filter while it runs",
         "estimator": "poise.baselines.gain_policy.adaptive.AdaptiveEstimator",
         "method": args.method,
-        "command": command_of(args),
+        "command": command_line("tune", args, ("method", "preset", "seed", "steps", "trajectories")),
         "data": "simulated hand motions",
         **policy.card,
         "best_constant": [round(float(value), 4) for value in constant.action],
@@ -224,15 +208,6 @@ def card_of(
         "date": date.today().isoformat(),
         "licence": "MIT",
     }
-
-
-def command_of(args: Args) -> str:
-    """The command line that gives these gains again."""
-    words = ["poise", "tune", args.filter, "--method", args.method, "--preset", args.preset, "--seed", str(args.seed)]
-    for name in ("steps", "trajectories"):
-        if getattr(args, name) is not None:
-            words += [f"--{name}", str(getattr(args, name))]
-    return shlex.join(words)
 
 
 if __name__ == "__main__":

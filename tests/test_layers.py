@@ -47,6 +47,8 @@ NOT_AT_IMPORT = {
     "envs": {"torch", "stable_baselines3", "matplotlib", "pandas"},
 }
 LOCAL_RANDOM = {"default_rng", "Generator", "SeedSequence", "BitGenerator", "PCG64", "PCG64DXSM", "Philox", "SFC64"}
+# stable-baselines3 shuffles with the global generator, whose state belongs to a checkpoint.
+KEPT_RANDOM = {"baselines/gain_policy/training.py": {"get_state", "set_state"}}
 QUATERNION_PRODUCT = re.compile(r"(quat\w*_?(mul|prod|conj|inv)|hamilton|qmul|quatmul)", re.IGNORECASE)
 
 

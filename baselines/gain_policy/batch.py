@@ -88,7 +88,9 @@ class RateGroup:
         self.trajectory = self.generator.integers(len(self.weight), size=self.rows)
         self.decision = np.zeros(self.rows, int)
         self.end = self.generator.integers(1, self.stack.decisions + 1, size=self.rows)
-        self.initial = self.tuned.init({name: values[0, self.trajectory] for name, values in self.stack.channels.items()})
+        self.initial = self.tuned.init(
+            {name: values[0, self.trajectory] for name, values in self.stack.channels.items()}
+        )
         self.state, self.error = self.initial, np.zeros(self.rows)
 
     def observe(self) -> np.ndarray:

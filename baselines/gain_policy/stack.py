@@ -53,9 +53,7 @@ class TrajectoryStack:
         return cls(tuned, tuple(trajectories), output, channels, truth, mask, decisions)
 
     @classmethod
-    def by_rate(
-        cls, tuned: TunedFilter, trajectories: Sequence[Trajectory], quantity: str | None = None
-    ) -> list[Self]:
+    def by_rate(cls, tuned: TunedFilter, trajectories: Sequence[Trajectory], quantity: str | None = None) -> list[Self]:
         """One stack for each rate among the trajectories, in the order of their first appearance."""
         rates: dict[int, list[Trajectory]] = {}
         for trajectory in trajectories:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import random
 import time
 from collections import deque
 from collections.abc import Callable, Sequence
@@ -253,7 +252,8 @@ class PolicyTraining:
 
         model, env = self.model, self.env
         self.home.mkdir(parents=True, exist_ok=True)
-        name, keys, *rest = np.random.get_state()
+        # The global generator, because stable-baselines3 shuffles its batches with it.
+        name, keys, *rest = np.random.get_state()  # noqa: NPY002
         normalisation = [env.obs_rms.mean, env.obs_rms.var, env.ret_rms.mean, env.ret_rms.var, env.returns]
         state = {
             "start": self.start,
@@ -270,7 +270,6 @@ class PolicyTraining:
             "generators": {
                 "torch": torch.get_rng_state(),
                 "numpy": [str(name), keys.astype(np.int64), json.dumps(rest)],
-                "python": json.dumps(random.getstate()),
             },
             "seconds": self.seconds,
         }
@@ -298,6 +297,4 @@ class PolicyTraining:
         generators = state["generators"]
         torch.set_rng_state(generators["torch"])
         name, keys, rest = generators["numpy"]
-        np.random.set_state((name, keys, *json.loads(rest)))
-        kind, internal, gauss = json.loads(generators["python"])
-        random.setstate((kind, tuple(internal), gauss))
+        np.random.set_state((name, keys, *json.loads(rest)))  # noqa: NPY002

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import json
 import math
-import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field
@@ -115,7 +113,7 @@ def train(
     dataset: LearnedDataset | None = None,
     validation: LearnedDataset | None = None,
     resume: bool = False,
-    progress: bool = False,
+    say: Callable[[str], object] | None = None,
 ) -> TrainingResult:
     """Train a network.
 
@@ -125,7 +123,7 @@ def train(
         dataset: what to train on, instead of simulated episodes.
         validation: what to choose the best epoch on, instead of simulated episodes.
         resume: continue from the checkpoint in ``folder``, bit by bit as if there had been no interruption.
-        progress: show progress bars and a line an epoch.
+        say: told a line an epoch, and progress bars are shown; None for a silent training.
 
     Raises:
         ValueError: there is nothing to resume, or it was started with another configuration, other data or another
@@ -138,7 +136,7 @@ def train(
 
     def simulated(seed: int, episodes: int, words: str) -> LearnedDataset:
         return LearnedDataset.from_curriculum(
-            config.curriculum, seed, episodes, config.frame, cache=folder, progress=words if progress else ""
+            config.curriculum, seed, episodes, config.frame, cache=folder, progress="" if say is None else words
         )
 
     dataset = simulated(train_seed, config.episodes, "simulate") if dataset is None else dataset
@@ -156,12 +154,10 @@ def train(
                 trainer.finish_epoch(entry)
                 trainer.save(folder / CHECKPOINT)
                 log(entry)
-                if progress:
-                    print(
+                if say is not None:
+                    say(
                         f"epoch {trainer.epoch}/{config.epochs}: training {entry['training_deg']:.3f}°, "
-                        f"held out {entry['validation_deg']:.3f}°",
-                        file=sys.stderr,
-                        flush=True,
+                        f"held out {entry['validation_deg']:.3f}°"
                     )
         finally:
             log(None)

@@ -107,9 +107,10 @@ def test_stopped_while_a_checkpoint_is_written_it_gives_the_same_policy(
         stop()
         replace(*paths)
 
-    with monkeypatch.context() as patch, pytest.raises(StoppedError):
+    with monkeypatch.context() as patch:
         patch.setattr(os, "replace", stopped_replace)
-        train(trajectories, tmp_path)
+        with pytest.raises(StoppedError):
+            train(trajectories, tmp_path)
     assert {path.suffix for path in tmp_path.iterdir() if path.is_file()} == {".pt"}
     assert_same(train(trajectories, tmp_path, resume=True), uninterrupted)
 
@@ -184,16 +185,14 @@ def damaged(data):
 
 
 @pytest.mark.parametrize("damage", [damaged, lambda data: data[: len(data) // 2], lambda data: b"", lambda data: b"{}"])
-def test_a_damaged_checkpoint_is_said_and_the_one_before_serves(
-    trajectories, stopped, uninterrupted, tmp_path, damage
-):
+def test_a_damaged_checkpoint_is_said_and_the_one_before_serves(trajectories, stopped, uninterrupted, tmp_path, damage):
     put(tmp_path, stopped | {CHECKPOINT: damage(stopped[CHECKPOINT])})
     with pytest.warns(UserWarning, match="is damaged or is not a checkpoint"):
         assert_same(train(trajectories, tmp_path, resume=True), uninterrupted)
     put(tmp_path, {name: damage(data) for name, data in stopped.items()})
     with (
         pytest.warns(UserWarning, match="is damaged or is not a checkpoint"),
-        pytest.raises(ValueError, match="no checkpoint in .* can be read"),
+        pytest.raises(ValueError, match=r"no checkpoint in .* can be read"),
     ):
         train(trajectories, tmp_path, resume=True)
 

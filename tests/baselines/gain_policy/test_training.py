@@ -73,9 +73,7 @@ def test_the_exported_policy_is_the_trained_one(trajectories):
 
     tuned = TunedFilter.of(tunable_filter("external-acceleration"))
     env = VecNormalize(TuningBatch(tuned, trajectories, 16), clip_obs=1e6)
-    model = make_model(
-        dataclasses.replace(SMALL, gains=None, net_arch=(32, 32)), env, np.array([0.5, -0.5, 0.1])
-    )
+    model = make_model(dataclasses.replace(SMALL, gains=None, net_arch=(32, 32)), env, np.array([0.5, -0.5, 0.1]))
     model.learn(2048)
     env.training = False
     observation = env.reset()
