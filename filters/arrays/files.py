@@ -43,10 +43,9 @@ class ArrayEquations(Equations):
         """The array of ``metadata["device"]``, and whether it has a gyroscope, where the equations have that field."""
         device = metadata.get("device")
         # recordings of one IMU may name their sensor here
-        described = device.get("array") if isinstance(device, Mapping) else None
-        if described is None:
+        if not isinstance(device, Mapping) or device.get("array") is None:
             return {}
-        parameters: dict[str, Any] = {"array": read_array(described)}
+        parameters: dict[str, Any] = {"array": read_array(device["array"])}
         if "gyroscope" in device and any(field.name == "gyroscope" for field in fields(cls)):
             parameters["gyroscope"] = bool(device["gyroscope"])
         return parameters

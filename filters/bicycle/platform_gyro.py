@@ -1,4 +1,4 @@
-r"""References for the two-gyroscope filter: roll from the platform's gyroscope alone, and integration alone.
+r"""Baselines for the two-gyroscope filter: roll from the platform's gyroscope alone, and integration alone.
 
 While a bicycle does not pitch, (5) of the paper (:mod:`.two_gyro`) ties two rates of its own gyroscope to its roll,
 
@@ -80,7 +80,7 @@ class PlatformGyro(RiderEquations, Model):
         return {"imu_tilt": geometry.bicycle_imu_tilt}
 
     def prior(self, z: Measurement) -> tuple[Array, Array]:
-        """Roll as told, no bias."""
+        """The given roll, no bias."""
         known = zero_where_known(z["bicycle_imu/gyr"])
         x = namespace(known).concat([expand(self.initial_roll, 1) + known, known, known, known], axis=-1)
         return x, diagonal([self.roll_prior**2, *[self.bias_prior**2] * 3], known)
@@ -88,6 +88,7 @@ class PlatformGyro(RiderEquations, Model):
     def predict(self, x: Array, z: Measurement, previous: Measurement) -> tuple[Array, Array, Array]:
         """Equation (8); biases as in (2)."""
         xp, dt, zero = namespace(x), expand(self.dt, 1), 0.0 * x[..., :1]
+        # dφ/dt = δω_x (8); only the bias of x enters it
         rate = platform_rate(z["bicycle_imu/gyr"], self.imu_tilt)[..., :1] - x[..., 1:2]
         kept = 1.0 - self.dt / self.bias_time
         moved = xp.concat([x[..., :1] + dt * rate, expand(kept, 1) * x[..., 1:]], axis=-1)
@@ -102,7 +103,7 @@ class PlatformGyro(RiderEquations, Model):
         """0 − (cos φ δω_y − sin φ δω_z); without a sample it is NaN."""
         xp = namespace(x)
         rate = platform_rate(z["bicycle_imu/gyr"], self.imu_tilt) - x[..., 1:]
-        value, by_angle, by_rate = level_constraint(x[..., :1], rate, "bicycle")
+        value, by_angle, by_rate = level_constraint(x[..., :1], rate)
         H = xp.concat([by_angle, -by_rate], axis=-1)[..., None, :]
         variance = (self.gyroscope_noise**2 + self.pitch_rate_noise**2) / self.dt
         return -value, H, diagonal([variance], 0.0 * x[..., :1])
@@ -114,7 +115,7 @@ class PlatformGyro(RiderEquations, Model):
 
 @dataclass(frozen=True)
 class TwoGyroIntegration(RiderEquations, Recurrence):
-    """Both gyroscopes integrated, from the first frame of the camera and a roll that is told; nothing corrects.
+    """Both gyroscopes integrated, from the first frame of the camera and a given roll; there is no measurement update.
 
     The rotation vector of each interval turns platform and body exactly if the axis stays within the interval.
 
@@ -140,7 +141,7 @@ class TwoGyroIntegration(RiderEquations, Recurrence):
         return {"imu_tilt": geometry.bicycle_imu_tilt}
 
     def prior(self, z: Measurement) -> Array:
-        """Roll as told, no pitch, and what the camera sees."""
+        """The given roll, no pitch, and what the camera sees."""
         camera = z["relative/orientation"]
         known = zero_where_known(*(z[channel.name] for channel in self.channels))
         roll = from_euler_xyz(expand(self.initial_roll, 0) + known[..., 0], known[..., 0], known[..., 0])

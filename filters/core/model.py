@@ -183,7 +183,7 @@ def equations_of(estimator: Any) -> Any:
 
 
 @functools.cache
-def _choices(model: type[Equations]) -> dict[str, tuple[Any, ...]]:
+def _choices(model: Any) -> dict[str, tuple[Any, ...]]:
     """Field → the values that its annotation as a ``Literal`` allows."""
     try:
         hints = get_type_hints(model)

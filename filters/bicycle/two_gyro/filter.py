@@ -11,12 +11,13 @@ Q = T² C (24), (25) with
     C = blkdiag(Â C_vh Âᵀ + D̂ C_vp D̂ᵀ, σ_uh² 1, σ_up² 1),    Â = [0; A],  D̂ = [1 0; D]
 
 where C_v is the variance of one sample of a gyroscope. Parameters are densities, which hold at any rate: C_v = σ²/T.
-The rate is a mean over the interval that the sample ends, so the current sample integrates (``gyroscope_sample``).
+A sample is the mean rate of the interval that it ends, so the sample of k turns k−1 into k.
 
-Differs from print: (26) has Â₃₃ and D̂₄₃ where D̂₃₂ and D̂₄₂ belong; the second variance of the platform's biases in (25)
-is that of z; Q is T² C, (27) lacks the power of T. Σ2 is exact without pitch only, not "without any approximation", and
-a constant error of the camera passes to the roll almost one to one. The paper gives neither noises nor T nor a prior.
-The pseudo-measurement of :mod:`.platform_gyro` needs the platform's gyroscope alone.
+Differs from print: the sample of k−1 is used there; (26) has Â₃₃ and D̂₄₃ where D̂₃₂ and D̂₄₂ belong; the second
+variance of the platform's biases in (25) is that of z; Q is T² C, (27) lacks the power of T. Σ2 is exact without pitch
+only, not "without any approximation", and a constant error of the camera passes to the roll almost one to one. The
+paper gives neither noises nor T nor a prior. The pseudo-measurement of :mod:`.platform_gyro` needs the platform's
+gyroscope alone.
 """
 
 from __future__ import annotations
@@ -70,14 +71,11 @@ class TwoGyro(RiderEquations, Model):
     model: Literal["sigma1", "sigma2"] = "sigma2"
     """Σ2 knows the roll while the platform turns; Σ1 is exact for any motion, and its roll drifts"""
     platform: Platform = "bicycle"
-    """``segway``: pitch instead of roll, by (6)"""
+    """``segway``: pitch χ instead of roll φ, by (6)"""
     body: Literal["trunk", "disk"] = "trunk"
     """what the second gyroscope is on: a rider's trunk, or the disk of ``poise/BicycleFixture-v0``"""
     sensor: Literal["orientation", "distances"] = "orientation"
     """h(θ) of (16): θ itself, or the distances of three markers"""
-    gyroscope_sample: Literal["current", "previous", "midpoint"] = "current"
-    """which sample turns k−1 into k: ``current`` for a mean over the interval that it ends, ``midpoint`` (mean of both)
-    for instantaneous samples, ``previous`` is printed"""
     integration: Literal["euler", "midpoint"] = "midpoint"
     """``euler`` is printed (23); ``midpoint`` takes the kinematics in the middle of the interval: with ``euler`` the
     roll of a rider who moves is 1.3 times its standard deviation wrong at 100 Hz"""
@@ -105,8 +103,8 @@ class TwoGyro(RiderEquations, Model):
     process_scale: float = 1.0
     """factor on all standard deviations of the process noise"""
     zero_yaw_guard: float = 0.0
-    """rad/s: below this yaw rate F does not let θ tell of φ, where bias and noise of the gyroscope would make the
-    filter believe that it learns the roll (0.5 °/s helps); 0: off"""
+    """rad/s: below this yaw rate F has no coupling of θ to φ, where bias and noise of the gyroscope would make the
+    filter believe that it observes the roll (0.5 °/s helps); 0: off"""
     pitch_rate_noise: float = 0.0
     """rad/s/√Hz along M_:2 / cos φ: the pitch rate, which is not modelled (1.4 °/s/√Hz helps on rough roads); 0: off"""
     roll_rate_noise: float = 0.0
@@ -116,7 +114,7 @@ class TwoGyro(RiderEquations, Model):
     initial_roll: float = 0.0
     """rad: φ (or χ) at the start"""
     initial_angles: Point = (0.0, -0.5847, 0.0)
-    """rad: θ at the start where distances are measured (an orientation tells it)"""
+    """rad: θ at the start where distances are measured (an orientation determines it)"""
     angle_prior: float = 15.0 * DEG
     """rad: standard deviation of θ at the start where distances are measured"""
     body_bias_prior: float = 0.15 * DEG
@@ -140,8 +138,9 @@ class TwoGyro(RiderEquations, Model):
         rough = ("zero_yaw_guard", "pitch_rate_noise", "roll_rate_noise")
         times = ("body_bias_time", "platform_bias_time")
         check_positive(self, *noises, *times, "roll_prior", "angle_prior", or_zero=(*drifts, *rough))
-        if self.constraint and self.model != "sigma1":
-            raise ValueError(f"constraint needs the bias of every axis, so model='sigma1', got {self.model!r}")
+        if self.constraint and (self.model, self.platform) != ("sigma1", "bicycle"):
+            given = f"model={self.model!r}, platform={self.platform!r}"
+            raise ValueError(f"constraint needs the bias of every axis, so model='sigma1', and a bicycle, got {given}")
 
     @classmethod
     def rider_parameters(cls, geometry: RiderGeometry) -> dict[str, Any]:
@@ -226,7 +225,7 @@ class TwoGyro(RiderEquations, Model):
     # ---- equations ---------------------------------------------------------------------------------------------------
 
     def prior(self, z: Measurement) -> tuple[Array, Array]:
-        """θ of the first frame (or the usual posture, if distances are measured), everything else as told."""
+        """θ of the first frame (or the usual posture, if distances are measured), everything else from parameters."""
         xp = namespace(*z.values())
         camera, count = z[self.channels[2].name], self.platform_rates
         known = zero_where_known(*(z[channel.name] for channel in self.channels))
@@ -242,10 +241,11 @@ class TwoGyro(RiderEquations, Model):
     def predict(self, x: Array, z: Measurement, previous: Measurement) -> tuple[Array, Array, Array]:
         """Equations (23) to (26), and F; a midpoint step has F = 1 + T G(middle) (1 + T G / 2)."""
         T, T3 = expand(self.dt, 1), expand(self.dt, 2)
-        samples = in_paper_axes(self._sample(z, previous, self.body_gyroscope)), self._platform_rates(z, previous)
+        samples = in_paper_axes(z[self.body_gyroscope]), self._platform_rates(z)
         rate, G, noise = self._dynamics(x, *samples)
         unit = diagonal([1.0] * self.state_size, 0.0 * x[..., :1])
         if self.integration == "midpoint":
+            # the kinematics in the middle of the interval, which half an Euler step reaches
             rate, middle, noise = self._dynamics(x + 0.5 * T * rate, *samples)
             G = middle @ (unit + 0.5 * T3 * G)
         return x + T * rate, unit + T3 * G, self._process(x, noise)
@@ -265,12 +265,13 @@ class TwoGyro(RiderEquations, Model):
         H = xp.concat([zeros(x, 3, 1), slope, zeros(x, 3, 3 + self.platform_rates)], axis=-1)
         variances = [spread**2] * 3
         if self.constraint:
+            # one more row, (5): 0 = cos φ δω_y − sin φ δω_z, with its derivatives by φ and by the platform's biases
             rate = platform_rate(z["bicycle_imu/gyr"], self.imu_tilt) - x[..., 7:]
-            value, by_angle, by_rate = level_constraint(x[..., :1], rate, self.platform)
+            value, by_angle, by_rate = level_constraint(x[..., :1], rate)
             row = block_matrix([[by_angle[..., None], zeros(x, 1, 6), -by_rate[..., None, :]]])
             r, H = xp.concat([r, -value], axis=-1), xp.concat([H, row], axis=-2)
-            across = self.platform_gyroscope_noise[1 if self.platform == "bicycle" else 0]
-            variances.append((across**2 + self.constraint_noise**2) / self.dt)
+            # the gyroscope's y axis is what (5) measures of a nearly upright bicycle
+            variances.append((self.platform_gyroscope_noise[1] ** 2 + self.constraint_noise**2) / self.dt)
         return r, H, diagonal(variances, 0.0 * x[..., :1])
 
     def pose(self, x: Array) -> dict[str, Array]:
@@ -278,6 +279,7 @@ class TwoGyro(RiderEquations, Model):
         xp = namespace(x)
         theta, signs = x[..., 1:4], constant(SIGNS, x)
         angle, zero = x[..., :1], 0.0 * x[..., :1]
+        # the vertical in the platform's axes, as the sensors have them, then turned into the body's
         cosine, sine = xp.cos(angle), xp.sin(angle)
         bicycle = self.platform == "bicycle"
         up = xp.concat([zero, sine, cosine] if bicycle else [sine, zero, cosine], axis=-1)
@@ -310,14 +312,9 @@ class TwoGyro(RiderEquations, Model):
         """Which of the rates that are used turns the angle φ or χ."""
         return self.used_axes.index(0 if self.platform == "bicycle" else 1)
 
-    def _sample(self, z: Measurement, previous: Measurement, name: str) -> Array:
-        if self.gyroscope_sample == "midpoint":
-            return 0.5 * (z[name] + previous[name])
-        return (z if self.gyroscope_sample == "current" else previous)[name]
-
-    def _platform_rates(self, z: Measurement, previous: Measurement) -> Array:
+    def _platform_rates(self, z: Measurement) -> Array:
         """Those of the platform's rates that are used, ``(..., 2 or 3)``, paper's axes."""
-        rate = platform_rate(self._sample(z, previous, "bicycle_imu/gyr"), self.imu_tilt)
+        rate = platform_rate(z["bicycle_imu/gyr"], self.imu_tilt)
         return namespace(rate).stack([rate[..., axis] for axis in self.used_axes], axis=-1)
 
     def _substitution(self, x: Array, used: Array) -> tuple[Array, Array]:
@@ -330,17 +327,21 @@ class TwoGyro(RiderEquations, Model):
         return substitution(angle, self.platform), xp.where(quiet, 0.0 * slope, slope)
 
     def _dynamics(self, x: Array, body_rate: Array, platform_rates: Array) -> tuple[Array, Array, Array]:
-        """Derivative dx/dt, its Jacobian G, and what noises per √s do to φ and θ ``(4, columns)``."""
+        """Derivative dx/dt, its Jacobian G, and how noises per √s enter φ and θ ``(4, columns)``."""
         xp, count = namespace(x), self.platform_rates
         theta, biases = x[..., 1:4], x[..., 4:]
+        # true rates δω^h and δω^p of (1) and (9)
         body, used = body_rate - biases[..., :3], platform_rates - biases[..., 3:]
+        # A and M of (13); D = M S of (15), where S gives all three platform rates from those that are used
         A, M, S, slope = body_rate_matrix(theta), platform_rate_matrix(theta), *self._substitution(x, used)
         D, platform = M @ S, times(S, used)
+        # f of (23): dφ/dt is one of the used rates (8), dθ/dt = A δω^h + M δω^p, biases decay with τ (2), (10)
         first = constant([[float(index == self._first) for index in range(count)]], x) + zeros(x, 1, count)
         decays = [-1.0 / self.body_bias_time] * 3 + [-1.0 / self.platform_bias_time] * count
         angles = times(A, body) + times(M, platform)
         rate = xp.concat([times(first, used), angles, values(decays, 0.0 * x[..., :1]) * biases], axis=-1)
 
+        # G = ∂f/∂x by rows φ, θ, biases; ∂(D δω^p)/∂φ is where Σ2 sees the roll, E of (21)
         by_theta = body_rate_derivative(theta, body) + platform_rate_derivative(theta, platform)
         G = block_matrix(
             [
@@ -349,7 +350,8 @@ class TwoGyro(RiderEquations, Model):
                 [zeros(x, 3 + count, 4), diagonal(decays, 0.0 * x[..., :1])],
             ]
         )
-        # a rough road: pitch rate along M_:2 / cos φ (of a segway: roll rate), sin χ dψ/dt on φ
+        # noise columns: Â and D̂ of (24), then what the model omits on a rough road: the pitch rate along M_:2 / cos φ
+        # (of a segway the roll rate along M_:1) and sin χ dψ/dt on φ
         pitching = M[..., 1:2] / xp.cos(x[..., :1])[..., None] if self.platform == "bicycle" else M[..., :1]
         rough = [[zeros(x, 1, 1), zeros(x, 1, 1) + 1.0], [pitching, zeros(x, 3, 1)]]
         return rate, G, block_matrix([[zeros(x, 1, 3), first, *rough[0]], [A, D, *rough[1]]])
@@ -358,7 +360,9 @@ class TwoGyro(RiderEquations, Model):
         """Q = T² C, with L Lᵀ of the scaled columns of ``noise`` for φ and θ."""
         used = [self.platform_gyroscope_noise[axis] for axis in self.used_axes]
         densities = [*self.body_gyroscope_noise, *used, self.pitch_rate_noise, self.roll_rate_noise]
+        # C^v of (25) for φ and θ as a product of its scaled columns
         L = noise * values(densities, 0.0 * x[..., :1])[..., None, :]
+        # C^u of (25): variance per √s that keeps the Markov processes (2), (10) at σ_b
         drifts = [(self.body_bias_drift, self.body_bias_time)] * 3
         drifts += [(self.platform_bias_drift, self.platform_bias_time)] * self.platform_rates
         biases = diagonal([2.0 * drift**2 / time for drift, time in drifts], 0.0 * x[..., :1])

@@ -69,6 +69,7 @@ def body_rate_derivative(theta: Array, rate: Array) -> Array:
     xp = namespace(theta)
     c2, t2 = xp.cos(theta[..., 1]), xp.tan(theta[..., 1])
     c3, s3 = xp.cos(theta[..., 2]), xp.sin(theta[..., 2])
+    # A ω = [p / c₂, q, ω₃ − p t₂]; column 1 is zero, since A does not hold θ₁
     p = c3 * rate[..., 0] - s3 * rate[..., 1]
     q = s3 * rate[..., 0] + c3 * rate[..., 1]
     return rows([[0.0, p * t2 / c2, -q / c2], [0.0, 0.0, p], [0.0, -p / (c2 * c2), q * t2]])
@@ -79,6 +80,7 @@ def platform_rate_derivative(theta: Array, rate: Array) -> Array:
     xp = namespace(theta)
     c1, s1 = xp.cos(theta[..., 0]), xp.sin(theta[..., 0])
     c2, t2 = xp.cos(theta[..., 1]), xp.tan(theta[..., 1])
+    # M ω = [−ω₁ − u t₂, −w, u / c₂]; column 3 is zero, since M does not hold θ₃
     u = s1 * rate[..., 1] - c1 * rate[..., 2]
     w = c1 * rate[..., 1] + s1 * rate[..., 2]
     return rows([[-w * t2, -u / (c2 * c2), 0.0], [u, 0.0, 0.0], [w / c2, u * t2 / c2, 0.0]])
@@ -107,19 +109,16 @@ def substitution_derivative(angle: Array, rate: Array, platform: Platform) -> Ar
     return xp.stack([-slope, zero, zero], axis=-1)
 
 
-def level_constraint(angle: Array, rate: Array, platform: Platform) -> tuple[Array, Array, Array]:
-    """What (5) says is zero, cos φ δω_y − sin φ δω_z; of a segway (6), cos χ δω_x + sin χ δω_z.
+def level_constraint(angle: Array, rate: Array) -> tuple[Array, Array, Array]:
+    """What is zero by (5) while a bicycle does not pitch: cos φ δω_y − sin φ δω_z.
 
     Args:
-        angle: ``(*batch, 1)`` φ or χ.
+        angle: ``(*batch, 1)`` φ.
         rate: ``(*batch, 3)`` of the platform.
-        platform: which of the two.
 
     Returns:
         The value ``(*batch, 1)``, its derivative by the angle ``(*batch, 1)`` and by the rate ``(*batch, 3)``.
     """
     xp = namespace(angle)
-    c, s, x, y, z = xp.cos(angle), xp.sin(angle), rate[..., :1], rate[..., 1:2], rate[..., 2:]
-    if platform == "bicycle":
-        return c * y - s * z, -s * y - c * z, xp.concat([0.0 * c, c, -s], axis=-1)
-    return c * x + s * z, c * z - s * x, xp.concat([c, 0.0 * c, s], axis=-1)
+    c, s, y, z = xp.cos(angle), xp.sin(angle), rate[..., 1:2], rate[..., 2:]
+    return c * y - s * z, -s * y - c * z, xp.concat([0.0 * c, c, -s], axis=-1)
