@@ -29,7 +29,7 @@ $(STAMP): pyproject.toml constraints.txt
 	@rm -f $@
 	@test -x $(BIN)/pip || "$(PYTHON)" -m venv --clear $(VENV)
 	@echo "Installing into $(VENV) (minutes the first time) …"
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --progress-bar off -c constraints.txt -e '.[compare,dev]'
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --progress-bar off -c constraints.txt -e '.[all,dev]'
 	@touch $@
 
 benchmark: $(STAMP) ## compare all estimators on all environments, quick form; options in ARGS="…"

@@ -9,11 +9,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-import pybullet
 
 from ..filters.core import rotation
+from ..filters.support.optional import extra
 from .physics.world import Physics
 from .sensors.ideal import BodyState
+
+with extra("sim"):
+    import pybullet
 
 IMAGE_SIZE = (480, 360)
 """Width and height of an image, pixels."""

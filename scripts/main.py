@@ -19,6 +19,7 @@ import tyro
 from gymnasium.error import UnregisteredEnv
 
 from ..filters.support.names import unknown
+from ..filters.support.optional import MissingExtraError, extra
 from ..filters.support.version import poise_version
 
 USAGE_ERROR = 2
@@ -27,10 +28,7 @@ INTERRUPTED = 130
 BROKEN_PIPE = 141
 """128 + SIGPIPE: the reader of our output left (`poise … | head`)."""
 
-USER_ERRORS = (
-    *(ValueError, UnregisteredEnv),
-    *(FileNotFoundError, FileExistsError, NotADirectoryError, IsADirectoryError, PermissionError),
-)
+USER_ERRORS = (ValueError, OSError, UnregisteredEnv, MissingExtraError)
 """What wrong input raises; shown as one line. Anything else is a defect and keeps its traceback."""
 
 
@@ -67,7 +65,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     words = list(sys.argv[1:] if argv is None else argv)
     debug = "--debug" in words or os.environ.get("POISE_DEBUG", "0") not in ("", "0")
     try:
-        status = dispatch([word for word in words if word != "--debug"])
+        with extra():
+            status = dispatch([word for word in words if word != "--debug"])
         # Here rather than at exit, where a reader that left could not be handled.
         sys.stdout.flush()
         return status

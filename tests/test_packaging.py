@@ -15,6 +15,8 @@ from typing import Any
 import pytest
 import yaml
 
+from poise.filters.support.optional import EXTRAS
+
 ROOT = Path(__file__).resolve().parents[1]
 PYPROJECT: dict[str, Any] = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 FLOORS = ("filters", "envs", "baselines", "scripts")
@@ -114,7 +116,23 @@ def test_the_readme_shows_the_two_commands() -> None:
 def requirements() -> set[str]:
     project = PYPROJECT["project"]
     asked = project["dependencies"] + [r for group in project["optional-dependencies"].values() for r in group]
-    return {re.split(r"[<>=!~\[; ]", requirement)[0].lower() for requirement in asked}
+    return {name_of(requirement) for requirement in asked} - {"poise"}
+
+
+def name_of(requirement: str) -> str:
+    return re.split(r"[<>=!~\[; ]", requirement)[0].lower()
+
+
+def test_messages_about_missing_packages_name_the_extra_that_brings_them() -> None:
+    offered = PYPROJECT["project"]["optional-dependencies"]
+    core = {name_of(requirement) for requirement in PYPROJECT["project"]["dependencies"]}
+    assert set(offered) == {*EXTRAS, "all", "dev"}
+    assert set(re.findall(r"\w+", offered["all"][0])) - {"poise"} == set(EXTRAS) - {"learn"}, "rl brings learn"
+    for extra, modules in EXTRAS.items():
+        groups = [offered[extra], offered["learn"]] if extra == "rl" else [offered[extra]]
+        asked = {name_of(requirement) for group in groups for requirement in group}
+        assert {name.replace("-", "_") for name in asked} - {"poise"} == set(modules) - {"pybullet_data"}
+        assert not asked & core
 
 
 def test_every_import_is_a_declared_requirement() -> None:

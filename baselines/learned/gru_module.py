@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-import torch
-from torch import Tensor, nn
 
 from ...filters.core.backend import to_numpy
+from ...filters.support.optional import extra
 from .level_frame import FEATURES
+
+with extra("learn"):
+    import torch
+    from torch import Tensor, nn
 
 SCALE = 0.1
 """rad: the output in this unit has the order of one"""

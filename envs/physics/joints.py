@@ -5,10 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import pybullet
 
 from ...filters.core import rotation
+from ...filters.support.optional import extra
 from .world import Physics, Vector, floats
+
+with extra("sim"):
+    import pybullet
 
 
 def joint_states(physics: Physics, body: int, links: Sequence[int]) -> tuple[np.ndarray, np.ndarray]:

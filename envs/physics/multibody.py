@@ -10,10 +10,13 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-import pybullet
 
 from ...filters.core import rotation
+from ...filters.support.optional import extra
 from .world import BASE, Physics, Vector
+
+with extra("sim"):
+    import pybullet
 
 Tuple3 = tuple[float, float, float]
 LinkState = tuple[Tuple3, tuple[float, float, float, float], Tuple3, Tuple3]

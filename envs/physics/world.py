@@ -19,10 +19,13 @@ from pathlib import Path
 from typing import Self
 
 import numpy as np
-import pybullet
 
 from ...filters.core import rotation
+from ...filters.support.optional import extra
 from ..sensors.ideal import STANDARD_GRAVITY, BodyState
+
+with extra("sim"):
+    import pybullet
 
 BASE = -1
 """Index of the base of a body where a link is asked for."""

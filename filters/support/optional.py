@@ -14,20 +14,25 @@ EXTRAS: dict[str, frozenset[str]] = {
 """Extra → the modules that it brings."""
 
 
+class MissingExtraError(ImportError):
+    """A package is missing that an extra of the installation brings; the message says how to install it."""
+
+
 @contextmanager
-def extra(name: str) -> Iterator[None]:
+def extra(name: str | None = None) -> Iterator[None]:
     """Surround the imports of what an extra of the installation brings.
 
     Args:
-        name: a key of :data:`EXTRAS`.
+        name: a key of :data:`EXTRAS`; None: the first that brings the missing module.
 
     Raises:
-        ImportError: it is not installed; the message says how to install it.
+        MissingExtraError: a module of the extra is not installed.
     """
     try:
         yield
     except ModuleNotFoundError as reason:
         module = (reason.name or "").split(".")[0]
-        if module not in EXTRAS[name]:
+        found = next((each for each in ([name] if name else EXTRAS) if module in EXTRAS[each]), None)
+        if found is None:
             raise
-        raise ImportError(f"{module} is not installed: pip install 'poise[{name}]'", name=module) from None
+        raise MissingExtraError(f"{module} is not installed: pip install 'poise[{found}]'", name=module) from None

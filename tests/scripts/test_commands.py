@@ -58,6 +58,16 @@ def test_record_explains_bad_words(tmp_path, capsys):
     assert main(["record", "--folder", str(tmp_path), "--options", "fast"]) == 2
     assert "name=value" in capsys.readouterr().err
     assert main(["record", "--folder", str(tmp_path), "--episodes", "0"]) == 2
+    capsys.readouterr()
+    for words, said in (
+        ("raet=3", "unknown option 'raet', did you mean 'rate'?"),
+        ("rate=fast", "cannot be made with"),
+    ):
+        assert main(["record", "--folder", str(tmp_path), "--options", words]) == 2
+        (line,) = capsys.readouterr().err.splitlines()
+        assert line.startswith("poise: error: ")
+        assert said in line
+    assert not list(tmp_path.iterdir())
     assert environment_id("poise/Replay-v0") == environment_id("replay")
     assert option("rate=200") == ("rate", 200)
     assert option("gesture=fast") == ("gesture", "fast")

@@ -6,8 +6,8 @@ import math
 from collections.abc import Mapping
 
 import numpy as np
-import pybullet
 
+from ....filters.support.optional import extra
 from ...physics.world import Physics
 from ...rendering import TILE_COLOURS, take_picture
 from ...sensors.ideal import BodyState
@@ -15,6 +15,9 @@ from ..frame.bicycle import bicycle_tree
 from ..rider.links import TRUNK_JOINTS, add_full_rider, limb_joints
 from ..rider.posture import LIMBS, Posture
 from .terrain import Ground
+
+with extra("sim"):
+    import pybullet
 
 TILE, TILES = 1.0, 8
 """m, and tiles on each side of the bicycle"""

@@ -124,7 +124,9 @@ with extra({name!r}):
     import {module}
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
-    assert done.stderr.splitlines()[-1] == f"ImportError: {module} is not installed: pip install 'poise[{name}]'"
+    error, message = done.stderr.splitlines()[-1].split(": ", 1)
+    assert error.endswith("MissingExtraError")
+    assert message == f"{module} is not installed: pip install 'poise[{name}]'"
 
 
 def test_other_missing_modules_stay_what_they_are() -> None:
