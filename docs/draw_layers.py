@@ -1,7 +1,7 @@
 """Draw the layers of the package from its own imports: ``python docs/draw_layers.py`` writes docs/figures/layers.svg.
 
-A box is a folder, or a module that lies beside folders. A row holds boxes that need only what lies below it; the arrows
-at the right margin say which rows a row imports.
+A box is a folder, or a module that lies beside folders; its color is that of its layer. A line leads down to what a box
+imports; a line that a longer way implies is left out.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 LAYERS = ("scripts", "baselines", "envs", "filters")
 COLORS = {"scripts": "#f2e2c9", "baselines": "#d9e8d3", "envs": "#d4e4f1", "filters": "#e6dcee"}
-WIDTH, HEIGHT, GAP, LABEL, MARGIN = 118, 30, 8, 20, 90
+WIDTH, HEIGHT, GAP, BETWEEN = 130, 28, 10, 24
 SHIPPED = ROOT / "docs" / "figures" / "layers.svg"
 
 
@@ -48,59 +48,73 @@ def edges() -> dict[str, set[str]]:
     return found
 
 
-def rows(graph: dict[str, set[str]]) -> list[list[str]]:
-    """Boxes by the length of the longest way down, lowest first.
+def reduced(graph: dict[str, set[str]]) -> dict[str, set[str]]:
+    """The same graph without the edges that a longer way implies.
 
     Raises:
-        ValueError: folders import each other in a circle.
+        ValueError: boxes import each other in a circle.
     """
-    level: dict[str, int] = {}
+    reach: dict[str, set[str]] = {}
 
-    def depth(name: str, above: tuple[str, ...]) -> int:
+    def below(name: str, above: tuple[str, ...] = ()) -> set[str]:
         if name in above:
-            raise ValueError(f"folders import each other: {' > '.join((*above[above.index(name) :], name))}")
-        if name not in level:
-            level[name] = 1 + max((depth(other, (*above, name)) for other in sorted(graph[name])), default=-1)
-        return level[name]
+            raise ValueError(f"boxes import each other: {' > '.join((*above[above.index(name) :], name))}")
+        if name not in reach:
+            reach[name] = set().union(*({other} | below(other, (*above, name)) for other in sorted(graph[name])))
+        return reach[name]
 
     for name in sorted(graph):
-        depth(name, ())
-    return [sorted(name for name in level if level[name] == number) for number in range(max(level.values()) + 1)]
+        below(name)
+    return {
+        name: {other for other in others if not any(other in reach[third] for third in others - {other})}
+        for name, others in graph.items()
+    }
+
+
+def rows(graph: dict[str, set[str]]) -> list[list[str]]:
+    """Rows of boxes from top to bottom: layer by layer, inside a layer by the longest way down."""
+    found = []
+    for layer in LAYERS:
+        own = {name for name in graph if name.split("/")[0] == layer}
+        level: dict[str, int] = {}
+        while len(level) < len(own):
+            ready = [name for name in own - set(level) if graph[name] & own <= set(level)]
+            level |= {name: 1 + max((level[other] for other in graph[name] & own), default=-1) for name in ready}
+        for number in sorted(set(level.values()), reverse=True):
+            found.append(sorted(name for name in own if level[name] == number))
+    return found
 
 
 def draw() -> str:
     """The picture as SVG."""
     graph = edges()
-    levels = rows(graph)[::-1]
-    where = {name: number for number, names in enumerate(levels) for name in names}
+    levels = rows(graph)
     across = max(len(names) for names in levels)
-    width = across * (WIDTH + GAP) + GAP + MARGIN
-    height = len(levels) * (HEIGHT + LABEL) + GAP
+    width, height = across * (WIDTH + GAP) + GAP, len(levels) * (HEIGHT + BETWEEN) + GAP
     lines = [
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" '
         'font-family="sans-serif" font-size="11">',
-        '<defs><marker id="head" markerWidth="6" markerHeight="6" refX="5" refY="3" orient="auto">'
-        '<path d="M0,0 L6,3 L0,6 Z" fill="#777"/></marker></defs>',
         f'<rect width="{width}" height="{height}" fill="white"/>',
     ]
+    middle: dict[str, tuple[float, float]] = {}
     for number, names in enumerate(levels):
-        y = GAP + number * (HEIGHT + LABEL)
+        left = 0.5 * (width - len(names) * (WIDTH + GAP) + GAP)
         for place, name in enumerate(names):
-            x = GAP + place * (WIDTH + GAP)
-            fill = COLORS[name.split("/")[0]]
-            lines.append(
-                f'<rect x="{x}" y="{y}" width="{WIDTH}" height="{HEIGHT}" rx="4" fill="{fill}" stroke="#999"/>'
+            middle[name] = (
+                left + place * (WIDTH + GAP) + 0.5 * WIDTH,
+                GAP + number * (HEIGHT + BETWEEN) + 0.5 * HEIGHT,
             )
-            lines.append(f'<text x="{x + WIDTH / 2}" y="{y + 19}" text-anchor="middle">{name}</text>')
-        reached = sorted({where[other] for name in names for other in graph[name]})
-        for step, target in enumerate(reached):
-            x = width - MARGIN + 4
-            start, stop = y + HEIGHT / 2, GAP + target * (HEIGHT + LABEL) + HEIGHT / 2
-            bend = x + 6 + 78 * (target - number) / len(levels)
+    for name, others in sorted(reduced(graph).items()):
+        for other in sorted(others):
+            (x0, y0), (x1, y1) = middle[name], middle[other]
             lines.append(
-                f'<path d="M{x},{start} C{bend:.0f},{start} {bend:.0f},{stop} {x},{stop}" fill="none" stroke="#777" '
-                f'stroke-width="0.8" opacity="{0.9 - 0.5 * step / max(len(reached), 2):.2f}" marker-end="url(#head)"/>'
+                f'<line x1="{x0:g}" y1="{y0:g}" x2="{x1:g}" y2="{y1 - 0.5 * HEIGHT:g}" stroke="#888"/>'
             )
+    for name, (x, y) in middle.items():
+        layer, _, label = name.partition("/")
+        box = f'x="{x - 0.5 * WIDTH:g}" y="{y - 0.5 * HEIGHT:g}" width="{WIDTH}" height="{HEIGHT}" rx="4"'
+        lines.append(f'<rect {box} fill="{COLORS[layer]}" stroke="#777"/>')
+        lines.append(f'<text x="{x:g}" y="{y + 4:g}" text-anchor="middle">{layer}/{label}</text>')
     return "\n".join([*lines, "</svg>", ""])
 
 
