@@ -107,9 +107,7 @@ def draw() -> str:
     for name, others in sorted(reduced(graph).items()):
         for other in sorted(others):
             (x0, y0), (x1, y1) = middle[name], middle[other]
-            lines.append(
-                f'<line x1="{x0:g}" y1="{y0:g}" x2="{x1:g}" y2="{y1 - 0.5 * HEIGHT:g}" stroke="#888"/>'
-            )
+            lines.append(f'<line x1="{x0:g}" y1="{y0:g}" x2="{x1:g}" y2="{y1 - 0.5 * HEIGHT:g}" stroke="#888"/>')
     for name, (x, y) in middle.items():
         layer, _, label = name.partition("/")
         box = f'x="{x - 0.5 * WIDTH:g}" y="{y - 0.5 * HEIGHT:g}" width="{WIDTH}" height="{HEIGHT}" rx="4"'
