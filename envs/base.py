@@ -234,10 +234,18 @@ class PoseEnv(gymnasium.Env[Observation, np.ndarray]):
         error = pose_error(self.quantity, self._estimate, truth)
         return -error if error == error else 0.0
 
+    def measurement(self) -> dict[str, np.ndarray]:
+        """What the sensors say now: channel → float64 ``(size,)``, NaN where there is no sample.
+
+        Raises:
+            RuntimeError: :meth:`reset` was not called.
+        """
+        if self._block is None:
+            raise RuntimeError("call reset first: nothing was measured yet")
+        return {name: values[self._row] for name, values in self._block.measurements.items()}
+
     def _observe(self) -> Observation:
-        assert self._block is not None
-        row = self._row
-        return self.suite.to_observation({name: values[row] for name, values in self._block.measurements.items()})
+        return self.suite.to_observation(self.measurement())
 
     def _info(self) -> dict[str, Any]:
         block, row = self._block, self._row

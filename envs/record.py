@@ -48,17 +48,19 @@ def record(
         if suite is None:
             raise ValueError(f"{env} has no sensor suite: only environments of this package can be recorded")
         choose = policy or default_policy(env, seed)
+        # environments of this package give the measurement itself, others an observation to be undone
+        measured = getattr(env.unwrapped, "measurement", None)
         observation, info = env.reset(seed=seed)
-        ticks, infos, ended = [suite.to_measurement(observation)], [info], "steps"
+        rows, infos, ended = [measured() if measured else suite.to_measurement(observation)], [info], "steps"
         for _ in itertools.count() if steps is None else range(steps):
             observation, _, terminated, truncated, info = env.step(choose(observation))
-            ticks.append(suite.to_measurement(observation))
+            rows.append(measured() if measured else suite.to_measurement(observation))
             infos.append(info)
             bar.update()
             if terminated or truncated:
                 ended = "terminated" if terminated else "truncated"
                 break
-        return join(ticks, infos, describe(env, seed) | {"ended": ended})
+        return join(rows, infos, describe(env, seed) | {"ended": ended})
 
 
 @contextmanager
@@ -87,16 +89,16 @@ def default_policy(env: Any, seed: int) -> Policy:
     return lambda observation: env.action_space.sample()
 
 
-def join(ticks: list[Mapping[str, Any]], infos: list[Mapping[str, Any]], metadata: dict[str, Any]) -> Trajectory:
-    """Stack measurements and infos of single ticks to a trajectory."""
+def join(rows: list[Mapping[str, Any]], infos: list[Mapping[str, Any]], metadata: dict[str, Any]) -> Trajectory:
+    """Stack measurements and infos of single time steps to a trajectory."""
     names = {key: set(infos[0].get(key, {})) for key in ("pose", "truth")}
-    for tick, info in enumerate(infos):
+    for step, info in enumerate(infos):
         for key in ("time", "pose", "truth"):
             if key not in info:
-                raise ValueError(f"info lacks {key!r} at tick {tick}; it holds {sorted(info)}")
+                raise ValueError(f"info lacks {key!r} at step {step}; it holds {sorted(info)}")
         for key, expected in names.items():
             if set(info[key]) != expected:
-                raise ValueError(f"info[{key!r}] changed from {sorted(expected)} to {sorted(info[key])} at tick {tick}")
+                raise ValueError(f"info[{key!r}] changed from {sorted(expected)} to {sorted(info[key])} at step {step}")
     truth = {
         name: np.stack([np.atleast_1d(np.asarray(info[key][name], dtype=float)) for info in infos])
         for key in ("pose", "truth")
@@ -104,7 +106,7 @@ def join(ticks: list[Mapping[str, Any]], infos: list[Mapping[str, Any]], metadat
     }
     trajectory = Trajectory(
         time=np.array([float(info["time"]) for info in infos]),
-        measurements={name: np.stack([np.asarray(tick[name], dtype=float) for tick in ticks]) for name in ticks[0]},
+        measurements={name: np.stack([np.asarray(row[name], dtype=float) for row in rows]) for name in rows[0]},
         truth=truth,
         mask=np.array([bool(info.get("scored", True)) for info in infos]),
         metadata=metadata,

@@ -254,7 +254,8 @@ class Curriculum:
         gesture = self.motion.draw(motion, self.duration)
         times = np.arange(1, math.floor(self.duration * rate) + 1) / rate
         states = gesture.sample(times)
-        measurements, _ = suite.simulate(states, before=gesture.sample(times - 1.0 / rate))
+        before = gesture.sample(times - 1.0 / rate)
+        measurements = suite.simulate(states, before=before).measurements
         shaken = measurements["imu/acc"] + self.shaking.draw(shaking, times, mean=means)
         limit = self.sensors.full_scale[1]
         measurements["imu/acc"] = np.clip(shaken, -limit, limit)

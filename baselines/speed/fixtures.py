@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ...envs.bicycle.sensors.suites import CATALOGUE as BICYCLE_CHANNELS
+from ...envs.bicycle.sensors.suites import CHANNELS as BICYCLE_CHANNELS
 from ...filters.arrays.array import AccelerometerArray, PlanarArray
 from ...filters.core import rotation
 from ...filters.core.estimator import Estimator

@@ -13,6 +13,7 @@ from ...filters.bicycle.geometry import RiderGeometry
 from ...filters.core.quantity import Quantity
 from ..base import Block, Observation, PoseEnv, Scene, pose_error
 from ..sensors.ideal import STANDARD_GRAVITY, Sampling
+from ..sensors.sensor import Sensor
 from .course.scenarios import Scenario
 from .course.scenarios import scenario as named_scenario
 from .frame.parameters import BICYCLES, BicycleParameters
@@ -26,8 +27,9 @@ from .rider.posture import Posture, sit
 from .rider.rider import Fidelity
 from .rider.style import RiderStyle, rider_style
 from .sensors.measured_geometry import rider_geometry
-from .sensors.readings import RideQuantities, given_readings
-from .sensors.suites import CATALOGUE, rider_bicycle_suite, sensor_places, suite_channels
+from .sensors.readings import RideQuantities
+from .sensors.sites import sensor_sites
+from .sensors.suites import CHANNELS, rider_bicycle_suite, suite_channels
 
 BLOCK = 50
 """ticks that are computed together"""
@@ -111,7 +113,8 @@ class RiderBicycleEnv(PoseEnv):
         subject: 0…4, ``"random"``, or a :class:`poise.envs.bicycle.rider.anthropometry.RiderBody`; also a reset option.
         style: ``still``, ``mild``, ``normal``, ``aggressive``, or a style; None for that of the scenario.
         suite: ``two-gyro``, ``force-inertial``, ``whole-body``, ``all``, or a list of channels
-            (:mod:`poise.envs.bicycle.sensors.suites` says where they sit and how they err).
+            (:mod:`poise.envs.bicycle.sensors.suites` says where they sit and how they err) and of
+            :class:`.Sensor` objects of one's own on the bodies ``bicycle``, ``trunk``, ….
         sensors: ``paper``, ``ideal``, or a device (:func:`poise.envs.sensors.presets.list_sensor_presets`) in place of
             the papers' inertial sensors.
         rate: Hz; None for that of the suite.
@@ -139,7 +142,7 @@ class RiderBicycleEnv(PoseEnv):
         scenario: str | Scenario = "indoor_circle",
         subject: int | str | RiderBody = 0,
         style: str | RiderStyle | None = None,
-        suite: str | Sequence[str] = "whole-body",
+        suite: str | Sequence[str | Sensor] = "whole-body",
         sensors: str = "paper",
         rate: float | None = None,
         duration: float = 60.0,
@@ -161,20 +164,20 @@ class RiderBicycleEnv(PoseEnv):
         if not 0.1 <= duration < math.inf:
             raise ValueError(f"duration must be at least 0.1 s and finite, got {duration}")
         self.fidelity, self.duration, self.physics_rate = fidelity, float(duration), float(physics_rate)
-        names, _ = suite_channels(suite)
+        names, own, _ = suite_channels(suite)
         if any(name.startswith("disk") for name in names):
             raise ValueError(f"suite must be one that a rider wears: there is no disk on this bicycle, got {suite!r}")
         self._sensors: dict[str, Any] = {
-            "name": suite if isinstance(suite, str) else names,
+            "name": suite if isinstance(suite, str) else (*names, *own),
             "sensors": sensors,
             "rate": rate,
-            "grade": grade,
+            "noise_scale": grade,
             "sampling": sampling,
         }
         self.tyre = TyreParameters()
         self._fit(sit(self.parameters, RiderBody() if subject == "random" else rider_body(subject)))
         made = self._suite
-        limbs = [name for name in names if CATALOGUE[name].body not in ("bicycle", "trunk")]
+        limbs = [name for name in names if CHANNELS[name].body not in ("bicycle", "trunk")]
         if fidelity == "lumped" and sampling == "instant" and limbs:
             raise ValueError(
                 f"a lumped rider's limbs have no instantaneous rates: sampling must be 'interval' for {limbs}"
@@ -199,7 +202,7 @@ class RiderBicycleEnv(PoseEnv):
     @property
     def geometry(self) -> RiderGeometry:
         """What a filter may be told about the present rider on this bicycle; before a reset the configured one."""
-        return rider_geometry(self._posture, self._places)
+        return rider_geometry(self._posture, self._sites)
 
     @property
     def neutral_action(self) -> np.ndarray:
@@ -227,18 +230,24 @@ class RiderBicycleEnv(PoseEnv):
 
     def _fit(self, posture: Posture) -> None:
         """Put the sensors on a person on the bicycle."""
-        self._posture, self._places = posture, sensor_places(posture)
-        self._suite = rider_bicycle_suite(places=self._places, gravity=STANDARD_GRAVITY, **self._sensors)
+        self._posture, self._sites = posture, sensor_sites(posture)
+        self._suite = rider_bicycle_suite(sites=self._sites, gravity=STANDARD_GRAVITY, **self._sensors)
 
     def next_block(self, most: int) -> Block:
         """Ride on and let the sensors see it."""
         log, bodies, pose = self._source.record(min(most, BLOCK))
         contact = log.contact
-        true = RideQuantities(
-            bodies, log.rates[:, 2], log.steer, log.crank, contact.seat_force, contact.seat_moment, contact.hands
+        ride = RideQuantities(
+            bodies,
+            self._sites,
+            wheel_rate=log.rates[:, 2],
+            steer=log.steer,
+            crank=log.crank,
+            seat_force=contact.seat_force,
+            seat_moment=contact.seat_moment,
+            hands=contact.hands,
         )
-        given = given_readings(self._suite, true, self._places)
-        measurements, biases = self._suite.simulate(bodies, given)
+        measurements, biases, _ = self._suite.simulate(bodies, ride)
         truth = {**other_truth(log), **biases}
         return Block(log.time, measurements, pose, truth, np.ones(len(log.time), bool))
 

@@ -23,8 +23,9 @@ from .rider.anthropometry import SUBJECTS
 from .rider.limbs import half_turns
 from .rider.posture import sit
 from .sensors.measured_geometry import rider_geometry
-from .sensors.readings import RideQuantities, given_readings
-from .sensors.suites import fixture_places, rider_bicycle_suite, sensor_places
+from .sensors.readings import RideQuantities
+from .sensors.sites import fixture_sites, sensor_sites
+from .sensors.suites import rider_bicycle_suite
 
 DISK_CENTRE = (0.26, 0.0, 1.0)
 """m in the bicycle frame: above the saddle; assumed"""
@@ -185,8 +186,8 @@ class BicycleFixtureEnv(PoseEnv):
         if render_mode is not None:
             raise ValueError(f"render_mode must be None: there is no picture of the fixture, got {render_mode!r}")
         self._posture = sit(MOUNTAIN_BIKE, SUBJECTS[0])
-        self.places = fixture_places(sensor_places(self._posture), DISK_CENTRE)
-        self._suite = rider_bicycle_suite(suite, sensors=sensors, rate=rate, grade=grade, places=self.places)
+        self.sites = fixture_sites(sensor_sites(self._posture), DISK_CENTRE)
+        self._suite = rider_bicycle_suite(suite, sensors=sensors, rate=rate, noise_scale=grade, sites=self.sites)
         missing = {sensor.body for sensor in self._suite.sensors} - {"bicycle", "disk"}
         forces = [s.channel.name for s in self._suite.sensors if s.channel.name.split("/")[0] in ("seat", "handlebar")]
         if missing or forces:
@@ -208,7 +209,7 @@ class BicycleFixtureEnv(PoseEnv):
     @property
     def geometry(self) -> RiderGeometry:
         """Of the bicycle; the rider in it is not there."""
-        return rider_geometry(self._posture, self.places)
+        return rider_geometry(self._posture, self.sites)
 
     def begin(self, motion: np.random.Generator, sensors: np.random.Generator, options: Mapping[str, Any]) -> int:
         """Draw the push and the sensors' errors."""
@@ -223,8 +224,8 @@ class BicycleFixtureEnv(PoseEnv):
         self._ticks += len(time)
         bodies, speed = self._motion.sample(time)
         zero = np.zeros_like(time)
-        true = RideQuantities(bodies, speed / self.places.wheel_radius, zero, zero)
-        measurements, biases = self._suite.simulate(bodies, given_readings(self._suite, true, self.places))
+        ride = RideQuantities(bodies, self.sites, wheel_rate=speed / self.sites.wheel_radius, steer=zero, crank=zero)
+        measurements, biases, _ = self._suite.simulate(bodies, ride)
         bicycle, disk = bodies["bicycle"], bodies["disk"]
         pose = {
             "bicycle/roll": rotation.to_euler_zyx(bicycle.orientation)[2][:, None],

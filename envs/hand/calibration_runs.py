@@ -18,7 +18,7 @@ from ..data.calibration.channels import accelerometer_channel, spatial_axes
 from ..data.calibration.data import MagnetometerData, RateTableData, mounting_matrix
 from ..data.calibration.records import CalibrationRecord, ChannelCalibration
 from ..sensors.ideal import STANDARD_GRAVITY, magnetic_field
-from ..sensors.noise_model import NoiseModel
+from ..sensors.noise import NoiseModel
 from .controller_gestures import BOTH_WAYS, DOWNWARDS, UPWARDS, RateTable
 from .devices import ArrayPreset, HandDevice, actual_array
 from .sensing import simulate_hand

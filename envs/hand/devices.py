@@ -19,11 +19,17 @@ import numpy as np
 
 from ...filters.arrays.array import CONTROLLER, OCTA, PLANAR, AccelerometerArray, PlanarArray
 from ...filters.arrays.files import load_array
+from ...filters.arrays.planar.orientation import PLANAR_GYROSCOPE
 from ...filters.core import rotation
-from ..sensors.ideal import vector
-from ..sensors.noise_model import NoiseModel
+from ...filters.core.quantity import GYROSCOPE, Channel
+from ..sensors.ideal import Mounting, Sampling, vector
+from ..sensors.kinds import SensorKind, SiteMotion
+from ..sensors.noise import NoiseModel
 from ..sensors.presets import SensorPreset, list_sensor_presets, sensor_preset
+from ..sensors.sensor import Sensor
+from ..sensors.suite import SensorSuite
 from .drivers import Device
+from .gestures import GestureConfig
 
 G = 9.81
 """m/s², the thesis'."""
@@ -56,10 +62,10 @@ class ArrayPreset(SensorPreset):
             if not 0.0 <= getattr(self, name) < math.inf:
                 raise ValueError(f"{name} must be 0 or more and finite, got {getattr(self, name)}")
 
-    def scaled(self, grade: float) -> Self:
-        """The same device with errors ``grade`` times as large."""
-        larger = {name: grade * getattr(self, name) for name in ("axis_error", "position_error")}
-        return replace(super().scaled(grade), **larger)
+    def scaled(self, noise_scale: float) -> Self:
+        """The same device with errors ``noise_scale`` times as large."""
+        larger = {name: noise_scale * getattr(self, name) for name in ("axis_error", "position_error")}
+        return replace(super().scaled(noise_scale), **larger)
 
 
 ARRAY_PRESETS = (
@@ -214,3 +220,84 @@ def hand_device(device: str | Path | HandDevice) -> HandDevice | None:
         )
     array = load_array(device)
     return HandDevice(array.name, array, "paper-planar" if array.dimension == 2 else "paper-array")
+
+
+def array_reading(motion: SiteMotion) -> np.ndarray:
+    """Ideal readings ``(n, m)`` of m uniaxial accelerometers: each one's own site is moved, nothing is linearised.
+
+    Args:
+        motion: of the array's reference point; its surroundings are the array as it is built. The accelerometers of a
+            planar one lie in the x-y plane.
+    """
+    array: AccelerometerArray = motion.surroundings
+    padding = ((0, 0), (0, 3 - array.dimension))
+    positions, axes = np.pad(array.r, padding), np.pad(array.e, padding)
+    readings = np.empty((len(motion.now.position), array.size))
+    for position in np.unique(positions, axis=0):
+        members = np.flatnonzero((positions == position).all(axis=1))
+        force = motion.moved(Mounting(tuple(position.tolist()))).specific_force
+        readings[-len(force) :, members] = force @ axes[members].T
+    return readings[-len(force) :]
+
+
+ARRAY = SensorKind("accelerometer-array", None, "m/s²", "acc", array_reading, 1000.0)
+"""Uniaxial accelerometers of one array; the environment tells the array as it is built."""
+PLANAR_RATE = SensorKind("planar-gyroscope", 1, "rad/s", "gyr", lambda motion: motion.angular_rate[..., 2:], 100.0)
+"""A gyroscope about the z axis of a planar device."""
+
+
+def device_suite(
+    device: HandDevice,
+    sensors: str | SensorPreset | SensorSuite | None = None,
+    rate: float | None = None,
+    magnetometer: bool | float | None = None,
+    sampling: Sampling = "instant",
+) -> SensorSuite:
+    """The sensors of a device.
+
+    Args:
+        device: which.
+        sensors: their errors; None for those of the device.
+        rate: Hz; None for 100.
+        magnetometer: False, True or its rate in Hz; None for what the device has.
+        sampling: ``instant`` or ``interval``.
+
+    Raises:
+        ValueError: ``sensors`` is a whole suite, or a magnetometer is wanted whose errors the preset does not know.
+    """
+    if isinstance(sensors, SensorSuite):
+        raise ValueError(f"sensors must be errors (a preset) for the device {device.name!r}, not a whole suite")
+    preset, rate = array_preset(device.noise if sensors is None else sensors), 100.0 if rate is None else rate
+
+    def placed(channel: Channel, kind: str | SensorKind, noise: NoiseModel, its_rate: float) -> Sensor:
+        return Sensor(channel, kind, its_rate, noise, sampling=sampling, device=preset.name)
+
+    chosen = [placed(device.array.channel, ARRAY, replace(preset.accelerometer, g_sensitivity=0.0), rate)]
+    if device.gyroscope and device.planar:
+        chosen.append(placed(PLANAR_GYROSCOPE, PLANAR_RATE, replace(preset.gyroscope, g_sensitivity=0.0), rate))
+    elif device.gyroscope:
+        chosen.append(placed(GYROSCOPE, "gyroscope", preset.gyroscope, rate))
+    wanted = device.magnetometer if magnetometer is None else magnetometer
+    if wanted is not False:
+        if preset.magnetometer is None:
+            raise ValueError(f"magnetometer must be False: the preset {preset.name!r} has none")
+        its_rate = rate if wanted is True else float(wanted)
+        chosen.append(placed(Channel("imu/mag", 3, "µT"), "magnetometer", preset.magnetometer, its_rate))
+    return SensorSuite(chosen, rate, field=device.magnetic_field)
+
+
+def check_planar(device: HandDevice, config: GestureConfig, mounting: Mounting) -> None:
+    """Refuse what would take a planar device out of its plane.
+
+    Raises:
+        ValueError: a spatial gesture, or turned axes.
+    """
+    if not device.planar:
+        return
+    if not getattr(config, "planar", False):
+        raise ValueError(
+            f"gesture of the planar device {device.name!r} must stay in the vertical plane "
+            f"(planar-walk, infinity, or a configuration with planar = True), got {config!r}"
+        )
+    if mounting.rotation != (1.0, 0.0, 0.0, 0.0):
+        raise ValueError(f"mounting of the planar device {device.name!r} must be no rotation, got {mounting.rotation}")

@@ -10,11 +10,10 @@ import numpy as np
 from ...filters.arrays.array import AccelerometerArray
 from ...filters.core.quantity import ORIENTATION, RELATIVE_ORIENTATION
 from ..base import Block, PoseEnv, Scene, choose_quantity
-from ..sensors.ideal import BodyState, Mounting, Sampling, vector
+from ..sensors.ideal import Mounting, Sampling, vector
 from ..sensors.presets import SensorPreset
 from ..sensors.suite import SensorSuite
-from .device_sensing import check_planar
-from .devices import HandDevice, hand_device
+from .devices import HandDevice, check_planar, hand_device
 from .drivers import Device, Drive, DynamicDrive, KinematicDrive
 from .gestures import GestureConfig, gesture_config, make_gesture
 from .sensing import HandVariation, built_array, check_duration, hand_gesture, hand_suite, sense, ticks_of
@@ -170,7 +169,6 @@ class HandMotionEnv(PoseEnv):
         self._array: AccelerometerArray | None = None
         self._drive: Drive | None = None
         self._episode_mounting = self.mounting
-        self._before: BodyState | None = None
 
     def begin(self, motion: np.random.Generator, sensors: np.random.Generator, options: Mapping[str, Any]) -> int:
         """Draw gesture, mounting and sensor errors."""
@@ -185,7 +183,6 @@ class HandMotionEnv(PoseEnv):
         self._ready_drive().start(gesture, mass_factor)
         self._suite.reset(sensors)
         self._array = built_array(self.hand_device, self._sensors, sensors)
-        self._before = None
         return ticks_of(duration, self.rate) - 1
 
     def _ready_drive(self) -> Drive:
@@ -201,16 +198,15 @@ class HandMotionEnv(PoseEnv):
         """Move the device on and let the sensors see it."""
         drive = self._ready_drive()
         states = drive.advance(min(most, drive.block))
-        block, self._before = sense(self._suite, states, self._episode_mounting, self._before, self._array)
-        return block
+        return sense(self._suite, states, self._episode_mounting, self._array)
 
     def save_source(self) -> Any:
-        """Drive, mounting, the last state, and the array as it is built."""
-        return self._ready_drive().save(), self._episode_mounting, self._before, self._array
+        """Drive, mounting, and the array as it is built."""
+        return self._ready_drive().save(), self._episode_mounting, self._array
 
     def restore_source(self, saved: Any) -> None:
         """Undo :meth:`save_source`."""
-        drive, self._episode_mounting, self._before, self._array = saved
+        drive, self._episode_mounting, self._array = saved
         self._ready_drive().restore(drive)
 
     def make_scene(self, gui: bool) -> Scene:

@@ -13,13 +13,13 @@ from ...filters.core import rotation
 from ...filters.support.seeds import root_seed
 from ..base import Block
 from ..data.trajectory import Trajectory
-from ..sensors.ideal import BodyState, Mounting, Sampling, instant_readings, interval_readings, mounted, vector
+from ..sensors.ideal import BodyState, Mounting, Sampling, mounted, vector
 from ..sensors.presets import SensorPreset, sensor_preset
 from ..sensors.suite import SensorSuite, imu_suite
-from .device_sensing import PLANAR_GYROSCOPE, array_readings, array_truth, check_planar, device_suite
-from .devices import HandDevice, actual_array, array_preset, hand_device
+from .devices import HandDevice, actual_array, array_preset, check_planar, device_suite, hand_device
 from .drivers import KinematicDrive, States
 from .gestures import GestureConfig, gesture_config, gesture_name, make_gesture
+from .planar_motion import planar_angle
 
 DEFAULT_SENSORS = "xsens-mtw-awinda"
 """Preset of the device ``imu``."""
@@ -89,7 +89,7 @@ def hand_suite(
     sampling: Sampling | None = None,
     device: HandDevice | None = None,
 ) -> SensorSuite:
-    """Sensors at the origin of their own frame; arguments as of :class:`HandMotionEnv`.
+    """Sensors at the origin of their own frame; arguments as of :class:`.HandMotionEnv`.
 
     Raises:
         ValueError: ``rate`` or ``magnetometer`` contradicts a whole suite, or a suite a device.
@@ -108,68 +108,56 @@ def hand_suite(
     return sensors
 
 
-def sense(
-    suite: SensorSuite,
-    states: States,
-    mounting: Mounting,
-    before: BodyState | None = None,
-    array: AccelerometerArray | None = None,
-) -> tuple[Block, BodyState]:
-    """Measurements and truth of a block of ticks.
+def sense(suite: SensorSuite, states: States, mounting: Mounting, array: AccelerometerArray | None = None) -> Block:
+    """Measurements and truth of consecutive time steps.
 
     Args:
-        suite: sensors at the mounted place.
+        suite: sensors at the mounted site.
         states: motion of the device.
-        mounting: place and axes on the device.
-        before: what the call for the block before returned second; None for the first block.
+        mounting: site and axes on the device.
         array: the array of accelerometers as it is built, for a device with one.
-
-    Returns:
-        The block, and the state at its end for the next call.
     """
     now, earlier = (mounted(part, mounting) for part in states)
-    first = earlier.at(slice(0, 1)) if before is None else before
-    sampling = suite.sensors[0].sampling
-    rate, acceleration = motion_readings(now, earlier, first, sampling, 0.0)
-    readings, more = None, {}
-    if array is not None:
-
-        def force(now: BodyState, earlier: BodyState, first: BodyState) -> np.ndarray:
-            return motion_readings(now, earlier, first, sampling, suite.gravity)[1]
-
-        readings = {array.channel.name: array_readings(array, (now, earlier, first), force)}
-        readings[PLANAR_GYROSCOPE.name] = rate[:, 2:]
-        more = array_truth(array, now, earlier)
-    measurements, biases = suite.simulate(now, readings, before=earlier)
+    first = suite.sensors[0]
+    # where the first sensor sits at this place and runs at this rate, its ideal readings are the truth
+    site = (first.body, Mounting(), first.sampling, suite.rate)
+    measurements, biases, motions = suite.simulate(now, array, before=earlier, reference=site)
     truth = {
         "position": now.position,
         "velocity": now.velocity,
-        "angular_rate": rate,
-        "external_acceleration": acceleration,
-        **more,
+        "angular_rate": motions[site].angular_rate,
+        "external_acceleration": motions[site].external_acceleration,
+        **({} if array is None else array_truth(array, now, earlier)),
         **biases,
     }
     pose = {"orientation": now.orientation, "up": rotation.up_in_body(now.orientation)}
     time = np.asarray(now.time)
-    return Block(time, measurements, pose, truth, np.ones(len(time), bool)), now.at(slice(-1, None))
+    return Block(time, measurements, pose, truth, np.ones(len(time), bool))
 
 
-def motion_readings(
-    now: BodyState, earlier: BodyState, first: BodyState, sampling: Sampling, gravity: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """Angular rate and specific force ``(n, 3)`` of an ideal sensor at consecutive ticks.
+def array_truth(array: AccelerometerArray, now: BodyState, earlier: BodyState) -> dict[str, np.ndarray]:
+    """What filters for arrays estimate besides the pose: name → ``(n, size)``.
 
-    Args:
-        now: states ``(n, …)`` of the sensor at the ticks.
-        earlier: one physics step before each of them.
-        first: state ``(1, …)`` at the tick before.
-        sampling: ``interval`` or ``instant``.
-        gravity: m/s²; 0 for the acceleration itself.
+    Accelerations that the motion does not know are differences over a physics step.
     """
-    if sampling == "instant":
-        return instant_readings(now, earlier, gravity)
-    path = BodyState(*(np.concatenate([a, b]) for a, b in zip(first[:5], now[:5], strict=True)))
-    return interval_readings(path.at(slice(None, -1)), path.at(slice(1, None)), gravity)
+    acceleration, angular = now.acceleration, now.angular_acceleration
+    if acceleration is None or angular is None:
+        step = np.asarray(now.time - earlier.time)[:, None]
+        acceleration = (now.velocity - earlier.velocity) / step
+        angular = (now.angular_velocity - earlier.angular_velocity) / step
+    truth = {"acceleration": acceleration, "angular_acceleration": rotation.rotate_back(now.orientation, angular)}
+    if array.dimension == 3:
+        return truth
+    body_rate = rotation.rotate_back(now.orientation, now.angular_velocity)
+    plane = [0, 2]
+    return truth | {
+        "planar/angle": planar_angle(now.orientation)[:, None],
+        "planar/angular_rate": body_rate[:, 2:],
+        "planar/angular_acceleration": truth["angular_acceleration"][:, 2:],
+        "planar/position": now.position[:, plane],
+        "planar/velocity": now.velocity[:, plane],
+        "planar/acceleration": acceleration[:, plane],
+    }
 
 
 def simulate_hand(
@@ -220,7 +208,7 @@ def simulate_hand(
     drive.start(make_gesture(config, motion, duration))
     suite.reset(errors)
     array = built_array(held, sensors, errors)
-    block, _ = sense(suite, drive.advance(ticks_of(duration, suite.rate)), where, array=array)
+    block = sense(suite, drive.advance(ticks_of(duration, suite.rate)), where, array)
     metadata = {
         "name": f"hand-{gesture_name(gesture)}-{seed}",
         "gesture": gesture_name(gesture),

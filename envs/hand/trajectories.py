@@ -89,7 +89,7 @@ class HandTrajectories:
         turn = rotation.random(choice)
         axes = turn if self.mounting == "random" else np.array([1.0, 0.0, 0.0, 0.0])
         place: dict[str, Any] = {"lever_arm": choice.normal(0.0, self.lever_arm, 3), "mounting": axes}
-        suite = imu_suite(device, rate, grade=grade)
+        suite = imu_suite(device, rate, noise_scale=grade)
         seed = int(episode.integers(2**32))
         if self.drive == "kinematic":
             trajectory = simulate_hand(gesture, seed, suite, duration=self.duration, **place)

@@ -1,22 +1,19 @@
 """What ideal sensors on a moving body read: gyroscope, accelerometer, magnetometer.
 
 Everything is written over leading dimensions: one state of an environment ``(3,)`` and a whole motion ``(T, 3)`` go
-through the same lines. :func:`mounted` carries the state of a body to the place and axes of a sensor; the readings are
+through the same lines. :func:`mounted` carries the state of a body to the site and axes of a sensor; the readings are
 functions of that. Positions are never differenced; the only difference is one of velocities.
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 
-from ...filters.compile.trace import Tape, print_code
 from ...filters.core import rotation
-from ...filters.core.backend import expand, namespace
 
 Sampling = Literal["interval", "instant"]
 """``interval``: delta angle and delta velocity over the sampling interval, divided by its length.
@@ -144,7 +141,7 @@ def interval_readings(
 
     Args:
         before: state of the sensor at the beginning of the interval.
-        after: state at its end; the turn in between must be less than 180°.
+        after: state at its end; the rotation in between must be less than 180°.
         gravity: m/s².
 
     Returns:
@@ -156,19 +153,21 @@ def interval_readings(
     dt = np.asarray(after.time - before.time)
     if not (dt > 0.0).all():
         raise ValueError(f"after.time must lie after before.time, got an interval of {np.min(dt):g} s")
-    return mean_readings(before, after, gravity)
+    rate, middle, acceleration = mean_motion(before, after)
+    return rate, rotation.rotate_back(middle, acceleration + np.array((0.0, 0.0, gravity)))
 
 
-def mean_readings(before: BodyState, after: BodyState, gravity: float) -> tuple[np.ndarray, np.ndarray]:
-    """The formulas of :func:`interval_readings`, on anything that can be traced."""
-    dt = expand(after.time - before.time, 1)
-    xp = namespace(after.orientation)
-    turn = rotation.multiply(rotation.conjugate(before.orientation), after.orientation)
+def mean_motion(before: BodyState, after: BodyState) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Angular rate (own axes), attitude half way, and mean acceleration (world axes) of :func:`interval_readings`."""
+    dt = np.asarray(after.time - before.time)[..., None]
+    increment = rotation.multiply(rotation.conjugate(before.orientation), after.orientation)
     # q and -q are one attitude: the half-way point needs the two ends on the same side
-    end = xp.where(xp.less(turn[..., :1], 0.0), -after.orientation, after.orientation)
+    end = np.where(increment[..., :1] < 0.0, -after.orientation, after.orientation)
     middle = rotation.normalize(before.orientation + end)
-    force = (after.velocity - before.velocity) / dt + np.array((0.0, 0.0, gravity))
-    return rotation.log(turn) / dt, rotation.rotate_back(middle, force)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        # half a turn exactly: the logarithm takes the right branch in spite of the division
+        rate = rotation.log(increment) / dt
+    return rate, middle, (after.velocity - before.velocity) / dt
 
 
 def instant_readings(
@@ -229,26 +228,3 @@ def magnetic_field(strength: float = 50.0, dip_deg: float = 65.0, declination_de
     dip, declination = np.deg2rad(dip_deg), np.deg2rad(declination_deg)
     level = np.cos(dip)
     return strength * np.array([level * np.sin(declination), level * np.cos(declination), -np.sin(dip)])
-
-
-def straight_line(function: Callable[..., tuple[np.ndarray, ...]], **sizes: int) -> Callable[..., list[list[float]]]:
-    """The same function as straight-line Python on lists of floats, ten times as fast on one sample.
-
-    Args:
-        function: takes arrays ``(size,)`` by keyword and gives a tuple of arrays ``(n,)``; it is run once, recorded
-            (:mod:`poise.filters.compile.trace`) and must not branch on values.
-        **sizes: its arguments and their sizes.
-
-    Returns:
-        A function of lists in the order of ``sizes`` that gives a list for each array. It raises ZeroDivisionError
-        where arrays would hold infinity or NaN.
-    """
-    tape = Tape()
-    results = function(**{name: tape.inputs(name, size) for name, size in sizes.items()})
-    outputs = {f"_{number}": np.asarray(result, dtype=object) for number, result in enumerate(results)}
-    lines = [f"def compute({', '.join(sizes)}):"]
-    lines += [f"    {name} = [0.0] * {len(output)}" for name, output in outputs.items()]
-    lines += [*print_code(outputs), f"    return [{', '.join(outputs)}]"]
-    scope: dict[str, Any] = {name: getattr(math, name) for name in ("sin", "cos", "sqrt", "atan2", "fabs", "isfinite")}
-    exec("\n".join(lines), scope)
-    return scope["compute"]

@@ -1,59 +1,129 @@
-"""Errors of a real sensor, drawn for one episode: :class:`NoiseProcess`, for a channel of any width.
+"""Errors of real sensors: :class:`NoiseModel` says how large they are, :class:`NoiseProcess` draws those of an episode.
 
 Order of the chain: scale factor, misalignment and g-sensitivity; white noise; low-pass; bias; quantisation;
-saturation; loss of samples. Everything that is independent of the signal is drawn ahead in blocks, from normal numbers
-in a fixed layout of one row a sample: samples one by one and whole sequences give the same numbers, and two models of
-different grade see the same realisation, scaled.
+saturation; loss of samples. Everything that is independent of the signal is drawn from normal numbers in a fixed layout
+of one row a sample: a motion in one piece or in several gives the same numbers, and two models of different
+``noise_scale`` see the same realisation, scaled.
 """
 
 from __future__ import annotations
 
 import copy
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from itertools import accumulate
 from statistics import NormalDist
+from typing import Literal, Self
 
 import numpy as np
 
-from .noise_model import NoiseModel
+from ...filters.core import rotation
 
-BLOCK = 256
-"""Samples drawn ahead when samples are taken one by one."""
+Form = Literal["additive", "angle", "rotation", "counted"]
+"""Error model. ``additive``: the error is added to the reading. ``angle``: likewise, wrapped to [−π, π]. ``rotation``:
+the reading is a unit quaternion and is rotated by the error, a rotation vector (rad) in axes of the child frame.
+``counted``: additive, but what quantisation leaves is carried to the next sample, as an incremental encoder does."""
+
+FORMS: tuple[Form, ...] = ("additive", "angle", "rotation", "counted")
+
+
+@dataclass(frozen=True)
+class NoiseModel:
+    """How large the errors of a channel are. ``u`` stands for the unit of the channel; standard deviations per axis.
+
+    The defaults are an ideal sensor. Terms follow IEEE Std 952 (gyroscopes) and IEEE Std 1293 (accelerometers).
+
+    Raises:
+        ValueError: a negative or not finite number, or a probability above 1.
+    """
+
+    white_noise: float = 0.0
+    """u/√Hz: Allan deviation of the white part at 1 s; a sample at ``rate`` has standard deviation white_noise·√rate"""
+    bias_random_walk: float = 0.0
+    """u/√s: growth of a random-walk bias (rate random walk)"""
+    bias_instability: float = 0.0
+    """u: stationary standard deviation of a first-order Gauss-Markov bias; its Allan deviation peaks at 0.62 of it"""
+    bias_correlation_time: float = 200.0
+    """s: correlation time of the Gauss-Markov bias"""
+    turn_on_bias: float = 0.0
+    """u: standard deviation of the bias from episode to episode"""
+    scale_factor: float = 0.0
+    """1: standard deviation of the relative scale error"""
+    misalignment: float = 0.0
+    """rad (1): standard deviation of each cross-axis sensitivity"""
+    g_sensitivity: float = 0.0
+    """u/(m/s²): standard deviation of each entry of the matrix by which specific force adds to the reading"""
+    full_scale: float = math.inf
+    """u: readings saturate at ± this"""
+    resolution: float = 0.0
+    """u: readings are rounded to multiples of this; 0 for none"""
+    bandwidth: float = math.inf
+    """Hz: -3 dB of a second-order Butterworth low-pass; without effect from half the sampling rate upwards"""
+    dropout: float = 0.0
+    """1: probability that a sample is lost by itself"""
+    burst_rate: float = 0.0
+    """1/s: how often a burst of lost samples begins"""
+    burst_duration: float = 0.2
+    """s: mean duration of a burst (exponential)"""
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value = getattr(self, field.name)
+            unbounded = field.name in ("full_scale", "bandwidth")
+            positive = unbounded or field.name in ("bias_correlation_time", "burst_duration")
+            low_enough = value <= 1.0 if field.name == "dropout" else (unbounded or value < math.inf)
+            if not ((value > 0.0 if positive else value >= 0.0) and low_enough):
+                wanted = "in [0, 1]" if field.name == "dropout" else "positive" if positive else "not negative"
+                raise ValueError(f"{field.name} must be {wanted}{'' if unbounded else ' and finite'}, got {value}")
+
+    def scaled(self, noise_scale: float) -> Self:
+        """The same sensor with all its errors ``noise_scale`` times as large: 0 is ideal, 1 leaves it as it is.
+
+        The full scale stays: it belongs to the observation space.
+
+        Raises:
+            ValueError: ``noise_scale`` is negative or not finite.
+        """
+        if not 0.0 <= noise_scale < math.inf:
+            raise ValueError(f"noise_scale must lie in [0, inf), got {noise_scale}")
+        kept = ("full_scale", "bandwidth", "dropout", "bias_correlation_time", "burst_duration")
+        larger = {
+            field.name: noise_scale * getattr(self, field.name) for field in fields(self) if field.name not in kept
+        }
+        # a perfect sensor is infinitely fast
+        bandwidth = self.bandwidth / noise_scale if noise_scale > 0.0 else math.inf
+        return replace(self, bandwidth=bandwidth, dropout=min(1.0, noise_scale * self.dropout), **larger)
+
+    def describe(self) -> dict[str, float | None]:
+        """All fields for JSON; infinity becomes None."""
+        values = {field.name: getattr(self, field.name) for field in fields(self)}
+        return {name: None if value == math.inf else float(value) for name, value in values.items()}
 
 
 @dataclass
 class NoiseState:
-    """All memory of a :class:`NoiseProcess`; W is the width of the channel, N the samples drawn ahead."""
+    """All memory of a :class:`NoiseProcess`; W is the number of its errors a sample."""
 
     generator: np.random.Generator
     turn_on: np.ndarray
     """(W,) u"""
     wander: np.ndarray
-    """(W,) Gauss-Markov bias of the last row drawn, u"""
+    """(W,) Gauss-Markov bias of the last sample, u"""
     walk: np.ndarray
-    """(W,) random-walk bias of the last row drawn, u"""
+    """(W,) random-walk bias of the last sample, u"""
     matrix: np.ndarray
     """(W, W) scale factors and cross-axis sensitivities"""
     force_matrix: np.ndarray
     """(W, 3) g-sensitivity, u/(m/s²)"""
     bias: np.ndarray
-    """(W,) bias of the last sample taken, u"""
+    """(W,) bias of the last sample, u"""
     in_burst: bool
     noise_filter: np.ndarray
     """(2, W) low-pass on the noise"""
     signal_filter: np.ndarray | None
     """(2, W) low-pass on the signal; None before the first sample"""
-    errors: np.ndarray
-    """(N, W) white noise and bias, u"""
-    biases: np.ndarray
-    """(N, W) u"""
-    lost: np.ndarray
-    """(N,) bool"""
-    used: int
-    """rows already taken"""
-    carry: np.ndarray | None = None
-    """(W,) what counting left for the next sample, u; None where nothing is counted"""
+    carry: np.ndarray
+    """(W,) what counting left for the next sample, u"""
 
 
 class NoiseProcess:
@@ -61,28 +131,45 @@ class NoiseProcess:
 
     Args:
         model: how large they are.
-        width: values a sample, W.
+        size: values a sample.
         rate: samples a second.
         generator: what to draw from; the process owns it from now on.
+        form: the error model.
+        units: size of one unit of ``model`` on each axis of the error, in units of the channel; empty for ones.
 
     Raises:
-        ValueError: ``width`` or ``rate`` is not positive.
+        ValueError: ``size`` or ``rate`` is not positive.
     """
 
-    def __init__(self, model: NoiseModel, width: int, rate: float, generator: np.random.Generator) -> None:
-        if width < 1:
-            raise ValueError(f"width must be at least 1, got {width}")
+    def __init__(
+        self,
+        model: NoiseModel,
+        size: int,
+        rate: float,
+        generator: np.random.Generator,
+        form: Form = "additive",
+        units: tuple[float, ...] = (),
+    ) -> None:
+        if size < 1:
+            raise ValueError(f"size must be at least 1, got {size}")
         if not 0.0 < rate < math.inf:
             raise ValueError(f"rate must be positive and finite (Hz), got {rate}")
-        self.model, self.width, self.rate = model, width, rate
-        dt = 1.0 / rate
+        width = error_size(form, size)
+        self.form, self.width, self.rate, self._limit = form, width, rate, model.full_scale
+        self._units = np.array(units) if units else np.ones(width)
+        # wrapped and unit readings cannot leave their range; counting comes after everything else
+        self.model = model if form == "additive" else replace(model, full_scale=math.inf)
+        self._count = model.resolution if form == "counted" else 0.0
+        if self._count:
+            self.model = replace(self.model, resolution=0.0)
+        model, dt = self.model, 1.0 / rate
         self._white = model.white_noise * math.sqrt(rate)
         self._memory = math.exp(-dt / model.bias_correlation_time)
         self._wander = model.bias_instability * math.sqrt(1.0 - self._memory**2)
         self._walk = model.bias_random_walk * math.sqrt(dt)
-        self._lost_above = exceeded_with(model.dropout)
-        self._burst_above = exceeded_with(model.burst_rate * dt)
-        self._recovery_above = exceeded_with(dt / model.burst_duration)
+        self._lost_above = upper_quantile(model.dropout)
+        self._burst_above = upper_quantile(model.burst_rate * dt)
+        self._recovery_above = upper_quantile(dt / model.burst_duration)
         self._filtered = model.bandwidth < 0.5 * rate
         if self._filtered:
             # on demand: this import takes longer than all others together
@@ -97,7 +184,6 @@ class NoiseProcess:
         np.fill_diagonal(crosstalk, 0.0)
         turn_on *= model.turn_on_bias
         wander *= model.bias_instability
-        empty = np.zeros((0, width))
         self._state = NoiseState(
             generator=generator,
             turn_on=turn_on,
@@ -109,73 +195,55 @@ class NoiseProcess:
             in_burst=False,
             noise_filter=np.zeros((2, width)),
             signal_filter=None,
-            errors=empty,
-            biases=empty,
-            lost=np.zeros(0, dtype=bool),
-            used=0,
+            carry=np.zeros(width),
         )
         self._exact = model.scale_factor == 0.0 and model.misalignment == 0.0
 
     @property
     def bias(self) -> np.ndarray:
-        """True bias (turn-on, wander and walk) of the last sample ``(W,)``, u; before it, that of the start."""
-        return self._state.bias
+        """True bias (turn-on, wander and walk) of the last sample, in units of the channel; before it, of the start.
+
+        ``(size,)``; a rotation vector ``(3,)`` (rad) for rotations.
+        """
+        return self._state.bias * self._units
 
     def save(self) -> NoiseState:
         """A copy of all memory, the generator's included."""
         return copy.deepcopy(self._state)
 
     def restore(self, state: NoiseState) -> None:
-        """Go on from a saved state, exactly."""
+        """Continue from a saved state, exactly."""
         self._state = copy.deepcopy(state)
 
-    def step(self, value: np.ndarray, specific_force: np.ndarray | None = None) -> np.ndarray:
-        """Measure once.
-
-        Args:
-            value: ``(W,)`` what an ideal sensor reads.
-            specific_force: ``(3,)`` m/s² in sensor axes, for the g-sensitivity; not needed without one.
-
-        Returns:
-            The measurement ``(W,)``; NaN if the sample is lost.
-        """
-        state = self._state
-        if state.used == len(state.lost):
-            self._draw(BLOCK)
-        row = state.used
-        state.used += 1
-        state.bias = state.biases[row]
-        if state.lost[row] and not self._filtered:
-            return np.full(self.width, np.nan)
-        measured = self._chain(value, specific_force, state.errors[row])
-        return np.full(self.width, np.nan) if state.lost[row] else measured
-
     def sequence(self, values: np.ndarray, specific_force: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
-        """Measure T times: the same numbers as T steps.
+        """Measure the next T samples.
 
         Args:
-            values: ``(T, W)`` what an ideal sensor reads.
+            values: ``(T, size)`` what an ideal sensor reads.
             specific_force: ``(T, 3)`` m/s² in sensor axes, for the g-sensitivity; not needed without one.
 
         Returns:
-            The measurements ``(T, W)``, NaN where lost, and the true biases ``(T, W)``.
+            The measurements ``(T, size)``, NaN where lost, and the true biases of each sample (see :attr:`bias`).
         """
-        state, length = self._state, len(values)
-        if length == 0:
-            return np.zeros((0, self.width)), np.zeros((0, self.width))
-        ahead = len(state.lost) - state.used
-        if ahead < length:
-            self._draw(length - ahead)
-        rows = slice(state.used, state.used + length)
-        state.used += length
-        biases, lost = state.biases[rows], state.lost[rows]
-        state.bias = biases[-1]
-        measured = self._chain(values, specific_force, state.errors[rows])
+        if len(values) == 0:
+            return np.zeros(values.shape), np.zeros((0, self.width))
+        errors, biases, lost = self._draw(len(values))
+        biases = biases * self._units
+        if self.form == "rotation":
+            rotations = self._chain(np.zeros((len(values), 3)), specific_force, errors) * self._units
+            measured = rotation.positive(rotation.multiply(values, rotation.exp(rotations)))
+            measured[lost] = np.nan
+            return measured, biases
+        measured = self._chain(values / self._units, specific_force, errors) * self._units
         measured[lost] = np.nan
+        if self.form == "angle":
+            measured = rotation.wrap(measured)
+        elif self.form == "counted":
+            measured = np.clip(self._counted(measured) if self._count else measured, -self._limit, self._limit)
         return measured, biases
 
-    def _draw(self, count: int) -> None:
-        """Append ``count`` rows to what is drawn ahead and forget the rows already used."""
+    def _draw(self, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """White noise plus bias ``(count, W)`` of the next samples, their biases ``(count, W)``, and which are lost."""
         state, width = self._state, self.width
         normal = state.generator.standard_normal((count, 3 * width + 2))
         white = self._white * normal[:, :width]
@@ -187,14 +255,11 @@ class NoiseProcess:
         walk = np.cumsum(np.concatenate([state.walk[None], steps]), axis=0)[1:]
         state.walk = walk[-1]
         biases = state.turn_on + wander + walk
+        state.bias = biases[-1]
         lost = normal[:, -2] > self._lost_above
         if self.model.burst_rate > 0.0:
             lost |= self._bursts(normal[:, -1])
-        kept = slice(state.used, None)
-        state.errors = np.concatenate([state.errors[kept], white + biases])
-        state.biases = np.concatenate([state.biases[kept], biases])
-        state.lost = np.concatenate([state.lost[kept], lost])
-        state.used = 0
+        return white + biases, biases, lost
 
     def _recurrence(self, start: np.ndarray, pushes: np.ndarray) -> np.ndarray:
         """First-order recurrence b ← m b + push over the rows of ``pushes`` ``(N, W)``."""
@@ -217,7 +282,7 @@ class NoiseProcess:
         return np.array(lost)
 
     def _chain(self, values: np.ndarray, specific_force: np.ndarray | None, errors: np.ndarray) -> np.ndarray:
-        """The part that depends on the signal, over leading dimensions: ``(..., W)``."""
+        """The part of the chain that depends on the signal: ``(T, W)``."""
         model = self.model
         # sums instead of matrix products: their rounding does not depend on the number of rows
         if not self._exact:
@@ -237,14 +302,30 @@ class NoiseProcess:
 
     def _low_pass(self, values: np.ndarray) -> np.ndarray:
         """Second-order Butterworth; it starts settled on the first value."""
-        state, rows = self._state, np.atleast_2d(values)
+        state = self._state
         if state.signal_filter is None:
-            state.signal_filter = self._settled * rows[0]
-        filtered, state.signal_filter = self._lfilter(*self._coefficients, rows, axis=0, zi=state.signal_filter)
-        return filtered.reshape(values.shape)
+            state.signal_filter = self._settled * values[0]
+        filtered, state.signal_filter = self._lfilter(*self._coefficients, values, axis=0, zi=state.signal_filter)
+        return filtered
+
+    def _counted(self, rows: np.ndarray) -> np.ndarray:
+        """Whole counts; a lost sample takes its counts with it and leaves the carry as it is."""
+        carry, counted = self._state.carry, np.full_like(rows, np.nan)
+        for number, row in enumerate(rows):
+            if not np.isnan(row[0]):
+                whole = row + carry
+                counted[number] = np.rint(whole / self._count) * self._count
+                carry = whole - counted[number]
+        self._state.carry = carry
+        return counted
 
 
-def exceeded_with(probability: float) -> float:
+def error_size(form: Form, size: int) -> int:
+    """Values of the error of a reading with ``size`` values: three for a quaternion."""
+    return 3 if form == "rotation" else size
+
+
+def upper_quantile(probability: float) -> float:
     """What a standard normal number exceeds with ``probability``; ± infinity at and beyond 0 and 1."""
     if probability <= 0.0:
         return math.inf

@@ -4,7 +4,7 @@ White noise, in-run bias stability, ranges and bandwidths are data-sheet values,
 Three things are choices of this project, because data sheets do not tell them:
 
 * In-run bias stability is the floor of the Allan deviation. It becomes a Gauss-Markov bias whose Allan deviation peaks
-  there (deviation = stability / 0.617), with a correlation time of 200 s.
+  there (standard deviation = stability / 0.617), with a correlation time of 200 s.
 * A tolerance or repeatability that a data sheet gives as ± x is taken as one standard deviation.
 * Where no value is published, the field is 0.
 """
@@ -12,11 +12,13 @@ Three things are choices of this project, because data sheets do not tell them:
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from typing import Any, Self
 
 from .ideal import STANDARD_GRAVITY
-from .noise_model import NoiseModel
+from .kinds import KINDS
+from .noise import NoiseModel
 
 DEG = math.pi / 180.0
 G = STANDARD_GRAVITY
@@ -39,19 +41,26 @@ class SensorPreset:
     accelerometer: NoiseModel
     magnetometer: NoiseModel | None = None
     """None for a device without one"""
+    others: Mapping[str, NoiseModel] = field(default_factory=dict, hash=False)
+    """further sensors of the device: kind (:data:`poise.envs.sensors.kinds.KINDS`) → noise, in the kind's unit"""
 
-    def scaled(self, grade: float) -> Self:
-        """The same device with errors ``grade`` times as large (:meth:`NoiseModel.scaled`).
+    def noise_of(self, kind: str) -> NoiseModel | None:
+        """The noise of its sensor of a kind; None where it has none."""
+        own = {"gyroscope": self.gyroscope, "accelerometer": self.accelerometer, "magnetometer": self.magnetometer}
+        return own[kind] if kind in own else self.others.get(kind)
+
+    def scaled(self, noise_scale: float) -> Self:
+        """The same device with errors ``noise_scale`` times as large (:meth:`NoiseModel.scaled`).
 
         Raises:
-            ValueError: ``grade`` is negative or not finite.
+            ValueError: ``noise_scale`` is negative or not finite.
         """
-        magnetometer = None if self.magnetometer is None else self.magnetometer.scaled(grade)
         return replace(
             self,
-            gyroscope=self.gyroscope.scaled(grade),
-            accelerometer=self.accelerometer.scaled(grade),
-            magnetometer=magnetometer,
+            gyroscope=self.gyroscope.scaled(noise_scale),
+            accelerometer=self.accelerometer.scaled(noise_scale),
+            magnetometer=None if self.magnetometer is None else self.magnetometer.scaled(noise_scale),
+            others={kind: noise.scaled(noise_scale) for kind, noise in self.others.items()},
         )
 
 
@@ -64,9 +73,7 @@ PRESETS = (
     SensorPreset(
         "ideal",
         "no errors; generous ranges, because observations need bounds",
-        NoiseModel(full_scale=100.0),
-        NoiseModel(full_scale=1000.0),
-        NoiseModel(full_scale=1000.0),
+        *(NoiseModel(full_scale=KINDS[kind].full_scale) for kind in ("gyroscope", "accelerometer", "magnetometer")),
     ),
     SensorPreset(
         "paper-hand",

@@ -3,24 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
 from ...filters.core.quantity import Channel
-from .error_forms import FORMS, Form, FormedNoise, error_size
-from .ideal import SAMPLINGS, BodyState, Mounting, Sampling
-from .noise import NoiseProcess
-from .noise_model import NoiseModel
-
-Kind = Literal["gyroscope", "accelerometer", "magnetometer", "given"]
-"""What an ideal sensor reads; ``given``: the caller says (wheel encoder, force sensor …)."""
+from .ideal import SAMPLINGS, Mounting, Sampling
+from .kinds import SensorKind, sensor_kind
+from .noise import FORMS, Form, NoiseModel, NoiseProcess, error_size
 
 FIXED = Mounting()
 """A sensor in the body frame's origin, along its axes."""
-WIDTHS = {"gyroscope": 3, "accelerometer": 3, "magnetometer": 3}
+Placement = tuple[str, Mounting, Sampling, float]
+"""Body, mounting, sampling and rate (Hz): sensors that have them in common see the same motion."""
 
 
 @dataclass(frozen=True)
@@ -28,11 +24,12 @@ class Sensor:
     """One sensor: a channel, what it senses, where, how often and how badly.
 
     Raises:
-        ValueError: a field out of its range, or a channel of another width than the kind has.
+        ValueError: a field out of its range, or a channel of another size than the kind has.
     """
 
     channel: Channel
-    kind: Kind
+    kind: str | SensorKind
+    """a name of :data:`poise.envs.sensors.kinds.KINDS`, or a kind of one's own"""
     rate: float
     """Hz"""
     noise: NoiseModel
@@ -44,31 +41,35 @@ class Sensor:
     device: str = ""
     """preset or product, for the record"""
     form: Form = "additive"
-    """how errors meet the reading; other forms are for given readings"""
+    """the error model; vectors have additive errors"""
     units: tuple[float, ...] = ()
-    """size of one unit of ``noise`` on each axis of the error, for axes of different kinds; empty for ones"""
+    """size of one unit of ``noise`` on each axis of the error, for axes of different units; empty for ones"""
 
     def __post_init__(self) -> None:
-        if self.kind not in (*WIDTHS, "given"):
-            raise ValueError(f"kind must be one of {[*WIDTHS, 'given']}, got {self.kind!r}")
+        kind, name, size = self.sensing, self.channel.name, self.channel.size
         if self.sampling not in SAMPLINGS:
             raise ValueError(f"sampling must be one of {list(SAMPLINGS)}, got {self.sampling!r}")
         if not 0.0 < self.rate < math.inf:
-            raise ValueError(f"rate of {self.channel.name!r} must be positive and finite (Hz), got {self.rate}")
-        if self.channel.size != WIDTHS.get(self.kind, self.channel.size):
-            raise ValueError(f"a {self.kind} has 3 axes, but channel {self.channel.name!r} has {self.channel.size}")
-        if self.form not in FORMS or (self.form != "additive" and self.kind != "given"):
-            raise ValueError(f"form must be 'additive', or for a given reading one of {list(FORMS)}, got {self.form!r}")
-        if self.form == "rotation" and self.channel.size != 4:
-            raise ValueError(f"a rotation has 4 values, but channel {self.channel.name!r} has {self.channel.size}")
-        size = error_size(self.form, self.channel.size)
-        if self.units and not (len(self.units) == size and all(0.0 < unit < math.inf for unit in self.units)):
-            raise ValueError(f"units must be {size} positive and finite numbers or none, got {self.units}")
+            raise ValueError(f"rate of {name!r} must be positive and finite (Hz), got {self.rate}")
+        if kind.size is not None and size != kind.size:
+            raise ValueError(f"a sample of a {kind.name} has {kind.size} values, but channel {name!r} has {size}")
+        if self.form not in FORMS or (self.form != "additive" and kind.vector):
+            raise ValueError(f"form must be 'additive', or where no vector is read one of {FORMS}, got {self.form!r}")
+        if self.form == "rotation" and size != 4:
+            raise ValueError(f"a rotation has 4 values, but channel {name!r} has {size}")
+        width = error_size(self.form, size)
+        if self.units and not (len(self.units) == width and all(0.0 < unit < math.inf for unit in self.units)):
+            raise ValueError(f"units must be {width} positive and finite numbers or none, got {self.units}")
 
     @property
-    def placement(self) -> tuple[str, Mounting, Sampling, float] | None:
-        """What sensors have in common whose readings are computed together; None for a given reading."""
-        return None if self.kind == "given" else (self.body, self.mounting, self.sampling, float(self.rate))
+    def sensing(self) -> SensorKind:
+        """The kind itself, where ``kind`` is its name."""
+        return sensor_kind(self.kind)
+
+    @property
+    def placement(self) -> Placement | None:
+        """What sensors have in common whose motion is computed together; None if it does not sense its own motion."""
+        return (self.body, self.mounting, self.sampling, float(self.rate)) if self.sensing.on_body else None
 
     @property
     def limit(self) -> float | np.ndarray:
@@ -79,29 +80,16 @@ class Sensor:
 
     def errors(self, generator: np.random.Generator) -> NoiseProcess:
         """Errors of an episode, drawn from ``generator``."""
-        size = self.channel.size
-        if self.form == "additive" and not self.units:
-            return NoiseProcess(self.noise, size, self.rate, generator)
-        return FormedNoise(self.noise, size, self.rate, generator, self.form, self.units)
-
-    def due(self, tick: int | np.ndarray, tick_rate: float) -> Any:
-        """Whether it is sampled at ``tick`` (a number or ``(T,)``): whether its own clock struck since the tick before.
-
-        Args:
-            tick: counted from 0, when every sensor is due.
-            tick_rate: ticks a second, Hz, at least ``rate``.
-        """
-        ratio = self.rate / tick_rate
-        # the small number keeps exact ratios exact
-        return np.floor(tick * ratio + 1e-9) > np.floor((tick - 1) * ratio + 1e-9)
+        return NoiseProcess(self.noise, self.channel.size, self.rate, generator, self.form, self.units)
 
     @property
     def truth_name(self) -> str:
-        """Name of its bias in the truth: ``gyroscope_bias`` at the place ``imu``, else ``<place>/gyroscope_bias``."""
-        place, _, rest = self.channel.name.partition("/")
-        if self.kind == "given":
+        """Name of its bias in the truth: ``gyroscope_bias`` at the site ``imu``, else ``<site>/gyroscope_bias``."""
+        site, _, rest = self.channel.name.partition("/")
+        bias = self.sensing.bias_name
+        if not bias:
             return f"{self.channel.name}_bias"
-        return f"{self.kind}_bias" if place == "imu" and rest else f"{place}/{self.kind}_bias"
+        return bias if site == "imu" and rest else f"{site}/{bias}"
 
     def describe(self) -> dict[str, Any]:
         """Everything about it, for JSON."""
@@ -109,7 +97,7 @@ class Sensor:
             "channel": self.channel.name,
             "size": self.channel.size,
             "unit": self.channel.unit,
-            "kind": self.kind,
+            "kind": self.sensing.name,
             "device": self.device,
             "rate": float(self.rate),
             "body": self.body,
@@ -122,14 +110,17 @@ class Sensor:
         }
 
 
-def pick(bodies: BodyState | Mapping[str, BodyState], name: str) -> BodyState:
-    """The state of the body ``name``.
+def due(rate: float, steps: np.ndarray, step_rate: float) -> np.ndarray:
+    """At which of the time steps ``(T,)`` a sensor is sampled: where its own clock struck since the step before.
 
-    Raises:
-        ValueError: there is none.
+    Args:
+        rate: of the sensor, Hz.
+        steps: counted from 0, when every sensor is due.
+        step_rate: time steps a second, Hz, at least ``rate``.
+
+    Returns:
+        Indices into ``steps``.
     """
-    if isinstance(bodies, BodyState):
-        return bodies
-    if name not in bodies:
-        raise ValueError(f"bodies must hold {name!r}, got {sorted(bodies)}")
-    return bodies[name]
+    ratio = rate / step_rate
+    # the small number keeps exact ratios exact
+    return np.flatnonzero(np.floor(steps * ratio + 1e-9) > np.floor((steps - 1) * ratio + 1e-9))

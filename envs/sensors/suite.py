@@ -6,47 +6,63 @@ import copy
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from gymnasium import spaces
 
 from ...filters.core.quantity import Channel
-from .ideal import STANDARD_GRAVITY, BodyState, Mounting, Sampling, magnetic_field, vector
-from .motion_sensing import MotionSensing
+from .ideal import STANDARD_GRAVITY, BodyState, Mounting, Sampling, magnetic_field, mounted, vector
+from .kinds import SiteMotion, sensor_kind
 from .noise import NoiseProcess, NoiseState
-from .noise_model import NoiseModel
 from .observation import ObservationLayout
 from .presets import SensorPreset, sensor_preset
-from .sensor import Kind, Sensor, pick
+from .sensor import Placement, Sensor, due
+
+Bodies = BodyState | Mapping[str, BodyState]
+"""States of bodies by name, or of the only one."""
 
 
 @dataclass
 class SuiteState:
     """All memory of a :class:`SensorSuite`."""
 
-    tick: int
+    step: int
     noise: list[NoiseState]
-    motion: list[Any]
+    last: dict[Placement, BodyState]
     held: dict[str, np.ndarray]
+
+
+class Sensed(NamedTuple):
+    """What a suite says of T time steps.
+
+    Attributes:
+        measurements: channel → ``(T, size)``, NaN where not sampled or lost.
+        truth: name → ``(T, size)``: the true bias of the last sample at each time step, see :attr:`.Sensor.truth_name`.
+        motions: placement → its motion at its own samples.
+    """
+
+    measurements: dict[str, np.ndarray]
+    truth: dict[str, np.ndarray]
+    motions: dict[Placement, SiteMotion]
 
 
 class SensorSuite:
     """Sensors that are sampled together.
 
-    The sample of a tick describes the interval that ends there. A sensor slower than the ticks is sampled at the first
-    tick at or after each multiple of its own interval, beginning with tick 0; its interval reaches back to its own last
-    sample. At tick 0 there is no interval yet, so gyroscopes and accelerometers with ``sampling="interval"`` start at
-    their second due tick, unless :meth:`sample` is told the state ``before``.
+    The sample of a time step describes the interval that ends there. A sensor slower than the suite is sampled at the
+    first time step at or after each multiple of its own interval, beginning with step 0; its interval reaches back to
+    its own last sample. At step 0 there is no interval yet, so gyroscopes and accelerometers with
+    ``sampling="interval"`` start at their second sample, unless :meth:`simulate` is given the states ``before``.
 
     Args:
         sensors: in the order of ``fresh``.
-        rate: ticks a second, Hz: how often :meth:`sample` is called.
+        rate: time steps a second, Hz.
         gravity: m/s².
-        field: magnetic field in the world (east, north, up), ``(3,)``, µT; None for that of :func:`magnetic_field`.
+        field: magnetic field in the world (east, north, up), ``(3,)``, µT; None for that of :func:`.magnetic_field`.
 
     Raises:
-        ValueError: no sensors, equal names, an infinite full scale, or a sensor faster than the ticks.
+        ValueError: no sensors, equal names, an infinite full scale, or a sensor faster than the suite.
     """
 
     def __init__(
@@ -70,17 +86,9 @@ class SensorSuite:
         self.channels = tuple(sensor.channel for sensor in sensors)
         limits = {sensor.channel.name: sensor.limit for sensor in sensors}
         self._layout = ObservationLayout(self.channels, limits)
-        keys = [sensor.placement for sensor in sensors]
-        places = {
-            key: MotionSensing(*key, self.gravity, self.field, {s.kind for s in sensors if s.placement == key})
-            for key in keys
-            if key is not None
-        }
-        self._motion = list(places.values())
-        self._places = [None if key is None else places[key] for key in keys]
-        self._missing = {channel.name: np.full(channel.size, np.nan) for channel in self.channels}
         self._noise: list[NoiseProcess] = []
-        self._tick = 0
+        self._last: dict[Placement, BodyState] = {}
+        self._step = 0
 
     @property
     def observation_space(self) -> spaces.Dict:
@@ -95,106 +103,94 @@ class SensorSuite:
         """
         children = rng.spawn(len(self.sensors))
         self._noise = [sensor.errors(child) for sensor, child in zip(self.sensors, children, strict=True)]
-        for place in self._motion:
-            place.reset()
+        self._last.clear()
         self._layout.reset()
-        self._tick = 0
+        self._step = 0
 
-    def sample(
+    def simulate(
         self,
-        bodies: BodyState | Mapping[str, BodyState],
-        readings: Mapping[str, np.ndarray] | None = None,
-        before: BodyState | Mapping[str, BodyState] | None = None,
-    ) -> dict[str, np.ndarray]:
-        """Measure at the next tick.
+        bodies: Bodies,
+        surroundings: Any = None,
+        before: Bodies | None = None,
+        reference: Placement | None = None,
+    ) -> Sensed:
+        """Measure at the next T time steps.
 
         Args:
-            bodies: state of each body now, by name, or of the only one.
-            readings: channel name → ``(size,)`` ideal reading of each sensor of kind ``given`` (due or not).
-            before: ``interval``: states at the beginning of the interval, used where a sensor has no earlier sample;
-                ``instant``: states one physics step before, needed where accelerations are unknown.
-
-        Returns:
-            Channel name → ``(size,)``, NaN where not sampled or lost.
+            bodies: states ``(T, …)`` of each body, by name, or of the only one.
+            surroundings: what kinds of sensors that do not sense a motion need, see
+                :attr:`poise.envs.sensors.kinds.SensorKind.reading`; for the kind ``given`` a mapping of channel names
+                to ideal readings ``(T, size)``.
+            before: states ``(T, …)`` at the beginning of each interval. ``interval``: used at the first sample of an
+                episode only; ``instant``: states one physics step before, needed where accelerations are unknown.
+            reference: a placement whose motion is wanted, whether or not it bears a sensor.
 
         Raises:
             ValueError: a body or reading is missing, or time does not advance.
             RuntimeError: :meth:`reset` was not called.
         """
         self._check_ready()
-        tick, self._tick = self._tick, self._tick + 1
-        ideal: dict[int, dict[str, np.ndarray]] = {}
-        measurement = {}
-        for sensor, place, noise in zip(self.sensors, self._places, self._noise, strict=True):
-            name = sensor.channel.name
-            measurement[name] = self._missing[name].copy()
-            if sensor.rate < self.rate and not sensor.due(tick, self.rate):
-                continue
-            force = None
-            if place is None:
-                value = self._reading(name, readings, (sensor.channel.size,))
-            else:
-                if id(place) not in ideal:
-                    earlier = None if before is None else pick(before, sensor.body)
-                    ideal[id(place)] = place.step(pick(bodies, sensor.body), earlier)
-                if sensor.kind not in ideal[id(place)]:
-                    continue
-                value, force = ideal[id(place)][sensor.kind], ideal[id(place)].get("accelerometer")
-            measurement[name] = noise.step(value, force)
-        return measurement
-
-    def simulate(
-        self,
-        bodies: BodyState | Mapping[str, BodyState],
-        readings: Mapping[str, np.ndarray] | None = None,
-        before: BodyState | Mapping[str, BodyState] | None = None,
-    ) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
-        """Measure at the next T ticks at once: the same numbers as T calls of :meth:`sample`.
-
-        Args:
-            bodies: states ``(T, …)`` of each body, by name, or of the only one.
-            readings: channel name → ``(T, size)`` ideal readings of the sensors of kind ``given``.
-            before: as for :meth:`sample`; with a time axis ``(T, …)``.
-
-        Returns:
-            Measurements: channel name → ``(T, size)``, NaN where not sampled or lost. Truth: name → ``(T, size)``, the
-            bias of the last sample at each tick (see :meth:`truth`).
-
-        Raises:
-            ValueError, RuntimeError: as :meth:`sample`.
-        """
-        self._check_ready()
         first = bodies if isinstance(bodies, BodyState) else next(iter(bodies.values()), None)
-        some = next(iter((readings or {}).values())) if first is None else first.time
-        ticks = self._tick + np.arange(len(np.atleast_1d(some)))
-        self._tick += len(ticks)
-        ideal: dict[int, tuple[np.ndarray, dict[str, tuple[int, np.ndarray]]]] = {}
+        some = next(iter((surroundings or {}).values())) if first is None else first.time
+        length = len(np.atleast_1d(some))
+        steps = self._step + np.arange(length)
+        self._step += length
+        motions: dict[Placement, SiteMotion] = {}
+
+        def motion_of(placement: Placement, rows: np.ndarray) -> SiteMotion:
+            if placement not in motions:
+                earlier = None if before is None else pick(before, placement[0]).at(rows)
+                state = pick(bodies, placement[0]).at(rows)
+                motions[placement] = self._motion(placement, state, earlier, surroundings)
+            return motions[placement]
+
+        if reference is not None:
+            motion_of(reference, np.arange(length))
         measurements, truth = {}, {}
-        for sensor, place, noise in zip(self.sensors, self._places, self._noise, strict=True):
-            name, size = sensor.channel.name, sensor.channel.size
-            rows, force = np.flatnonzero(sensor.due(ticks, self.rate)), None
-            if place is None:
-                values = self._reading(name, readings, (len(ticks), size))[rows]
+        for sensor, noise in zip(self.sensors, self._noise, strict=True):
+            name, size, kind, placement = sensor.channel.name, sensor.channel.size, sensor.sensing, sensor.placement
+            rows, force = due(sensor.rate, steps, self.rate), None
+            if placement is None:
+                values = self._handed(name, surroundings) if kind.reading is None else kind.reading(surroundings)
+                values = checked(name, values, (length, size))[rows]
+            elif len(rows):
+                motion = motion_of(placement, rows)
+                values = checked(name, kind.reading(motion), (None, size))  # type: ignore[misc]
+                if sensor.noise.g_sensitivity:
+                    force = motion.specific_force[-len(values) :]
+                    values = values[-len(force) :]
+                rows = rows[len(rows) - len(values) :]
             else:
-                if id(place) not in ideal:
-                    earlier = None if before is None else pick(before, sensor.body).at(rows)
-                    ideal[id(place)] = (rows, place.sequence(pick(bodies, sensor.body).at(rows), earlier))
-                skipped, values = ideal[id(place)][1][sensor.kind]
-                rows = rows[skipped:]
-                force_skipped, force = ideal[id(place)][1].get("accelerometer", (0, None))
-                force = None if force is None else force[max(0, skipped - force_skipped) :]
+                values = np.zeros((0, size))
             start = noise.bias
             measured, biases = noise.sequence(values, force)
-            measurements[name] = np.full((len(ticks), size), np.nan)
+            measurements[name] = np.full((length, size), np.nan)
             measurements[name][rows] = measured
-            latest = np.searchsorted(rows, np.arange(len(ticks)), side="right")
+            latest = np.searchsorted(rows, np.arange(length), side="right")
             truth[sensor.truth_name] = np.concatenate([start[None], biases])[latest]
-        return measurements, truth
+        return Sensed(measurements, truth, motions)
 
-    def truth(self) -> dict[str, np.ndarray]:
-        """True biases of the last samples: name → ``(size,)``, see :attr:`Sensor.truth_name`."""
-        self._check_ready()
-        return {sensor.truth_name: noise.bias.copy() for sensor, noise in zip(self.sensors, self._noise, strict=True)}
+    def _motion(
+        self, placement: Placement, states: BodyState, earlier: BodyState | None, surroundings: Any
+    ) -> SiteMotion:
+        """Motion of a placement at its next samples; the last of them is kept for the interval that follows."""
+        body, mounting, sampling, _ = placement
+        now = mounted(states, mounting)
+        if sampling == "instant":
+            earlier = None if earlier is None else mounted(earlier, mounting)
+            return SiteMotion(now, now, earlier, sampling, self.gravity, self.field, surroundings)
+        last = self._last.get(placement)
+        if last is None and earlier is not None:
+            last = mounted(earlier.at(slice(0, 1)), mounting)
+        path = BodyState(*now[:5])
+        if last is not None:
+            path = BodyState(*(np.concatenate([a, b]) for a, b in zip(last[:5], now[:5], strict=True)))
+        stopped = np.flatnonzero(~(np.diff(path.time) > 0.0))
+        if len(stopped):
+            before, after = np.asarray(path.time)[stopped[0] : stopped[0] + 2]
+            raise ValueError(f"time of body {body!r} must advance: {after:g} s does not lie after {before:g} s")
+        self._last[placement] = path.at(slice(-1, None))
+        return SiteMotion(now, path, None, sampling, self.gravity, self.field, surroundings)
 
     def to_observation(self, measurement: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Observation of a measurement; see :meth:`ObservationLayout.observe`."""
@@ -208,23 +204,18 @@ class SensorSuite:
         """A copy of all memory."""
         self._check_ready()
         return SuiteState(
-            self._tick,
-            [noise.save() for noise in self._noise],
-            [copy.deepcopy(place.memory) for place in self._motion],
-            copy.deepcopy(self._layout.held),
+            self._step, [noise.save() for noise in self._noise], dict(self._last), copy.deepcopy(self._layout.held)
         )
 
     def restore(self, state: SuiteState) -> None:
-        """Go on from a saved state, exactly (in this suite or in another one of the same sensors)."""
+        """Continue from a saved state, exactly (in this suite or in another one of the same sensors)."""
         if len(state.noise) != len(self.sensors):
             raise ValueError(f"state must be of {len(self.sensors)} sensors, got {len(state.noise)}")
         if not self._noise:
             self.reset(np.random.default_rng(0))
-        self._tick = state.tick
+        self._step, self._last = state.step, dict(state.last)
         for noise, saved in zip(self._noise, state.noise, strict=True):
             noise.restore(saved)
-        for place, memory in zip(self._motion, state.motion, strict=True):
-            place.memory = copy.deepcopy(memory)
         self._layout.held = copy.deepcopy(state.held)
 
     def describe(self) -> dict[str, Any]:
@@ -240,13 +231,36 @@ class SensorSuite:
         if not self._noise:
             raise RuntimeError("call reset(rng) first: the errors of an episode are drawn there")
 
-    def _reading(self, name: str, readings: Mapping[str, np.ndarray] | None, shape: tuple[int, ...]) -> np.ndarray:
-        if readings is None or name not in readings:
-            raise ValueError(f"readings must hold {name!r}, got {sorted(readings or {})}")
-        value = np.asarray(readings[name], dtype=float)
-        if value.shape != shape:
-            raise ValueError(f"readings[{name!r}] must have shape {shape}, got {value.shape}")
-        return value
+    def _handed(self, name: str, surroundings: Any) -> np.ndarray:
+        if not isinstance(surroundings, Mapping) or name not in surroundings:
+            found = sorted(surroundings) if isinstance(surroundings, Mapping) else surroundings
+            raise ValueError(f"surroundings must hold the reading {name!r}, got {found}")
+        return surroundings[name]
+
+
+def checked(name: str, values: Any, shape: tuple[int | None, int]) -> np.ndarray:
+    """Readings ``(T, size)`` as floats; any T where the first entry of ``shape`` is None.
+
+    Raises:
+        ValueError: another shape.
+    """
+    array = np.asarray(values, dtype=float)
+    if array.ndim != 2 or array.shape[1] != shape[1] or shape[0] not in (None, len(array)):
+        raise ValueError(f"readings of {name!r} must have shape {shape}, got {array.shape}")
+    return array
+
+
+def pick(bodies: Bodies, name: str) -> BodyState:
+    """The state of the body ``name``.
+
+    Raises:
+        ValueError: there is none.
+    """
+    if isinstance(bodies, BodyState):
+        return bodies
+    if name not in bodies:
+        raise ValueError(f"bodies must hold {name!r}, got {sorted(bodies)}")
+    return bodies[name]
 
 
 def imu_suite(
@@ -257,9 +271,9 @@ def imu_suite(
     magnetometer: bool | float = False,
     *,
     sampling: Sampling = "interval",
-    grade: float = 1.0,
-    tick_rate: float | None = None,
-    place: str = "imu",
+    noise_scale: float = 1.0,
+    step_rate: float | None = None,
+    site: str = "imu",
     body: str = "body",
     gravity: float = STANDARD_GRAVITY,
     field: Sequence[float] | np.ndarray | None = None,
@@ -267,15 +281,15 @@ def imu_suite(
     """One inertial measurement unit: channels ``imu/gyr`` (rad/s), ``imu/acc`` (m/s²) and, if wanted, ``imu/mag`` (µT).
 
     Args:
-        preset: name of a device (:func:`list_sensor_presets`) or a preset.
+        preset: name of a device (:func:`list_sensor_presets`) or a preset; its ``others`` get channels of their own.
         rate: samples a second, Hz.
         lever_arm: ``(3,)`` m, from the body frame's origin to the sensor, body axes.
         mounting: ``(4,)`` unit quaternion w, x, y, z, sensor axes to body axes.
         magnetometer: False for none, True for one at ``rate``, or its own rate in Hz.
         sampling: ``interval`` or ``instant``.
-        grade: all errors times this; 0 for an ideal sensor with the preset's full scale.
-        tick_rate: how often the suite is sampled, Hz; None for ``rate``.
-        place: first part of the channel names.
+        noise_scale: factor on all errors; 0 for an ideal sensor with the preset's full scale.
+        step_rate: time steps of the suite a second, Hz; None for ``rate``.
+        site: first part of the channel names.
         body: name of the body.
         gravity: m/s².
         field: magnetic field ``(3,)`` in the world (east, north, up), µT; None for a default.
@@ -285,18 +299,16 @@ def imu_suite(
     """
     device = sensor_preset(preset) if isinstance(preset, str) else preset
     where = Mounting(tuple(lever_arm), tuple(mounting))
-
-    def sensor(suffix: str, kind: Kind, unit: str, noise: NoiseModel, its_rate: float) -> Sensor:
-        channel = Channel(f"{place}/{suffix}", 3, unit)
-        return Sensor(channel, kind, its_rate, noise.scaled(grade), body, where, sampling, device.name)
-
-    sensors = [
-        sensor("gyr", "gyroscope", "rad/s", device.gyroscope, rate),
-        sensor("acc", "accelerometer", "m/s²", device.accelerometer, rate),
-    ]
+    rates = {"gyroscope": rate, "accelerometer": rate}
     if magnetometer is not False:
         if device.magnetometer is None:
             raise ValueError(f"magnetometer must be False: the preset {device.name!r} has none")
-        its_rate = rate if magnetometer is True else float(magnetometer)
-        sensors.append(sensor("mag", "magnetometer", "µT", device.magnetometer, its_rate))
-    return SensorSuite(sensors, rate if tick_rate is None else tick_rate, gravity=gravity, field=field)
+        rates["magnetometer"] = rate if magnetometer is True else float(magnetometer)
+    rates |= dict.fromkeys(device.others, rate)
+    sensors = []
+    for name, its_rate in rates.items():
+        kind, noise = sensor_kind(name), device.noise_of(name)
+        assert noise is not None
+        channel = Channel(f"{site}/{kind.suffix}", kind.size or 1, kind.unit)
+        sensors.append(Sensor(channel, name, its_rate, noise.scaled(noise_scale), body, where, sampling, device.name))
+    return SensorSuite(sensors, rate if step_rate is None else step_rate, gravity=gravity, field=field)

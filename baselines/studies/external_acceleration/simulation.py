@@ -84,7 +84,7 @@ def simulate(
         bodies = gesture.sample(np.minimum(times, gesture.duration))
         suite = imu_suite("paper-hand", RATE, sampling="instant")
         suite.reset(noise)
-        measurements, _ = suite.simulate(bodies)
+        measurements = suite.simulate(bodies).measurements
         turn = mounting.normal(0.0, MISALIGNMENT, 3) if misalignment is None else np.array([*misalignment, 0.0])
         misaligned = rotation.exp(turn)
         up = rotation.rotate(misaligned, rotation.up_in_body(bodies.orientation))

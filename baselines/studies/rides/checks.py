@@ -21,7 +21,7 @@ from ....envs.bicycle.rider.anthropometry import SUBJECTS
 from ....envs.bicycle.rider.loop_closure import loop_gaps
 from ....envs.bicycle.rider.posture import sit
 from ....envs.bicycle.rider.style import STYLES, RiderMotion
-from ....envs.bicycle.sensors.suites import BICYCLE_IMU_PLACE, BICYCLE_IMU_TILT, pitched
+from ....envs.bicycle.sensors.sites import BICYCLE_IMU_SITE, BICYCLE_IMU_TILT, pitched
 from ....envs.data.trajectory import Trajectory
 from ....envs.physics.world import Physics
 from ....envs.record import record
@@ -164,7 +164,7 @@ def ridden(seed: int, **options: Any) -> Trajectory:
 
 def strapdown_errors(ride: Trajectory) -> tuple[float, float]:
     """Error of position (m) and attitude (rad) after integrating the bicycle's ideal IMU over a ride."""
-    mounting, lever, dt = np.array(pitched(BICYCLE_IMU_TILT)), np.array(BICYCLE_IMU_PLACE), ride.dt
+    mounting, lever, dt = np.array(pitched(BICYCLE_IMU_TILT)), np.array(BICYCLE_IMU_SITE), ride.dt
     frame, omega = ride.truth["bicycle/orientation"], ride.truth["bicycle/angular_rate"]
     places = ride.truth["bicycle/position"] + rotation.rotate(frame, lever)
     swing = rotation.rotate(frame, rotation.cross(omega, lever))

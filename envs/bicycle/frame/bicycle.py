@@ -15,9 +15,10 @@ import numpy as np
 
 from ....filters.core import rotation
 from ...physics.multibody import CentreMotion, Multibody, newton_euler
+from ...physics.straight_line import straight_line
 from ...physics.urdf import Tree
 from ...physics.world import BASE, Physics
-from ...sensors.ideal import BodyState, straight_line
+from ...sensors.ideal import BodyState
 from ..course.terrain import FlatGround, Ground
 from .drivetrain import Drivetrain
 from .parameters import BicycleParameters, RigidPart

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ....filters.core import rotation
-from ...sensors.ideal import straight_line
+from ...physics.straight_line import straight_line
 
 
 class Limb(NamedTuple):

@@ -17,9 +17,10 @@ import numpy as np
 
 from ....filters.core import rotation
 from ...physics.joints import connect_points, constraint_force
+from ...physics.straight_line import straight_line
 from ...physics.urdf import Tree
 from ...physics.world import BASE
-from ...sensors.ideal import STANDARD_GRAVITY, straight_line
+from ...sensors.ideal import STANDARD_GRAVITY
 from ..frame.bicycle import Bicycle, BicycleState
 from .limb_tables import SHOULDERS_FOLLOW, LimbTables
 from .limbs import tip_torques

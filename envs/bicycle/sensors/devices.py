@@ -13,9 +13,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from ...sensors.error_forms import Form
 from ...sensors.ideal import STANDARD_GRAVITY
-from ...sensors.noise_model import NoiseModel
+from ...sensors.noise import Form, NoiseModel
 
 DEG, G = math.pi / 180.0, STANDARD_GRAVITY
 LINES = 256

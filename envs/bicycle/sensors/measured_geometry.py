@@ -10,20 +10,20 @@ import numpy as np
 from ....filters.bicycle.geometry import Point, RiderGeometry
 from ..ride.contact_forces import CELLS_BEHIND, CELLS_LONG, CELLS_WIDE
 from ..rider.posture import ANKLE_ANGLE, ANKLE_TO_PEDAL, Posture
-from .suites import BICYCLE_IMU_PLACE, BICYCLE_IMU_TILT, POST_LENGTH, POST_TILT, SensorPlaces, sensor_places
+from .sites import BICYCLE_IMU_SITE, BICYCLE_IMU_TILT, POST_LENGTH, POST_TILT, SensorSites, sensor_sites
 
 BODY_LENGTHS = ("upper_arm", "forearm", "thigh", "shank", "ankle_to_pedal")
 BODY_PLACES = ("trunk_pivot", "shoulder", "hip", "trunk_imu")
 
 
-def rider_geometry(posture: Posture, places: SensorPlaces | None = None) -> RiderGeometry:
+def rider_geometry(posture: Posture, sites: SensorSites | None = None) -> RiderGeometry:
     """The geometry of a person fitted to a bicycle.
 
     Args:
         posture: the person on the bicycle.
-        places: of the sensors (for the rolling radius of the wheel); None for those of the papers.
+        sites: of the sensors (for the rolling radius of the wheel); None for those of the papers.
     """
-    places = sensor_places(posture) if places is None else places
+    sites = sensor_sites(posture) if sites is None else sites
     bicycle, body, trunk = posture.bicycle, posture.body, posture.trunk()
     drive = bicycle.drive
     assert drive is not None
@@ -50,10 +50,10 @@ def rider_geometry(posture: Posture, places: SensorPlaces | None = None) -> Ride
         trunk_centre=_point(trunk.centre),
         trunk_moments=_point(np.diag(trunk.tensor)),
         rider_mass=body.mass,
-        bicycle_imu=BICYCLE_IMU_PLACE,
+        bicycle_imu=BICYCLE_IMU_SITE,
         bicycle_imu_tilt=BICYCLE_IMU_TILT,
         trunk_imu=posture.trunk_imu,
-        wheel_radius=places.wheel_radius,
+        wheel_radius=sites.wheel_radius,
         post_length=POST_LENGTH,
         post_tilt=POST_TILT,
         cells_long=CELLS_LONG,

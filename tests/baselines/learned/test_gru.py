@@ -62,7 +62,7 @@ def fast(rate: float, seed: int = 3, duration: float = 40.0) -> Trajectory:
     states = gesture.sample(np.arange(int(duration * rate) + 1) / rate)
     suite = imu_suite("paper-hand", rate)
     suite.reset(np.random.default_rng(seed + 1))
-    measurements, _ = suite.simulate(states)
+    measurements = suite.simulate(states).measurements
     return Trajectory(np.asarray(states.time), measurements, {"orientation": states.orientation})
 
 

@@ -370,5 +370,5 @@ def test_what_cannot_be_recorded_is_refused():
             del info["truth"]["heading"]
             return *rest, info
 
-    with pytest.raises(ValueError, match=r"info\['truth'\] changed from \['heading'\] to \[\] at tick 1"):
+    with pytest.raises(ValueError, match=r"info\['truth'\] changed from \['heading'\] to \[\] at step 1"):
         record(Forgetful())

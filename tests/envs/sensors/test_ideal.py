@@ -12,7 +12,6 @@ from poise.envs.sensors.ideal import (
     magnetic_field,
     magnetometer_reading,
     mounted,
-    straight_line,
 )
 from poise.filters.core import rotation
 
@@ -160,16 +159,6 @@ def test_the_sign_of_a_quaternion_does_not_matter():
     flipped = after._replace(orientation=-after.orientation)
     for one, other in zip(interval_readings(before, after), interval_readings(before, flipped), strict=True):
         np.testing.assert_allclose(one, other, atol=1e-9)
-
-
-def test_straight_lines_compute_what_arrays_compute():
-    rng = np.random.default_rng(3)
-    function = straight_line(lambda q, v: (rotation.rotate(q, v), rotation.log(q)), q=4, v=3)
-    for _ in range(20):
-        q, v = rotation.random(rng), rng.normal(size=3)
-        turned, logarithm = function(q.tolist(), v.tolist())
-        np.testing.assert_allclose(turned, scipy_rotation(q).apply(v), atol=1e-14)
-        np.testing.assert_allclose(logarithm, scipy_rotation(q).as_rotvec(), atol=1e-13)
 
 
 def test_bad_input_is_named():

@@ -7,8 +7,7 @@ import allantools
 import numpy as np
 import pytest
 
-from poise.envs.sensors.noise import NoiseProcess
-from poise.envs.sensors.noise_model import NoiseModel
+from poise.envs.sensors.noise import NoiseModel, NoiseProcess
 from poise.envs.sensors.presets import PEAK, list_sensor_presets, sensor_preset
 
 EVERYTHING = NoiseModel(
@@ -74,9 +73,9 @@ def test_constant_errors_have_their_deviations():
     biases, diagonals, others = [], [], []
     for seed in range(400):
         one = process(model, seed=seed)
-        bias = one.step(np.zeros(3))
+        measured, _ = one.sequence(np.concatenate([np.zeros((1, 3)), np.eye(3)]))
+        bias, response = measured[0], measured[1:] - measured[0]
         np.testing.assert_allclose(bias, one.bias)
-        response = np.array([one.step(axis) - bias for axis in np.eye(3)])
         biases.append(bias)
         diagonals.append(np.diag(response) - 1.0)
         others.append(response[~np.eye(3, dtype=bool)])
@@ -86,10 +85,11 @@ def test_constant_errors_have_their_deviations():
 
 def test_specific_force_leaks_into_a_g_sensitive_gyroscope():
     model = NoiseModel(g_sensitivity=0.01)
-    leaks = [process(model, seed=seed).step(np.zeros(3), np.array([0.0, 0.0, 9.8])) for seed in range(300)]
+    force = np.array([[0.0, 0.0, 9.8]])
+    leaks = [process(model, seed=seed).sequence(np.zeros((1, 3)), force)[0] for seed in range(300)]
     assert np.std(leaks) == pytest.approx(0.098, rel=0.1)
     with pytest.raises(ValueError, match="specific_force is needed"):
-        process(model).step(np.zeros(3))
+        process(model).sequence(np.zeros((1, 3)))
 
 
 def test_readings_saturate_and_come_in_steps():
@@ -130,16 +130,13 @@ def test_samples_are_lost_alone_and_in_bursts():
 
 
 @pytest.mark.parametrize("bandwidth", [math.inf, 20.0])
-def test_steps_and_sequences_give_the_same_numbers(bandwidth):
+def test_a_motion_in_parts_gives_the_numbers_of_the_whole(bandwidth):
     model = replace(EVERYTHING, bandwidth=bandwidth)
     values, forces = np.random.default_rng(1).standard_normal((2, 700, 3))
-    one, other = process(model), process(model)
-    steps, biases = [], []
-    for value, force in zip(values, forces, strict=True):
-        steps.append(one.step(value, force))
-        biases.append(one.bias)
-    parts = [other.sequence(values[a:b], forces[a:b]) for a, b in ((0, 0), (0, 10), (10, 600), (600, 700))]
-    np.testing.assert_allclose(np.concatenate([part[0] for part in parts]), steps, rtol=0.0, atol=1e-15)
+    whole, biases = process(model).sequence(values, forces)
+    other = process(model)
+    parts = [other.sequence(values[a:b], forces[a:b]) for a, b in ((0, 0), (0, 1), (1, 10), (10, 600), (600, 700))]
+    np.testing.assert_allclose(np.concatenate([part[0] for part in parts]), whole, rtol=0.0, atol=1e-15)
     np.testing.assert_allclose(np.concatenate([part[1] for part in parts]), biases, rtol=0.0, atol=1e-15)
 
 
@@ -149,8 +146,7 @@ def test_seeds_decide_and_saved_states_go_on_exactly():
     first = one.sequence(values, values)[0]
     np.testing.assert_array_equal(first, same.sequence(values, values)[0])
     assert not np.array_equal(first, other.sequence(values, values)[0], equal_nan=True)
-    for _ in range(10):
-        one.step(values[0], values[0])
+    one.sequence(values[:10], values[:10])
     state = one.save()
     ahead = one.sequence(values, values)[0]
     other.restore(state)
@@ -159,7 +155,7 @@ def test_seeds_decide_and_saved_states_go_on_exactly():
     np.testing.assert_array_equal(ahead, one.sequence(values, values)[0])
 
 
-def test_grades_scale_one_realisation():
+def test_noise_scales_share_one_realisation():
     model = NoiseModel(white_noise=0.01, bias_instability=0.1, bias_random_walk=0.01, turn_on_bias=0.3)
     zeros = np.zeros((50, 3))
     full = process(model.scaled(1.0)).sequence(zeros)[0]
@@ -179,11 +175,11 @@ def test_bad_numbers_are_named():
         NoiseModel(turn_on_bias=math.nan)
     with pytest.raises(ValueError, match="full_scale must be positive, got 0"):
         NoiseModel(full_scale=0.0)
-    with pytest.raises(ValueError, match=r"grade must lie in \[0, inf\), got -1"):
+    with pytest.raises(ValueError, match=r"noise_scale must lie in \[0, inf\), got -1"):
         NoiseModel().scaled(-1.0)
     with pytest.raises(ValueError, match="rate must be positive"):
         process(NoiseModel(), rate=0.0)
-    with pytest.raises(ValueError, match="width must be at least 1"):
+    with pytest.raises(ValueError, match="size must be at least 1"):
         process(NoiseModel(), width=0)
 
 

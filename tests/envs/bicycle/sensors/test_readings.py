@@ -11,17 +11,14 @@ import pytest
 from poise.envs.bicycle.frame.parameters import MOUNTAIN_BIKE
 from poise.envs.bicycle.rider.anthropometry import SUBJECTS
 from poise.envs.bicycle.rider.posture import sit
-from poise.envs.bicycle.sensors.readings import RideQuantities, centre_of_pressure, given_readings
-from poise.envs.bicycle.sensors.suites import SPREAD_VIEWPOINTS, rider_bicycle_suite, sensor_places
+from poise.envs.bicycle.sensors.readings import RideQuantities, centre_of_pressure
+from poise.envs.bicycle.sensors.sites import SPREAD_VIEWPOINTS, sensor_sites
+from poise.envs.bicycle.sensors.suites import CHANNELS
 from poise.envs.sensors.ideal import BodyState
-from poise.envs.sensors.noise_model import NoiseModel
-from poise.envs.sensors.sensor import Sensor
-from poise.envs.sensors.suite import SensorSuite
 from poise.filters.core import rotation
-from poise.filters.core.quantity import Channel
 
 POSTURE = sit(MOUNTAIN_BIKE, SUBJECTS[3])
-PLACES = sensor_places(POSTURE)
+SITES = sensor_sites(POSTURE)
 WEIGHT = 600.0
 
 
@@ -29,9 +26,10 @@ def body(orientation=(1.0, 0.0, 0.0, 0.0), position=(0.0, 0.0, 0.0)):
     return BodyState(0.0, np.array(position), np.array(orientation), np.zeros(3), np.zeros(3))
 
 
-def read(names, places=PLACES, **quantities):
+def read(names, sites=SITES, **quantities):
     quantities.setdefault("bodies", {"bicycle": body(), "trunk": body()})
-    return given_readings(rider_bicycle_suite(names, places=places), RideQuantities(**quantities), places)
+    ride = RideQuantities(sites=sites, **quantities)
+    return {name: CHANNELS[name].kind.reading(ride) for name in names}
 
 
 @pytest.mark.parametrize("place", [(0.0, 0.0), (0.05, 0.02), (-0.03, -0.04)])
@@ -41,7 +39,7 @@ def test_cells_of_a_static_rider_carry_the_weight_and_tell_its_place(place):
     moment = np.cross([x, y, 0.0], force)
     cells = read(["seat/load_cells"], seat_force=force, seat_moment=moment)["seat/load_cells"]
     assert cells.sum() == pytest.approx(WEIGHT)
-    np.testing.assert_allclose(centre_of_pressure(cells, PLACES), place, atol=1e-12)
+    np.testing.assert_allclose(centre_of_pressure(cells, SITES), place, atol=1e-12)
     # the formula as the paper prints it
     assert cells[0] / cells.sum() * 0.20 - 0.043 == pytest.approx(x, abs=1e-12)
     assert (cells[1] - cells[2]) / (2.0 * cells.sum()) * 0.12 == pytest.approx(y, abs=1e-12)
@@ -84,7 +82,7 @@ def test_encoders():
     assert found["wheel/speed"] == pytest.approx([9.0 * 0.335])
     assert found["steer/angle"] == pytest.approx([-0.2])
     assert found["crank/angle"] == pytest.approx([15.0 - 4.0 * math.pi])
-    sunk = replace(PLACES, wheel_radius=0.33)
+    sunk = replace(SITES, wheel_radius=0.33)
     assert read(["wheel/speed"], sunk, wheel_rate=1.0)["wheel/speed"] == pytest.approx([0.33])
 
 
@@ -111,11 +109,11 @@ def test_distances_do_not_depend_on_where_the_bicycle_is():
 
 @pytest.mark.parametrize(("viewpoints", "rank"), [(None, 2), (SPREAD_VIEWPOINTS, 3)], ids=["camera", "spread"])
 def test_one_camera_is_blind_to_turns_about_its_line_of_sight_to_the_joint(viewpoints, rank):
-    places = PLACES if viewpoints is None else sensor_places(POSTURE, viewpoints=viewpoints)
+    sites = SITES if viewpoints is None else sensor_sites(POSTURE, viewpoints=viewpoints)
 
     def distances(turn):
         bodies = trunk_at(np.array([1.0, 0, 0, 0]), np.zeros(3), turn)
-        return read(["relative/distances"], places, bodies=bodies)["relative/distances"]
+        return read(["relative/distances"], sites, bodies=bodies)["relative/distances"]
 
     step = 1e-5
     jacobian = np.array([(distances(step * axis) - distances(-step * axis)) / (2.0 * step) for axis in np.eye(3)]).T
@@ -133,18 +131,20 @@ def test_many_ticks_are_read_at_once():
     }
     whole = RideQuantities(
         bodies,
+        SITES,
         *rng.standard_normal((3, length)),
         *rng.standard_normal((2, length, 3)),
         rng.standard_normal((length, 2, 3)),
     )
-    suite = rider_bicycle_suite("all", places=PLACES)
-    found = given_readings(suite, whole, PLACES)
+    kinds = {name: channel.kind for name, channel in CHANNELS.items() if not channel.kind.on_body}
+    assert len(kinds) == 8
+    found = {name: kind.reading(whole) for name, kind in kinds.items()}
     fields = ("wheel_rate", "steer", "crank", "seat_force", "seat_moment", "hands")
     for tick in range(length):
         now = {name: state.at(tick) for name, state in bodies.items()}
-        one = RideQuantities(now, **{name: getattr(whole, name)[tick] for name in fields})
-        for name, value in given_readings(suite, one, PLACES).items():
-            np.testing.assert_allclose(value, found[name][tick], atol=1e-12)
+        one = RideQuantities(now, SITES, **{name: getattr(whole, name)[tick] for name in fields})
+        for name, kind in kinds.items():
+            np.testing.assert_allclose(kind.reading(one), found[name][tick], atol=1e-12)
 
 
 def test_what_is_missing_is_named():
@@ -152,6 +152,3 @@ def test_what_is_missing_is_named():
         read(["steer/angle"], crank=0.0)
     with pytest.raises(ValueError, match="bodies must hold 'trunk'"):
         read(["relative/orientation"], bodies={"bicycle": body()})
-    bell = Sensor(Channel("bell/sound", 1, "1"), "given", 100.0, NoiseModel(full_scale=1.0))
-    with pytest.raises(ValueError, match="given channels must be among"):
-        given_readings(SensorSuite([bell], 100.0), RideQuantities({}), PLACES)

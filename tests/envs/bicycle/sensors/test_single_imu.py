@@ -10,7 +10,8 @@ from poise.envs.bicycle.rider.anthropometry import rider_body
 from poise.envs.bicycle.rider.loop_closure import loop_gaps
 from poise.envs.bicycle.rider.posture import sit
 from poise.envs.bicycle.sensors.single_imu import PLACES, imu_of
-from poise.envs.bicycle.sensors.suites import BICYCLE_IMU_TILT, IMUS, pitched
+from poise.envs.bicycle.sensors.sites import BICYCLE_IMU_TILT, pitched
+from poise.envs.bicycle.sensors.suites import IMUS
 from poise.filters.core import rotation
 from poise.filters.core.metrics import direction_error
 

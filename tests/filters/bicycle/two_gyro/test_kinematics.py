@@ -13,7 +13,7 @@ from poise.envs.bicycle.frame.parameters import MOUNTAIN_BIKE
 from poise.envs.bicycle.rider.anthropometry import SUBJECTS
 from poise.envs.bicycle.rider.posture import sit
 from poise.envs.bicycle.sensors.measured_geometry import rider_geometry
-from poise.envs.bicycle.sensors.suites import fixture_places, sensor_places
+from poise.envs.bicycle.sensors.sites import fixture_sites, sensor_sites
 from poise.filters.bicycle import relative_sensor as sensor
 from poise.filters.bicycle.two_gyro import kinematics as kinematics
 from poise.filters.core import rotation
@@ -133,7 +133,7 @@ def test_relative_angles_are_those_of_scipy():
 
 def test_a_tilted_gyroscope():
     """Nose up: the sensor's x axis points up and forward; axes of the paper are y right and z down."""
-    mounted = sensor_places(sit(MOUNTAIN_BIKE, SUBJECTS[0])).bicycle_imu.rotation
+    mounted = sensor_sites(sit(MOUNTAIN_BIKE, SUBJECTS[0])).bicycle_imu.rotation
     reading = rotation.rotate_back(np.array(mounted), RATE)
     np.testing.assert_allclose(kinematics.platform_rate(reading, np.radians(10.0)), RATE * kinematics.SIGNS, atol=1e-12)
 
@@ -141,11 +141,11 @@ def test_a_tilted_gyroscope():
 def test_distances():
     """Distances of the environment's markers, and their Jacobian; places that the filter is told are the true ones."""
     posture = sit(MOUNTAIN_BIKE, SUBJECTS[2])
-    places = sensor_places(posture)
+    places = sensor_sites(posture)
     told = sensor.MarkerPlaces.of_trunk(rider_geometry(posture))
     np.testing.assert_allclose(told.markers, places.markers, atol=1e-12)
     np.testing.assert_allclose(told.viewpoints, places.viewpoints, atol=1e-12)
-    disk, true_disk = sensor.MarkerPlaces.of_disk(), fixture_places(places, DISK_CENTRE)
+    disk, true_disk = sensor.MarkerPlaces.of_disk(), fixture_sites(places, DISK_CENTRE)
     np.testing.assert_allclose(disk.markers, true_disk.markers, atol=1e-12)
     np.testing.assert_allclose(disk.viewpoints, true_disk.viewpoints, atol=1e-12)
     found, slope = sensor.marker_distances(THETA, told)
