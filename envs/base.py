@@ -7,9 +7,11 @@ An environment is a source of ticks. Estimates do not act on what is estimated, 
 from __future__ import annotations
 
 import copy
+import functools
 import math
 import time
-from collections.abc import Mapping, Sequence
+import warnings
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple, Protocol
 
@@ -359,3 +361,19 @@ def choose_quantity(score: str, choices: Sequence[Quantity]) -> Quantity:
         if quantity.name == score:
             return quantity
     raise ValueError(f"score must be one of {[quantity.name for quantity in choices]}, got {score!r}")
+
+
+def renamed(**names: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Let a function understand former names of its keyword arguments (old → new), with a DeprecationWarning."""
+
+    def decorate(function: Callable[..., Any]) -> Callable[..., Any]:
+        @functools.wraps(function)
+        def call(*args: Any, **kwargs: Any) -> Any:
+            for old in names.keys() & kwargs.keys():
+                warnings.warn(f"argument {old} is now called {names[old]}", DeprecationWarning, stacklevel=2)
+                kwargs.setdefault(names[old], kwargs.pop(old))
+            return function(*args, **kwargs)
+
+        return call
+
+    return decorate

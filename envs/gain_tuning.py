@@ -18,6 +18,7 @@ from ..filters.adaptation.tuned import TunedFilter, TunedState
 from ..filters.core.kalman import KalmanFilter
 from ..filters.core.metrics import error
 from ..filters.core.quantity import Estimate, Quantity
+from .base import renamed
 from .data.formats.load import load_recording
 from .data.trajectory import Trajectory
 from .hand.gestures import GestureConfig
@@ -196,7 +197,7 @@ class HandMotionGainEnv(GainTuningEnv):
     ## Arguments
 
     Those of :class:`GainTuningEnv`, and ``gesture``, ``rate`` (Hz), ``sensors`` (preset), each a single one or
-    several to draw from, ``grade`` (factor on the sensor's errors, or lowest and highest), ``duration`` (s),
+    several to draw from, ``noise_scale`` (factor on the sensor's errors, or lowest and highest), ``duration`` (s),
     ``mounting``, ``drive``; see :class:`poise.envs.hand.trajectories.HandTrajectories`. The dynamic drive costs
     seconds a reset.
 
@@ -205,6 +206,7 @@ class HandMotionGainEnv(GainTuningEnv):
     v0: first release.
     """
 
+    @renamed(grade="noise_scale")
     def __init__(
         self,
         filter: str | KalmanFilter = "external-acceleration",
@@ -212,7 +214,7 @@ class HandMotionGainEnv(GainTuningEnv):
         gesture: str | GestureConfig | Sequence[str | GestureConfig] = "mixed",
         rate: float | Sequence[float] = 100.0,
         sensors: str | SensorPreset | Sequence[str | SensorPreset] = "xsens-mtw-awinda",
-        grade: float | tuple[float, float] = 1.0,
+        noise_scale: float | tuple[float, float] = 1.0,
         duration: float = 60.0,
         mounting: Literal["random", "aligned"] = "random",
         drive: Literal["kinematic", "dynamic"] = "kinematic",
@@ -223,7 +225,7 @@ class HandMotionGainEnv(GainTuningEnv):
             gestures=gesture,  # type: ignore[arg-type]
             rates=rate,  # type: ignore[arg-type]
             sensors=sensors,  # type: ignore[arg-type]
-            grade=grade,  # type: ignore[arg-type]
+            noise_scale=noise_scale,  # type: ignore[arg-type]
             duration=duration,
             mounting=mounting,
             drive=drive,

@@ -27,7 +27,7 @@ TRAINING_MOTIONS = HandTrajectories(
     gestures=("mixed", "mixed", "mixed", SUSTAINED, SUSTAINED, "slow", "fast", "severe", "rest"),
     rates=(100.0, 286.0),
     sensors=("paper-hand", "xsens-mtw-awinda", "st-lsm6dsox", VIBRATING),
-    grade=(0.1, 1.0),
+    noise_scale=(0.1, 1.0),
     duration=60.0,
 )
 """What shipped policies are trained on."""

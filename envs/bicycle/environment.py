@@ -11,7 +11,7 @@ from gymnasium import spaces
 
 from ...filters.bicycle.geometry import RiderGeometry
 from ...filters.core.quantity import Quantity
-from ..base import Block, Observation, PoseEnv, Scene, pose_error
+from ..base import Block, Observation, PoseEnv, Scene, pose_error, renamed
 from ..sensors.ideal import STANDARD_GRAVITY, Sampling
 from ..sensors.sensor import Sensor
 from .course.scenarios import Scenario
@@ -123,7 +123,7 @@ class RiderBicycleEnv(PoseEnv):
         bicycle: ``mountain-bike`` or parameters with a crank.
         physics_rate: physics steps a second, Hz; a multiple of 250 Hz and of ``rate``.
         score: one quantity or several of ``info["pose"]``; by default the orientations of bicycle and trunk.
-        grade: all errors times this, 0 for none.
+        noise_scale: factor on all errors, 0 for none.
         sampling: ``interval`` or ``instant``, of gyroscopes and accelerometers.
         render_mode: ``human`` (a window), ``rgb_array`` or None.
 
@@ -137,6 +137,7 @@ class RiderBicycleEnv(PoseEnv):
 
     reset_options: ClassVar[tuple[str, ...]] = ("scenario", "subject")
 
+    @renamed(grade="noise_scale")
     def __init__(
         self,
         scenario: str | Scenario = "indoor_circle",
@@ -151,7 +152,7 @@ class RiderBicycleEnv(PoseEnv):
         physics_rate: float = 500.0,
         score: str | Sequence[str] = ("bicycle/orientation", "trunk/orientation"),
         *,
-        grade: float = 1.0,
+        noise_scale: float = 1.0,
         sampling: Sampling = "interval",
         render_mode: str | None = None,
     ) -> None:
@@ -171,7 +172,7 @@ class RiderBicycleEnv(PoseEnv):
             "name": suite if isinstance(suite, str) else (*names, *own),
             "sensors": sensors,
             "rate": rate,
-            "noise_scale": grade,
+            "noise_scale": noise_scale,
             "sampling": sampling,
         }
         self.tyre = TyreParameters()

@@ -16,7 +16,7 @@ import numpy as np
 from ...filters.bicycle.geometry import RiderGeometry
 from ...filters.core import rotation
 from ...filters.core.quantity import Quantity
-from ..base import Block, PoseEnv, Scene, choose_quantity
+from ..base import Block, PoseEnv, Scene, choose_quantity, renamed
 from ..sensors.ideal import BodyState
 from .frame.parameters import MOUNTAIN_BIKE
 from .rider.anthropometry import SUBJECTS
@@ -159,7 +159,7 @@ class BicycleFixtureEnv(PoseEnv):
         rate: Hz; None for that of the suite.
         duration: s.
         score: one of the quantities of ``info["pose"]``.
-        grade: all errors times this.
+        noise_scale: factor on all errors.
         render_mode: None; there is no picture of it.
 
     Raises:
@@ -170,6 +170,7 @@ class BicycleFixtureEnv(PoseEnv):
     * v0: first release.
     """
 
+    @renamed(grade="noise_scale")
     def __init__(
         self,
         suite: str | Sequence[str] = "two-gyro-fixture",
@@ -178,7 +179,7 @@ class BicycleFixtureEnv(PoseEnv):
         duration: float = 60.0,
         score: str = "bicycle/roll",
         *,
-        grade: float = 1.0,
+        noise_scale: float = 1.0,
         render_mode: str | None = None,
     ) -> None:
         if not 0.1 <= duration < math.inf:
@@ -187,7 +188,7 @@ class BicycleFixtureEnv(PoseEnv):
             raise ValueError(f"render_mode must be None: there is no picture of the fixture, got {render_mode!r}")
         self._posture = sit(MOUNTAIN_BIKE, SUBJECTS[0])
         self.sites = fixture_sites(sensor_sites(self._posture), DISK_CENTRE)
-        self._suite = rider_bicycle_suite(suite, sensors=sensors, rate=rate, noise_scale=grade, sites=self.sites)
+        self._suite = rider_bicycle_suite(suite, sensors=sensors, rate=rate, noise_scale=noise_scale, sites=self.sites)
         missing = {sensor.body for sensor in self._suite.sensors} - {"bicycle", "disk"}
         forces = [s.channel.name for s in self._suite.sensors if s.channel.name.split("/")[0] in ("seat", "handlebar")]
         if missing or forces:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from ...filters.core.kalman import KalmanFilter
+from ..base import renamed
 from ..data.trajectory import Trajectory
 from ..gain_tuning import GainTuningEnv
 from ..record import record
@@ -15,7 +16,7 @@ from .environment import RiderBicycleEnv
 from .rider.anthropometry import RiderBody
 from .rider.rider import Fidelity
 from .rider.style import RiderStyle
-from .sensors.single_imu import PLACES, imu_of
+from .sensors.single_imu import SITES, imu_of
 
 Scenarios = str | Scenario | Sequence[str | Scenario]
 
@@ -40,7 +41,7 @@ class RiderBicycleGainEnv(GainTuningEnv):
     | ``bounded-motion`` | ``process`` (σ_g), ``bias`` (σ_b), ``velocity`` (σ_V) |
     | ``two-gyro``, ``force-inertial``, ``whole-body``, ``odometry-aided`` … | ``env.unwrapped.tuned.kalman.gains`` |
 
-    A filter of one IMU reads ``imu/gyr`` and ``imu/acc`` of the chosen ``place``. A filter of rides reads the channels
+    A filter of one IMU reads ``imu/gyr`` and ``imu/acc`` of the chosen ``site``. A filter of rides reads the channels
     of the ride that it needs, and is told rider and bicycle of every episode.
 
     ## Observation Space
@@ -82,7 +83,7 @@ class RiderBicycleGainEnv(GainTuningEnv):
 
     Args:
         filter: name of a Kalman filter with gains (:func:`poise.list_estimators`), or such a filter.
-        place: ``bicycle_imu`` or ``trunk_imu``; of no effect with a filter of rides.
+        site: ``bicycle_imu`` or ``trunk_imu``; of no effect with a filter of rides.
         scenario: of the rides, one or several to draw from with equal probability.
         subject: 0…4, ``"random"`` for a new rider in every episode, or a rider.
         style: how the rider moves; None for that of the scenario.
@@ -92,23 +93,24 @@ class RiderBicycleGainEnv(GainTuningEnv):
         fidelity: ``lumped`` (cheap; hands, feet and limbs exert no reactions of their own on frame and trunk) or
             ``full``.
         physics_rate: physics steps a second, Hz; a multiple of 250 Hz and of ``rate``.
-        grade: all sensor errors times this.
+        noise_scale: factor on all sensor errors.
         sampling: ``interval`` or ``instant``.
         common: ``gains``, ``quantity``, ``interval`` (s), ``reward``, ``consistency`` of
             :class:`poise.envs.gain_tuning.GainTuningEnv`.
 
     Raises:
-        ValueError: an unknown place, filter, scenario or rider, or a number out of its range.
+        ValueError: an unknown site, filter, scenario or rider, or a number out of its range.
 
     ## Version History
 
     * v0: first release.
     """
 
+    @renamed(grade="noise_scale", place="site")
     def __init__(
         self,
         filter: str | KalmanFilter = "external-acceleration",
-        place: str = "bicycle_imu",
+        site: str = "bicycle_imu",
         scenario: Scenarios = "outdoor",
         subject: int | str | RiderBody = "random",
         *,
@@ -118,19 +120,19 @@ class RiderBicycleGainEnv(GainTuningEnv):
         duration: float = 20.0,
         fidelity: Fidelity = "lumped",
         physics_rate: float = 500.0,
-        grade: float = 1.0,
+        noise_scale: float = 1.0,
         sampling: Sampling = "interval",
         **common: Any,
     ) -> None:
         super().__init__(filter, **common)
-        if place not in PLACES:
-            raise ValueError(f"place must be one of {list(PLACES)}, got {place!r}")
-        self.place = place
+        if site not in SITES:
+            raise ValueError(f"site must be one of {list(SITES)}, got {site!r}")
+        self.site = site
         names = [channel.name for channel in self.tuned.kalman.channels]
         self.of_rides = not all(name.startswith("imu/") for name in names)
         if not self.of_rides:
             kinds = dict.fromkeys((*(name.removeprefix("imu/") for name in names), "gyr", "acc"))
-            names = [f"{place}/{kind}" for kind in kinds]
+            names = [f"{site}/{kind}" for kind in kinds]
         scenarios = [scenario] if isinstance(scenario, str | Scenario) else list(scenario)
         if not scenarios:
             raise ValueError("scenario must name at least one scenario, got none")
@@ -145,7 +147,7 @@ class RiderBicycleGainEnv(GainTuningEnv):
                 duration,
                 fidelity,
                 physics_rate=physics_rate,
-                grade=grade,
+                noise_scale=noise_scale,
                 sampling=sampling,
             )
             for each in scenarios
@@ -159,7 +161,7 @@ class RiderBicycleGainEnv(GainTuningEnv):
         generator = self.np_random.spawn(1)[0]
         ride = self.rides[int(generator.integers(len(self.rides)))]
         ridden = record(ride, seed=int(generator.integers(2**32)))
-        return ridden if self.of_rides else imu_of(ridden, self.place)
+        return ridden if self.of_rides else imu_of(ridden, self.site)
 
     def close(self) -> None:
         """Close the worlds of the rides; may be called twice."""

@@ -30,7 +30,7 @@ class HandTrajectories:
         gestures: names of :data:`poise.envs.hand.gestures.GESTURES`, or configurations.
         rates: Hz.
         sensors: names of sensor presets, or presets.
-        grade: lowest and highest factor on all errors of the sensor, drawn log-uniformly.
+        noise_scale: lowest and highest factor on all errors of the sensor, drawn log-uniformly.
         duration: s.
         lever_arm: standard deviation of the sensor's place on the body, m an axis.
         mounting: ``random``: the axes of the sensor are drawn evenly from all rotations; ``aligned``: they are the
@@ -44,7 +44,7 @@ class HandTrajectories:
     gestures: tuple[str | GestureConfig, ...] = ("mixed",)
     rates: tuple[float, ...] = (100.0,)
     sensors: tuple[str | SensorPreset, ...] = ("xsens-mtw-awinda",)
-    grade: tuple[float, float] = (1.0, 1.0)
+    noise_scale: tuple[float, float] = (1.0, 1.0)
     duration: float = 60.0
     lever_arm: float = 0.05
     mounting: Literal["random", "aligned"] = "random"
@@ -53,16 +53,20 @@ class HandTrajectories:
     def __post_init__(self) -> None:
         for name in ("gestures", "rates", "sensors"):
             object.__setattr__(self, name, several(name, getattr(self, name)))
-        grade = (self.grade, self.grade) if isinstance(self.grade, int | float) else tuple(self.grade)
-        object.__setattr__(self, "grade", grade)
+        noise_scale = (
+            (self.noise_scale, self.noise_scale)
+            if isinstance(self.noise_scale, int | float)
+            else tuple(self.noise_scale)
+        )
+        object.__setattr__(self, "noise_scale", noise_scale)
         for gesture in self.gestures:
             gesture_config(gesture)
         for sensor in self.sensors:
             as_preset(sensor)
         if not all(isinstance(rate, int | float) and 1.0 <= rate < math.inf for rate in self.rates):
             raise ValueError(f"rate must be at least 1 Hz and finite, got {list(self.rates)}")
-        if len(grade) != 2 or not 0.0 < grade[0] <= grade[1] < math.inf:
-            raise ValueError(f"grade must be a positive number or (lowest, highest), got {self.grade!r}")
+        if len(noise_scale) != 2 or not 0.0 < noise_scale[0] <= noise_scale[1] < math.inf:
+            raise ValueError(f"noise_scale must be a positive number or (lowest, highest), got {self.noise_scale!r}")
         if not 0.0 < self.duration < math.inf:
             raise ValueError(f"duration must be positive seconds, got {self.duration}")
         if not 0.0 <= self.lever_arm < math.inf:
@@ -85,11 +89,11 @@ class HandTrajectories:
         gesture = self.gestures[choice.integers(len(self.gestures))]
         rate = float(self.rates[choice.integers(len(self.rates))])
         device = as_preset(self.sensors[choice.integers(len(self.sensors))])
-        grade = float(np.exp(choice.uniform(*np.log(self.grade))))
+        noise_scale = float(np.exp(choice.uniform(*np.log(self.noise_scale))))
         turn = rotation.random(choice)
         axes = turn if self.mounting == "random" else np.array([1.0, 0.0, 0.0, 0.0])
         place: dict[str, Any] = {"lever_arm": choice.normal(0.0, self.lever_arm, 3), "mounting": axes}
-        suite = imu_suite(device, rate, noise_scale=grade)
+        suite = imu_suite(device, rate, noise_scale=noise_scale)
         seed = int(episode.integers(2**32))
         if self.drive == "kinematic":
             trajectory = simulate_hand(gesture, seed, suite, duration=self.duration, **place)
@@ -99,7 +103,12 @@ class HandTrajectories:
                 trajectory = record(env, seed=seed)
             finally:
                 env.close()
-        drawn = {"gesture": gesture_name(gesture), "device": device.name, "grade": grade, "drive": self.drive}
+        drawn = {
+            "gesture": gesture_name(gesture),
+            "device": device.name,
+            "noise_scale": noise_scale,
+            "drive": self.drive,
+        }
         metadata = trajectory.metadata | drawn
         return trajectory.replace(metadata=metadata if name is None else metadata | {"name": name})
 

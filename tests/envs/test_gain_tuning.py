@@ -116,7 +116,7 @@ def test_the_interval_is_kept_at_any_rate():
 
 
 def test_motion_and_setting_follow_the_seed():
-    options = {"gesture": ("slow", "fast"), "rate": (50.0, 100.0), "grade": (0.5, 2.0), "duration": 3.0}
+    options = {"gesture": ("slow", "fast"), "rate": (50.0, 100.0), "noise_scale": (0.5, 2.0), "duration": 3.0}
     one, two = HandMotionGainEnv(**options), HandMotionGainEnv(**options)
     settings = set()
     for seed in range(8):
@@ -170,7 +170,7 @@ def test_recordings_are_read_from_files(tmp_path, trajectory):
         ({"sensors": "nose"}, "name must be one of"),
         ({"rate": 0.0}, "rate must be at least 1 Hz"),
         ({"rate": ()}, "rates must not be empty"),
-        ({"grade": (2.0, 1.0)}, "grade must be"),
+        ({"noise_scale": (2.0, 1.0)}, "noise_scale must be"),
         ({"duration": 0.05}, "duration must be one interval at least"),
         ({"drive": "magnetic"}, "drive must be one of"),
         ({"mounting": "upside-down"}, "mounting must be one of"),

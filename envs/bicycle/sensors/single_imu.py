@@ -10,23 +10,23 @@ import numpy as np
 from ....filters.core import rotation
 from ...data.trajectory import Trajectory
 
-PLACES = ("bicycle_imu", "trunk_imu")
-"""Places with a gyroscope and an accelerometer."""
+SITES = ("bicycle_imu", "trunk_imu")
+"""Sensor sites with a gyroscope and an accelerometer."""
 KINDS = ("gyr", "acc", "mag")
 
 
-def imu_of(trajectory: Trajectory, place: str = "bicycle_imu") -> Trajectory:
+def imu_of(trajectory: Trajectory, site: str = "bicycle_imu") -> Trajectory:
     """What one IMU of a ride measured, with the true motion of the sensor itself.
 
     Args:
         trajectory: an episode of ``poise/RiderBicycle-v0`` or ``poise/BicycleFixture-v0``, recorded, loaded or
             simulated; its metadata say where the sensors sit.
-        place: ``bicycle_imu`` or ``trunk_imu``.
+        site: ``bicycle_imu`` or ``trunk_imu``.
 
     Returns:
-        The same ticks, mask and metadata (``name`` gets the place appended), with
+        The same ticks, mask and metadata (``name`` gets the site appended), with
 
-        * measurements ``imu/gyr`` (rad/s), ``imu/acc`` (m/s²) and, where the place has one, ``imu/mag`` (µT), each
+        * measurements ``imu/gyr`` (rad/s), ``imu/acc`` (m/s²) and, where the site has one, ``imu/mag`` (µT), each
           ``(T, 3)`` in sensor axes;
         * truth ``orientation`` ``(T, 4)``, sensor to world: that of the body turned by the sensor's mounting; ``up``
           ``(T, 3)``, world's vertical in sensor axes; and where the ride knows them ``angular_rate`` (rad/s, sensor
@@ -34,24 +34,24 @@ def imu_of(trajectory: Trajectory, place: str = "bicycle_imu") -> Trajectory:
           ``magnetometer_bias`` (sensor axes).
 
     Raises:
-        ValueError: an unknown place, or a trajectory that lacks the place's gyroscope or accelerometer, its mounting,
+        ValueError: an unknown site, or a trajectory that lacks the site's gyroscope or accelerometer, its mounting,
             or the orientation of the body that carries it.
     """
-    if place not in PLACES:
-        raise ValueError(f"place must be one of {list(PLACES)}, got {place!r}")
+    if site not in SITES:
+        raise ValueError(f"site must be one of {list(SITES)}, got {site!r}")
     measurements = {
-        f"imu/{kind}": trajectory.measurements[f"{place}/{kind}"]
+        f"imu/{kind}": trajectory.measurements[f"{site}/{kind}"]
         for kind in KINDS
-        if f"{place}/{kind}" in trajectory.measurements
+        if f"{site}/{kind}" in trajectory.measurements
     }
-    missing = [f"{place}/{kind}" for kind in KINDS[:2] if f"imu/{kind}" not in measurements]
+    missing = [f"{site}/{kind}" for kind in KINDS[:2] if f"imu/{kind}" not in measurements]
     if missing:
         raise ValueError(f"trajectory {trajectory.name!r} lacks the channels {missing}")
-    sensor = sensor_at(trajectory, f"{place}/gyr")
+    sensor = sensor_at(trajectory, f"{site}/gyr")
     return trajectory.replace(
         measurements=measurements,
-        truth=sensor_truth(trajectory.truth, sensor, place, trajectory.name),
-        metadata=trajectory.metadata | {"name": f"{trajectory.name}-{place}", "place": place},
+        truth=sensor_truth(trajectory.truth, sensor, site, trajectory.name),
+        metadata=trajectory.metadata | {"name": f"{trajectory.name}-{site}", "site": site},
     )
 
 
@@ -69,14 +69,14 @@ def sensor_at(trajectory: Trajectory, channel: str) -> Mapping[str, Any]:
 
 
 def sensor_truth(
-    truth: Mapping[str, np.ndarray], sensor: Mapping[str, Any], place: str, name: str
+    truth: Mapping[str, np.ndarray], sensor: Mapping[str, Any], site: str, name: str
 ) -> dict[str, np.ndarray]:
     """Truth of the body that carries a sensor → truth of the sensor.
 
     Args:
         truth: of the ride, name → ``(T, size)``.
         sensor: from :func:`sensor_at`.
-        place: of the sensor.
+        site: of the sensor.
         name: of the ride, for messages.
 
     Raises:
@@ -84,7 +84,7 @@ def sensor_truth(
     """
     body, axes, lever = sensor["body"], np.array(sensor["rotation"]), np.array(sensor["lever_arm"])
     if f"{body}/orientation" not in truth:
-        raise ValueError(f"{name!r} knows no '{body}/orientation', which carries {place!r}")
+        raise ValueError(f"{name!r} knows no '{body}/orientation', which carries {site!r}")
     carrier = truth[f"{body}/orientation"]
     orientation = rotation.multiply(carrier, axes)
     found = {"orientation": orientation, "up": rotation.up_in_body(orientation)}
@@ -93,6 +93,6 @@ def sensor_truth(
     if f"{body}/position" in truth:
         found["position"] = truth[f"{body}/position"] + rotation.rotate(carrier, lever)
     for kind in ("gyroscope", "accelerometer", "magnetometer"):
-        if f"{place}/{kind}_bias" in truth:
-            found[f"{kind}_bias"] = truth[f"{place}/{kind}_bias"]
+        if f"{site}/{kind}_bias" in truth:
+            found[f"{kind}_bias"] = truth[f"{site}/{kind}_bias"]
     return found

@@ -73,7 +73,7 @@ def test_geometry_is_that_of_the_rider_in_the_saddle():
     assert env.ride is None
     assert env.geometry.rider_mass == SUBJECTS[0].mass
     env.reset(seed=0, options={"subject": 4})
-    assert env.geometry == rider_geometry(env.ride.rider.posture, env._places)
+    assert env.geometry == rider_geometry(env.ride.rider.posture, env._sites)
     assert env.geometry.rider_mass == SUBJECTS[4].mass
     env.close()
 
@@ -237,7 +237,7 @@ def test_pictures_show_something(fidelity):
         ({"suite": "nose"}, "two-gyro"),
         ({"suite": ["imu/smell"]}, "channels"),
         ({"sensors": "broken"}, "sensors"),
-        ({"grade": -1.0}, "grade"),
+        ({"noise_scale": -1.0}, "noise_scale"),
         ({"suite": "two-gyro-fixture"}, "disk"),
         ({"rate": 1e6}, "rate"),
         ({"rate": 130.0}, "physics_rate"),

@@ -7,7 +7,7 @@ import pytest
 import poise
 from poise.envs.bicycle.environment import RiderBicycleEnv
 from poise.envs.bicycle.gain_tuning import RiderBicycleGainEnv
-from poise.envs.bicycle.sensors.single_imu import PLACES, imu_of
+from poise.envs.bicycle.sensors.single_imu import SITES, imu_of
 from poise.envs.gain_tuning import ReplayGainEnv
 from poise.filters.bicycle.geometry import RiderGeometry
 from poise.filters.core.kalman import KalmanFilter
@@ -24,10 +24,10 @@ def rewards_of(env, seed=0):
     return rewards, info
 
 
-@pytest.mark.parametrize("place", PLACES)
+@pytest.mark.parametrize("site", SITES)
 @pytest.mark.parametrize("name", ["external-acceleration", "bounded-motion"])
-def test_it_tunes_named_filters_at_both_places(place, name):
-    env = gym.make("poise/RiderBicycleGain-v0", filter=name, place=place, duration=1.0)
+def test_it_tunes_named_filters_at_both_sites(site, name):
+    env = gym.make("poise/RiderBicycleGain-v0", filter=name, site=site, duration=1.0)
     rewards, info = rewards_of(env)
     assert len(rewards) == 10
     assert np.isfinite(rewards).all()
@@ -35,7 +35,7 @@ def test_it_tunes_named_filters_at_both_places(place, name):
     assert {"orientation", "up", "gyroscope_bias", "accelerometer_bias", "position"} <= set(info["truth"])
     trajectory = env.unwrapped.trajectory
     assert set(trajectory.measurements) == {"imu/gyr", "imu/acc"}
-    assert trajectory.metadata["place"] == place
+    assert trajectory.metadata["site"] == site
     env.close()
     env.unwrapped.close()
 
@@ -111,7 +111,7 @@ def test_the_geometry_of_the_episode_reaches_the_filter():
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        ({"place": "thigh_left"}, "place must be one of"),
+        ({"site": "thigh_left"}, "site must be one of"),
         ({"filter": "kalman"}, "unknown estimator 'kalman'"),
         ({"scenario": "moon"}, "scenario must be one of"),
         ({"scenario": ()}, "at least one scenario"),
@@ -119,7 +119,7 @@ def test_the_geometry_of_the_episode_reaches_the_filter():
         ({"duration": 0.1, "interval": 0.5}, "one interval at least"),
         ({"fidelity": "rough"}, "fidelity must be"),
         ({"rate": 33.0}, "physics_rate must be a multiple"),
-        ({"grade": -1.0}, "grade|factor|scale"),
+        ({"noise_scale": -1.0}, "noise_scale"),
         ({"render_mode": "human"}, "render_mode must be None"),
     ],
 )

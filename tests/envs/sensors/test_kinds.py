@@ -103,7 +103,7 @@ def test_bad_kinds_are_named(barometer):
     assert register_sensor_kind(BAROMETER) is BAROMETER
     with pytest.raises(ValueError, match="there is another sensor kind 'barometer'"):
         register_sensor_kind(SensorKind("barometer", 2, "hPa", "bar", None))
-    with pytest.raises(ValueError, match="kind must be a SensorKind or one of .*'barometer'.*, got 'thermometer'"):
+    with pytest.raises(ValueError, match=r"kind must be a SensorKind or one of .*'barometer'.*, got 'thermometer'"):
         sensor_kind("thermometer")
     with pytest.raises(ValueError, match="a sample of a barometer has 1 values, but channel 'imu/bar' has 2"):
         Sensor(Channel("imu/bar", 2, "hPa"), "barometer", 1.0, NoiseModel(full_scale=1.0))

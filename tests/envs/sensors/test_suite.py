@@ -1,5 +1,6 @@
 """Suites: rates, observations, truth, and that motions in parts and restored states agree."""
 
+import itertools
 import json
 
 import numpy as np
@@ -26,7 +27,7 @@ def motion(length=LENGTH, rate=100.0):
 def in_parts(suite, states, borders, readings=None):
     """Measurements and truth of a motion that is simulated in several parts."""
     parts = []
-    for first, last in zip(borders[:-1], borders[1:], strict=True):
+    for first, last in itertools.pairwise(borders):
         handed = None if readings is None else {name: values[first:last] for name, values in readings.items()}
         parts.append(suite.simulate(states.at(slice(first, last)), handed))
     return tuple({name: np.concatenate([part[i][name] for part in parts]) for name in parts[0][i]} for i in range(2))

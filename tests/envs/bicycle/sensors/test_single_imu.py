@@ -9,7 +9,7 @@ from poise.envs.bicycle.frame.parameters import MOUNTAIN_BIKE
 from poise.envs.bicycle.rider.anthropometry import rider_body
 from poise.envs.bicycle.rider.loop_closure import loop_gaps
 from poise.envs.bicycle.rider.posture import sit
-from poise.envs.bicycle.sensors.single_imu import PLACES, imu_of
+from poise.envs.bicycle.sensors.single_imu import SITES, imu_of
 from poise.envs.bicycle.sensors.sites import BICYCLE_IMU_TILT, pitched
 from poise.envs.bicycle.sensors.suites import IMUS
 from poise.filters.core import rotation
@@ -29,10 +29,10 @@ def ride():
     return ridden(scenario="slalom", subject=2)
 
 
-@pytest.mark.parametrize("place", PLACES)
-def test_strapdown_from_noise_free_signals_returns_the_truth(ride, place):
+@pytest.mark.parametrize("site", SITES)
+def test_strapdown_from_noise_free_signals_returns_the_truth(ride, site):
     """Gyroscope, mounting and orientation belong together: integrated, one gives the other."""
-    imu = imu_of(ride, place)
+    imu = imu_of(ride, site)
     orientation, dt = imu.truth["orientation"][0], imu.dt
     for tick in range(1, len(imu)):
         orientation = rotation.multiply(orientation, rotation.exp(imu.measurements["imu/gyr"][tick] * dt))
@@ -40,10 +40,10 @@ def test_strapdown_from_noise_free_signals_returns_the_truth(ride, place):
     assert np.degrees(lost) < 0.01
 
 
-@pytest.mark.parametrize("place", PLACES)
-def test_accelerometer_and_position_belong_together(ride, place):
+@pytest.mark.parametrize("site", SITES)
+def test_accelerometer_and_position_belong_together(ride, site):
     """Specific force, turned into the world and less gravity, sums up to the velocity of the sensor's position."""
-    imu = imu_of(ride, place)
+    imu = imu_of(ride, site)
     before, after = imu.truth["orientation"][:-1], imu.truth["orientation"][1:]
     after = after * np.sign(np.sum(before * after, axis=1, keepdims=True))
     middle = rotation.normalize(before + after)
@@ -80,7 +80,7 @@ def test_riding_slowly_and_straight_the_accelerometer_shows_the_mounting():
 
 def test_filters_run_on_it_and_files_keep_it(ride, tmp_path):
     names = ["bounded-motion", "mekf", "external-acceleration", "tilt"]
-    table = poise.evaluate(names, [imu_of(ride, place) for place in PLACES])
+    table = poise.evaluate(names, [imu_of(ride, site) for site in SITES])
     assert set(table["estimator"]) == set(names)
     assert table["trajectory"].nunique() == 2
     assert table.loc[table["metric"] == "inclination", "value"].between(0.0, 20.0).all()
@@ -89,7 +89,7 @@ def test_filters_run_on_it_and_files_keep_it(ride, tmp_path):
 
 
 def test_what_is_missing_is_named(ride):
-    with pytest.raises(ValueError, match="place must be one of"):
+    with pytest.raises(ValueError, match="site must be one of"):
         imu_of(ride, "thigh_left")
     channels = {name: values for name, values in ride.measurements.items() if name != "trunk_imu/acc"}
     half, anywhere, unknown = ride.replace(measurements=channels), ride.replace(metadata={}), ride.replace(truth={})
