@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 CONTENDERS = ("bounded-motion", "vqf", "mahony", "tilt", "gyroscope-integration")
 """What the network is compared with on the test episodes."""
 GESTURES = ("slow", "fast", "severe", "mixed")
-"""Gestures of the hand-motion environment on which it is tested besides the episodes of its curriculum."""
+"""Gestures of the hand-motion environment on which it is tested besides randomised episodes."""
 
 OPTIONS = ("preset", "seed", "episodes", "epochs", "units", "recordings", "test_episodes")
 """Arguments that the weights and their card depend on."""
@@ -93,13 +93,13 @@ def run(args: Args) -> int:
 
 def training_config(args: Args) -> TrainingConfig:
     """The configuration that the arguments ask for."""
-    from ..baselines.learned.recipe import Curriculum
+    from ..baselines.learned.domain_randomisation import DomainRandomisation
     from ..baselines.learned.training import TrainingConfig
 
     config = TrainingConfig()
     if args.preset == "quick":
-        quick = Curriculum(duration=60.0)
-        config = replace(config, episodes=96, validation_episodes=16, epochs=4, units=32, batch=16, curriculum=quick)
+        quick = DomainRandomisation(duration=60.0)
+        config = replace(config, episodes=96, validation_episodes=16, epochs=4, units=32, batch=16, domain=quick)
     given = {name: getattr(args, name) for name in ("episodes", "epochs", "units")}
     return replace(config, seed=args.seed, **{name: value for name, value in given.items() if value is not None})
 
@@ -130,11 +130,11 @@ def test(estimator: LearnedEstimator, config: TrainingConfig, episodes: int, out
 
 
 def test_trajectories(config: TrainingConfig, episodes: int) -> list[Trajectory]:
-    """Held-out episodes of the curriculum, and hand motions of the environment with a sensor that is not in it."""
+    """Held-out randomised episodes, and hand motions of the environment with a sensor that is not among them."""
     from ..baselines.learned.dataset import simulate
     from ..envs.hand.trajectories import HandTrajectories
 
-    trajectories = list(simulate(config.curriculum, config.test_seed(), episodes))
+    trajectories = list(simulate(config.domain, config.test_seed(), episodes))
     for index, gesture in enumerate(GESTURES):
         hand = HandTrajectories((gesture,), rates=(60.0, 100.0, 200.0), sensors=("paper-hand",), duration=60.0)
         for number, trajectory in enumerate(hand.draw_many(config.test_seed() + 1 + index, max(1, episodes // 6))):
@@ -168,7 +168,7 @@ def card_of(args: Args, config: TrainingConfig, result: TrainingResult, table: p
     best = result.history[result.best_epoch - 1]
     return {
         "name": "gru",
-        "description": "upward vertical from gyroscope and accelerometer: level-frame front end and recurrent network",
+        "description": "inclination from gyroscope and accelerometer: gravity-aligned frame and recurrent network",
         "estimator": "poise.baselines.learned.estimator.LearnedEstimator",
         "units": config.units,
         "front_end": {name: value for name, value in asdict(config.frame).items() if name != "dt"},

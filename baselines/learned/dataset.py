@@ -1,4 +1,4 @@
-"""What a network is trained on: features in the level frame, and the vertical there, for many sequences at once."""
+"""What a network is trained on: features and the true inclination in the gravity-aligned frame, of many sequences."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from ...filters.core.observer import Observer
 from ...filters.support.files import replacing
 from ...filters.support.parallel import progress_bar
 from ...filters.support.version import code_version
-from .level_frame import FEATURES, VECTORS, LevelFrame
-from .recipe import Curriculum
+from .domain_randomisation import DomainRandomisation
+from .gravity_aligned_frame import FEATURES, VECTORS, GravityAlignedFrame
 
 
 class Window(NamedTuple):
@@ -27,39 +27,39 @@ class Window(NamedTuple):
 
     Attributes:
         features: ``(B, N, F)`` float32.
-        vertical: ``(B, N, 3)`` float32, the true upward vertical in the level frame.
-        scored: ``(B, N)`` bool.
-        first: whether the sequences begin here; otherwise the window goes on where the one before ended.
+        up: ``(B, N, 3)`` float32, the true up vector in the gravity-aligned frame.
+        mask: ``(B, N)`` bool, what is scored.
+        first: whether the sequences begin here; otherwise the window continues the one before.
     """
 
     features: np.ndarray
-    vertical: np.ndarray
-    scored: np.ndarray
+    up: np.ndarray
+    mask: np.ndarray
     first: bool
 
 
 @dataclass(frozen=True, eq=False)
 class LearnedDataset:
-    """Sequences of intervals of the network, filled up to the longest with intervals that are not scored.
+    """Sequences of intervals of the network, padded to the longest with intervals that are not scored.
 
     Attributes:
         features: ``(E, N, F)`` float32.
-        vertical: ``(E, N, 3)`` float32, the true upward vertical in the level frame at the end of each interval.
-        scored: ``(E, N)`` bool: the truth is known, and the tick lies in the mask of its trajectory.
+        up: ``(E, N, 3)`` float32, the true up vector in the gravity-aligned frame at the end of each interval.
+        mask: ``(E, N)`` bool, the evaluation mask: the truth is known, and the sample is in the mask of its trajectory.
         names: of the trajectories.
     """
 
     features: np.ndarray
-    vertical: np.ndarray
-    scored: np.ndarray
+    up: np.ndarray
+    mask: np.ndarray
     names: tuple[str, ...]
 
     def __len__(self) -> int:
         return len(self.features)
 
     @classmethod
-    def from_trajectories(cls, trajectories: Iterable[Trajectory], frame: LevelFrame | None = None) -> Self:
-        """Features of simulated or recorded trajectories that know the vertical.
+    def from_trajectories(cls, trajectories: Iterable[Trajectory], frame: GravityAlignedFrame | None = None) -> Self:
+        """Features of simulated or recorded trajectories that know the inclination.
 
         Args:
             trajectories: with the channels ``imu/gyr`` and ``imu/acc`` and the truth ``up`` or ``orientation``.
@@ -69,7 +69,7 @@ class LearnedDataset:
             ValueError: there is no trajectory, one is not sampled evenly, lacks a channel or the truth, or is too
                 short for one interval.
         """
-        frame = LevelFrame() if frame is None else frame
+        frame = GravityAlignedFrame() if frame is None else frame
         names, parts = [], []
         for trajectory in trajectories:
             names.append(trajectory.name)
@@ -78,20 +78,20 @@ class LearnedDataset:
             raise ValueError("trajectories must hold at least one, got none")
         longest = max(len(part[0]) for part in parts)
         features = np.zeros((len(parts), longest, FEATURES.size), np.float32)
-        vertical = np.tile(np.array([0.0, 0.0, 1.0], np.float32), (len(parts), longest, 1))
-        scored = np.zeros((len(parts), longest), bool)
+        up = np.tile(np.array([0.0, 0.0, 1.0], np.float32), (len(parts), longest, 1))
+        mask = np.zeros((len(parts), longest), bool)
         for index, part in enumerate(parts):
-            for whole, values in zip((features, vertical, scored), part, strict=True):
+            for whole, values in zip((features, up, mask), part, strict=True):
                 whole[index, : len(values)] = values
-        return cls(features, vertical, scored, tuple(names))
+        return cls(features, up, mask, tuple(names))
 
     @classmethod
-    def from_curriculum(
+    def from_simulation(
         cls,
-        curriculum: Curriculum,
+        domain: DomainRandomisation,
         seed: int,
         episodes: int,
-        frame: LevelFrame | None = None,
+        frame: GravityAlignedFrame | None = None,
         *,
         cache: str | Path | None = None,
         progress: str = "",
@@ -99,7 +99,7 @@ class LearnedDataset:
         """Simulate episodes, one child of ``seed`` each; a larger number keeps the first ones.
 
         Args:
-            curriculum: their distribution.
+            domain: their distribution.
             seed: root seed; data sets with different seeds share nothing.
             episodes: how many.
             frame: front end; the default one if None.
@@ -111,11 +111,11 @@ class LearnedDataset:
         """
         if episodes < 1:
             raise ValueError(f"episodes must be at least 1, got {episodes}")
-        frame = LevelFrame() if frame is None else frame
-        path = None if cache is None else Path(cache) / f"{recipe_digest(curriculum, seed, episodes, frame)}.npz"
+        frame = GravityAlignedFrame() if frame is None else frame
+        path = None if cache is None else Path(cache) / f"{simulation_digest(domain, seed, episodes, frame)}.npz"
         if path is not None and path.is_file():
             return cls.load(path)
-        dataset = cls.from_trajectories(simulate(curriculum, seed, episodes, progress), frame)
+        dataset = cls.from_trajectories(simulate(domain, seed, episodes, progress), frame)
         if path is not None:
             dataset.save(path)
         return dataset
@@ -124,7 +124,7 @@ class LearnedDataset:
         """Write a NumPy archive in one move."""
         with replacing(path) as part:
             names = np.array(self.names)
-            np.savez(part, features=self.features, vertical=self.vertical, scored=self.scored, names=names)
+            np.savez(part, features=self.features, up=self.up, mask=self.mask, names=names)
         return Path(path)
 
     @classmethod
@@ -132,17 +132,17 @@ class LearnedDataset:
         """Read what :meth:`save` wrote."""
         with np.load(path, allow_pickle=False) as file:
             names = tuple(str(name) for name in file["names"])
-            return cls(file["features"], file["vertical"], file["scored"], names)
+            return cls(file["features"], file["up"], file["mask"], names)
 
     def digest(self) -> str:
         """Letters that tell data sets apart."""
         content = hashlib.sha256()
-        for array in (self.features, self.vertical, self.scored):
+        for array in (self.features, self.up, self.mask):
             content.update(np.ascontiguousarray(array))
         return content.hexdigest()[:16]
 
     def windows(
-        self, size: int, length: int, generator: np.random.Generator | None = None, *, turn: bool = True
+        self, size: int, length: int, generator: np.random.Generator | None = None, *, rotate: bool = True
     ) -> Iterator[Window]:
         """All sequences in batches, each batch from its beginning to its end in consecutive windows.
 
@@ -150,31 +150,31 @@ class LearnedDataset:
             size: sequences in a batch; a smaller rest is left out if there is a ``generator``.
             length: intervals in a window.
             generator: order of the sequences and headings; None: as they are.
-            turn: turn every sequence by a random angle about the vertical: the heading of a level frame means nothing.
+            rotate: rotate every sequence by a random angle about the vertical: the heading of the frame means nothing.
         """
         order = np.arange(len(self)) if generator is None else generator.permutation(len(self))
         size = min(size, len(self))
         stop = len(self) if generator is None else len(self) - size + 1
         for start in range(0, stop, size):
             chosen = order[start : start + size]
-            features, vertical = self.features[chosen], self.vertical[chosen]
-            if generator is not None and turn:
-                features, vertical = turned(features, vertical, generator.uniform(-np.pi, np.pi, len(chosen)))
+            features, up = self.features[chosen], self.up[chosen]
+            if generator is not None and rotate:
+                features, up = rotated(features, up, generator.uniform(-np.pi, np.pi, len(chosen)))
             for begin in range(0, features.shape[1], length):
                 part = slice(begin, begin + length)
-                yield Window(features[:, part], vertical[:, part], self.scored[chosen, part], begin == 0)
+                yield Window(features[:, part], up[:, part], self.mask[chosen, part], begin == 0)
 
 
-def simulate(curriculum: Curriculum, seed: int, episodes: int, progress: str = "") -> Iterator[Trajectory]:
-    """Episodes one after the other, named ``curriculum-<seed>-<index>``."""
+def simulate(domain: DomainRandomisation, seed: int, episodes: int, progress: str = "") -> Iterator[Trajectory]:
+    """Episodes one after the other, named ``randomised-<seed>-<index>``."""
     with progress_bar(episodes, progress, "episode", show=bool(progress)) as bar:
         for index, child in enumerate(np.random.SeedSequence(seed).spawn(episodes)):
-            yield curriculum.draw(child, f"curriculum-{seed}-{index}")
+            yield domain.draw(child, f"randomised-{seed}-{index}")
             bar.update()
 
 
-def sequence_of(trajectory: Trajectory, frame: LevelFrame) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Features ``(N, F)``, vertical ``(N, 3)`` in the level frame and scored flags ``(N,)`` of one trajectory."""
+def sequence_of(trajectory: Trajectory, frame: GravityAlignedFrame) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Features ``(N, F)``, true up vector ``(N, 3)`` in the frame and evaluation mask ``(N,)`` of a trajectory."""
     if not trajectory.uniform:
         raise ValueError(f"{trajectory.name} is not sampled evenly; resample it first")
     truth = trajectory.truth_of("up")
@@ -184,17 +184,17 @@ def sequence_of(trajectory: Trajectory, frame: LevelFrame) -> tuple[np.ndarray, 
     due = seen["due"][:, 0] == 1.0
     if not due.any():
         raise ValueError(f"{trajectory.name} is too short: {len(trajectory)} ticks hold no interval of the network")
-    vertical = rotation.rotate(seen["relative_orientation"], truth)[due]
-    known = np.isfinite(vertical).all(axis=-1)
-    vertical[~known] = (0.0, 0.0, 1.0)
-    return seen["features"][due], vertical, trajectory.mask[due] & known
+    up = rotation.rotate(seen["relative_orientation"], truth)[due]
+    known = np.isfinite(up).all(axis=-1)
+    up[~known] = (0.0, 0.0, 1.0)
+    return seen["features"][due], up, trajectory.mask[due] & known
 
 
-def turned(features: np.ndarray, vertical: np.ndarray, angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The same sequences ``(B, N, …)`` in level frames turned by ``angles`` ``(B,)`` about the vertical."""
+def rotated(features: np.ndarray, up: np.ndarray, angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The same sequences ``(B, N, …)`` in frames rotated by ``angles`` ``(B,)`` about the vertical."""
     cosine, sine = (part.astype(np.float32)[:, None] for part in (np.cos(angles), np.sin(angles)))
     copies = []
-    for array, vectors in ((features, VECTORS), (vertical, 1)):
+    for array, vectors in ((features, VECTORS), (up, 1)):
         copy = array.copy()
         for index in range(vectors):
             x, y = array[..., 3 * index], array[..., 3 * index + 1]
@@ -203,8 +203,8 @@ def turned(features: np.ndarray, vertical: np.ndarray, angles: np.ndarray) -> tu
     return copies[0], copies[1]
 
 
-def recipe_digest(curriculum: Curriculum, seed: int, episodes: int, frame: LevelFrame) -> str:
+def simulation_digest(domain: DomainRandomisation, seed: int, episodes: int, frame: GravityAlignedFrame) -> str:
     """Name of a data set that depends on its settings and on the code that simulates it."""
-    recipe = {"curriculum": asdict(curriculum), "seed": seed, "episodes": episodes, "frame": asdict(frame)}
-    recipe["code"] = code_version()
-    return hashlib.sha256(json.dumps(recipe, sort_keys=True).encode()).hexdigest()[:16]
+    settings = {"domain": asdict(domain), "seed": seed, "episodes": episodes, "frame": asdict(frame)}
+    settings["code"] = code_version()
+    return hashlib.sha256(json.dumps(settings, sort_keys=True).encode()).hexdigest()[:16]

@@ -16,18 +16,18 @@ from ...filters.core.quantity import ACCELEROMETER, GYROSCOPE, UP, Channel, Esti
 from ...filters.core.rotation import normalize, rotate_back
 from ...filters.core.sampling import empty_memory, join
 from ..weights_io import load_weights
+from .gravity_aligned_frame import GravityAlignedFrame
 from .gru import GruNetwork
-from .level_frame import LevelFrame
 
 
 class LearnedState(NamedTuple):
     """All memory of the estimator.
 
     Attributes:
-        x: ``(*batch, n)`` state of the level frame; zeros before the start.
+        x: ``(*batch, n)`` state of the gravity-aligned frame; zeros before the start.
         memory: ``(*batch, H)`` of the network.
-        tilt: ``(*batch, 2)`` what the network said last: horizontal part of the vertical in the level frame.
-        held: ``(*batch, 6)`` last finite sample of every channel element, NaN if there was none.
+        tilt: ``(*batch, 2)`` last output of the network: horizontal part of the up vector in the gravity-aligned frame.
+        held: ``(*batch, 6)`` last valid sample of every channel element, NaN if there was none.
         started: ``(*batch,)`` bool.
     """
 
@@ -40,23 +40,23 @@ class LearnedState(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class LearnedEstimator:
-    """The upward vertical from six axes, by a recurrent network on a level frame.
+    """Inclination from six axes, by a recurrent network behind a gravity-aligned frame.
 
-    :class:`.LevelFrame` runs at the rate of the sensor. At fixed intervals, whatever that
-    rate is, the network sees what happened and says by how much the frame leans; in between that is held, in the level
-    frame, where it changes slowly.
+    :class:`.GravityAlignedFrame` runs at the rate of the sensor. At fixed intervals, whatever that rate is, the network
+    gets the features of the interval and estimates by how much the frame leans; in between the estimate is held, in
+    the frame, where it changes slowly.
 
     Attributes:
         network: the weights.
         frame: the front end and the sampling interval.
-        compiled: use compiled loops for NumPy data (needs numba; arrays serve without it, to rounding).
+        compiled: use compiled loops for NumPy data; arrays give the same to rounding.
 
     Raises:
         ValueError: the sampling interval is longer than that of the network.
     """
 
     network: GruNetwork
-    frame: LevelFrame = field(default_factory=LevelFrame)
+    frame: GravityAlignedFrame = field(default_factory=GravityAlignedFrame)
     compiled: bool = True
 
     channels: ClassVar[tuple[Channel, ...]] = (GYROSCOPE, ACCELEROMETER)
@@ -80,9 +80,9 @@ class LearnedEstimator:
         arrays, card = load_weights(path_or_name)
         network = GruNetwork.from_arrays(arrays)
         try:
-            frame = LevelFrame(**{**card.get("front_end", {}), "dt": dt})
+            frame = GravityAlignedFrame(**{**card.get("front_end", {}), "dt": dt})
         except TypeError as reason:
-            raise ValueError(f"{path_or_name}: the card tells of another front end ({reason})") from None
+            raise ValueError(f"{path_or_name}: the card describes another front end ({reason})") from None
         return cls(network, frame)
 
     @property
@@ -106,11 +106,8 @@ class LearnedEstimator:
         features, due = seen.pose["features"], seen.pose["due"]
         memory, tilt = state.memory, state.tilt
         if bool((due == 1.0).any()):
-            compiled = None
             if self.compiled and not is_torch(features):
-                compiled = self._advance(features[None], due[None], memory, tilt)
-            if compiled is not None:
-                memory, tilt, _ = compiled
+                memory, tilt, _ = self._advance(features[None], due[None], memory, tilt)
             else:
                 xp = namespace(features)
                 now = due == 1.0
@@ -126,18 +123,16 @@ class LearnedEstimator:
             return run_by_steps(self, arrays)
         state = self.init({name: array[0] for name, array in arrays.items()})
         seen = self._observer().run(arrays).pose
-        advanced = self._advance(seen["features"], seen["due"], state.memory, state.tilt)
-        if advanced is None:
-            return run_by_steps(self, arrays)
-        return Estimate({"up": upward(seen["relative_orientation"], advanced[2])})
+        _, _, tilts = self._advance(seen["features"], seen["due"], state.memory, state.tilt)
+        return Estimate({"up": upward(seen["relative_orientation"], tilts)})
 
     def _observer(self) -> Observer:
         return Observer(self.frame, compiled=self.compiled)
 
     def _advance(
         self, features: np.ndarray, due: np.ndarray, memory: np.ndarray, tilt: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
-        """Memory and tilt after ``(T, *batch, …)`` ticks, and the tilt of every tick; None without a compiler."""
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Memory and tilt after ``(T, *batch, …)`` samples, and the tilt of every sample."""
         length, batch = features.shape[0], features.shape[1:-1]
         memory, tilt = memory.copy(), tilt.copy()
         count = int(np.prod(batch, dtype=int))
@@ -147,11 +142,11 @@ class LearnedEstimator:
             memory.reshape(count, -1),
             tilt.reshape(count, 2),
         )
-        return None if tilts is None else (memory, tilt, tilts.reshape(length, *batch, 2))
+        return memory, tilt, tilts.reshape(length, *batch, 2)
 
 
 def upward(orientation: Array, tilt: Array) -> Array:
-    """The vertical in sensor coordinates ``(..., 3)`` from the attitude of the level frame and the tilt in it."""
+    """The up vector in sensor coordinates ``(..., 3)`` from the frame's attitude and the tilt in the frame."""
     xp = namespace(orientation, tilt)
     return rotate_back(orientation, normalize(xp.concat([tilt, 1.0 + 0.0 * tilt[..., :1]], axis=-1)))
 

@@ -2,9 +2,9 @@
 
     u = tanh(A s + a),   h ← GRU(u, h),   t = C h + c
 
-with features s, memory h and two numbers t: the horizontal part of the upward vertical in the level frame, where its
-third coordinate is 1. The GRU is that of K. Cho et al., "Learning Phrase Representations using RNN Encoder-Decoder for
-Statistical Machine Translation", EMNLP 2014, with the reset after the product, as PyTorch has it,
+with features s, memory h and two numbers t: the horizontal part of the up vector in the gravity-aligned frame, where
+its third coordinate is 1. The GRU is that of K. Cho et al., "Learning Phrase Representations using RNN Encoder-Decoder
+for Statistical Machine Translation", EMNLP 2014, with the reset after the product, as PyTorch has it,
 
     r = σ(W_r u + b_r + V_r h + d_r),   z = σ(W_z u + b_z + V_z h + d_z),
     n = tanh(W_n u + b_n + r ∘ (V_n h + d_n)),   h ← (1 − z) ∘ n + z ∘ h
@@ -20,7 +20,7 @@ from typing import Self
 import numpy as np
 
 from ...filters.core.backend import Array, constant, namespace
-from .level_frame import FEATURES
+from .gravity_aligned_frame import FEATURES
 
 NAMES = (
     "input.weight",
@@ -97,7 +97,7 @@ class GruNetwork:
         return len(np.atleast_1d(self.input_bias))
 
     def step(self, features: Array, memory: Array) -> tuple[Array, Array]:
-        """One tick: features ``(..., F)`` and memory ``(..., H)`` → new memory and tilt ``(..., 2)``."""
+        """One update: features ``(..., F)`` and memory ``(..., H)`` → new memory and tilt ``(..., 2)``."""
         xp, size = namespace(features, memory), self.size
 
         def affine(weight: np.ndarray, bias: np.ndarray, x: Array) -> Array:
@@ -112,23 +112,20 @@ class GruNetwork:
         memory = (1.0 - z) * n + z * memory
         return memory, affine(self.output_weight, self.output_bias, memory)
 
-    def advance(self, features: np.ndarray, due: np.ndarray, memory: np.ndarray, tilt: np.ndarray) -> np.ndarray | None:
-        """All ticks of all sequences, compiled.
+    def advance(self, features: np.ndarray, due: np.ndarray, memory: np.ndarray, tilt: np.ndarray) -> np.ndarray:
+        """All samples of all sequences, compiled.
 
         Args:
             features: ``(T, B, F)``.
-            due: ``(T, B)``, 1 where the network moves on; elsewhere memory and tilt stay.
+            due: ``(T, B)``, 1 where the network is updated; elsewhere memory and tilt stay.
             memory: ``(B, H)``, changed in place.
             tilt: ``(B, 2)``, changed in place.
 
         Returns:
-            The tilt of every tick, ``(T, B, 2)``; None where there is no compiler (numba), and nothing was done.
+            The tilt of every sample, ``(T, B, 2)``.
         """
-        kernel = compiled_kernel()
-        if kernel is None:
-            return None
         tilts = np.empty((*due.shape, 2))
-        kernel(features, due, memory, tilt, tilts, *self._columns())
+        compiled_kernel()(features, due, memory, tilt, tilts, *self._columns())
         return tilts
 
     def _columns(self) -> tuple[np.ndarray, ...]:
@@ -150,12 +147,10 @@ class GruNetwork:
 
 
 @lru_cache(maxsize=1)
-def compiled_kernel() -> Callable[..., None] | None:
-    """:func:`advance_all` compiled, or None without numba."""
-    try:
-        from numba import njit
-    except ImportError:
-        return None
+def compiled_kernel() -> Callable[..., None]:
+    """:func:`advance_all`, compiled."""
+    from numba import njit
+
     return njit(cache=True, nogil=True, error_model="numpy")(advance_all)
 
 

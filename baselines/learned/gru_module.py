@@ -1,12 +1,13 @@
-"""The network of :mod:`poise.baselines.learned.gru` as a torch module, for training."""
+"""For training: the network of :mod:`poise.baselines.learned.gru` as a torch module, and the loss."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from ...filters.core.backend import to_numpy
+from ...filters.core.backend import Array, namespace, to_numpy
+from ...filters.core.metrics import direction_error, rms, scored
 from ...filters.support.optional import extra
-from .level_frame import FEATURES
+from .gravity_aligned_frame import FEATURES
 
 with extra("learn"):
     import torch
@@ -46,3 +47,32 @@ class GruModule(nn.Module):
         return {
             name: array * np.float32(SCALE if name.startswith("output.") else 1.0) for name, array in arrays.items()
         }
+
+
+def up_of(tilt: Array) -> Array:
+    """The up vector ``(..., 3)``, of any length, of a tilt ``(..., 2)`` in the gravity-aligned frame."""
+    xp = namespace(tilt)
+    return xp.concat([tilt, xp.ones_like(tilt[..., :1])], axis=-1)
+
+
+def inclination_loss(tilt: Array, up: Array, mask: Array) -> Array:
+    """Mean over sequences of the root mean square inclination error in time, rad.
+
+    This is what a table of trials shows. Its gradient weighs a sequence of small errors as much as one of large ones,
+    which the mean square over all would not.
+
+    Args:
+        tilt: ``(B, N, 2)`` estimate.
+        up: ``(B, N, 3)`` truth in the gravity-aligned frame.
+        mask: ``(B, N)`` bool, what is scored.
+
+    Returns:
+        A number; zero, with gradient zero, where nothing is scored.
+    """
+    xp = namespace(tilt)
+    error = direction_error(up_of(tilt), up)
+    counted = xp.any(scored(error, mask), axis=1)
+    each = rms(error, mask, axis=1)
+    each = xp.where(counted, each, xp.zeros_like(each))
+    count = xp.sum(xp.astype(counted, each.dtype))
+    return xp.sum(each) / xp.where(count > 0.0, count, xp.ones_like(count))

@@ -16,10 +16,9 @@ from torch import nn
 from ...filters.support.seeds import child_seed, child_seeds
 from ..checkpoint import load_checkpoint, save_checkpoint
 from .dataset import LearnedDataset
-from .gru_module import GruModule
-from .level_frame import LevelFrame
-from .losses import inclination_loss
-from .recipe import Curriculum
+from .domain_randomisation import DomainRandomisation
+from .gravity_aligned_frame import GravityAlignedFrame
+from .gru_module import GruModule, inclination_loss
 
 CHECKPOINT = "checkpoint.pt"
 MOST_BAD_STEPS = 10
@@ -56,9 +55,9 @@ class TrainingConfig:
     """largest norm of a gradient"""
     seed: int = 0
     """root seed: its children are training data, validation data, initial weights, order and headings"""
-    curriculum: Curriculum = field(default_factory=Curriculum)
+    domain: DomainRandomisation = field(default_factory=DomainRandomisation)
     """distribution of the episodes"""
-    frame: LevelFrame = field(default_factory=LevelFrame)
+    frame: GravityAlignedFrame = field(default_factory=GravityAlignedFrame)
     """front end"""
 
     def __post_init__(self) -> None:
@@ -135,8 +134,8 @@ def train(
     train_seed, validation_seed, weights_seed, order_seed = config.seeds()
 
     def simulated(seed: int, episodes: int, words: str) -> LearnedDataset:
-        return LearnedDataset.from_curriculum(
-            config.curriculum, seed, episodes, config.frame, cache=folder, progress="" if say is None else words
+        return LearnedDataset.from_simulation(
+            config.domain, seed, episodes, config.frame, cache=folder, progress="" if say is None else words
         )
 
     dataset = simulated(train_seed, config.episodes, "simulate") if dataset is None else dataset
@@ -205,10 +204,10 @@ class Trainer:
         total, count, skipped = 0.0, 0, 0
         memory: torch.Tensor | None = None
         for window in dataset.windows(self.config.batch, self.config.window, generator):
-            features, vertical, scored = (torch.from_numpy(np.ascontiguousarray(part)) for part in window[:3])
+            features, up, mask = (torch.from_numpy(np.ascontiguousarray(part)) for part in window[:3])
             tilt, last = self.module(features, None if window.first else memory)
             memory = last.detach()
-            loss = inclination_loss(tilt, vertical, scored)
+            loss = inclination_loss(tilt, up, mask)
             if self.descend(loss):
                 total, count = total + loss.item(), count + 1
             else:
@@ -278,9 +277,9 @@ def validation_error(module: GruModule, dataset: LearnedDataset, size: int = 64,
             for begin in range(0, features.shape[1], length):
                 tilt, memory = module(features[:, begin : begin + length], memory)
                 tilts.append(tilt)
-            scored = torch.from_numpy(dataset.scored[part])
-            loss = inclination_loss(torch.cat(tilts, dim=1), torch.from_numpy(dataset.vertical[part]), scored)
-            counted = int(scored.any(dim=1).sum())
+            mask = torch.from_numpy(dataset.mask[part])
+            loss = inclination_loss(torch.cat(tilts, dim=1), torch.from_numpy(dataset.up[part]), mask)
+            counted = int(mask.any(dim=1).sum())
             total, count = total + loss.item() * counted, count + counted
     return total / max(count, 1)
 

@@ -1,4 +1,4 @@
-"""Episodes of the curriculum, features in the level frame, windows."""
+"""Randomised episodes, features in the gravity-aligned frame, windows."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from poise.baselines.learned.dataset import LearnedDataset, recipe_digest, sequence_of, turned
-from poise.baselines.learned.level_frame import FEATURES, LevelFrame
-from poise.baselines.learned.recipe import Curriculum, Shaking, VariedMotion
+from poise.baselines.learned.dataset import LearnedDataset, rotated, sequence_of, simulation_digest
+from poise.baselines.learned.domain_randomisation import DomainRandomisation, Shaking, VariedMotion
+from poise.baselines.learned.gravity_aligned_frame import FEATURES, GravityAlignedFrame
 from poise.envs.data.trajectory import Trajectory
 from poise.filters.core import rotation
 from poise.filters.core.estimator import run
 from poise.filters.core.observer import Observer
 
-SHORT = Curriculum(duration=12.0, motion=VariedMotion(first_rest=(0.3, 2.0), longest=(4.0, 6.0)))
+SHORT = DomainRandomisation(duration=12.0, motion=VariedMotion(first_rest=(0.3, 2.0), longest=(4.0, 6.0)))
 
 
 @pytest.fixture(scope="module")
@@ -59,26 +59,26 @@ def test_shaking_has_no_net_velocity() -> None:
 
 
 def test_the_vertical_in_the_level_frame_is_nearly_vertical(dataset: LearnedDataset) -> None:
-    assert dataset.features.shape == (5, dataset.vertical.shape[1], FEATURES.size)
+    assert dataset.features.shape == (5, dataset.up.shape[1], FEATURES.size)
     assert dataset.features.dtype == np.float32
     assert np.isfinite(dataset.features).all()
-    np.testing.assert_allclose(np.linalg.norm(dataset.vertical, axis=-1), 1.0, rtol=1e-5)
-    assert np.median(dataset.vertical[..., 2]) > np.cos(np.deg2rad(10.0))
+    np.testing.assert_allclose(np.linalg.norm(dataset.up, axis=-1), 1.0, rtol=1e-5)
+    assert np.median(dataset.up[..., 2]) > np.cos(np.deg2rad(10.0))
 
 
 def test_intervals_are_counted_exactly_at_odd_rates(episodes: list[Trajectory], dataset: LearnedDataset) -> None:
     for index, episode in enumerate(episodes):
-        expected = (len(episode) - 1) * episode.dt / LevelFrame().interval
-        assert abs(dataset.scored[index].sum() - expected) <= 1.0
+        expected = (len(episode) - 1) * episode.dt / GravityAlignedFrame().interval
+        assert abs(dataset.mask[index].sum() - expected) <= 1.0
 
 
 def test_what_the_mask_leaves_out_is_not_scored(episodes: list[Trajectory]) -> None:
     mask = episodes[0].time > 6.0
-    scored = sequence_of(episodes[0].replace(mask=mask), LevelFrame())[2]
+    scored = sequence_of(episodes[0].replace(mask=mask), GravityAlignedFrame())[2]
     assert 0.45 < scored.mean() < 0.55
     unknown = episodes[0].truth["orientation"].copy()
     unknown[: len(unknown) // 2] = np.nan
-    _, vertical, scored = sequence_of(episodes[0].replace(truth={"orientation": unknown}), LevelFrame())
+    _, vertical, scored = sequence_of(episodes[0].replace(truth={"orientation": unknown}), GravityAlignedFrame())
     assert 0.45 < scored.mean() < 0.55
     assert np.isfinite(vertical).all()
 
@@ -86,7 +86,7 @@ def test_what_the_mask_leaves_out_is_not_scored(episodes: list[Trajectory]) -> N
 def test_heading_turns_the_vectors_and_nothing_else(episodes: list[Trajectory]) -> None:
     """Features of a frame with another heading are those of ``turned``: what augmentation rests on."""
     episode = episodes[1]
-    observer = Observer(LevelFrame(), compiled=False).with_dt(episode.dt)
+    observer = Observer(GravityAlignedFrame(), compiled=False).with_dt(episode.dt)
     angle = 0.7
     turn = np.array([np.cos(angle / 2), 0.0, 0.0, np.sin(angle / 2)])
 
@@ -104,13 +104,13 @@ def test_heading_turns_the_vectors_and_nothing_else(episodes: list[Trajectory]) 
         return np.array(rows)[None], np.array(ups)[None]
 
     plain, other = features(np.array([1.0, 0.0, 0.0, 0.0])), features(turn)
-    for expected, found in zip(turned(*plain, np.array([angle])), other, strict=True):
+    for expected, found in zip(rotated(*plain, np.array([angle])), other, strict=True):
         np.testing.assert_allclose(found, expected, atol=2e-6)
 
 
 def test_windows_hold_everything_once(dataset: LearnedDataset) -> None:
     windows = list(dataset.windows(2, 100))
-    assert sum(window.scored.sum() for window in windows) == dataset.scored.sum()
+    assert sum(window.mask.sum() for window in windows) == dataset.mask.sum()
     assert [window.first for window in windows[:3]] == [True, False, False]
     assert sum(window.first for window in windows) == 3
     joined = np.concatenate([window.features for window in windows[:3]], axis=1)
@@ -120,33 +120,33 @@ def test_windows_hold_everything_once(dataset: LearnedDataset) -> None:
 def test_shuffled_windows_keep_errors(dataset: LearnedDataset) -> None:
     windows = list(dataset.windows(5, 10_000, np.random.default_rng(0)))
     assert len(windows) == 1
-    assert not np.array_equal(windows[0].vertical, dataset.vertical)
-    tilts = np.sort(windows[0].vertical[:, -1, 2])
-    np.testing.assert_allclose(tilts, np.sort(dataset.vertical[:, -1, 2]), rtol=1e-6)
+    assert not np.array_equal(windows[0].up, dataset.up)
+    tilts = np.sort(windows[0].up[:, -1, 2])
+    np.testing.assert_allclose(tilts, np.sort(dataset.up[:, -1, 2]), rtol=1e-6)
     again = list(dataset.windows(5, 10_000, np.random.default_rng(0)))
     np.testing.assert_array_equal(windows[0].features, again[0].features)
 
 
 def test_a_data_set_is_kept_and_found(tmp_path: Path) -> None:
-    first = LearnedDataset.from_curriculum(SHORT, 3, 2, cache=tmp_path)
+    first = LearnedDataset.from_simulation(SHORT, 3, 2, cache=tmp_path)
     (path,) = tmp_path.iterdir()
     stamp = path.stat().st_mtime_ns
-    second = LearnedDataset.from_curriculum(SHORT, 3, 2, cache=tmp_path)
+    second = LearnedDataset.from_simulation(SHORT, 3, 2, cache=tmp_path)
     np.testing.assert_array_equal(first.features, second.features)
-    assert second.names == ("curriculum-3-0", "curriculum-3-1")
+    assert second.names == ("randomised-3-0", "randomised-3-1")
     assert path.stat().st_mtime_ns == stamp
-    frame = LevelFrame()
+    frame = GravityAlignedFrame()
     names = {
-        recipe_digest(SHORT, 3, 2, frame),
-        recipe_digest(SHORT, 4, 2, frame),
-        recipe_digest(replace(SHORT, duration=13.0), 3, 2, frame),
-        recipe_digest(SHORT, 3, 2, LevelFrame(tilt_gain=0.03)),
+        simulation_digest(SHORT, 3, 2, frame),
+        simulation_digest(SHORT, 4, 2, frame),
+        simulation_digest(replace(SHORT, duration=13.0), 3, 2, frame),
+        simulation_digest(SHORT, 3, 2, GravityAlignedFrame(tilt_gain=0.03)),
     }
     assert len(names) == 4
 
 
 def test_more_episodes_keep_the_first_ones(tmp_path: Path) -> None:
-    few, more = (LearnedDataset.from_curriculum(SHORT, 3, count) for count in (1, 2))
+    few, more = (LearnedDataset.from_simulation(SHORT, 3, count) for count in (1, 2))
     length = few.features.shape[1]
     np.testing.assert_array_equal(few.features[0], more.features[0, :length])
 
@@ -156,7 +156,7 @@ def test_wrong_input_is_refused(episodes: list[Trajectory]) -> None:
     with pytest.raises(ValueError, match="at least one"):
         LearnedDataset.from_trajectories([])
     with pytest.raises(ValueError, match="at least 1"):
-        LearnedDataset.from_curriculum(SHORT, 0, 0)
+        LearnedDataset.from_simulation(SHORT, 0, 0)
     with pytest.raises(ValueError, match="knows no 'up'"):
         LearnedDataset.from_trajectories([episode.replace(truth={})])
     with pytest.raises(ValueError, match="too short"):
@@ -174,9 +174,9 @@ def test_the_front_end_alone_is_a_sound_observer() -> None:
         "imu/gyr": np.tile(bias, (T, 1)),
         "imu/acc": np.tile([0.0, 0.0, 9.80665], (T, 1)),
     }
-    pose = run(Observer(LevelFrame()).with_dt(dt), measurements).pose
+    pose = run(Observer(GravityAlignedFrame()).with_dt(dt), measurements).pose
     up = rotation.up_in_body(pose["relative_orientation"])
     assert np.rad2deg(np.arccos(np.clip(up[-1, 2], -1, 1))) < 0.02
-    # 20 b in level axes is the sixth vector; about the vertical nothing is observable
+    # 20 b in axes of the frame is the sixth vector; about the vertical nothing is observable
     found = pose["features"][-1, 15:18] / 20.0
     assert np.linalg.norm(found[:2]) == pytest.approx(np.linalg.norm(bias[:2]), rel=0.05)

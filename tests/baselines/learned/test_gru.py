@@ -12,11 +12,11 @@ import pytest
 import torch
 
 from poise.baselines.learned.dataset import LearnedDataset
+from poise.baselines.learned.domain_randomisation import DomainRandomisation, VariedMotion
 from poise.baselines.learned.estimator import LearnedEstimator, LearnedState, shipped
+from poise.baselines.learned.gravity_aligned_frame import FEATURES
 from poise.baselines.learned.gru import NAMES, GruNetwork
 from poise.baselines.learned.gru_module import GruModule
-from poise.baselines.learned.level_frame import FEATURES
-from poise.baselines.learned.recipe import Curriculum, VariedMotion
 from poise.baselines.weights_io import save_weights
 from poise.envs.data.trajectory import Trajectory
 from poise.envs.hand.gestures import make_gesture
@@ -47,7 +47,9 @@ def network(module: GruModule) -> GruNetwork:
 @pytest.fixture(scope="module")
 def episode() -> Trajectory:
     """Some seconds at a rate that is no multiple of the network's, with drop-outs, also at the start."""
-    trajectory = Curriculum(duration=6.0, rates=(137.0, 137.0), motion=VariedMotion(first_rest=(0.3, 0.4))).draw(5)
+    trajectory = DomainRandomisation(
+        duration=6.0, rates=(137.0, 137.0), motion=VariedMotion(first_rest=(0.3, 0.4))
+    ).draw(5)
     measurements = {name: values.copy() for name, values in trajectory.measurements.items()}
     measurements["imu/acc"][:4] = np.nan
     measurements["imu/acc"][200:230] = np.nan
@@ -176,7 +178,7 @@ def test_a_saved_state_goes_on(network: GruNetwork, episode: Trajectory) -> None
 def test_the_tilt_means_what_training_takes_it_for(network: GruNetwork, episode: Trajectory) -> None:
     """An estimator whose network says the truth makes no error at the ticks of the network."""
     dataset = LearnedDataset.from_trajectories([episode])
-    vertical = dataset.vertical[0, -1].astype(float)
+    vertical = dataset.up[0, -1].astype(float)
     bias = vertical[:2] / vertical[2]
     knowing = replace(network, output_weight=0.0 * network.output_weight, output_bias=bias)
     estimator = LearnedEstimator(knowing).with_dt(episode.dt)

@@ -12,9 +12,8 @@ import torch
 
 from poise.baselines.learned import training
 from poise.baselines.learned.dataset import LearnedDataset
-from poise.baselines.learned.gru_module import GruModule
-from poise.baselines.learned.level_frame import FEATURES
-from poise.baselines.learned.losses import inclination_loss
+from poise.baselines.learned.gravity_aligned_frame import FEATURES
+from poise.baselines.learned.gru_module import GruModule, inclination_loss
 from poise.baselines.learned.training import Trainer, TrainingConfig, train, validation_error
 from poise.filters.core.metrics import direction_error
 from poise.scripts.main import main
@@ -164,7 +163,7 @@ def test_the_command_leaves_weights_that_load(tmp_path: Path, capsys: pytest.Cap
         assert (folder / name).is_file(), name
     arrays, card = load_weights(tmp_path / "mine")
     assert card["command"].startswith("poise train gru --preset quick --seed 0 --episodes 2 --epochs 1 --units 8")
-    assert card["test_inclination"]["curriculum"]["gru"]["mean_deg"] > 0.0
+    assert card["test_inclination"]["randomised"]["gru"]["mean_deg"] > 0.0
     assert LearnedEstimator.load(tmp_path / "mine").network.size == 8
     assert main([*words, "--runs", str(tmp_path / "runs"), "--resume", str(folder)]) == 0
     again, _ = load_weights(folder / "gru.safetensors")
@@ -176,5 +175,5 @@ def test_the_quick_training_improves_on_its_front_end(tmp_path: Path) -> None:
     from poise.baselines.weights_io import load_weights
 
     assert main(["train", "gru", "--runs", str(tmp_path), "--export", str(tmp_path / "mine")]) == 0
-    tested = load_weights(tmp_path / "mine")[1]["test_inclination"]["curriculum"]
+    tested = load_weights(tmp_path / "mine")[1]["test_inclination"]["randomised"]
     assert tested["gru"]["mean_deg"] < 0.95 * tested["gru (front end alone)"]["mean_deg"]

@@ -1,4 +1,4 @@
-"""The front end of the learned estimator: gravity made constant, and what happened in a short interval made numbers.
+"""The front end of the learned estimator: samples in a gravity-aligned frame, summed up over short intervals.
 
 In sensor axes gravity turns with the hand, and a network would have to learn strapdown integration first. In a frame
 that the gyroscope keeps level, gravity stays where it is, and what is left to learn is by how much the frame leans.
@@ -15,19 +15,19 @@ from ...filters.core.quantity import ACCELEROMETER, GYROSCOPE, RELATIVE_ORIENTAT
 from ...filters.core.rotation import cross, exp, level, multiply, normalize, rotate, rotate_back
 
 VECTORS = 6
-"""Features that are vectors in the level frame; they turn with its heading."""
+"""Features that are vectors in the gravity-aligned frame; they rotate with its heading."""
 SCALARS = 4
 """Features that do not."""
 FEATURES = Quantity("features", "vector", 3 * VECTORS + SCALARS, "1")
-"""What the network sees of an interval: first the vectors, then the scalars, all of the order of one."""
+"""Input of the network for an interval: first the vectors, then the scalars, all of the order of one."""
 DUE = Quantity("due", "vector", 1, "1")
 """1 at the tick that ends an interval of the network, else 0."""
 VERTICAL = [0.0, 0.0, 1.0]
 
 
 @dataclass(frozen=True)
-class LevelFrame(Recurrence):
-    r"""A level frame from gyroscope and accelerometer by an observer with fixed gains, and features in it.
+class GravityAlignedFrame(Recurrence):
+    r"""A gravity-aligned frame from gyroscope and accelerometer by an observer with fixed gains, and features in it.
 
     Like :class:`~poise.filters.imu.bounded_motion.BoundedMotion`, without covariance and so a tenth of its work: the
     velocity v that the specific force f integrates to leaks away, and what stays of it is blamed on tilt and bias,
@@ -38,9 +38,9 @@ class LevelFrame(Recurrence):
     k_v² = 2 g k_θ + (σ_a / σ_V)², except that of the bias, which is chosen larger, to settle within a trial. The last
     sample stands in for missing ones; after ``hold`` without the accelerometer all integrals of force are given up.
 
-    Heading is that of the start, drifting. State: q (4), b (3), v (3), level force of the tick (3), leaking integrals
-    of the force over 0.25 s and 4 s (6), sums over the interval of force and rate (6), of their squares and of
-    | ‖f‖ − g | (3), length and clock of the interval (2), youth (1), age of the accelerometer sample (1).
+    Heading is that of the start, drifting. State: q (4), b (3), v (3), f in the frame (3), its leaking integrals over
+    0.25 s and 4 s (6), sums over the interval of force and rate (6), of their squares and of | ‖f‖ − g | (3), length
+    and clock of the interval (2), youth (1), age of the accelerometer sample (1).
     """
 
     interval: float = 0.04

@@ -1,7 +1,7 @@
-"""What the learned estimator is trained on: simulated hands of every temper, with sensors of every grade.
+"""Domain randomisation: the simulated hand motions, sensors and mountings that the learned estimator is trained on.
 
 Wider than what it is tested on, so that recordings lie inside: rests of any length, motions from a tremor to a shake,
-at 50 to 300 Hz, each episode with a sensor, a mounting and a temper of its own.
+at 50 to 300 Hz, each episode with a sensor, a mounting and motion parameters of its own.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ class VariedMotion:
     longest: Range = (4.0, 60.0)
     """s; an episode draws the length of its longest segments"""
     acceleration: Range = (0.05, 12.0)
-    """m/s², root mean square of the level of an episode while it moves"""
+    """m/s², root mean square of an episode while it moves"""
     rate: Range = (0.05, 7.0)
     """rad/s, root mean square likewise"""
     single_share: float = 0.1
@@ -157,7 +157,7 @@ class VariedSensors:
             burst_rate=burst_rate * float(silent),
             burst_duration=log_uniform(generator, self.pause),
         )
-        return SensorPreset("varied", "ranges of the curriculum", gyroscope, accelerometer)
+        return SensorPreset("varied", "domain randomisation", gyroscope, accelerometer)
 
 
 @dataclass(frozen=True)
@@ -209,7 +209,7 @@ class Shaking:
 
 
 @dataclass(frozen=True)
-class Curriculum:
+class DomainRandomisation:
     """The distribution of training episodes.
 
     Attributes:
@@ -231,7 +231,7 @@ class Curriculum:
     sensors: VariedSensors = field(default_factory=VariedSensors)
     shaking: Shaking = field(default_factory=Shaking)
 
-    def draw(self, seed: int | np.random.SeedSequence, name: str = "curriculum") -> Trajectory:
+    def draw(self, seed: int | np.random.SeedSequence, name: str = "randomised") -> Trajectory:
         """Simulate one episode.
 
         Args:
