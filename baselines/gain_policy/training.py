@@ -23,6 +23,7 @@ from ...filters.adaptation.features import InnovationFeatures
 from ...filters.adaptation.gains import tunable_filter
 from ...filters.adaptation.tuned import TunedFilter
 from ...filters.core.kalman import KalmanFilter
+from ...filters.support.optional import extra
 from ...filters.support.version import package_version
 from ..checkpoint import load_checkpoint, save_checkpoint
 from .config import TrainingConfig
@@ -77,7 +78,9 @@ def train_policy(
     """
     if resume and folder is None:
         raise ValueError("resume needs a folder with a checkpoint")
-    import torch
+    with extra("rl"):
+        import stable_baselines3  # noqa: F401
+        import torch
 
     filter = tunable_filter(config.filter) if kalman is None else kalman
     tuned = TunedFilter.of(filter, config.gains, InnovationFeatures(config.interval))
