@@ -103,7 +103,7 @@ class RideStudy:
     def errors(self, pose: Mapping[str, np.ndarray], truth: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Angle → signed error ``(T,)``, deg, of those angles that the pose has."""
         return {
-            angle: np.degrees(rotation.wrap(pose[name][:, part] - truth[name][:, part]))
+            angle: np.degrees(rotation.wrap(pose[name][..., part] - truth[name][..., part]))
             for angle, (name, part) in self.angles.items()
             if name in pose
         }

@@ -11,6 +11,7 @@ from ....filters.bicycle.force_inertial.axes import UP_THE_TRUNK
 from ....filters.bicycle.force_inertial.filter import ForceInertial
 from ....filters.bicycle.force_inertial.kinematics import Angles, rates
 from ....filters.bicycle.force_inertial.readings import Readings, readings, steering
+from ....filters.core.kalman import KalmanFilter
 
 
 def true_states(
@@ -58,3 +59,20 @@ def torques(
     delta = states[:, 3] - states[:, 0]
     read = np.stack([N[0], np.cos(delta) * N[1] - np.sin(delta) * N[2]], axis=-1)
     return read, read - residual
+
+
+def from_the_truth(
+    kalman: KalmanFilter, samples: dict[str, np.ndarray], truth: dict[str, np.ndarray], off: float = 0.0
+) -> dict[str, np.ndarray]:
+    """Estimates of a filter that starts at the true angles, φ_h off by so many rad, zero bias.
+
+    Returns:
+        The pose from the second tick on.
+    """
+    first = {name: array[0] for name, array in samples.items()}
+    state, _ = kalman.step(kalman.init(first), first)
+    x = state.x.copy()
+    x[..., :3], x[..., 3:4], x[..., 4:7] = truth["force-inertial/trunk_angles"][0], truth["bicycle/roll"][0], 0.0
+    x[..., 0] += off
+    rest = {name: array[1:] for name, array in samples.items()}
+    return kalman.run_from(state._replace(x=x), rest)[0].pose

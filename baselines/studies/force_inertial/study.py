@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from ..claims import Claim
 from ..kit import Study
 from ..report import Report
 from .consistency import ideal_consistency
@@ -20,28 +21,27 @@ def reproduce(study: Study, report: Report) -> None:
     simulations(study, report)
     runs = 50 if study.quick else 100
     found = study.cached("consistency", ideal_consistency, runs, 6.0, study.seed)
-    rows = [{"of": name, **{key: round(value, 3) for key, value in each.items()}} for name, each in found.items()]
-    report.table(
+    report.claims(
         "Consistency where the model is exact",
-        rows,
+        [
+            Claim.within(f"{name}: within the bounds", each["ratio"], each["lower"], each["upper"])
+            for name, each in found.items()
+        ],
         f"{runs} runs drawn from the model itself. Ratio to the degrees of freedom, with the 95 % bounds of a "
         "consistent filter.",
     )
-    report.text(LESSONS, "Where we differ, and why")
+    report.text(LESSONS, "Where this filter differs from the published one, and why")
 
 
 LESSONS = """
-* **(13) is no roll measurement in a turn.** The seat's force points along the apparent vertical; at face value the roll
-  is off by the angle atan(v ψ̇ / g) of the turn. With the apparent vertical the roll is the best of all four angles.
+* **(13) reads the apparent vertical.** The seat's force points along it, so in a turn the published reading of the roll
+  is off by the angle atan(v ψ̇ / g). Here that angle is predicted.
 * **Gravity cancels** when the accelerometers of (8) feed the torque model (9). The differentiated gyroscopes have no
   gravity in them.
-* **A rider is no point mass on a saddle.** The saddle carries the pelvis and part of the legs, the trunk turns about a
-  point above it, each hand pushes at its own grip, and grips turn with the handlebar. The pedals carry what seat and
-  hands do not. Without these loads the trunk's torque is wrong by tens of N·m.
-* **Zeros of the force sensors** are much of what is left of φ_h and θ: a moment that lasts cannot be told from a lean.
+* **A rider is more than a point mass on a saddle.** The saddle carries the pelvis and part of the legs, the trunk turns
+  about a point above it, each hand pushes at its own grip, and grips turn with the handlebar. The pedals carry what
+  seat and hands do not.
+* **Zeros of the force sensors** look like a lean: a moment that lasts cannot be told from one.
 * **Shoulders are not level.** (17) decides φ, so φ is wrong by what the shoulders really tilt, times 1/cos θ.
-* **Load cells add nothing**: the centre of pressure cancels in (10) to (12).
-* **The static torque underestimates** how much τ_φh fluctuates, as the paper says. Outdoors most of what is read in
-  τ_φh is the alternating push on the two pedals, which neither model knows.
-* The bias model helps little, as in the paper: the forces hold the angles whatever the bias does.
+* **The centre of pressure cancels** in (10) to (12), and with it the load cells.
 """

@@ -45,7 +45,7 @@ def draw_ride(report: Report, study: RideStudy, path: Path, title: str) -> None:
             ax.set_ylabel(f"{angle}, deg")
         for name, curve in curves.items():
             ax.plot(ride.time, curve, color=COLOURS[name], linewidth=0.9, label=name)
-        low, high = np.percentile(scale, (0.5, 99.5))
+        low, high = np.nanpercentile(scale, (0.5, 99.5))
         margin = 0.5 * (high - low) + 0.5
         ax.set_ylim(low - margin, high + margin)
         legend_above(ax)

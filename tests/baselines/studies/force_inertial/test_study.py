@@ -7,16 +7,15 @@ import pytest
 
 from poise.baselines.studies.force_inertial.consistency import FREE, forces_for, ideal_consistency
 from poise.baselines.studies.force_inertial.motion import NO_ERRORS, Errors, draw_motion, simulate
-from poise.baselines.studies.force_inertial.rides import better_sensors, rms_after, samples_of
-from poise.baselines.studies.force_inertial.simulation import from_the_truth, synthetic, variant, without_forces
-from poise.baselines.studies.force_inertial.states import torques, true_states
+from poise.baselines.studies.force_inertial.simulation import synthetic, variant, without_forces
+from poise.baselines.studies.force_inertial.states import from_the_truth, torques, true_states
 from poise.baselines.studies.force_inertial.study import reproduce
 from poise.baselines.studies.kit import Study
 from poise.baselines.studies.report import Report
+from poise.baselines.studies.sensors import without_errors
 from poise.envs.bicycle.environment import RiderBicycleEnv
 from poise.envs.record import record
 from poise.filters.bicycle.force_inertial.filter import ForceInertial
-from poise.filters.bicycle.geometry import RiderGeometry
 from poise.filters.core.kalman import KalmanFilter
 
 
@@ -66,14 +65,18 @@ def test_sensors_without_errors_are_the_environment_s():
         rides.append(record(env, seed=3))
         env.close()
     noisy, ideal = rides
-    model = ForceInertial.for_rider(RiderGeometry.of(noisy.metadata))
-    found, (wanted, _, _) = better_sensors(noisy, model, "force sensors: exact"), samples_of(ideal)
-    for name in ("seat/wrench", "handlebar/force"):
-        length = min(len(found[name]), len(wanted[name]))
-        np.testing.assert_allclose(found[name][-length:], wanted[name][-length:], atol=1e-6)
-    known, recorded = better_sensors(noisy, model, "force sensors: zeros known"), samples_of(noisy)[0]
-    assert np.abs(known["seat/wrench"] - recorded["seat/wrench"]).max() > 0.0
-    np.testing.assert_array_equal(known["trunk_imu/gyr"], recorded["trunk_imu/gyr"])
+    forces = ("seat/wrench", "handlebar/force")
+    found = without_errors(noisy, exact=forces)
+    for name in forces:
+        sampled = np.isfinite(ideal.measurements[name]) & np.isfinite(noisy.measurements[name])
+        np.testing.assert_allclose(found[name][sampled], ideal.measurements[name][sampled], atol=1e-6)
+    known = without_errors(noisy, unbiased=forces)
+    assert np.nanmax(np.abs(known["seat/wrench"] - noisy.measurements["seat/wrench"])) > 0.0
+    np.testing.assert_array_equal(known["trunk_imu/gyr"], noisy.measurements["trunk_imu/gyr"])
+    with pytest.raises(ValueError, match="the ride has no channel 'disk/gyr'"):
+        without_errors(noisy, unbiased=("disk/gyr",))
+    with pytest.raises(ValueError, match="ideal samples of 'wheel/speed' are not known"):
+        without_errors(noisy, exact=("wheel/speed",))
 
 
 def test_integration_from_the_truth_ignores_forces():
@@ -95,12 +98,6 @@ def test_exact_data_repeat():
         np.testing.assert_array_equal(array, again[name])
     with pytest.raises(ValueError, match="course must be"):
         draw_motion(np.random.default_rng(0), "hall", Errors())  # type: ignore[arg-type]
-
-
-def test_errors_count_from_a_time_on():
-    errors, time = np.ones((100, 4)), np.arange(100) * 0.1
-    assert rms_after(errors, time, 5.0) == [1.0] * 4
-    assert np.isnan(rms_after(errors, time, 50.0)).all()
 
 
 @pytest.mark.slow
