@@ -230,8 +230,10 @@ class ArrayRate(ArrayEquations, Recurrence):
         at = rate if self.variant == "sound" else roots
         J = printed_jacobian(xi, rate, roots) if self.variant == "printed" else roots_jacobian(at)
         B_C, B_CT = constant(self.array.B_C, x), constant(self.array.B_TC.T, x)
+        # C = J B_C Jᵀ and M = Δt J B_TCᵀ of the head of this file; ``known`` is Σ' + T
         C, JB, known = J @ B_C @ J.mT, J @ B_CT, xp.reshape(x[..., 3:12], (*x.shape[:-1], 3, 3))
         M = dt * JB
+        # w_i (2.48): least variance by axis, clipped to [0, 1]
         top = _diagonal_of(C) - 0.5 * _diagonal_of(M)
         bottom = _diagonal_of(known - M + C)
         moving = xp.greater(xp.sum(at * at, axis=-1)[..., None], SLOWEST**2)
@@ -239,6 +241,7 @@ class ArrayRate(ArrayEquations, Recurrence):
         one = 1.0 + 0.0 * rate
         weights = xp.where(usable, top / xp.where(usable, bottom, one), one)
         weights = xp.minimum(xp.maximum(weights, 0.0 * one), one)
+        # Σ (2.44) of the mean with these weights, and S for the next sample
         w, v = weights[..., :, None], 1.0 - weights[..., :, None]
         crossed = 0.5 * v * M * w.mT
         covariance = w * known * w.mT + crossed + crossed.mT + v * C * v.mT

@@ -16,8 +16,8 @@ from typing import Literal
 
 import numpy as np
 
-from ....filters.bicycle.force_inertial.axes import DOWN, UP_THE_TRUNK
 from ....filters.bicycle.force_inertial.filter import ForceInertial
+from ....filters.bicycle.force_inertial.kinematics import DOWN, UP_THE_TRUNK
 from ....filters.core import rotation
 from ..signals import DEG, STEP, Function, Waves, derivative, gauss_markov, second_derivative
 

@@ -14,9 +14,9 @@ import numpy as np
 from ....envs.bicycle.sensors.measured_geometry import measured
 from ....envs.data.trajectory import Trajectory
 from ....filters.analysis.bounds import posterior_bound
-from ....filters.bicycle.force_inertial.axes import true_angles
 from ....filters.bicycle.force_inertial.filter import ForceInertial
 from ....filters.bicycle.force_inertial.integration import ForceInertialIntegration
+from ....filters.bicycle.force_inertial.kinematics import true_angles
 from ....filters.bicycle.geometry import RiderGeometry
 from ....filters.core.quantity import Estimate
 from ...plots import TRUTH_COLOR, legend_above, new_figure

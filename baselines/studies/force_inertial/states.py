@@ -7,9 +7,8 @@ from collections.abc import Mapping
 import numpy as np
 from scipy.signal import lfilter
 
-from ....filters.bicycle.force_inertial.axes import UP_THE_TRUNK
 from ....filters.bicycle.force_inertial.filter import ForceInertial
-from ....filters.bicycle.force_inertial.kinematics import Angles, rates
+from ....filters.bicycle.force_inertial.kinematics import UP_THE_TRUNK, Angles, rates
 from ....filters.bicycle.force_inertial.readings import Readings, readings, steering
 from ....filters.core.kalman import KalmanFilter
 

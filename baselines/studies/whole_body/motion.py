@@ -15,8 +15,8 @@ import numpy as np
 
 from ....envs.data.trajectory import Trajectory
 from ....filters.bicycle.geometry import RiderGeometry
+from ....filters.bicycle.whole_body.constraints import hip_angles, limb_frame, shoulder_angles
 from ....filters.bicycle.whole_body.linkage import SIDES, SIGNS, RiderLinkage, paper_axes, seat_moments
-from ....filters.bicycle.whole_body.start import hip_angles, limb_frame, shoulder_angles
 from ....filters.core import rotation
 from ..signals import DEG, Waves, derivative, second_derivative
 

@@ -12,9 +12,9 @@ from ....envs.bicycle.sensors.measured_geometry import measured
 from ....envs.data.trajectory import Trajectory
 from ....filters.analysis.bounds import posterior_bound
 from ....filters.bicycle.geometry import RiderGeometry
+from ....filters.bicycle.whole_body.constraints import limb_frame, shoulder_angles
 from ....filters.bicycle.whole_body.filter import WholeBody
 from ....filters.bicycle.whole_body.linkage import ERROR_SIZE, HIP, ROLL, SHOULDER, SIDES, SIGNS, TRUNK, true_angles
-from ....filters.bicycle.whole_body.start import limb_frame, shoulder_angles
 from ....filters.core import rotation
 from ....filters.core.kalman import KalmanFilter
 from ..kit import Study

@@ -218,6 +218,7 @@ class ArrayOrientation(ArrayEquations, Model):
         dt, dt2 = expand(self.dt, 1), expand(self.dt, 2)
         unit = constant(UNIT, x) + 0.0 * Q
         none = 0.0 * unit
+        # q_i ← Φ q_i (5.26): the rows of Q turn back with the body
         turn = dt * rate
         back = exp_matrix(-turn) if self.exact_rotation else unit - skew(turn)
         turned = Q @ back.mT
@@ -229,10 +230,12 @@ class ArrayOrientation(ArrayEquations, Model):
         else:
             lever = [skew(Q[..., row, :]) for row in range(3)]
         lever = [expand(self.coupling_sign * self.dt, 2) * block for block in lever]
+        # F (5.28), (5.29): Φ on the diagonal and ∂q_i⁺/∂ω = Δt [q_i]× for each row; α stays, ω gains Δt α
         F = block_matrix(
             [[*(back if row == column else none for column in range(3)), none, lever[row]] for row in range(3)]
             + [[none, none, none, unit, none], [none, none, none, dt2 * unit, unit]],
         )
+        # V = J σ_γ² Jᵀ with J = [0 0 0 Δt ½Δt²]ᵀ: white jerk γ drives α and ω
         power = expand(self.jerk_deviation**2, 2) * unit
         jerk = [none, none, none, expand(self.dt, 2) * unit, expand(0.5 * self.dt**2, 2) * unit]
         V = block_matrix([[a @ power @ b for b in jerk] for a in jerk])
@@ -246,7 +249,7 @@ class ArrayOrientation(ArrayEquations, Model):
         none, zero3 = 0.0 * unit, 0.0 * x[..., :3]
         r, H, R = [], [], []
         if self.method != "integration":
-            # in place order: array, gyroscope, magnetometer, zeros
+            # array (5.30): G A_P q₃ + A_T α + A_C ξ(ω); its covariance holds σ_b, shared by all accelerometers
             P, T, C = (constant(matrix, x) for matrix in (self.geometry.A_P, self.geometry.A_T, self.geometry.A_C))
             gravity = expand(self.gravity_sign * self.gravity, 2)
             rate = x[..., 12:15]
@@ -258,10 +261,12 @@ class ArrayOrientation(ArrayEquations, Model):
             shared = 0.0 if self.method == "tilt" else expand(self.acceleration_deviation**2, 2)
             R.append(shared * (P @ P.mT) + expand(self.array_deviation**2, 2) * identity)
         if self.has_rate_rows:
+            # gyroscope: ω
             r.append(z["imu/gyr"] - x[..., 12:15])
             H.append([none, none, none, none, unit])
             R.append(expand(self.gyroscope_deviation**2, 2) * unit)
         if self.method != "integration":
+            # magnetometer (5.23): R_BOᵀ Qᵀ m, linear in each row of Q
             field, there = known(z["imu/mag"])
             to_sensor = to_matrix(self._vector(self.magnetometer_mounting, x)).mT + 0.0 * unit
             world = x[..., 15:18]
@@ -269,6 +274,7 @@ class ArrayOrientation(ArrayEquations, Model):
             r.append(xp.where(there, normalize(field), xp.nan + zero3) - expected[..., 0])
             H.append([*(world[..., i, None, None] * to_sensor for i in range(3)), none, none])
             R.append(expand(self.magnetometer_deviation**2, 2) * unit)
+        # orthogonality (5.31), (5.32): six zeros
         zeros, jacobian = _orthogonality(xp, x)
         r.append(-zeros)
         six = constant(np.eye(6), x) + 0.0 * x[..., :1, None]
@@ -288,6 +294,7 @@ class ArrayOrientation(ArrayEquations, Model):
         readings = z[self.readings.name]
         there = xp.all(xp.isfinite(readings), axis=-1)[..., None]
         readings = xp.where(there, readings, xp.zeros_like(readings))
+        # readings less what turning adds, averaged to the specific force at the reference point; less gravity: b̈
         T, C, mean = (constant(matrix, x) for matrix in (self.geometry.A_T, self.geometry.A_C, self._mean))
         turning = T @ x[..., 9:12, None] + C @ products(x[..., 12:15])[..., None]
         force = (mean @ (readings[..., None] - turning))[..., 0]

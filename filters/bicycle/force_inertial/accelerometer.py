@@ -5,7 +5,7 @@ with z down is (0, 0, −g) level and at rest.
 
 The corrected forms are exact. They are an option, because gravity cancels when (8) feeds the torque model (9): the
 predicted torque then depends on the state only through 1 − h_h/h of gravity, h_h and h being the heights of the trunk's
-centre and of its accelerometer. With h ≤ h_h the torque tells nothing, or the wrong way.
+centre and of its accelerometer. With h ≤ h_h the torque holds no information on the pose, or of the wrong sign.
 
 As printed, (5)–(8) lack the lateral acceleration v_b ψ̇ of the rear contact, have +g although z points down, the
 opposite sign of every p_z, ω̇ without its y entry ψ̇ φ̇_b, φ̈_b = 0, no turn of the accelerometer's axes by φ, and a
@@ -46,6 +46,7 @@ def yaw_acceleration(
     if printed:
         spurious = p_x * s_b * rate.psi * rate.phi_b
         return (a_by - s_b * gravity - p_z * s_b * c_b * squared - spurious) / (p_x * c_b)
+    # a_by = c_b v_b ψ̇ + p_x c_b ψ̈ + p_z φ̈_b − p_z s_b c_b ψ̇² − s_b g (6), solved for ψ̈
     kept = p_z * s_b * c_b * squared - p_z * roll_acceleration
     return (a_by + s_b * gravity - c_b * travel.speed * rate.psi + kept) / (p_x * c_b)
 
@@ -80,6 +81,7 @@ def accelerometer_accelerations(
     s_h, c_h = sin(angles.phi_h), cos(angles.phi_h)
     s_t, c_t = sin(angles.theta), cos(angles.theta)
     s_p, c_p = sin(angles.phi), cos(angles.phi)
+    # specific force of the pivot (5), (6), from which that of the trunk's accelerometer differs by what the trunk does
     if printed:
         roll_acceleration = 0.0 * roll_acceleration
     yaw = yaw_acceleration(a_by, angles.phi_b, rate, roll_acceleration, travel, (p_x, p_z), gravity, printed)
@@ -93,10 +95,12 @@ def accelerometer_accelerations(
         lean = lean - cotangent * rate.phi_h * rate.theta
         pitch = (2.0 * c_t * c_t - 1.0) * c_h * rate.phi_h * rate.psi
     else:
+        # the sample in axes before the spin φ
         a_y, a_z = c_p * a_h[1] - s_p * a_h[2], s_p * a_h[1] + c_p * a_h[2]
         seat_z = seat_z - gravity
         lean = 2.0 * c_h * rate.psi * rate.theta - 2.0 * cotangent * rate.phi_h * rate.theta
         pitch = -2.0 * c_h * s_t * s_t * rate.phi_h * rate.psi
+    # (8): acceleration of the sensor against the pivot over h, then Coriolis, centripetal and yaw terms
     return Accelerations(
         (a_y - c_h * seat_y - s_h * seat_z) / (s_t * h) + s_h * c_h * squared + lean - c_h * cotangent * yaw,
         (-a_z + s_t * seat_x - c_t * s_h * seat_y + c_h * c_t * seat_z) / h

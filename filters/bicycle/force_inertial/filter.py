@@ -1,8 +1,8 @@
 r"""Rider's trunk and bicycle's roll from two inertial units, the seat's forces and the handlebar's.
 
 Y. Zhang, K. Chen, J. Yi, "Rider Trunk and Bicycle Pose Estimation With Fusion of Force/Inertial Sensors", IEEE
-Transactions on Biomedical Engineering 60, 2013, doi 10.1109/TBME.2013.2260339. Equation numbers are the paper's; frames
-and letters are in :mod:`.force_inertial.kinematics`, the change of axes in :mod:`.force_inertial.axes`.
+Transactions on Biomedical Engineering 60, 2013, doi 10.1109/TBME.2013.2260339. Equation numbers are the paper's;
+frames, axes and letters are in :mod:`.force_inertial.kinematics`.
 
     X = [φ_h θ φ φ_b b]                trunk X-Y-X angles, roll of the bicycle, bias of the trunk's gyroscope
     Ẋ = f(X, ω_h − b, ω_b)             (3), (4), (15), one Euler step a sample (16)
@@ -43,7 +43,6 @@ from ...core.quantity import Channel, Measurement, Quantity
 from ...core.rotation import wrap
 from ..parameter_matrices import diagonal
 from .accelerometer import accelerometer_accelerations
-from .axes import down, from_trunk, up_the_trunk
 from .forces import Needed, apparent_vertical, in_bicycle, needed_load, pedal_moment
 from .kinematics import (
     Accelerations,
@@ -51,10 +50,13 @@ from .kinematics import (
     Rates,
     Travel,
     Triple,
+    down,
+    from_trunk,
     gyroscope_accelerations,
     rate_jacobians,
     rates,
     triple,
+    up_the_trunk,
 )
 from .parameters import CHANNELS, ForceInertialParameters
 from .readings import Readings, readings, static_angles, steering
@@ -94,7 +96,7 @@ class ForceInertial(ForceInertialParameters, Model):
     jacobian: Literal["full", "partial"] = "full"
     """H of the whole residual, or with rates, accelerations and readings held fixed as in (21)"""
     bias_model: bool = True
-    """estimate the bias; without, it stays zero"""
+    """estimate the bias; without this it stays zero"""
     gyroscope_sample: Literal["current", "previous"] = "current"
     """which sample drives (16): ``previous`` as printed; ``current`` for samples that describe the interval they end"""
 
@@ -107,7 +109,7 @@ class ForceInertial(ForceInertialParameters, Model):
         "process": Gain("gyroscope_noise", description="process variance of the angles, from the gyroscopes"),
         "bias": Gain("bias_deviation", description="process variance of the gyroscope bias"),
         "torque": Gain("torque_noise", description="measurement variance of the two torques"),
-        "roll": Gain("roll_noise", description="measurement variance of the roll that the seat's force tells"),
+        "roll": Gain("roll_noise", description="measurement variance of the roll from the seat's force"),
         "shoulder": Gain("shoulder_noise", description="variance of the shoulders' tilt"),
     }
 
@@ -116,7 +118,7 @@ class ForceInertial(ForceInertialParameters, Model):
         """The paper's rider: a point mass that turns about a point of the seat (table I; the rest is not published)."""
         return cls(**(PUBLISHED | parameters))
 
-    # ---- the recursion's four questions ------------------------------------------------------------------------------
+    # ---- the model ------------------------------------------------------------------------------------------------
 
     def prior(self, z: Measurement) -> tuple[Array, Array]:
         """Angles from the static torque and the apparent vertical (v_b ψ̇ known), zero bias."""
@@ -126,10 +128,11 @@ class ForceInertial(ForceInertialParameters, Model):
         s_a, c_a = sin(self.imu_tilt), cos(self.imu_tilt)
         gyroscope = down(omega_b)
         yaw = c_a * gyroscope[2] - s_a * gyroscope[0]
+        # the angles at which the trunk, at rest in a steady turn, needs what was read
         steer = steering(self, speed[..., 0], yaw)
         phi_h, theta, phi, phi_b = static_angles(self, self._readings(z, steer), speed[..., 0] * yaw)
         start = xp.stack([phi_h, theta, phi, phi_b], axis=-1)
-        # nothing is said before every channel brought a sample
+        # NaN until every channel has had a valid sample
         start = start + 0.0 * xp.sum(z["seat/load_cells"], axis=-1, keepdims=True)
         none = 0.0 * omega_h
         memory = [omega_h, omega_b, speed, none, none, 0.0 * speed, z["trunk_imu/acc"], z["bicycle_imu/acc"]]
@@ -147,13 +150,16 @@ class ForceInertial(ForceInertialParameters, Model):
         omega_b = down(used["bicycle_imu/gyr"])
         angles = Angles(*(x[..., index] for index in range(4)))
         rate = rates(angles, omega_h, omega_b, self.imu_tilt)
+        # Euler step (16) of the four angles; the bias decays with τ (15)
         moved = [angle + dt * change for angle, change in zip(angles, rate[:4], strict=True)]
         decay = (1.0 - dt / self.bias_time) if self.bias_model else 1.0
+        # F = I + ΔT F_X (20): rows of the angles, then those of the bias
         F_X, G = rate_jacobians(angles, omega_h, omega_b, self.imu_tilt, printed=self.form == "printed")
         zero = 0.0 * x[..., 0]
         unit = [[float(row == column) for column in range(7)] for row in range(7)]
         upper = rows([[unit[row][column] + dt * F_X[..., row, column] for column in range(7)] for row in range(4)])
         lower = rows([[zero + (decay if row == column else 0.0) for column in range(7)] for row in range(4, 7)])
+        # Q: ΔT² G Σ_ω Gᵀ of the angles, 2σ² ΔT/τ of the bias
         scale = (dt * self.gyroscope_noise) * (dt * self.gyroscope_noise)
         spread = G @ G.mT
         drift = 2.0 * self.bias_deviation * self.bias_deviation * dt / self.bias_time if self.bias_model else 0.0
@@ -178,6 +184,7 @@ class ForceInertial(ForceInertialParameters, Model):
         parts = variables(x[..., :7])
         angles = Angles(*parts[:4])
         whole = self.jacobian == "full"
+        # q̇ and q̈ of the state, and what they need of seat and hands (9)
         rate, acceleration, axial = self._motion(x, angles if whole else Angles(*map(value, angles)), parts[4:7], whole)
         needed = self._needed(x, angles, rate, acceleration, axial)
         known, z = self._known_forces(z)
@@ -185,17 +192,20 @@ class ForceInertial(ForceInertialParameters, Model):
         delta = angles.phi_b - angles.phi_h
         if not whole:
             delta = value(delta)
+        # moment about the pivot (11), (12), with that of the pedals, which carry what seat and hands do not
         N_x, N_y, N_z = read.moment
         load = in_bicycle(needed.force, angles.phi_b if whole else value(angles.phi_b))
         down = -1.0 * (read.whole[2] + load[2])
         N_y = N_y + self.pedal_share * pedal_moment(down if whole else value(down), self.pedals())
         tau_theta = cos(delta) * N_y - sin(delta) * N_z if self.torque_reading == "exact" else N_y / cos(delta)
+        # (13): direction of the seat's force, and φ_c, the apparent vertical
         if self.roll_model == "apparent-vertical":
             # along z the seat carries the load less what the pedals take
             z_B = (1.0 - self.pedal_share) * read.whole[2] - self.pedal_share * load[2]
             roll = atan2(read.whole[1], z_B) - angles.phi_b + apparent_vertical(needed.force)
         else:
             roll = atan2(read.seat[1], read.seat[2]) - angles.phi_b
+        # (17): tilt of the shoulders, and how far the chest is turned from straight ahead
         s_h, c_h = sin(angles.phi_h), cos(angles.phi_h)
         s_p, c_p, c_t = sin(angles.phi), cos(angles.phi), cos(angles.theta)
         turn = angles.phi_b - angles.phi_h
@@ -238,7 +248,7 @@ class ForceInertial(ForceInertialParameters, Model):
         return readings(self, z, steer, self.handlebar_load, printed=self.torque_reading == "printed")
 
     def _known_forces(self, z: Measurement) -> tuple[Any, Measurement]:
-        """Whether seat and hands brought samples, and the samples with something finite where they did not."""
+        """Whether seat and hands have valid samples, and the samples with something finite where they have not."""
         xp = namespace(z["seat/wrench"])
         names = ("seat/wrench", "handlebar/force")
         known = [xp.all(xp.isfinite(z[name]), axis=-1) for name in names]
@@ -250,7 +260,7 @@ class ForceInertial(ForceInertialParameters, Model):
         return xp.logical_and(*known), {**z, **whole}
 
     def _remember(self, x: Array, z: Measurement, previous: Measurement) -> Array:
-        """The inputs of this tick and their low-passed backward differences."""
+        """The inputs of this sample and their low-passed backward differences."""
         xp = namespace(x)
         fast = self.dt / (self.dt + self.gyroscope_filter)
         slow = self.dt / (self.dt + self.speed_filter)

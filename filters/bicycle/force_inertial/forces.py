@@ -86,6 +86,7 @@ def needed_load(
         masses: what sits on the seat.
         gravity: m/s²; all rates and accelerations zero give the static model.
     """
+    # the trunk's centre of mass, h_h up the trunk from the pivot: its specific force, times m_h
     l_s, h_s = pivot
     s_h, c_h = sin(angles.phi_h), cos(angles.phi_h)
     u = trunk_axis(angles)
@@ -93,13 +94,15 @@ def needed_load(
     base = point_acceleration(l_s, h_s, angles.phi_b, rate, acceleration, travel)
     a_x, a_y, a_z = (a + masses.height * b for a, b in zip(base, second, strict=True))
     force = (masses.trunk * a_x, masses.trunk * a_y, masses.trunk * (a_z - gravity))
-    # the moment of the point mass and I_t u × ü have the same arm
+    # (9): h_h u × force; I_t u × ü has the same arm u
     along_u = tuple(masses.height * f + masses.across * b for f, b in zip(force, second, strict=True))
     tau_x, tau_y = _turned(u, (along_u[0], along_u[1], along_u[2]), s_h, c_h)
+    # the spin's angular momentum I_a ω_a u: its derivative is I_a (ω_a u̇ + ω̇_a u)
     tau_x = tau_x + masses.along * (axial_rate * first[0] + acceleration.axial * u[0])
     # u itself is perpendicular to y'
     tau_y = tau_y + masses.along * axial_rate * (c_h * first[1] + s_h * first[2])
     s_b, c_b = sin(angles.phi_b), cos(angles.phi_b)
+    # what else is carried turns with the bicycle: the moment of its specific force about the pivot
     forward, up = masses.carried_forward, masses.carried_up
     c_x, c_y, c_z = point_acceleration(l_s + forward, h_s + up, angles.phi_b, rate, acceleration, travel)
     load = (masses.carried * c_x, masses.carried * c_y, masses.carried * (c_z - gravity))
@@ -114,6 +117,7 @@ def apparent_vertical(force: Triple) -> Scalar:
 
 def in_bicycle(force: Triple, phi_b: Scalar) -> Triple:
     """A vector of R in the axes of the bicycle."""
+    # R_x(−φ_b)
     s_b, c_b = sin(phi_b), cos(phi_b)
     return force[0], c_b * force[1] + s_b * force[2], c_b * force[2] - s_b * force[1]
 
@@ -177,6 +181,7 @@ def seat_load(
         R_h and M_h.
     """
     force, moment = wrench
+    # R_y(γ) turns the sensor's axes into the bicycle's; then the moment is shifted from the sensor to the point
     s_g, c_g = sin(sensors.post_tilt), cos(sensors.post_tilt)
     R = (c_g * force[0] + s_g * force[2], force[1], c_g * force[2] - s_g * force[0])
     T = (c_g * moment[0] + s_g * moment[2], moment[1], c_g * moment[2] - s_g * moment[0])

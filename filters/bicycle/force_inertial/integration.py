@@ -15,9 +15,8 @@ from ...core.backend import Array, namespace
 from ...core.model import Recurrence
 from ...core.quantity import Channel, Measurement, Quantity
 from ...core.rotation import wrap
-from .axes import down, up_the_trunk
 from .filter import ROLL, THETA_LIMIT, TRUNK_ANGLES
-from .kinematics import Angles, rates
+from .kinematics import Angles, down, rates, up_the_trunk
 from .parameters import CHANNELS, ForceInertialParameters
 from .readings import readings, static_angles, steering
 

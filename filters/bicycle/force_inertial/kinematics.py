@@ -5,6 +5,9 @@ Transactions on Biomedical Engineering 60, 2013, doi 10.1109/TBME.2013.2260339. 
 the rear contact, x forward along the contact line, y right, **z down**, and turns by ψ; the bicycle is B = R Rx(φ_b),
 its IMU B Ry(α), the trunk R Rx(φ_h) Ry(θ) Rx(φ), whose **x axis points up the trunk**: θ = 90° is upright.
 
+This package's axes are x forward, y left, z up, and z up the trunk; either change of axes is a half turn
+(:data:`DOWN`, :data:`UP_THE_TRUNK`), so going back is the same function.
+
 Everything takes and gives scalars: arrays ``(...)`` or :class:`.Dual`. SI units, rad.
 
 Differs from the publication: (7) and (8) are an option, with and without their errors (:mod:`.accelerometer`). The
@@ -13,12 +16,35 @@ default differentiates the gyroscopes, which is exact, holds no gravity and divi
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from ...analysis.forward_mode import Scalar, cos, sin
-from ...core.backend import Array, rows
+from ...core import rotation
+from ...core.backend import Array, namespace, rows
 
 Triple = tuple[Scalar, Scalar, Scalar]
+DOWN = np.diag([1.0, -1.0, -1.0])
+"""A vector of the bicycle from this package's axes to the paper's."""
+UP_THE_TRUNK = np.array([[0.0, 0.0, 1.0], [0.0, -1.0, 0.0], [1.0, 0.0, 0.0]])
+"""A vector of the trunk from this package's axes to the paper's."""
+
+
+def down(v: Array) -> Triple:
+    """A vector ``(..., 3)`` of the bicycle, its IMU or its seat in the paper's axes."""
+    return v[..., 0], -v[..., 1], -v[..., 2]
+
+
+def up_the_trunk(v: Array) -> Triple:
+    """A vector ``(..., 3)`` of the trunk in the paper's axes."""
+    return v[..., 2], -v[..., 1], v[..., 0]
+
+
+def from_trunk(x: Scalar, y: Scalar, z: Scalar) -> Array:
+    """A vector in the paper's trunk axes in this package's ``(..., 3)``."""
+    return namespace(x).stack([z, -y, x], axis=-1)
 
 
 class Angles(NamedTuple):
@@ -45,7 +71,7 @@ class Rates(NamedTuple):
 
 
 class Accelerations(NamedTuple):
-    """Second derivatives, rad/s²; the trunk's spin is told by its rate about its own axis."""
+    """Second derivatives, rad/s²; the trunk's spin enters by its rate about its own axis."""
 
     phi_h: Scalar
     theta: Scalar
@@ -78,10 +104,12 @@ def rates(angles: Angles, omega_h: Triple, omega_b: Triple, alpha: Scalar) -> Ra
         omega_b: bicycle's angular rate in the axes of its IMU.
         alpha: tilt of that IMU, nose up.
     """
+    # yaw rate Ω from the bicycle's gyroscope (3)
     s_phi, c_phi = sin(angles.phi), cos(angles.phi)
     s_theta, c_theta = sin(angles.theta), cos(angles.theta)
     s_a, c_a = sin(alpha), cos(alpha)
     yaw = (-s_a * omega_b[0] + c_a * omega_b[2]) / cos(angles.phi_b)
+    # the trunk's rates in its axes before the spin φ, ω'_y and ω'_z (4)
     y, z = c_phi * omega_h[1] - s_phi * omega_h[2], s_phi * omega_h[1] + c_phi * omega_h[2]
     c_lean = cos(angles.phi_h)
     return Rates(
@@ -111,10 +139,13 @@ def gyroscope_accelerations(
     s_p, c_p = sin(angles.phi), cos(angles.phi)
     s_a, c_a = sin(alpha), cos(alpha)
     s_b, c_b = sin(angles.phi_b), cos(angles.phi_b)
+    # ψ̈: derivative of (3), with that of 1 / cos φ_b
     yaw = (-s_a * turn_b[0] + c_a * turn_b[2]) / c_b + rate.psi * rate.phi_b * s_b / c_b
+    # ω'_y, ω'_z and their derivatives, in axes that turn back by φ̇
     y, z = c_p * omega_h[1] - s_p * omega_h[2], s_p * omega_h[1] + c_p * omega_h[2]
     turn_y = c_p * turn_h[1] - s_p * turn_h[2] - rate.phi * z
     turn_z = s_p * turn_h[1] + c_p * turn_h[2] + rate.phi * y
+    # φ̈_h: derivative of s_θ φ̇_h = ω'_z − c_θ c_φh ψ̇, divided by s_θ
     lean = (
         turn_z
         + s_t * c_h * rate.theta * rate.psi
@@ -145,6 +176,8 @@ def point_acceleration(
     """
     s_b, c_b = sin(phi_b), cos(phi_b)
     squared = rate.psi * rate.psi
+    # x: v̇_b, Euler, Coriolis and centripetal term of the yaw; y: v_b ψ̇, Euler and centripetal terms of yaw and roll;
+    # z: those of the roll
     return (
         travel.acceleration - h * s_b * acceleration.psi - 2.0 * h * c_b * rate.phi_b * rate.psi - l * squared,
         travel.speed * rate.psi
@@ -166,12 +199,13 @@ def axis_motion(angles: Angles, rate: Rates, acceleration: Accelerations) -> tup
     s_t, c_t = sin(angles.theta), cos(angles.theta)
     lean, pitch = rate.phi_h, rate.theta
     x, y, z = c_t, s_h * s_t, -c_h * s_t
-    # derivatives of the components, then those of the turning axes
+    # u = (c_θ, s_φh s_θ, −c_φh s_θ): first and second derivative of its components in R
     dx, dy, dz = -s_t * pitch, c_h * s_t * lean + s_h * c_t * pitch, s_h * s_t * lean - c_h * c_t * pitch
     both = lean * lean + pitch * pitch
     ddx = -s_t * acceleration.theta - c_t * pitch * pitch
     ddy = c_h * s_t * acceleration.phi_h + s_h * c_t * acceleration.theta + 2.0 * c_h * c_t * lean * pitch - y * both
     ddz = s_h * s_t * acceleration.phi_h - c_h * c_t * acceleration.theta + 2.0 * s_h * c_t * lean * pitch - z * both
+    # R turns by ψ̇ about z: u̇ + ψ̇ z × u, and ü + 2 ψ̇ z × u̇ + ψ̈ z × u − ψ̇² (u without its z)
     yaw, squared = rate.psi, rate.psi * rate.psi
     first = (dx - yaw * y, dy + yaw * x, dz)
     second = (
@@ -202,10 +236,12 @@ def rate_jacobians(
     s_p, c_p = sin(angles.phi), cos(angles.phi)
     s_a, c_a = sin(alpha), cos(alpha)
     s_b, c_b = sin(angles.phi_b), cos(angles.phi_b)
+    # κ = −c_φb ψ̇, and the trunk's rates ω'_y, ω'_z in its axes before the spin φ
     kappa = s_a * omega_b[0] - c_a * omega_b[2]
     y, z = c_p * omega_h[1] - s_p * omega_h[2], s_p * omega_h[1] + c_p * omega_h[2]
     rate = rates(angles, omega_h, omega_b, alpha)
     sign = 1.0 if printed else -1.0
+    # F_X of (20), columns φ_h, θ, φ, φ_b, b: derivatives of (4) for φ̇_h, θ̇ and φ̇; φ̇_b of (3) holds no state
     by_state: list[list[Any]] = [
         [
             -c_t * s_h * kappa / (s_t * c_b),
@@ -228,8 +264,9 @@ def rate_jacobians(
         ],
         [0.0] * 7,
     ]
-    # by the yaw rate, which the bicycle's gyroscope gives
+    # derivatives of φ̇_h, θ̇, φ̇ by the yaw rate ψ̇ = (−s_α ω_bx + c_α ω_bz) / c_φb of (3)
     by_yaw = (-c_t * c_h / s_t, -s_h, c_h / s_t)
+    # G, columns ω_h, ω_b: derivatives of (4) by the trunk's gyroscope, and through ψ̇ by the bicycle's
     by_rate: list[list[Any]] = [
         [*gyroscope, -by * s_a / c_b, 0.0, by * c_a / c_b]
         for gyroscope, by in zip(
@@ -238,6 +275,37 @@ def rate_jacobians(
             strict=True,
         )
     ]
+    # φ̇_b = c_α ω_bx + s_α ω_bz
     zero = 0.0 * angles.phi_h
     by_rate.append([0.0, 0.0, 0.0, c_a + zero, 0.0, s_a + zero])
     return rows(by_state), rows(by_rate)
+
+
+def true_angles(truth: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """The filter's own quantities from the environment's truth.
+
+    Args:
+        truth: with ``bicycle/orientation`` and ``trunk/orientation`` ``(T, 4)``, body to world.
+
+    Returns:
+        ``force-inertial/trunk_angles`` ``(T, 3)``: φ_h, θ, φ of the trunk against R, which is yawed with the bicycle
+        but not rolled, rad.
+
+    Raises:
+        ValueError: an orientation is missing.
+    """
+    for name in ("bicycle/orientation", "trunk/orientation"):
+        if name not in truth:
+            raise ValueError(f"the truth must hold {name!r}, got {sorted(truth)}")
+    bicycle, trunk = truth["bicycle/orientation"], truth["trunk/orientation"]
+    yaw = rotation.to_euler_zyx(bicycle)[0]
+    level = rotation.from_euler_zyx(yaw, 0.0 * yaw, 0.0 * yaw)
+    seen = rotation.to_matrix(rotation.multiply(rotation.conjugate(level), trunk))
+    M = DOWN @ seen @ UP_THE_TRUNK.T
+    # M = Rx(φ_h) Ry(θ) Rx(φ) with 0 < θ < π
+    angles = [
+        np.arctan2(M[..., 1, 0], -M[..., 2, 0]),
+        np.arctan2(np.hypot(M[..., 1, 0], M[..., 2, 0]), M[..., 0, 0]),
+        np.arctan2(M[..., 0, 1], M[..., 0, 2]),
+    ]
+    return {"force-inertial/trunk_angles": np.stack(angles, axis=-1)}

@@ -7,14 +7,13 @@ from typing import NamedTuple
 from ...analysis.forward_mode import Scalar, atan2, cos, sin
 from ...core.backend import Array, namespace
 from ...core.quantity import Measurement
-from .axes import down
 from .forces import centre_of_pressure, pedal_moment, seat_load, trunk_moment
-from .kinematics import Triple
+from .kinematics import Triple, down
 from .parameters import ForceInertialParameters
 
 
 class Readings(NamedTuple):
-    """What the force sensors say, axes of the bicycle with z down."""
+    """Readings of the force sensors, axes of the bicycle with z down."""
 
     moment: Triple
     """N, of seat and hands on the rider about the pivot, N·m"""
@@ -92,6 +91,7 @@ def static_angles(
     xp = namespace(lateral)
     gravity, scale = parameters.gravity, parameters.trunk_mass * parameters.trunk_height
     mass = parameters.trunk_mass + parameters.carried_mass
+    # roll from the direction of the seat's force (13) and of the apparent vertical atan(v_b ψ̇ / g)
     squared = lateral * lateral + gravity * gravity
     phi_b = xp.atan2(read.whole[1], read.whole[2] + 0.0 * lateral) + xp.atan2(lateral, gravity + 0.0 * lateral)
     s_b, c_b = sin(phi_b), cos(phi_b)
@@ -103,10 +103,12 @@ def static_angles(
     N_x = read.moment[0] - carried * up * f_y
     N_y = read.moment[1] + pedals + carried * forward * f_z
     N_z = read.moment[2] - carried * forward * f_y
+    # the trunk's moment in R
     M_y, M_z = c_b * N_y - s_b * N_z, s_b * N_y + c_b * N_z
     # u across f = (0, lateral, −gravity): f × N / (m_h h_h f²)
     cross = (lateral * M_z + gravity * M_y, -gravity * N_x, -lateral * N_x)
     across = [part / (scale * squared) for part in cross]
+    # the part of the unit vector u along f follows from its length; a moment that no trunk can have is shortened
     length = across[0] * across[0] + across[1] * across[1] + across[2] * across[2]
     one = 1.0 + 0.0 * length
     too_far = xp.greater(length, 0.95)

@@ -1,4 +1,4 @@
-"""Matrices of the whole-body filter by their parts: eight blocks of the error state, most of which do not meet."""
+"""Matrices of the whole-body filter by their parts: eight blocks of the error state, most of them decoupled."""
 
 from __future__ import annotations
 

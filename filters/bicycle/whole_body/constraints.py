@@ -1,4 +1,4 @@
-r"""What hands on the handlebar and feet on the pedals say about limbs: constraints C1–C3 and C5–C7, angles C4 and C8.
+r"""Constraints of limbs that end at handlebar and pedals: C1–C3 and C5–C7, angles C4 and C8, and the start from them.
 
 Whole-body paper, equations (11)–(19), in the paper's axes (x forward, y up, z to the right), vectors in the bicycle's
 axes. Long axes of limbs point to the proximal joint (ISB): an upper segment of length l ends at −l y from its joint.
@@ -11,10 +11,10 @@ asin(l_z sin γ / l_sp), which is 7° off at γ = 80°.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 from ...core.backend import Array, constant, expand, namespace
-from ...core.rotation import cross, euler_axes, euler_matrix, norm, skew
+from ...core.rotation import cross, euler_axes, euler_matrix, euler_yxy, euler_zxy, norm, normalize, skew
 
 
 class Limb(NamedTuple):
@@ -41,16 +41,19 @@ def arm(trunk: Array, shoulder: Array, pivot: Array, joint: Array, hand: Array, 
         lower: elbow to hand, m.
     """
     xp = namespace(trunk, shoulder)
+    # matrices to the bicycle's axes, and the axes about which the angles turn: d(R v) = −[R v]× J dΘ
     R, J = euler_matrix("zxy", trunk), euler_axes("zxy", trunk)
     RH, JH = R @ euler_matrix("yxy", shoulder), R @ euler_axes("yxy", shoulder)
     offset = (R @ joint[..., None])[..., 0]
     u = expand(-upper, 1) * RH[..., :, 1]
     z = RH[..., :, 2]
+    # f: from the hand to the elbow, whose length is the forearm's (C1)
     f = pivot + offset + u - hand
     normal = constant([0.0, 0.0, 1.0], trunk)
     du, dz = (-skew(u) @ JH, -skew(z) @ JH)
     by_joint = _gradients(f, u, z, normal, du, du, dz, upper, lower)
     du, dz = -skew(u) @ J, -skew(z) @ J
+    # the trunk carries the shoulder with it, its own joint does not
     df = du - skew(offset) @ J
     by_trunk = _gradients(f, u, z, normal, du, df, dz, upper, lower)
     return Limb(xp.stack(_values(f, u, z, normal, upper, lower), axis=-1), by_trunk, by_joint)
@@ -71,6 +74,7 @@ def leg(hip: Array, joint: Array, foot: Array, upper: float, lower: float, axis:
     R, J = euler_matrix("zxy", hip), euler_axes("zxy", hip)
     u = expand(-upper, 1) * R[..., :, 1]
     z = R[..., :, 2]
+    # f: from the pedal to the knee, whose length is that of shank and foot (C5)
     f = joint + u - foot
     normal = constant([1.0, 0.0, 0.0] if axis == "x" else [0.0, 1.0, 0.0], hip)
     du, dz = -skew(u) @ J, -skew(z) @ J
@@ -137,3 +141,64 @@ def knee_flexion(
     lower = xp.sqrt(sine * sine + cosine * cosine)
     turned = foot_length * ankle / lower if printed else xp.atan2(sine, cosine)
     return _bend(norm(joint - foot), upper, lower) + turned
+
+
+# ---- the start: inverse kinematics of limbs whose two ends are known ------------------------------------------------
+
+
+def limb_frame(
+    root: Array,
+    tip: Array,
+    upper: float,
+    lower: float,
+    outward: Array,
+    kind: Literal["arm", "leg"],
+    swivel: Array = 0.0,
+) -> tuple[Array, Array]:
+    """Frame of the upper segment and place of the hinge between the segments.
+
+    With D = |tip − root| and a along it, the hinge lies at root + l₁ (cos A a + sin A (cos σ e + sin σ a × e)), where
+    cos A = (l₁² + D² − l₂²) / (2 l₁ D) and e is the part of ``outward`` that is normal to a. A tip out of reach is
+    reached for with the straight limb.
+
+    Args:
+        root: ``(..., 3)`` proximal joint, m.
+        tip: ``(..., 3)`` hand or pedal, m.
+        upper: l₁, m.
+        lower: l₂ from hinge to tip, m.
+        outward: ``(..., 3)`` direction in which elbow or knee stands out.
+        kind: elbows and knees bend in opposite directions.
+        swivel: σ about the line from root to tip, rad.
+
+    Returns:
+        Matrix ``(..., 3, 3)``, segment to the frame of the arguments, and hinge ``(..., 3)``.
+    """
+    xp = namespace(root, tip)
+    line = tip - root
+    distance = norm(line)
+    a = line / distance
+    out = outward + 0.0 * a
+    e = normalize(out - a * xp.sum(a * out, axis=-1, keepdims=True))
+    b = cross(a, e)
+    upper1, lower1 = expand(upper, 1), expand(lower, 1)
+    cosine = (upper1 * upper1 + distance * distance - lower1 * lower1) / (2.0 * upper1 * distance)
+    most = 0.999 + 0.0 * cosine
+    cosine = xp.where(xp.greater(cosine, most), most, xp.where(xp.less(cosine, -most), -most, cosine))
+    sine = xp.sqrt(1.0 - cosine * cosine)
+    turn = expand(swivel, 1) + 0.0 * cosine
+    u = upper1 * (cosine * a + sine * (xp.cos(turn) * e + xp.sin(turn) * b))
+    hinge = root + u
+    y = -u / upper1
+    z = normalize(cross(u, tip - hinge))
+    z = z if kind == "arm" else -z
+    return xp.stack([cross(y, z), y, z], axis=-1), hinge
+
+
+def shoulder_angles(trunk: Array, frame: Array) -> Array:
+    """Y-X-Y angles Φ ``(..., 3)`` of an upper arm in the trunk, both given as matrices to the bicycle's frame."""
+    return euler_yxy(trunk.mT @ frame)
+
+
+def hip_angles(frame: Array) -> Array:
+    """Z-X-Y angles Ψ ``(..., 3)`` of a thigh, given as a matrix to the bicycle's frame."""
+    return euler_zxy(frame)

@@ -210,9 +210,11 @@ class WholeBody(RiderLinkage, Model):
             before = self.rates(previous)
             rates = {name: 0.5 * (now[name] + before[name]) for name in now}
         bicycle, trunk = rates["bicycle_imu/gyr"], rates["trunk_imu/gyr"]
+        # roll (2), block 0
         parts: dict[int, Array] = {0: x[..., ROLL] + expand(dt, 1) * bicycle[..., :1]}
         F: dict[tuple[int, int], Array] = {(0, 0): one[..., None]}
         Q: dict[tuple[int, int], Array] = {(0, 0): one[..., None] * expand(dt * self.bicycle_gyroscope_noise**2, 2)}
+        # Gauss–Markov processes (4)*, (7): ϑ̈ (block 1) and a_ts (block 3)
         memories = (
             (1, YAW_ACCELERATION, self.yaw_acceleration_time, self.yaw_acceleration_deviation),
             (3, RELATIVE_ACCELERATION, self.relative_acceleration_time, self.relative_acceleration_deviation),
@@ -223,6 +225,7 @@ class WholeBody(RiderLinkage, Model):
             F[index, index] = keep[..., None] * unit(x, part.stop - part.start)
             spread = expand(deviation**2, 2) * (1.0 - keep * keep)[..., None]
             Q[index, index] = spread * unit(x, part.stop - part.start)
+        # Euler angles of trunk (6), shoulders (10) and hips (15): blocks 2, 4 to 7, each against its parent
         steps: dict[int, Rates] = {}
         joints = [(2, "zxy", TRUNK, trunk, bicycle)]
         for side, (arm, leg) in zip(SIDES, ((4, 5), (6, 7)), strict=True):
@@ -236,6 +239,7 @@ class WholeBody(RiderLinkage, Model):
             M, G = steps[index].by_child, steps[index].by_parent
             own, its = ("trunk", "bicycle") if index == 2 else ("limb", "trunk" if index in (4, 6) else "bicycle")
             Q[index, index] = noise[own] * (M @ M.mT) + noise[its] * (G @ G.mT)
+        # the trunk's gyroscope is the child's of the trunk and the parent's of both arms: covariances between them
         for row, column in ((2, 4), (2, 6), (4, 6)):
             first = steps[row].by_child if row == 2 else steps[row].by_parent
             Q[row, column] = noise["trunk"] * (first @ steps[column].by_parent.mT)
@@ -245,7 +249,7 @@ class WholeBody(RiderLinkage, Model):
         return xp.concat([angles, memory], axis=-1), assemble(F, x), assemble(Q, x)
 
     def _remember(self, x: Array, z: Measurement, rate: Array) -> Array:
-        """Encoders, rate and its derivative, f, speed, shock: what the measurement equations need of held samples."""
+        """Encoders, rate and its derivative, f, speed, shock: last valid samples for the measurement equations."""
         xp = namespace(x)
         share = self.dt / (self.dt + self.difference_time)
         change = x[..., ACCELERATION_OF_RATE]
@@ -258,11 +262,12 @@ class WholeBody(RiderLinkage, Model):
         return xp.concat([z["steer/angle"], z["crank/angle"], rate, change, force, speed, shock], axis=-1)
 
     def residual(self, x: Array, z: Measurement) -> tuple[Array, Array, Array]:
-        """(3*), (8), (9*), C1–C3, C5–C7; a row whose samples are missing is NaN."""
+        """(3*), (8), (9*), C1–C3, C5–C7; a row whose samples are missing is NaN, and its update is skipped."""
         xp = namespace(x)
         zero = 0.0 * x[..., :1]
         bicycle = xp.all(xp.isfinite(z["bicycle_imu/acc"]), axis=-1)[..., None]
         rows: list[tuple[Array, dict[int, Array], Any]] = []
+        # (3*): lateral specific force of the bicycle's accelerometer
         calm = self._calm(x)
         expected, slope, by_change = self._lateral(x)
         rows.append(
@@ -272,6 +277,7 @@ class WholeBody(RiderLinkage, Model):
                 calm * expand(self.lateral_noise**2, 1),
             )
         )
+        # (8): the trunk's accelerometer reads R_BTᵀ (f + a_ts), three rows
         R, J = euler_matrix("zxy", x[..., TRUNK]), euler_axes("zxy", x[..., TRUNK])
         total = x[..., SEAT_FORCE] + x[..., RELATIVE_ACCELERATION]
         residual = paper_axes(z["trunk_imu/acc"]) - (R.mT @ total[..., None])[..., 0]
@@ -284,6 +290,7 @@ class WholeBody(RiderLinkage, Model):
                     calm * expand(self.trunk_noise**2, 1),
                 )
             )
+        # (9*): moment of the seat about the forward axis, from the rear load cells
         torque, by_trunk = self._torque(x, R, J)
         cells = z["seat/load_cells"]
         measured = 0.5 * self.cells_wide * (cells[..., 1:2] - cells[..., 2:3])
@@ -294,7 +301,8 @@ class WholeBody(RiderLinkage, Model):
                 calm * expand(self.torque_noise**2, 1),
             )
         )
-        rows += self._held(x, z)
+        # (11)–(17): C1–C3 of the arms, C5–C7 of the legs
+        rows += self._limb_rows(x, z)
         if self.usual_twist:
             difference = expand(self.twist_follow, 1) * x[..., STEER] - x[..., TRUNK][..., 2:]
             by_twist = constant([[0.0, 0.0, 1.0]], x) + 0.0 * x[..., :1, None]
@@ -321,8 +329,10 @@ class WholeBody(RiderLinkage, Model):
         rate = x[..., RATE][..., 1:2]
         gravity = self.gravity if self.lateral == "printed" else -self.gravity
         yaw = x[..., YAW_ACCELERATION]
+        # gravity, centripetal and Euler term of the yaw at the sensor
         expected = gravity * s - py * s / c * rate * rate - px * c * yaw
         if self.lateral == "corrected":
+            # the turn's own acceleration v ϑ̇ and the Euler term of the roll, which print lacks
             expected = expected - x[..., SPEED] * rate + py * x[..., ACCELERATION_OF_RATE][..., :1]
         return expected, gravity * c - py * rate * rate / (c * c) + px * s * yaw, -px * c
 
@@ -335,13 +345,14 @@ class WholeBody(RiderLinkage, Model):
             s, c = xp.sin(x[..., TRUNK]), xp.cos(x[..., TRUNK])
             weight, zero = turning[..., 1:2] * self.gravity, 0.0 * s[..., :1]
             return -weight * s[..., 1:2], xp.concat([zero, -weight * c[..., 1:2], zero], axis=-1)
+        # x component of (k_S + R_BT k_T) × f, of which the seat feels only a share of the sideways lean
         f, share = x[..., SEAT_FORCE], self.seat_share
         still = paper_axes(constant([*self.sitting_moment], x))
         torque = (still[..., 1] + k[..., 1]) * f[..., 2] - share * (still[..., 2] + k[..., 2]) * f[..., 1]
         dk = -skew(k) @ J
         return torque[..., None], f[..., 2:3] * dk[..., 1, :] - share * f[..., 1:2] * dk[..., 2, :]
 
-    def _held(self, x: Array, z: Measurement) -> list[tuple[Array, dict[int, Array], Any]]:
+    def _limb_rows(self, x: Array, z: Measurement) -> list[tuple[Array, dict[int, Array], Any]]:
         """Rows of the chosen constraints: right arm, right leg, left arm, left leg."""
         xp = namespace(x)
         deviations = (self.length_noise, self.hinge_noise, self.swivel_noise)

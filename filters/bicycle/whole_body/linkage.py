@@ -21,7 +21,6 @@ from ...core.quantity import Channel, Measurement, Quantity
 from ...core.rotation import elementary_matrix, euler_matrix, exp, rotate
 from ..geometry import ARM_MASS, Point, RiderEquations, RiderGeometry
 from . import constraints as limb_constraints
-from . import start as whole_body_start
 
 USUAL = RiderGeometry()
 SIDES = ("right", "left")
@@ -188,11 +187,11 @@ class RiderLinkage(RiderEquations):
                 + (R @ self.point(self.shoulder, side, steer)[..., None])[..., 0]
             )
             outward = constant([0.0, 0.0, -SIGNS[side]], steer)
-            frame, _ = whole_body_start.limb_frame(
+            frame, _ = limb_constraints.limb_frame(
                 root, self.hand(side, steer), self.upper_arm, self.forearm, outward, "arm"
             )
-            parts[f"shoulder_{side}"] = whole_body_start.shoulder_angles(R, frame)
-            frame, _ = whole_body_start.limb_frame(
+            parts[f"shoulder_{side}"] = limb_constraints.shoulder_angles(R, frame)
+            frame, _ = limb_constraints.limb_frame(
                 self.point(self.hip, side, steer) + zero,
                 self.pedal(side, crank),
                 self.thigh,
@@ -200,7 +199,7 @@ class RiderLinkage(RiderEquations):
                 constant([1.0, 0.0, 0.0], steer),
                 "leg",
             )
-            parts[f"hip_{side}"] = whole_body_start.hip_angles(frame)
+            parts[f"hip_{side}"] = limb_constraints.hip_angles(frame)
         limbs = [parts[f"{joint}_{side}"] for side in SIDES for joint in ("shoulder", "hip")]
         x = xp.concat([zero, zero, trunk, zero, zero, zero, *limbs, steer, crank], axis=-1)
         heard = xp.concat([z[name] for name in (*GYROSCOPES, "bicycle_imu/acc")], axis=-1)

@@ -41,6 +41,8 @@ def zxy_rates(angles: Array, child: Array, parent: Array) -> Rates:
     s, c = xp.sin(angles), xp.cos(angles)
     s1, s2, s3, c1, c2, c3 = (*(s[..., i] for i in range(3)), *(c[..., i] for i in range(3)))
     t2 = s2 / c2
+    # the child's rate turned back by the third angle (k about the first axis, n about the second), the parent's turned
+    # by the first (m, p); then ė of (6) and its derivatives by the angles, the child's rate (M) and the parent's (G)
     k, n = -s3 * child[..., 0] + c3 * child[..., 2], c3 * child[..., 0] + s3 * child[..., 2]
     m, p = s1 * parent[..., 0] - c1 * parent[..., 1], c1 * parent[..., 0] + s1 * parent[..., 1]
     rates = xp.stack([k / c2 - m * t2 - parent[..., 2], n - p, child[..., 1] - t2 * k + m / c2], axis=-1)
@@ -62,6 +64,7 @@ def yxy_rates(angles: Array, child: Array, parent: Array) -> Rates:
     s, c = xp.sin(angles), xp.cos(angles)
     s1, s2, s3, c1, c2, c3 = (*(s[..., i] for i in range(3)), *(c[..., i] for i in range(3)))
     cot = c2 / s2
+    # as above for Y-X-Y: k and n of the child's rate, m and p of the parent's; ė of (10) and its derivatives
     k, n = s3 * child[..., 0] - c3 * child[..., 2], c3 * child[..., 0] + s3 * child[..., 2]
     m, p = s1 * parent[..., 0] + c1 * parent[..., 2], c1 * parent[..., 0] - s1 * parent[..., 2]
     rates = xp.stack([k / s2 + m * cot - parent[..., 1], n - p, child[..., 1] - k * cot - m / s2], axis=-1)
@@ -97,6 +100,7 @@ def advance(sequence: str, angles: Array, child: Array, parent: Array, dt: float
     function = RATES[sequence]
     first = function(angles, child, parent)
     middle = function(angles + expand(0.5 * dt, 1) * first.rates, child, parent)
+    # derivative of e + Δt f(e + Δt/2 f(e)): 1 + Δt f'(middle) (1 + Δt/2 f'(e))
     unit = rows([[1.0 + 0.0 * angles[..., 0], 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
     half = unit + expand(0.5 * dt, 2) * first.by_angles
     return angles + expand(dt, 1) * middle.rates, unit + expand(dt, 2) * middle.by_angles @ half, middle

@@ -40,7 +40,7 @@ from poise.filters.bicycle.force_inertial.kinematics import (
     gyroscope_accelerations,
     rates,
 )
-from poise.filters.bicycle.force_inertial.rider import LEG_MASS, resting_leg, resting_legs
+from poise.filters.bicycle.force_inertial.parameters import LEG_MASS, resting_leg, resting_legs
 from poise.filters.bicycle.geometry import RiderGeometry
 from poise.filters.core import rotation
 

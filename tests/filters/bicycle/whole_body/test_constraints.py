@@ -9,8 +9,8 @@ from sympy import lambdify
 from sympy.physics.mechanics import Point, ReferenceFrame, dynamicsymbols
 
 from poise.filters.bicycle.whole_body import constraints as limb_constraints
+from poise.filters.bicycle.whole_body.constraints import hip_angles, limb_frame, shoulder_angles
 from poise.filters.bicycle.whole_body.linkage import RiderLinkage
-from poise.filters.bicycle.whole_body.start import hip_angles, limb_frame, shoulder_angles
 
 from .whole_body_cases import RIDER
 

@@ -7,9 +7,9 @@ import pytest
 
 from poise.baselines.studies.whole_body.motion import ExactRide
 from poise.filters.bicycle.whole_body import constraints as limb_constraints
+from poise.filters.bicycle.whole_body.constraints import hip_angles, limb_frame
 from poise.filters.bicycle.whole_body.linkage import RiderLinkage
 from poise.filters.bicycle.whole_body.rates import advance
-from poise.filters.bicycle.whole_body.start import hip_angles, limb_frame
 from poise.filters.core import rotation
 
 from .whole_body_cases import RIDER
