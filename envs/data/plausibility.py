@@ -1,0 +1,322 @@
+"""Whether a recording is what it claims to be: SI units, signs and axes of a right-handed sensor, time in seconds.
+
+An estimator cannot tell a wrong unit from a violent motion. Every check here compares a number with what physics and
+other channels allow, and names the mistake that explains the number best.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from ...filters.core import rotation
+from .rate_consistency import RateConsistency, rate_consistency
+from .trajectory import Trajectory
+
+GRAVITY = 9.80665
+PLAUSIBLE_FORCE = (7.0, 13.0)
+"""m/s²: median length of the specific force of anything that people or vehicles carry."""
+FORCE_UNITS = {
+    "g": 1.0,
+    "mg": 1e3,
+    "cm/s²": 100.0 * GRAVITY,
+    "ft/s²": GRAVITY / 0.3048,
+    "mm/s²": 1e3 * GRAVITY,
+    "counts of ±2 g in 16 bits": 16384.0,
+    "counts of ±4 g in 16 bits": 8192.0,
+    "counts of ±8 g in 16 bits": 4096.0,
+    "counts of ±16 g in 16 bits": 2048.0,
+}
+"""Unit → what an accelerometer at rest reports in it."""
+PLAUSIBLE_RATES = (5.0, 10_000.0)
+"""Hz."""
+FASTEST_TURN = 70.0
+"""rad/s (4,000 °/s): the largest range of the gyroscopes in use."""
+LARGEST_BIAS = 0.2
+"""rad/s (11 °/s): beyond what uncalibrated consumer gyroscopes show at rest."""
+REST_WINDOW = 100
+"""Samples; the quietest such window is taken for rest."""
+
+Severity = Literal["note", "warning"]
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing that is odd about a recording.
+
+    Attributes:
+        severity: ``warning`` if estimates will be wrong, ``note`` if it is only good to know.
+        channel: what it concerns: a channel, ``time``, or a quantity of the truth.
+        what: what was found, with the number.
+        cause: the likely cause.
+        remedy: what to do about it.
+    """
+
+    severity: Severity
+    channel: str
+    what: str
+    cause: str
+    remedy: str
+
+    def __str__(self) -> str:
+        return f"{self.channel}: {self.what}; likely cause: {self.cause}. {self.remedy}"
+
+
+def check_recording(trajectory: Trajectory) -> list[Finding]:
+    """Look for wrong units, signs, axes and clocks.
+
+    Args:
+        trajectory: any; every ``place/gyr``, ``place/acc`` and ``place/mag`` is looked at.
+
+    Returns:
+        Findings, warnings first; empty if nothing is odd.
+    """
+    findings = list(check_clock(trajectory))
+    wrong_clock = any(finding.severity == "warning" for finding in findings)
+    for place in places(trajectory):
+        findings += check_place(trajectory, place, wrong_clock)
+    findings += check_reference(trajectory)
+    return sorted(findings, key=lambda finding: finding.severity != "warning")
+
+
+def places(trajectory: Trajectory) -> list[str]:
+    """Mounting locations with an inertial sensor, ``imu`` of ``imu/gyr`` …, in order of appearance."""
+    found = (name.rpartition("/") for name in trajectory.measurements)
+    return list(dict.fromkeys(place for place, _, kind in found if kind in ("gyr", "acc", "mag") and place))
+
+
+def vectors(trajectory: Trajectory, channel: str) -> np.ndarray | None:
+    """Samples ``(T, 3)`` of a channel of three axes, or None."""
+    values = trajectory.measurements.get(channel)
+    return values if values is not None and values.shape[1] == 3 else None
+
+
+def check_clock(trajectory: Trajectory) -> Iterator[Finding]:
+    """Unit of time, gaps."""
+    if len(trajectory) < 2:
+        return
+    step = np.diff(trajectory.time)
+    interval = float(np.median(step))
+    rate = 1.0 / interval
+    if rate < PLAUSIBLE_RATES[0]:
+        whole = bool(np.all(np.abs(step - np.round(step)) < 1e-6 * interval))
+        units = {"sample numbers": 1.0} if whole and interval == 1.0 else {}
+        units |= {"ms": 1e3, "µs": 1e6, "ns": 1e9}
+        fitting = [unit for unit, scale in units.items() if unit == "sample numbers" or 15 <= scale * rate <= 4000]
+        cause = f"time in {' or '.join(fitting)}" if fitting else "a recording that is too slow for inertial sensors"
+        remedy = "Give time in seconds." if fitting else "Inertial estimates need 20 Hz or more."
+        yield Finding("warning", "time", f"{interval:.4g} s between samples ({rate:.3g} Hz)", cause, remedy)
+    elif rate > PLAUSIBLE_RATES[1]:
+        what = f"{rate:.3g} Hz"
+        yield Finding("warning", "time", what, "time in minutes, days or another unit", "Give time in seconds.")
+    else:
+        long = step[step > 1.0]
+        if len(long):
+            what = f"{len(long)} gaps of more than 1 s, the longest {long.max():.1f} s"
+            remedy = "Estimators predict through gaps; cut the recording if the motion in them matters."
+            yield Finding("note", "time", what, "lost rows, or a paused recorder", remedy)
+        lost = 1.0 - len(trajectory) * interval / (trajectory.time[-1] - trajectory.time[0] + interval)
+        if lost > 0.05 and not len(long):
+            remedy = "They are treated as missing samples."
+            yield Finding("note", "time", f"{100 * lost:.0f} % of the rows are missing", "lost packets", remedy)
+
+
+def check_place(trajectory: Trajectory, place: str, wrong_clock: bool) -> list[Finding]:
+    """All checks of one sensor."""
+    gyr, acc, mag = (vectors(trajectory, f"{place}/{kind}") for kind in ("gyr", "acc", "mag"))
+    findings: list[Finding] = []
+    for kind, values in (("gyr", gyr), ("acc", acc), ("mag", mag)):
+        if values is not None:
+            findings += check_alive(f"{place}/{kind}", values)
+    dead = {finding.channel for finding in findings if finding.severity == "warning"}
+    if acc is not None and f"{place}/acc" not in dead:
+        findings += check_force(f"{place}/acc", acc)
+    if gyr is not None and f"{place}/gyr" not in dead:
+        if not wrong_clock:
+            findings += check_rates(trajectory, place, gyr, acc, mag if f"{place}/mag" not in dead else None)
+        findings += check_rest(f"{place}/gyr", gyr, any(f.channel == f"{place}/gyr" for f in findings))
+    removed = any(f.channel == f"{place}/acc" and f.severity == "warning" for f in findings)
+    if acc is not None and not removed:
+        findings += check_sign(trajectory, f"{place}/acc", acc, mag if f"{place}/mag" not in dead else None)
+    return findings
+
+
+def check_alive(channel: str, values: np.ndarray) -> Iterator[Finding]:
+    """Zeros, constants, clipping, absent samples."""
+    present = np.isfinite(values).all(axis=1)
+    if not present.any():
+        yield Finding("warning", channel, "no sample at all", "a channel that was not recorded", "Leave it out.")
+        return
+    samples = values[present]
+    zero = float(np.mean(~samples.any(axis=1)))
+    still = len(samples) > 20 and bool((samples == samples[0]).all())
+    what = f"{100 * zero:.0f} % of the samples are 0, 0, 0"
+    if zero > 0.5:
+        yield Finding("warning", channel, what, "a sensor that was absent or off", "Leave the channel out.")
+    elif still:
+        remedy = "Leave the channel out."
+        yield Finding("warning", channel, f"always {samples[0].tolist()}", "a sensor that is off or stuck", remedy)
+    elif zero > 0.01 and not channel.endswith("gyr"):
+        yield Finding("note", channel, what, "drop-outs written as zeros", "They are treated as missing samples.")
+    else:
+        clipped = clipped_share(samples)
+        if clipped > 1e-3:
+            what = f"{100 * clipped:.1f} % of the samples stand at the extreme value {np.abs(samples).max():.4g}"
+            yield Finding("note", channel, what, "saturation of the sensor", "Choose a larger range of the sensor.")
+
+
+def clipped_share(samples: np.ndarray) -> float:
+    """Share of samples with a component at the largest magnitude of all, in runs of three or more."""
+    largest = np.abs(samples).max()
+    at_limit = np.abs(samples) >= (1.0 - 1e-4) * largest
+    runs = at_limit[2:] & at_limit[1:-1] & at_limit[:-2] & (samples[2:] != 0.0)
+    return float(runs.any(axis=1).mean()) if len(runs) else 0.0
+
+
+def check_force(channel: str, acc: np.ndarray) -> Iterator[Finding]:
+    """Unit of the accelerometer, and whether gravity is in it."""
+    samples = acc[np.isfinite(acc).all(axis=1) & acc.any(axis=1)]
+    length = np.linalg.norm(samples, axis=1)
+    usual = float(np.median(length))
+    if PLAUSIBLE_FORCE[0] <= usual <= PLAUSIBLE_FORCE[1]:
+        return
+    what = f"median length {usual:.4g} m/s²"
+    # Where the sensor is quiet it reads gravity, in whatever unit; without gravity it reads next to nothing.
+    rest = quietest(samples)
+    quiet = usual if rest is None else float(np.linalg.norm(rest.mean(axis=0)))
+    unit = min(FORCE_UNITS, key=lambda name: abs(np.log(usual / FORCE_UNITS[name])))
+    apart = max(abs(np.log(value / FORCE_UNITS[unit])) if value > 0.0 else np.inf for value in (usual, quiet))
+    if apart < 0.25:
+        factor = GRAVITY / FORCE_UNITS[unit]
+        yield Finding("warning", channel, what, f"readings in {unit}", f"Multiply by {factor:.6g}.")
+    elif usual < PLAUSIBLE_FORCE[0]:
+        remedy = "Export the raw acceleration (specific force), which is 9.81 m/s² at rest."
+        yield Finding("warning", channel, what, "gravity was removed (linear acceleration)", remedy)
+    else:
+        remedy = "Calibrate the sensor, or convert to m/s²."
+        yield Finding("warning", channel, what, "a scale error, or a unit other than m/s²", remedy)
+
+
+def check_rates(
+    trajectory: Trajectory, place: str, gyr: np.ndarray, acc: np.ndarray | None, mag: np.ndarray | None
+) -> Iterator[Finding]:
+    """Unit, signs and axes of the gyroscope, against the motion of gravity, of the field and of the truth."""
+    channel = f"{place}/gyr"
+    fastest = float(np.nanquantile(np.linalg.norm(gyr, axis=1), 0.99))
+    against = {"accelerometer": acc, "magnetometer": mag}
+    if place == "imu" and "orientation" in trajectory.truth:
+        against["reference"] = rotation.rotate_back(trajectory.truth["orientation"], np.array([0.6, 0.0, 0.8]))
+    found: dict[str, RateConsistency] = {}
+    for name, vector in against.items():
+        one = None if vector is None else rate_consistency(trajectory.time, gyr, vector)
+        if one is not None:
+            found[name] = one
+    decided = {name: one for name, one in found.items() if one.explains} or found
+    units = {name: one.other_unit for name, one in decided.items() if one.other_unit is not None}
+    if units:
+        unit = max(units.values(), key=list(units.values()).count)
+        what = f"the reported turns are not those of the {' and '.join(units)}"
+        yield Finding("warning", channel, what, f"rates in {unit}", "Convert to rad/s.")
+        return
+    if fastest > FASTEST_TURN:
+        what = f"rates up to {fastest:.4g} rad/s, {np.degrees(fastest):.0f} °/s"
+        yield Finding("warning", channel, what, "rates in deg/s, or raw counts", "Convert to rad/s.")
+        return
+    yield from check_axes(place, decided)
+
+
+def check_axes(place: str, found: dict[str, RateConsistency]) -> Iterator[Finding]:
+    """Name the channel whose axes contradict the others."""
+    odd = {name: one.other_axes for name, one in found.items() if one.other_axes is not None}
+    if not odd:
+        return
+    agreeing = [name for name in found if name not in odd]
+    name, axes = next(iter(odd.items()))
+    assert axes is not None
+    what = f"gyroscope and {' and '.join(odd)} do not turn together"
+    proper = float(np.linalg.det(axes)) > 0.0
+    of_gyroscope = f"of the gyroscope {axes_in_words(axes)}"
+    # A vector's own sign does not show: of the two arrangements that look alike, the one with fewer signs is meant.
+    of_vector = f"of the {name} {axes_in_words(min(axes, -axes, key=lambda m: int((m < 0.0).sum())))}"
+    if proper and agreeing:
+        channel = {"accelerometer": f"{place}/acc", "magnetometer": f"{place}/mag", "reference": "orientation"}[name]
+        cause = of_vector
+    else:
+        # No arrangement of a vector's axes looks like a left-handed gyroscope.
+        channel, cause = f"{place}/gyr", f"{of_gyroscope}, or {of_vector}" if proper else of_gyroscope
+    yield Finding("warning", channel, what, cause, "Check signs and order of the axes.")
+
+
+def axes_in_words(axes: np.ndarray) -> str:
+    """What a signed permutation does to x, y, z."""
+    if np.array_equal(axes, -np.eye(3)):
+        return "all signs are reversed (left-handed)"
+    if np.array_equal(np.abs(axes), np.eye(3)):
+        return f"the sign of {' and '.join('xyz'[i] for i in range(3) if axes[i, i] < 0.0)} is reversed"
+    terms = [("-" if row.sum() < 0.0 else "") + "xyz"[int(np.abs(row).argmax())] for row in axes]
+    return f"the axes x, y, z should be {', '.join(terms)}"
+
+
+def quietest(values: np.ndarray) -> np.ndarray | None:
+    """The samples of the window that varies least; None if there is no complete window."""
+    present = values[np.isfinite(values).all(axis=1)]
+    count = len(present) // REST_WINDOW
+    if count == 0:
+        return None
+    windows = present[: count * REST_WINDOW].reshape(count, REST_WINDOW, -1)
+    return windows[int(np.argmin(windows.var(axis=1).sum(axis=1)))]
+
+
+def check_rest(channel: str, gyr: np.ndarray, known: bool) -> Iterator[Finding]:
+    """Bias of the gyroscope where it rests."""
+    rest = quietest(gyr)
+    if rest is None or known:
+        return
+    bias, spread = float(np.linalg.norm(rest.mean(axis=0))), float(rest.std(axis=0).max())
+    if bias > LARGEST_BIAS and spread < 0.05 * bias:
+        what = f"{bias:.3g} rad/s ({np.degrees(bias):.1f} °/s) where it is steady"
+        cause = "rates in deg/s, or a gyroscope without calibration"
+        yield Finding("warning", channel, what, cause, "Convert to rad/s, or subtract the rates at rest.")
+
+
+def check_sign(trajectory: Trajectory, channel: str, acc: np.ndarray, mag: np.ndarray | None) -> Iterator[Finding]:
+    """Whether the accelerometer points up at rest (+g on an axis that points up), as a specific force does."""
+    apple = "the accelerometer has Apple's sign (it reports −g on an axis that points up)"
+    remedy = "Change the sign of all three axes."
+    length = np.linalg.norm(acc, axis=1)
+    direction = acc / np.where(length > 0.0, length, np.nan)[:, None]
+    if "up" in trajectory.quantities and channel == "imu/acc":
+        cosine = float(np.nanmedian((direction * trajectory.truth_of("up")).sum(axis=1)))
+        if cosine < -0.5:
+            what = f"it points down by the reference (cosine {cosine:.2f})"
+            yield Finding("warning", channel, what, apple, remedy)
+        elif cosine < 0.5:
+            what = f"it does not point up by the reference (cosine {cosine:.2f})"
+            cause = "a reference in another frame, or conjugate quaternions"
+            yield Finding("warning", "orientation", what, cause, "Check frame and order of the reference.")
+        return
+    usual = np.nanmedian(direction, axis=0)
+    size = float(np.nanmedian(length))
+    if usual[2] < -0.9:
+        cause = f"a sensor that is mounted upside down, or {apple}"
+        what = f"−{size:.2f} m/s² on z: the z axis points down"
+        yield Finding("warning", channel, what, cause, f"{remedy[:-1]} if the z axis points up.")
+    elif mag is not None:
+        field = mag / np.where(mag.any(axis=1), np.linalg.norm(mag, axis=1), np.nan)[:, None]
+        upwards = float(np.nanmedian((direction * field).sum(axis=1)))
+        if upwards > 0.3:
+            cause = f"a recording south of the equator, or {apple}"
+            what = f"the magnetic field points {np.degrees(np.arcsin(min(upwards, 1.0))):.0f}° above the horizon"
+            yield Finding("note", channel, what, cause, f"{remedy[:-1]} if the recording is from the north.")
+
+
+def check_reference(trajectory: Trajectory) -> Iterator[Finding]:
+    """What is known of the clock of the reference."""
+    offset = trajectory.metadata.get("reference_clock_offset")
+    if isinstance(offset, int | float) and abs(offset) > 1e-3:
+        what = f"the reference is {1e3 * abs(offset):.1f} ms {'ahead of' if offset > 0.0 else 'behind'} the gyroscope"
+        remedy = "Evaluate with the reference clock corrected as well."
+        yield Finding("note", "orientation", what, "two clocks that were not synchronised", remedy)
