@@ -5,7 +5,7 @@ estimators and policies that adapt filter gains, compared on the same data, simu
 
 >>> import poise
 >>> trajectory = poise.record("poise/HandMotion-v0", seed=0)
->>> estimate = poise.run(poise.make_estimator("bounded-motion", dt=trajectory.dt), trajectory.measurements)
+>>> estimate = poise.run("bounded-motion", trajectory)
 >>> table = poise.evaluate(["bounded-motion", "tilt"], [trajectory])
 
 Four floors, imports only downwards: :mod:`poise.filters` (rotations, the Kalman core, published filters, metrics),
@@ -25,20 +25,24 @@ from .filters.support.version import poise_version
 if TYPE_CHECKING:
     from .baselines.evaluation import evaluate
     from .baselines.registry import EstimatorInfo, list_estimators, make_estimator
+    from .baselines.run import run
     from .envs.data.calibration.records import apply_calibration, load_calibration
     from .envs.data.formats.load import load_recording
+    from .envs.data.plausibility import Finding, check_recording
     from .envs.data.trajectory import Trajectory
     from .envs.record import record
-    from .filters.core.estimator import Estimator, run
+    from .filters.core.estimator import Estimator
     from .filters.core.quantity import Estimate
 
 __all__ = [
     "Estimate",
     "Estimator",
     "EstimatorInfo",
+    "Finding",
     "Trajectory",
     "__version__",
     "apply_calibration",
+    "check_recording",
     "evaluate",
     "list_estimators",
     "load_calibration",
@@ -52,15 +56,17 @@ _HOMES = {
     "Estimate": ".filters.core.quantity",
     "Estimator": ".filters.core.estimator",
     "EstimatorInfo": ".baselines.registry",
+    "Finding": ".envs.data.plausibility",
     "Trajectory": ".envs.data.trajectory",
     "apply_calibration": ".envs.data.calibration.records",
+    "check_recording": ".envs.data.plausibility",
     "evaluate": ".baselines.evaluation",
     "list_estimators": ".baselines.registry",
     "load_calibration": ".envs.data.calibration.records",
     "load_recording": ".envs.data.formats.load",
     "make_estimator": ".baselines.registry",
     "record": ".envs.record",
-    "run": ".filters.core.estimator",
+    "run": ".baselines.run",
 }
 
 __version__ = poise_version()

@@ -52,7 +52,8 @@ class Equations:
     A float parameter may be an array ``(*batch,)``: use :func:`.expand` where it scales a matrix.
 
     Attributes of the class: ``channels``, what is read; ``outputs``, the quantities of ``pose``; ``state_size`` n, the
-    numbers in the state; ``gains``, name → :class:`Gain`.
+    numbers in the state; ``gains``, name → :class:`Gain`; ``error_parts``, quantity → (start, stop) of its part of the
+    error state, if it has one (of a rotation: in world axes).
     """
 
     dt: float = 0.01
@@ -62,6 +63,7 @@ class Equations:
     outputs: ClassVar[tuple[Quantity, ...]]
     state_size: ClassVar[int]
     gains: ClassVar[Mapping[str, Gain]] = {}
+    error_parts: ClassVar[Mapping[str, tuple[int, int]]] = {}
 
     def __post_init__(self) -> None:
         """Refuse parameters that are not finite numbers, choices that there are not, and intervals of no length."""

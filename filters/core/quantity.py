@@ -8,9 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 from .backend import Array
+from .frames import SequenceTable
+
+if TYPE_CHECKING:
+    import pandas
 
 Measurement = Mapping[str, Array]
 """Channel name → array ``(..., size)``; NaN where a channel brought no sample at this tick."""
@@ -45,6 +49,20 @@ class Quantity:
     unit: str
 
 
+@dataclass(frozen=True)
+class Layout:
+    """What the arrays of an :class:`Estimate` hold.
+
+    Attributes:
+        outputs: the quantities of ``pose``.
+        error_parts: quantity → (start, stop) of its part of the error state, whose covariance ``covariance`` is; of a
+            rotation it is a rotation vector in world axes.
+    """
+
+    outputs: tuple[Quantity, ...]
+    error_parts: Mapping[str, tuple[int, int]]
+
+
 class Estimate(NamedTuple):
     """What an estimator says at one tick, or (time axis first) over a whole sequence.
 
@@ -54,12 +72,24 @@ class Estimate(NamedTuple):
         innovation: ``(..., m)`` whitened innovation (unit variance if the filter is consistent); 0 where a row of the
             measurement was missing; None where a method has none.
         nis: ``(...,)`` normalised innovation squared, the squared length of ``innovation``; 0 without a measurement.
+        time: ``(T,)`` s of the samples, if :func:`poise.run` knew it.
+        layout: what the arrays hold, if :func:`poise.run` made the estimate.
     """
 
     pose: dict[str, Array]
     covariance: Array | None = None
     innovation: Array | None = None
     nis: Array | None = None
+    time: Array | None = None
+    layout: Layout | None = None
+
+    def to_frame(self) -> pandas.DataFrame:
+        """A table with a row a sample, angles in degrees: see :meth:`.frames.SequenceTable.frame`."""
+        kinds = {
+            quantity.name: (quantity.kind, quantity.unit) for quantity in (self.layout.outputs if self.layout else ())
+        }
+        parts = self.layout.error_parts if self.layout else {}
+        return SequenceTable(self.pose, self.time, self.covariance, self.nis, kinds, parts).frame()
 
 
 GYROSCOPE = Channel("imu/gyr", 3, "rad/s")

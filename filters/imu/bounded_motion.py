@@ -106,6 +106,7 @@ class BoundedMotion(Model):
     state_size: ClassVar[int] = 15
     error_size: ClassVar[int] = 9
     residual_size: ClassVar[int] = 3
+    error_parts: ClassVar[dict[str, tuple[int, int]]] = {"relative_orientation": (0, 3), "gyroscope_bias": (3, 6)}
     gains: ClassVar[dict[str, Gain]] = {
         "process": Gain("gyroscope_noise", description="process variance σ_g² of the attitude"),
         "bias": Gain("bias_noise", description="process variance σ_b² of the gyroscope bias"),

@@ -91,6 +91,7 @@ class ExternalAcceleration(Model):
     outputs: ClassVar = (UP, EXTERNAL_ACCELERATION)
     state_size: ClassVar = 7
     error_size: ClassVar = 3
+    error_parts: ClassVar = {"up": (0, 3)}
     residual_size: ClassVar = 3
     gains: ClassVar = {
         "process": Gain("gyroscope_noise", description="process variance σ_G²"),

@@ -24,7 +24,7 @@ def value(table, estimator, metric, quantity="up"):
 def test_the_table_holds_the_errors_that_the_metrics_define(trajectory):
     table = evaluate(["mekf", "mekf-9", "tilt"], trajectory)
     assert tuple(table.columns) == COLUMNS
-    up = poise.run(poise.make_estimator("mekf", dt=trajectory.dt), trajectory.measurements).pose["up"]
+    up = poise.run("mekf", trajectory).pose["up"]
     expected = rms(direction_error(up, trajectory.truth["up"]), trajectory.mask) * DEGREES
     assert value(table, "mekf", "inclination") == pytest.approx(expected, rel=1e-12)
     assert value(table, "mekf-9", "total", "orientation") >= value(table, "mekf-9", "inclination") - 1e-9

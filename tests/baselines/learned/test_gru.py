@@ -197,7 +197,8 @@ def test_too_slow_a_sensor_is_refused(network: GruNetwork) -> None:
 def test_running_needs_no_torch() -> None:
     code = (
         "import sys, numpy as np; from poise.baselines.learned.estimator import shipped; from poise import run;"
-        "run(shipped(), {'imu/gyr': np.zeros((9, 3)), 'imu/acc': np.ones((9, 3))}); assert 'torch' not in sys.modules"
+        "run(shipped(), {'imu/gyr': np.zeros((9, 3)), 'imu/acc': np.ones((9, 3))}, dt=0.01);"
+        "assert 'torch' not in sys.modules"
     )
     subprocess.run([sys.executable, "-c", code], check=True)
 

@@ -1,0 +1,122 @@
+"""``poise.run``: an estimator over a recording, at the recording's own clock."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from numbers import Real
+from typing import Any
+
+import numpy as np
+
+from ..envs.data.trajectory import Trajectory
+from ..filters.core.estimator import Estimator
+from ..filters.core.estimator import run as run_sequence
+from ..filters.core.model import equations_of
+from ..filters.core.quantity import Estimate, Layout
+from .registry import make_estimator
+
+SAME_INTERVAL = 1e-3
+"""Relative difference up to which two sampling intervals are the same."""
+
+
+def run(
+    estimator: str | Estimator[Any],
+    data: Trajectory | Mapping[str, Any],
+    dt: float | None = None,
+    *,
+    grid: bool = False,
+) -> Estimate:
+    """Run an estimator over a recording.
+
+    Of a trajectory, time is respected: the estimator runs on the uniform grid behind the time stamps, gaps are missing
+    samples that it predicts through, and an estimator made for another sampling interval is adjusted. Bare arrays have
+    no time, so their interval must be given.
+
+    Args:
+        estimator: a name (see :func:`poise.list_estimators`), or an estimator. One that is only named is configured
+            for the trajectory (rider, bicycle, array), where its metadata say.
+        data: a trajectory, or channel name → ``(T, *batch, size)``, NaN where a channel brought no sample.
+        dt: sampling interval, s; needed with arrays. With a trajectory it may only confirm the trajectory's.
+        grid: give the estimate on the uniform grid, gaps included, instead of at the trajectory's own samples.
+
+    Returns:
+        The estimate, time first, with ``time``: as many samples as the trajectory has, or as its grid.
+
+    Raises:
+        ValueError: no ``dt`` with arrays; a ``dt`` that contradicts trajectory or estimator; an unknown name; missing
+            channels; a clock that is no uniform sampling (:meth:`Trajectory.on_grid`).
+    """
+    interval = checked_interval(dt)
+    if isinstance(data, Trajectory):
+        on_grid = data.on_grid()
+        if interval is not None and not same_interval(interval, on_grid.dt):
+            raise ValueError(
+                f"dt={interval:.6g} s contradicts {data.name!r}, which has {on_grid.dt:.6g} s; leave it out"
+            )
+        estimate = run_on(fitted(estimator, on_grid), on_grid)
+        return estimate if grid or on_grid is data else at_samples(estimate, data, on_grid)
+    if not isinstance(data, Mapping):
+        raise ValueError(f"data must be a Trajectory or a mapping from channel to array, got {type(data).__name__}")
+    if interval is None:
+        raise ValueError(
+            "arrays have no time: pass dt, the sampling interval in s, as poise.run(estimator, arrays, dt=0.01), "
+            "or a poise.Trajectory"
+        )
+    if isinstance(estimator, str):
+        estimator = make_estimator(estimator, dt=interval)
+    elif not same_interval(interval, estimator.dt):
+        raise ValueError(
+            f"dt={interval:.6g} s contradicts the estimator, which was made for {estimator.dt:.6g} s; "
+            f"use estimator.with_dt({interval:.6g})"
+        )
+    estimate = run_sequence(estimator, data)
+    length = len(next(iter(estimate.pose.values())))
+    return estimate._replace(time=interval * np.arange(length), layout=layout_of(estimator))
+
+
+def checked_interval(dt: Any) -> float | None:
+    """A sampling interval as a float.
+
+    Raises:
+        ValueError: it is not a positive, finite number.
+    """
+    if dt is None:
+        return None
+    if isinstance(dt, bool | np.bool_) or not isinstance(dt, Real) or not 0.0 < float(dt) < math.inf:
+        raise ValueError(f"dt must be a positive number of seconds, got {dt!r}")
+    return float(dt)
+
+
+def same_interval(one: float, other: float) -> bool:
+    """Whether two sampling intervals agree."""
+    return abs(one - other) <= SAME_INTERVAL * other
+
+
+def fitted(estimator: str | Estimator[Any], trajectory: Trajectory) -> Estimator[Any]:
+    """An estimator at the trajectory's sampling interval; one that is only named is configured for it."""
+    if isinstance(estimator, str):
+        return make_estimator(estimator, dt=trajectory.dt, metadata=trajectory.metadata)
+    return estimator if abs(estimator.dt - trajectory.dt) <= 1e-6 * trajectory.dt else estimator.with_dt(trajectory.dt)
+
+
+def run_on(estimator: Estimator[Any], trajectory: Trajectory) -> Estimate:
+    """Run an estimator over a trajectory that is on its grid already."""
+    estimate = run_sequence(estimator, trajectory.measurements)
+    return estimate._replace(time=trajectory.time, layout=layout_of(estimator))
+
+
+def layout_of(estimator: Estimator[Any]) -> Layout:
+    """What the arrays of its estimates hold."""
+    return Layout(tuple(estimator.outputs), dict(getattr(equations_of(estimator), "error_parts", {})))
+
+
+def at_samples(estimate: Estimate, trajectory: Trajectory, on_grid: Trajectory) -> Estimate:
+    """The part of an estimate on the grid that belongs to the trajectory's own samples."""
+    index = trajectory.clock.index
+    if len(index) != len(trajectory) or index[-1] >= len(on_grid):
+        # rows that repeat their predecessor are not on the grid twice
+        index = np.rint((trajectory.time - on_grid.time[0]) / on_grid.dt).astype(int).clip(0, len(on_grid) - 1)
+    rest = (None if part is None else part[index] for part in (estimate.covariance, estimate.innovation, estimate.nis))
+    pose = {name: values[index] for name, values in estimate.pose.items()}
+    return Estimate(pose, *rest, trajectory.time, estimate.layout)

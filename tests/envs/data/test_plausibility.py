@@ -1,0 +1,153 @@
+"""Mistakes of units, signs, axes and clocks are named; sound recordings are left in peace."""
+
+import numpy as np
+import pytest
+
+from poise.envs.data.plausibility import check_recording
+from poise.envs.data.rate_consistency import rate_consistency
+from poise.envs.data.trajectory import Trajectory
+from poise.envs.hand.sensing import simulate_hand
+from poise.filters.core import rotation
+
+GESTURES = ("slow", "fast", "severe", "mixed")
+
+
+@pytest.fixture(scope="module")
+def motions():
+    return {gesture: simulate_hand(gesture, seed=3, duration=20.0) for gesture in GESTURES}
+
+
+def changed(trajectory, truth=False, **channels):
+    """The trajectory with other readings; ``gyr``, ``acc``, ``mag`` are functions of the old ones."""
+    measurements = {
+        name: channels[name[4:]](values) if name[4:] in channels else values
+        for name, values in trajectory.measurements.items()
+    }
+    return trajectory.replace(measurements=measurements, truth=trajectory.truth if truth else {})
+
+
+def warnings_of(trajectory):
+    return [str(finding) for finding in check_recording(trajectory) if finding.severity == "warning"]
+
+
+@pytest.mark.parametrize("gesture", GESTURES)
+@pytest.mark.parametrize("truth", [True, False])
+def test_sound_recordings_have_no_findings(motions, gesture, truth):
+    assert check_recording(changed(motions[gesture], truth)) == []
+
+
+@pytest.mark.parametrize("gesture", GESTURES)
+@pytest.mark.parametrize("truth", [True, False])
+@pytest.mark.parametrize(
+    ("unit", "factor"),
+    [("deg/s", 180 / np.pi), ("rev/s", 0.5 / np.pi), ("rpm", 30 / np.pi), ("mrad/s", 1e3), ("mdeg/s", 1.8e5 / np.pi)],
+)
+def test_units_of_the_gyroscope_are_named(motions, gesture, truth, unit, factor):
+    found = warnings_of(changed(motions[gesture], truth, gyr=lambda values: factor * values))
+    assert len(found) == 1
+    assert f"rates in {unit}" in found[0]
+
+
+@pytest.mark.parametrize("gesture", GESTURES)
+@pytest.mark.parametrize(
+    ("unit", "at_rest"), [("g", 1.0), ("mg", 1e3), ("cm/s²", 980.665), ("counts of ±8 g in 16 bits", 4096.0)]
+)
+def test_units_of_the_accelerometer_are_named(motions, gesture, unit, at_rest):
+    (found,) = warnings_of(changed(motions[gesture], acc=lambda values: values / 9.80665 * at_rest))
+    # milli-g and cm/s² differ by 2 %
+    assert f"readings in {unit}" in found or (unit == "cm/s²" and "readings in mg" in found)
+
+
+@pytest.mark.parametrize("gesture", GESTURES)
+def test_removed_gravity_is_named(motions, gesture):
+    up = motions[gesture].truth_of("up")
+    (found,) = warnings_of(changed(motions[gesture], acc=lambda values: values - 9.81 * up))
+    assert "gravity was removed" in found
+
+
+@pytest.mark.parametrize("gesture", GESTURES)
+def test_the_sign_of_apple_is_named_where_the_truth_tells(motions, gesture):
+    found = warnings_of(changed(motions[gesture], truth=True, acc=lambda values: -values))
+    assert len(found) == 1
+    assert "Apple's sign" in found[0]
+
+
+def test_without_truth_a_level_sensor_tells_the_sign(motions):
+    level = simulate_hand("slow", seed=3, duration=4.0)
+    up = rotation.level(level.truth_of("up"))
+    flat = {name: rotation.rotate(up, values) for name, values in level.measurements.items()}
+    found = warnings_of(level.replace(measurements=flat | {"imu/acc": -flat["imu/acc"]}, truth={}))
+    assert any("Apple's sign" in text and "upside down" in text for text in found)
+
+
+@pytest.mark.parametrize("gesture", GESTURES)
+@pytest.mark.parametrize(
+    ("axes", "words"),
+    [
+        (np.diag([-1.0, 1.0, 1.0]), "sign of x"),
+        (np.diag([1.0, -1.0, 1.0]), "sign of y"),
+        (np.diag([1.0, 1.0, -1.0]), "sign of z"),
+        (-np.eye(3), "all signs"),
+        (np.eye(3)[[1, 0, 2]], "should be y, x, z"),
+        (np.eye(3)[[1, 2, 0]], "should be z, x, y"),
+    ],
+)
+def test_axes_of_the_gyroscope_are_named(motions, gesture, axes, words):
+    (found,) = warnings_of(changed(motions[gesture], gyr=lambda values: values @ axes.T))
+    assert "imu/gyr" in found
+    assert words in found
+
+
+@pytest.mark.parametrize("gesture", ["slow", "fast", "mixed"])
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_a_reversed_axis_of_the_accelerometer_is_told_from_one_of_the_gyroscope(motions, gesture, axis):
+    sign = 1.0 - 2.0 * np.eye(3)[axis]
+    found = warnings_of(changed(motions[gesture], acc=lambda values: sign * values))
+    assert any(f"imu/acc: gyroscope and accelerometer do not turn together; likely cause: of the accelerometer "
+               f"the sign of {'xyz'[axis]}" in text for text in found)  # fmt: skip
+
+
+@pytest.mark.parametrize(("unit", "scale"), [("ms", 1e3), ("µs", 1e6), ("ns", 1e9), ("sample numbers", 100.0)])
+def test_units_of_time_are_named(motions, unit, scale):
+    motion = motions["slow"]
+    time = np.arange(len(motion)) * 1.0 if unit == "sample numbers" else motion.time * scale
+    found = warnings_of(motion.replace(time=time, truth={}))
+    assert len(found) == 1
+    assert unit in found[0]
+
+
+@pytest.mark.parametrize("channel", ["gyr", "acc", "mag"])
+@pytest.mark.parametrize("kind", ["zeros", "constant", "missing"])
+def test_dead_channels_are_named(motions, channel, kind):
+    value = {"zeros": 0.0, "constant": 3.5, "missing": np.nan}[kind]
+    found = warnings_of(changed(motions["fast"], **{channel: lambda values: np.full_like(values, value)}))
+    assert any(text.startswith(f"imu/{channel}: ") and "Leave" in text for text in found)
+
+
+def test_saturation_gaps_and_clock_offsets_are_notes(motions):
+    motion = motions["severe"]
+    clipped = changed(motion, gyr=lambda values: np.clip(values, -2.0, 2.0))
+    rows = np.r_[0:500, 900:1500]
+    cut = Trajectory(motion.time[rows], {name: values[rows] for name, values in motion.measurements.items()})
+    late = motion.replace(metadata={**motion.metadata, "reference_clock_offset": 0.004})
+    for trajectory, words in ((clipped, "saturation"), (cut, "gaps of more than 1 s"), (late, "4.0 ms ahead")):
+        notes = [str(finding) for finding in check_recording(trajectory) if finding.severity == "note"]
+        assert any(words in text for text in notes), words
+
+
+def test_the_comparison_of_rates_is_that_of_scipy(motions):
+    """Gravity turned back by SciPy's integration of the rates stands as still as the residual says."""
+    from scipy.spatial.transform import Rotation
+
+    motion = motions["slow"]
+    rate, up = motion.measurements["imu/gyr"], motion.truth_of("up")
+    found = rate_consistency(motion.time, rate, up)
+    turned, attitude = [], Rotation.identity()
+    for t in range(1, 300):
+        attitude = attitude * Rotation.from_rotvec(rate[t] * motion.dt)
+        turned.append(attitude.apply(up[t].copy()))
+    means = np.reshape(turned[:297], (3, 99, 3)).mean(axis=1)
+    spread = np.sqrt(np.var(means, axis=0).sum() / np.square(means.mean(axis=0)).sum())
+    assert found.as_given < 0.03
+    assert spread < 0.03
+    assert found.at_rest > 5.0 * found.as_given
