@@ -1,6 +1,6 @@
 r"""What a gain policy sees: statistics of innovations and sensors over several times, no truth.
 
-Five streams of vectors are watched tick by tick: the whitened innovation of the filter, the gyroscope, the
+Five streams of vectors are watched sample by sample: the whitened innovation of the filter, the gyroscope, the
 accelerometer (nothing for a filter that reads none), the external acceleration a that the filter believes in, and the
 lean u × a / g with its vertical u (both zero where a filter gives none). A steady tilt error τ (b × u), which a
 gyroscope bias b leaves at a time constant τ, is a lean whose mean in sensor axes points along b whatever the attitude,
@@ -8,15 +8,15 @@ while true accelerations of a hand average out. Of each stream, running means of
 
     1,  v,  |v|²,  |v − v_previous|²        and, of the accelerometer,  ‖f‖ − g  and its square
 
-are kept over each time scale; a missing sample adds nothing. An interval of ticks ends with a decision; there the
+are kept over each time scale; a missing sample adds nothing. An interval of samples ends with a decision; there the
 means over the interval m enter
 
     average ← average + (1 − exp(−interval / τ)) (m − average)
 
 and the features are their invariants, independent of how the sensor is mounted: for every stream and scale the
 logarithms of its root mean square, of its deviation from its mean, of the length of its mean, and of its change from
-tick to tick. A consistent filter has innovations of rms √m without a mean; a mean or slow changes show a gain that is
-too small (R. K. Mehra, "On the identification of variances and adaptive Kalman filtering", IEEE Trans. Automatic
+sample to sample. A consistent filter has innovations of rms √m without a mean; a mean or slow changes show a gain that
+is too small (R. K. Mehra, "On the identification of variances and adaptive Kalman filtering", IEEE Trans. Automatic
 Control 15(2), 1970).
 
 All is squashed to [−1, 1]. One memory serves a batch of sequences.
@@ -46,11 +46,11 @@ CENTRES = {
 }
 """Stream → decimal logarithm of each statistic that is mapped to 0: about the middle of what a hand does."""
 FLOOR = 1e-5
-"""Smallest statistic that is told from zero."""
+"""Smallest statistic that is distinguished from zero."""
 CHANGE_TIME = 0.01
-"""s: changes of the sensors from tick to tick are given per this time, so that they mean the same at any rate"""
+"""s: changes of the sensors from sample to sample are given per this time, so that they mean the same at any rate"""
 START_TIME = 20.0
-"""s: time constant of the feature that tells a young filter from an old one."""
+"""s: time constant of the feature that distinguishes a young filter from an old one."""
 
 
 class FeatureMemory(NamedTuple):
@@ -58,9 +58,9 @@ class FeatureMemory(NamedTuple):
 
     Attributes:
         averages: ``(*batch, scales, moments)`` running means.
-        sums: ``(*batch, moments)`` over the ticks of the interval that is not over.
+        sums: ``(*batch, moments)`` over the samples of the interval that is not over.
         previous: ``(*batch, streams, width)`` last sample of every stream; NaN if there was none.
-        tick: ``()`` int, ticks of the interval that is not over; 0 asks for a decision.
+        tick: ``()`` int, samples of the interval that is not over; 0 asks for a decision.
         decisions: ``(*batch,)`` int, intervals that are over.
     """
 
@@ -76,7 +76,7 @@ class InnovationFeatures:
     """Statistics over several time scales, computed while a filter runs.
 
     Attributes:
-        interval: time from decision to decision, s; rounded to ticks of the filter, one at least.
+        interval: time from decision to decision, s; rounded to samples of the filter, one at least.
         scales: time constants of the running means, s; 0 for the last interval alone.
 
     Raises:
@@ -104,7 +104,7 @@ class InnovationFeatures:
         return len(self.scales) * (len(STREAMS) * len(STATISTICS) + 2) + 1 + actions
 
     def ticks(self, dt: float) -> int:
-        """Ticks of an interval at a sampling interval of ``dt`` seconds."""
+        """Samples of an interval at a sampling interval of ``dt`` seconds."""
         return max(1, round(self.interval / dt))
 
     def init(self, kalman: KalmanFilter, batch: tuple[int, ...] = ()) -> FeatureMemory:
@@ -127,23 +127,23 @@ class InnovationFeatures:
     def update(
         self, memory: FeatureMemory, kalman: KalmanFilter, measurements: Mapping[str, np.ndarray], estimate: Estimate
     ) -> FeatureMemory:
-        """Take the ticks that a filter has just run over.
+        """Take the samples that a filter has just run over.
 
         Args:
             memory: from :meth:`init` or the update before; it is not changed.
             kalman: the filter.
             measurements: channel → ``(T, *batch, size)``.
-            estimate: what the filter said, ``(T, *batch, …)``.
+            estimate: of the filter, ``(T, *batch, …)``.
 
         Raises:
-            ValueError: the ticks reach beyond the end of the interval.
+            ValueError: the samples reach beyond the end of the interval.
         """
         moments, previous = self._moments(memory, kalman, measurements, estimate)
         tick = int(memory.tick) + len(moments)
         whole = self.ticks(kalman.dt)
         if tick > whole:
-            raise ValueError(f"{len(moments)} ticks after {memory.tick} reach beyond the interval of {whole} ticks")
-        # The first axis is added up row by row, so ticks one by one and together give the same sums.
+            raise ValueError(f"{len(moments)} samples after {memory.tick} reach beyond the interval of {whole} samples")
+        # The first axis is added up row by row, so samples one by one and together give the same sums.
         sums = np.concatenate([memory.sums[None], moments]).sum(axis=0)
         if tick < whole:
             return memory._replace(sums=sums, previous=previous, tick=np.array(tick))
@@ -181,7 +181,7 @@ class InnovationFeatures:
     def _moments(
         self, memory: FeatureMemory, kalman: KalmanFilter, measurements: Mapping[str, np.ndarray], estimate: Estimate
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Moments ``(T, *batch, moments)`` of the ticks, and the last sample of every stream."""
+        """Moments ``(T, *batch, moments)`` of the samples, and the last one of every stream."""
         gyroscope, accelerometer = stream_channels(kalman)
         gyr = np.asarray(measurements[gyroscope], dtype=float)
         acc = np.full_like(gyr, np.nan) if accelerometer is None else np.asarray(measurements[accelerometer], float)
@@ -220,11 +220,11 @@ def stream_channels(kalman: KalmanFilter) -> tuple[str, str | None]:
 
 
 def before(values: np.ndarray, held: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The last known vector before every tick ``(T, *batch, d)``, and that after the last tick ``(*batch, d)``.
+    """The last valid vector before every sample ``(T, *batch, d)``, and that after the last one ``(*batch, d)``.
 
     Args:
         values: ``(T, *batch, d)``; a vector with any NaN is unknown.
-        held: ``(*batch, d)`` last known vector before the first tick.
+        held: ``(*batch, d)`` last valid vector before the first sample.
     """
     row = np.concatenate([held[None], values])
     known = np.isfinite(row).all(axis=-1)

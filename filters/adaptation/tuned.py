@@ -66,11 +66,11 @@ class TunedFilter:
 
     @property
     def ticks(self) -> int:
-        """Ticks from decision to decision."""
+        """Samples from decision to decision."""
         return self.features.ticks(self.kalman.dt)
 
     def with_dt(self, dt: float) -> TunedFilter:
-        """The same for another sampling interval; decisions stay as many seconds apart, to a tick."""
+        """The same for another sampling interval; decisions stay as many seconds apart, to a sample."""
         return replace(self, kalman=self.kalman.with_dt(dt))
 
     def init(self, measurement: Mapping[str, Any]) -> TunedState:
@@ -97,7 +97,7 @@ class TunedFilter:
         return state._replace(action=np.broadcast_to(bounded, state.action.shape))
 
     def advance(self, state: TunedState, measurements: Mapping[str, Any]) -> tuple[Estimate, TunedState]:
-        """Run over ticks ``(T, *batch, size)`` of one interval, not beyond its end, with the action in force."""
+        """Run over samples ``(T, *batch, size)`` of one interval, not beyond its end, with the action in force."""
         length = len(next(iter(measurements.values())))
         gains = {
             name: np.broadcast_to(factor, (length, *factor.shape)) for name, factor in self.gains(state.action).items()

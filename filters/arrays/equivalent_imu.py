@@ -11,7 +11,7 @@ from .array import AccelerometerArray
 def array_to_imu(array: AccelerometerArray, readings: Array) -> Array:
     """Specific force at the array's reference point ``(..., 3)``, m/s², body axes, by least squares.
 
-    An array of full rank tells it apart from angular acceleration and rates (ẑ = A⁺â). One of lower rank is taken as if
+    An array of full rank separates it from angular acceleration and rates (ẑ = A⁺â). One of lower rank is taken as if
     it did not turn (A_P⁺â), which is right where the contributions of turning cancel, as in the controller: its two
     accelerometers sit opposite each other.
 

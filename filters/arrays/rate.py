@@ -2,13 +2,13 @@ r"""Angular rate from an array of accelerometers alone.
 
 P. He, "Estimating the orientation of a game controller from inertial and magnetic measurements", thesis, Université
 Laval; chapter 2 and appendix A; equation numbers are the thesis'. The readings â give the angular acceleration α̂ and
-the products ξ̂ of angular rates, ẑ = A⁺â, which tell the rate in two ways:
+the products ξ̂ of angular rates, ẑ = A⁺â, which determine the rate in two ways:
 
     ω_TI = ω̂_{k−1} + ½ Δt (α̂_{k−1} + α̂_k)                                   time integration (2.15): drifts
     N = sm(ξ̂₂) + diag(ξ̂₁) + (1ᵀξ̂₁) 1,   ω_PR = ± √(λ_max(N)/2) v_max(N)      polynomial roots (2.17): blunt near rest
 
 with the sign that agrees with ω_TI. The weighted method takes ω̂ = D ω_TI + (1 − D) ω_PR, D = diag(w), with the weights
-of least variance (2.48). With σ_a² taken out, J = ∂ω_PR/∂ξ and primes for the tick before,
+of least variance (2.48). With σ_a² taken out, J = ∂ω_PR/∂ξ and primes for the sample before,
 
     J = |ω|⁻² (1 − ¾ ωωᵀ/|ω|²) Ψ,   Ψ = [ω1ᵀ + diag(ω)  sm(ω)],   C = J B_C Jᵀ,   M = Δt J B_TCᵀ
     S = (1 − D') J' B_TCᵀ,   T = ¼ Δt² (2 B_T + B_T D' + D' B_T) + ½ Δt (S + Sᵀ)
@@ -117,7 +117,7 @@ class ArrayRate(ArrayEquations, Recurrence):
     """The weighted method, and the three that it is compared with.
 
     State: ω (3); for the weighted method also Σ/σ_a² (9), w (3), (S + Sᵀ)/σ_a² (9), β̂ (3), p/σ_a² and u/σ_a² (3 each).
-    A tick on which a reading is missing is integrated with the last readings.
+    Where a reading is missing, the last valid readings are integrated.
 
     Raises:
         ValueError: an unknown method, variant or start, or an array that does not determine α and ξ.
@@ -149,7 +149,7 @@ class ArrayRate(ArrayEquations, Recurrence):
         check_positive(self, "accelerometer_noise", "bias_time")
         if self.array.dimension != 3 or self.array.rank < 12:
             raise ValueError(
-                f"array {self.array.name!r} must be spatial and of rank 12 to tell an angular rate by itself, "
+                f"array {self.array.name!r} must be spatial and of rank 12 to determine an angular rate by itself, "
                 f"got dimension {self.array.dimension}, rank {self.array.rank}"
             )
 

@@ -99,7 +99,7 @@ class RiderGeometry:
 
     @property
     def knee_to_pedal(self) -> float:
-        """Distance from knee to pedal with the ankle held (whole-body paper: l_sp)."""
+        """Distance from knee to pedal with a fixed ankle (whole-body paper: l_sp)."""
         a, b = self.shank, self.ankle_to_pedal
         return math.sqrt(a * a + b * b + 2.0 * a * b * math.cos(self.ankle_angle))
 
@@ -160,7 +160,7 @@ class RiderEquations(Equations):
 
     @classmethod
     def rider_parameters(cls, geometry: RiderGeometry) -> dict[str, Any]:
-        """The parameters that the geometry determines, by field: those of the same name unless a subclass says more."""
+        """The parameters that the geometry determines, by field: those of the same name, by default."""
         names = {field.name for field in fields(cls)} & {field.name for field in fields(geometry)}
         return {name: getattr(geometry, name) for name in names}
 

@@ -11,9 +11,9 @@ in bicycle axes, whatever the roll: a thin wheel that turns by Ω in its frame h
 the frame's point −r e₃ below the hub moves by r Ω e₁. What v integrates to with a wrong tilt δ, g δ t, (1) does not
 bear; steady curves are no exception, since nothing of (1) refers to the accelerometer.
 
-Bicycle axes are x forward, y left, z up; the sensor is mounted nose up by α, and its samples are turned at the door.
+Bicycle axes are x forward, y left, z up; the sensor is mounted nose up by α, and its samples are rotated on input.
 The state is q (bicycle to a level frame), gyroscope bias b (bicycle axes), v (level frame), integrated as
-:mod:`..strapdown` says. With the error [δθ (level frame), δb, δv], c× as a matrix [c]×,
+:mod:`..strapdown` describes. With the error [δθ (level frame), δb, δv], c× as a matrix [c]×,
 
     H = [Rᵀ[v]×, [c]×, Rᵀ],   n: σ_w² = (s/Δt)²/12,  σ_y²/Δt,  σ_z²/Δt
 
@@ -78,7 +78,7 @@ class OdometryAided(RiderEquations, Model):
     """σ_z, m/s·√s: bumps and bends of the ground"""
     jump: float = 0.2
     """m/s: residuals r beyond this (and a count of the wheel) count less, their variances times (1 + (r/jump)²)²: a
-    wheel in the air tells nothing"""
+    wheel in the air holds no information"""
     imu_forward: float = 0.37
     """m, of the IMU from the rear contact"""
     imu_height: float = 0.71
@@ -177,7 +177,7 @@ class OdometryAided(RiderEquations, Model):
         return xp.concat([after, b, v, x[..., 10:]], axis=-1), F, Q
 
     def residual(self, x: Array, z: Measurement) -> tuple[Array, Array, Array]:
-        """Equation (1): the wheel's speed and no slip, less what the state says of the contact."""
+        """Equation (1): the wheel's speed and no slip, less those of the contact that the state predicts."""
         xp = namespace(x)
         q, b, v, wheel = x[..., :4], x[..., 4:7], x[..., 7:10], z["wheel/speed"]
         c = self._lever(x)
@@ -201,8 +201,8 @@ class OdometryAided(RiderEquations, Model):
     def finish(self, x: Array, z: Measurement) -> Array:
         """Normalise; advance or reset the clock of the accelerometer."""
         xp = namespace(x)
-        brought = xp.all(xp.isfinite(z["bicycle_imu/acc"]), axis=-1)[..., None]
-        age = xp.where(brought, 0.0 * x[..., 10:11], x[..., 10:11] + expand(self.dt, 1))
+        present = xp.all(xp.isfinite(z["bicycle_imu/acc"]), axis=-1)[..., None]
+        age = xp.where(present, 0.0 * x[..., 10:11], x[..., 10:11] + expand(self.dt, 1))
         return xp.concat([normalize(x[..., :4]), x[..., 4:10], age], axis=-1)
 
     def pose(self, x: Array) -> dict[str, Array]:

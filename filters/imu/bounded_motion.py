@@ -140,7 +140,7 @@ class BoundedMotion(Model):
         return xp.concat([after, b, v, x[..., 10:13], x[..., 13:14] + dt, x[..., 14:]], axis=-1), F, Q
 
     def residual(self, x: Array, z: Measurement) -> tuple[Array, Array, Array]:
-        """0 = v + n, if the interval is over and there is a sample; else NaN, which corrects nothing."""
+        """0 = v + n, if the interval is over and there is a sample; else NaN: the update is skipped."""
         xp = namespace(x)
         v = x[..., 7:10]
         r = xp.where(self._is_due(x, z), -v, xp.nan + 0.0 * v)
@@ -156,13 +156,13 @@ class BoundedMotion(Model):
         """Normalise, remember the external acceleration, reset or advance the clocks."""
         xp = namespace(x)
         q, f = normalize(x[..., :4]), z["imu/acc"]
-        brought = xp.all(xp.isfinite(f), axis=-1)[..., None]
+        present = xp.all(xp.isfinite(f), axis=-1)[..., None]
         zero = 0.0 * x[..., 13:14]
         elapsed = xp.where(self._is_due(x, z), zero, x[..., 13:14])
-        age = xp.where(brought, zero, x[..., 14:15] + expand(self.dt, 1))
+        age = xp.where(present, zero, x[..., 14:15] + expand(self.dt, 1))
         forgotten = xp.greater_equal(age, expand(self.hold, 1))
         remembered = xp.where(forgotten, 0.0 * x[..., 10:13], x[..., 10:13])
-        acceleration = xp.where(brought, self._external(q, f), remembered)
+        acceleration = xp.where(present, self._external(q, f), remembered)
         elapsed = xp.where(forgotten, zero, elapsed)
         return xp.concat([q, x[..., 4:10], acceleration, elapsed, age, x[..., 15:]], axis=-1)
 
@@ -186,11 +186,11 @@ class BoundedMotion(Model):
         return xp.where(xp.greater(x[..., 13:14], interval), x[..., 13:14], interval)
 
     def _is_due(self, x: Array, z: Measurement) -> Array:
-        """Whether this tick corrects ``(..., 1)``: the one nearest to the end of the interval, if it has a sample."""
+        """Whether the velocity is updated now ``(..., 1)``: at the end of the interval, if there is a sample."""
         xp = namespace(x)
-        brought = xp.all(xp.isfinite(z["imu/acc"]), axis=-1)[..., None]
+        present = xp.all(xp.isfinite(z["imu/acc"]), axis=-1)[..., None]
         over = xp.greater(x[..., 13:14], expand(self.correction_interval - 0.5 * self.dt, 1))
-        return xp.logical_and(brought, over)
+        return xp.logical_and(present, over)
 
 
 @dataclass(frozen=True)

@@ -96,8 +96,8 @@ class Mahony(Recurrence):
 
         e = v × v̂,   q̇ = ½ q ⊗ (ω − b + k_P e),   ḃ = −k_I e
 
-    in two steps a tick, the turn by the gyroscope and the correction; gains are those of continuous time, so the
-    filter means the same at any rate. An accelerometer sample that is missing corrects nothing.
+    in two steps a sample, the rotation by the gyroscope and the correction; gains are those of continuous time, so the
+    filter is the same at any rate. Where an accelerometer sample is missing, the correction is skipped.
 
     State: q (4), b (3). Not estimated: heading, external acceleration.
     """

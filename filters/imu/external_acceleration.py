@@ -19,7 +19,7 @@ Differs from print: (31) has a transposed ω̃ that would turn the wrong way, (1
 single-argument arctangent that is 0/0 at zero roll (:func:`poise.filters.core.rotation.roll_pitch` is its well-defined
 form). c_a acts as a covariance gain more than as the correlation that (7) calls it: under (7) the variance of (23)
 would be that of ε, which falls as c_a grows. The printed first-order rotation (12) loses 1.9 °/s at 10 rad/s and
-100 Hz; ``exact_rotation`` replaces it by the exponential. The text never says how to start: here Z₀ = y_A/‖y_A‖,
+100 Hz; ``exact_rotation`` replaces it by the exponential. The paper gives no initial state: here Z₀ = y_A/‖y_A‖,
 P₀ = 10⁻² I, sensor at rest.
 
 c_a is what a gain policy must not choose freely. A steady tilt error e looks like an acceleration g e: it shrinks the
@@ -32,7 +32,7 @@ does not grow with e. A gyroscope that drifts faster than √3 σ_G (1 − c_a) 
 filter is locked out. :meth:`ExternalAcceleration.limited` therefore keeps c_a so low that a drift of
 :data:`FOLLOWED_DRIFT` can be followed at the σ_G of the same action, and below :data:`LARGEST_C_A` in any case.
 
-Not estimated: heading, gyroscope bias. Sustained acceleration cannot be told from tilt.
+Not estimated: heading, gyroscope bias. Sustained acceleration cannot be distinguished from tilt.
 """
 
 from __future__ import annotations
@@ -114,7 +114,7 @@ class ExternalAcceleration(Model):
         return x, constant([[1e-2, 0, 0], [0, 1e-2, 0], [0, 0, 1e-2]], y) + 0.0 * y[..., None]
 
     def predict(self, x: Array, z: Measurement, previous: Measurement) -> tuple[Array, Array, Array]:
-        """Equations (10)–(15), (24), (25): Φ, and Q = −Δt² Z̃ Σ_G Z̃ with the corrected Z of the tick before."""
+        """Equations (10)–(15), (24), (25): Φ, and Q = −Δt² Z̃ Σ_G Z̃ with the corrected Z of the sample before."""
         xp = namespace(x)
         rate = (z if self.gyroscope_sample == "current" else previous)["imu/gyr"]
         turn = expand(self.dt, 1) * rate
@@ -127,7 +127,7 @@ class ExternalAcceleration(Model):
         return xp.concat([(phi @ up[..., None])[..., 0], x[..., 3:]], axis=-1), phi, Q
 
     def residual(self, x: Array, z: Measurement) -> tuple[Array, Array, Array]:
-        """Equations (16)–(23), or the threshold (30): rows that it shuts out are NaN and correct nothing."""
+        """Equations (16)–(23), or the threshold (30): rows that it shuts out are NaN, and their update is skipped."""
         xp = namespace(x)
         y, up, last = z["imu/acc"], x[..., :3], x[..., 3:6]
         identity = constant([[1, 0, 0], [0, 1, 0], [0, 0, 1]], x) + 0.0 * x[..., :3, None]
@@ -138,8 +138,8 @@ class ExternalAcceleration(Model):
             squared = xp.sum(last * last, axis=-1)[..., None, None]
             variance = variance + expand(self.c_a**2, 2) * squared / 3.0
         if self.mode == 3:
-            held = xp.greater(self._static_samples(x, y), self.window / self.dt + 0.5)
-            r = xp.where(held, r, xp.nan)
+            static = xp.greater(self._static_samples(x, y), self.window / self.dt + 0.5)
+            r = xp.where(static, r, xp.nan)
         return r, expand(self.gravity, 2) * identity, variance * identity
 
     def retract(self, x: Array, dx: Array) -> Array:

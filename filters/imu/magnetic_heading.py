@@ -105,7 +105,7 @@ class MagneticHeading(Model):
     The other base keeps the orientation in the first four numbers of its state and the turn about world axes in the
     first three of its error, and passes what follows its own numbers on. The state gains two numbers at its end: norm
     and dip of the field that are expected. The residual gains one row at its end: the error of the heading. The filter
-    starts at the first tick at which the magnetometer, too, has brought a sample.
+    starts at the first sample at which the magnetometer, too, has had a valid one.
 
     The row has no entry for the inclination. Heading and gyroscope bias are correlated, so that the bias about the
     vertical is found; a false field that is taken for true therefore harms the bias, and through it, slowly, the

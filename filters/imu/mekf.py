@@ -24,7 +24,7 @@ angle about the vertical, and its Jacobian has no entry for the inclination (:mo
 
 Nine axes on the same ten trials, total error with the heading: 3.2° (bounded motion 2.7°, VQF 3.2°).
 
-Not estimated: external acceleration, magnetic field. Sustained acceleration cannot be told from tilt.
+Not estimated: external acceleration, magnetic field. Sustained acceleration cannot be distinguished from tilt.
 """
 
 from __future__ import annotations

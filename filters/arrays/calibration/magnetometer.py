@@ -132,8 +132,8 @@ def align_magnetometer(unit: np.ndarray, orientation: np.ndarray) -> Alignment:
 
     Args:
         unit: ``(T, 3)`` readings of length about one (:class:`Ellipsoid`), magnetometer axes.
-        orientation: ``(T, 4)`` reference quaternions w, x, y, z, device to world, of the same ticks; rows with NaN are
-            left out.
+        orientation: ``(T, 4)`` reference quaternions w, x, y, z, device to world, of the same samples; rows with NaN
+            are left out.
 
     Raises:
         ValueError: shapes that differ, a quaternion of zeros, too few samples, or attitudes that do not determine the

@@ -16,7 +16,8 @@ coordinate. Without an upright pose only ratios are determined; the columns are 
 
 :func:`calibrate_direction` is ours: with s = e/μ and f_k the upward directions of the poses the same relation is
 v = s·(g f_k) + b − ω² c_k, linear in s, b and one c_k a mounting, so that upward directions that span space (and one
-that is opposite to another) tell the sensitive axis as well. Half a degree left in an axis costs as much as 0.09 m/s².
+that is opposite to another) determine the sensitive axis as well. Half a degree left in an axis costs as much as
+0.09 m/s².
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ from typing import Any
 import numpy as np
 
 SINGULAR = 1e-5
-"""Smallest singular value, relative to the largest, of columns of unit length that are still told apart."""
+"""Smallest singular value, relative to the largest, of columns of unit length that are still distinguished."""
 UPRIGHT = 0.999
 """An axis whose upward part is at least that is upright: it has no horizontal part, and no position is seen."""
 
@@ -233,7 +234,7 @@ def _check_gravity(gravity: float) -> None:
 def _check_rates(rate: np.ndarray, mounting: np.ndarray, names: list[str]) -> None:
     for name in names:
         if len(np.unique(np.round(rate[mounting == name] ** 2, 6))) < 2:
-            raise ValueError(f"mounting {name!r} needs at least two different rates to tell its position, got 1")
+            raise ValueError(f"mounting {name!r} needs at least two different rates to determine its position, got 1")
 
 
 def _columns(raw: np.ndarray, rate: np.ndarray, mounting: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -254,8 +255,8 @@ def _least_squares(columns: np.ndarray, right: np.ndarray, labels: list[str]) ->
     lengths = np.linalg.norm(columns, axis=0)
     if not (lengths > 0.0).all():
         nothing = [label for label, length in zip(labels, lengths, strict=True) if not length > 0.0]
-        raise ValueError(f"the data say nothing about {nothing}")
+        raise ValueError(f"the data do not determine {nothing}")
     values = np.linalg.svd(columns / lengths, compute_uv=False)
     if values[-1] < SINGULAR * values[0]:
-        raise ValueError(f"the data do not tell {', '.join(labels)} apart (singular normal matrix): add rates or poses")
+        raise ValueError(f"the data do not separate {', '.join(labels)} (singular normal matrix): add rates or poses")
     return np.linalg.lstsq(columns / lengths, right, rcond=None)[0] / lengths

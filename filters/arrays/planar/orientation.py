@@ -123,7 +123,7 @@ class PlanarOrientation(PlanarEquations, Model):
     """Kalman filters on the angle, section 3.3: ``extended`` on the specific force, ``linear`` on the tilt angle."""
 
     method: Literal["extended", "linear"] = "extended"
-    """what the filter is told: c̈ or its angle"""
+    """what is measured: c̈ or its angle"""
     wrapped: bool = True
     """of the linear one: the difference of angles is taken within half a turn"""
 

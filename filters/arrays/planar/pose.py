@@ -12,7 +12,7 @@ Differs from print: R is printed as σ_a² (AᵀA)⁻¹ (3.44), the covariance o
 block of H as A_P (3.45). ``form`` brings either back: on smooth motion both are worse by far. p and v cannot be seen in
 accelerations; the sign of ω only through α and φ.
 
-In the thesis' model b̈ walks at random, so that nothing ever tells gravity from it: after the start the angle is
+In the thesis' model b̈ walks at random, so that nothing ever separates gravity from it: after the start the angle is
 integrated, and drifts; white acceleration of 30 m/s² is no motion of that model at all. Here b̈ returns to zero,
 b̈ ← e^{−λΔt} b̈ (``acceleration_decay`` λ; 0 is the thesis'), which holds the angle. Its standard deviation is then
 σ_β Δt / √(1 − e^{−2λΔt}): 5 m/s² for the defaults.

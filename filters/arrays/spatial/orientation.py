@@ -17,7 +17,7 @@ A = [A_P A_T A_C] the array, what is expected of the readings is
     zeros          q₁·q₁ − 1, q₂·q₂ − 1, q₃·q₃ − 1, q₂·q₃, q₃·q₁, q₁·q₂          (orthogonality as a measurement)
 
 and R = blkdiag(σ_b² A_P A_Pᵀ + σ_a² 1, σ_ω² 1, σ_m² 1, σ_s² 1). The idea is in σ_b: the acceleration of the hand is
-white noise that all accelerometers share, so the filter knows how little they say about gravity.
+white noise that all accelerometers share, so the filter knows how little information on gravity they hold.
 
 Differs from print:
 

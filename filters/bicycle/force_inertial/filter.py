@@ -23,7 +23,7 @@ Differs from print, each with an option that brings the printed form back:
 * ``jacobian``: H is the whole derivative of the residual; (21) holds rates and accelerations fixed.
 * ``ahead_share``: level shoulders (17) count 0.8, a chest that faces ahead 0.2. A rider who leans tilts the shoulders,
   and φ then is wrong by their tilt over cos θ.
-* the bias is the Gauss–Markov process that (15) writes, not the random walk that the text says.
+* the bias is the Gauss–Markov process that (15) writes, not the random walk of the text.
 * a rider is no point mass on a seat: the seat also carries the pelvis and part of the legs, the pivot is above it, each
   hand pushes at its own grip (:mod:`.force_inertial.forces`). All of that vanishes in :meth:`ForceInertial.published`.
 
@@ -232,7 +232,7 @@ class ForceInertial(ForceInertialParameters, Model):
         return xp.concat([xp.stack(parts, axis=-1), x[..., 7:]], axis=-1)
 
     def pose(self, x: Array) -> dict[str, Array]:
-        """Roll (right positive), trunk angles in the paper's frame R, and the bias in our trunk axes."""
+        """Roll (right positive), trunk angles in the paper's frame R, and the bias in the sensor's axes."""
         return {
             "bicycle/roll": x[..., 3:4],
             "force-inertial/trunk_angles": x[..., :3],

@@ -4,7 +4,7 @@ Frames are those of :mod:`.force_inertial.kinematics` (z down); loads are those 
 
 **Read.** Centre of pressure from the load cells, (10) moves the six-axis sensor's load there, (11) and (12) on to the
 trunk's pivot P. Written out, the centre of pressure cancels: the moment about P is that of the six-axis sensor,
-whatever the load cells say. (Not with the printed sign of (12), where R_z x_C counts twice.) A missing load cell
+whatever the load cells read. (Not with the printed sign of (12), where R_z x_C counts twice.) A missing load cell
 therefore costs nothing, and its noise does not count.
 
 **Needed.** Newton and Euler for all that sits on the seat, about P, with f = a − g of each part:

@@ -1,7 +1,7 @@
 """The two gyroscopes alone: what the force/inertial filter would be without its forces.
 
 The baseline of Y. Zhang, K. Chen, J. Yi, IEEE Transactions on Biomedical Engineering 60, 2013, section III: strapdown
-integration of (3) and (4) from the angles that the first forces tell. It drifts.
+integration of (3) and (4) from the angles that the first forces determine. It drifts.
 """
 
 from __future__ import annotations
@@ -23,14 +23,14 @@ from .readings import readings, static_angles, steering
 
 @dataclass(frozen=True)
 class ForceInertialIntegration(ForceInertialParameters, Recurrence):
-    """Euler steps (16) without a correction. State: φ_h, θ, φ, φ_b."""
+    """Euler steps (16) without a measurement update. State: φ_h, θ, φ, φ_b."""
 
     channels: ClassVar[tuple[Channel, ...]] = CHANNELS
     outputs: ClassVar[tuple[Quantity, ...]] = (ROLL, TRUNK_ANGLES)
     state_size: ClassVar[int] = 4
 
     def prior(self, z: Measurement) -> Array:
-        """Angles from the first forces; NaN until every channel brought a sample."""
+        """Angles from the first forces; NaN until every channel has had a valid sample."""
         xp = namespace(z["seat/wrench"])
         rate, speed = down(z["bicycle_imu/gyr"]), z["wheel/speed"][..., 0]
         yaw = cos(self.imu_tilt) * rate[2] - sin(self.imu_tilt) * rate[0]

@@ -83,7 +83,7 @@ class ForceInertialParameters(RiderEquations):
     grip_half_width: float = 0.27
     """of each hand from the middle"""
     wheelbase: float = 1.05
-    """tells how far the handlebar is turned from the path's curvature; zero in the paper: it stays straight"""
+    """from which, with the path's curvature, the steering angle follows; zero in the paper: it stays straight"""
     caster: float = 0.3142
     """tilt of the steering axis, backwards"""
     trunk_mass: float = 29.835

@@ -41,7 +41,7 @@ def readings(
     xp = namespace(wrench)
     known = xp.all(xp.isfinite(cells), axis=-1)
     filled = [xp.where(known, cells[..., k], 1.0 + 0.0 * parameters.cells_long) for k in range(3)]
-    # ours are front, rear left, rear right
+    # the channel holds front, rear left, rear right
     x_C, y_C = centre_of_pressure((filled[0], filled[2], filled[1]), sensors)
     centre = (xp.where(known, x_C, 0.0 * x_C), xp.where(known, y_C, 0.0 * y_C))
     R, M = seat_load((down(wrench[..., :3]), down(wrench[..., 3:])), sensors, centre)

@@ -132,7 +132,7 @@ def knee_flexion(
         upper: length of the thigh, m.
         shank: knee to ankle, l_s, m.
         foot_length: ankle to pedal, l_z, m.
-        ankle: exterior angle γ of the held ankle, 0 with the foot in line with the shank, rad.
+        ankle: exterior angle γ of the fixed ankle, 0 with the foot in line with the shank, rad.
         printed: with the small-angle form of print.
     """
     xp = namespace(foot)

@@ -1,8 +1,8 @@
-r"""Pose of a whole bicycle rider from few worn sensors and what hands and feet hold.
+r"""Pose of a whole bicycle rider from few worn sensors and the constraints at hands and feet.
 
 Y. Zhang, K. Chen, J. Yi, T. Liu, Q. Pan, "Whole-Body Pose Estimation in Human Bicycle Riding Using a Small Set of
 Wearable Sensors", 2016; equation numbers are the paper's, * marks those that were corrected. Axes are the paper's
-inside (x forward, y up, z to the right) and the environment's at every door (:mod:`.whole_body.linkage`).
+inside (x forward, y up, z to the right) and the environment's at every interface (:mod:`.whole_body.linkage`).
 
 State X = [φ, ϑ̈, Θ, a_ts, Φ_r, Ψ_r, Φ_l, Ψ_l] (20): roll, yaw acceleration, trunk, acceleration of the trunk's sensor
 against the seat, right shoulder and hip, left shoulder and hip. Six gyroscopes are inputs: with w the child's and q
@@ -21,11 +21,11 @@ and k_S that of what sits still between saddle and pivot (:func:`.seat_moments`)
 trunk's lean, ``seat_share`` is the part of it that the seat feels. Legs and pedal forces are left to the noise.
 
 Q is that of the gyroscopes' noise, which trunk and arms share; what φ, trunk and legs share of the bicycle's gyroscope
-is left out, so that the filter falls into four parts that do not meet: {φ, ϑ̈}, {Θ, a_ts, Φ_r, Φ_l}, {Ψ_r}, {Ψ_l}. A
+is left out, so that the filter has four decoupled subsystems: {φ, ϑ̈}, {Θ, a_ts, Φ_r, Φ_l}, {Ψ_r}, {Ψ_l}. A
 shock (|f| far from g) widens a_bz, a_t and τ and wears off (``shock_guard``).
 
 Not estimated: yaw, gyroscope and accelerometer biases. Assumed: flat ground, no pitch, no side slip, a pelvis fixed to
-the frame, held ankles.
+the frame, fixed ankles.
 """
 
 from __future__ import annotations
@@ -86,7 +86,7 @@ class WholeBody(RiderLinkage, Model):
     """(9): corrected, as printed"""
     usual_twist: bool = False
     """one more output, not the paper's: θ₃ is about ``twist_follow`` times the steering angle, as shoulders follow
-    hands. Where hands carry the trunk's lean, the seat torque does not tell how the trunk is turned about gravity"""
+    hands. Where hands carry the trunk's lean, the seat torque does not determine the trunk's heading"""
     shock_guard: bool = True
     """widen a_bz, a_t and τ during shocks"""
     sampling: Literal["interval", "instant"] = "interval"

@@ -32,7 +32,7 @@ SHOULDER = {"right": slice(8, 11), "left": slice(14, 17)}
 HIP = {"right": slice(11, 14), "left": slice(17, 20)}
 ERROR_SIZE = 20
 STEER, CRANK = slice(20, 21), slice(21, 22)
-"""Encoders as last heard of, remembered for the angles of elbows and knees."""
+"""Last valid samples of the encoders, for the angles of elbows and knees."""
 
 GYROSCOPES = (
     "bicycle_imu/gyr",
@@ -85,8 +85,8 @@ def true_angles(truth: Mapping[str, Any]) -> dict[str, np.ndarray]:
 class RiderLinkage(RiderEquations):
     """Geometry of rider and bicycle (m, environment's axes), the start, the angles of elbows and knees.
 
-    State: φ (1), yaw acceleration (1), Θ (3), a_ts (3), Φ_r (3), Ψ_r (3), Φ_l (3), Ψ_l (3), steering and crank angle as
-    last heard of (2).
+    State: φ (1), yaw acceleration (1), Θ (3), a_ts (3), Φ_r (3), Ψ_r (3), Φ_l (3), Ψ_l (3), last valid steering and
+    crank angle (2).
     """
 
     saddle: Point = USUAL.saddle
@@ -173,7 +173,7 @@ class RiderLinkage(RiderEquations):
     def start(self, z: Measurement) -> Array:
         """State ``(..., 22)``: trunk as usual, limbs by inverse kinematics with plain elbows and knees.
 
-        NaN until every gyroscope, the bicycle's accelerometer and both encoders have been heard of.
+        NaN until every gyroscope, the bicycle's accelerometer and both encoders have had a valid sample.
         """
         steer, crank = z["steer/angle"], z["crank/angle"]
         xp = namespace(steer)
@@ -202,8 +202,8 @@ class RiderLinkage(RiderEquations):
             parts[f"hip_{side}"] = limb_constraints.hip_angles(frame)
         limbs = [parts[f"{joint}_{side}"] for side in SIDES for joint in ("shoulder", "hip")]
         x = xp.concat([zero, zero, trunk, zero, zero, zero, *limbs, steer, crank], axis=-1)
-        heard = xp.concat([z[name] for name in (*GYROSCOPES, "bicycle_imu/acc")], axis=-1)
-        return xp.where(xp.all(xp.isfinite(heard), axis=-1)[..., None], x, xp.nan)
+        present = xp.concat([z[name] for name in (*GYROSCOPES, "bicycle_imu/acc")], axis=-1)
+        return xp.where(xp.all(xp.isfinite(present), axis=-1)[..., None], x, xp.nan)
 
     def pose(self, x: Array) -> dict[str, Array]:
         """Roll, angles of trunk, shoulders and hips from the state, elbows by C4, knees by C8."""

@@ -241,12 +241,12 @@ def test_wrong_counts_and_missing_poses_are_refused():
     part = RateTableData(data.time[keep], data.up[keep], data.out[keep], data.rate[keep], data.raw[keep])
     with pytest.raises(ValueError, match="accelerometer 3 of 'triaxial': no pose in which the axis points up"):
         accelerometer_record(part, TRIAXIAL)
-    with pytest.raises(ValueError, match=r"the data say nothing about \['axis z'\]"):
+    with pytest.raises(ValueError, match=r"the data do not determine \['axis z'\]"):
         accelerometer_record(part, TRIAXIAL, estimate_axes=True)
     three = np.char.startswith(data.up.astype(str), "+")
     upright = RateTableData(data.time[three], data.up[three], data.out[three], data.rate[three], data.raw[three])
     assert accelerometer_record(upright, TRIAXIAL).channels
-    with pytest.raises(ValueError, match="do not tell axis x, axis y, axis z, offset"):
+    with pytest.raises(ValueError, match="do not separate axis x, axis y, axis z, offset"):
         accelerometer_record(upright, TRIAXIAL, estimate_axes=True)
     with pytest.raises(ValueError, match="gyroscope axis z: no run in which it stood upright"):
         gyroscope_record(part)
