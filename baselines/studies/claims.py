@@ -40,7 +40,9 @@ class Claim:
             factor: how much smaller it must be: 0.5 for less than half.
             names: of both numbers, where the statement does not say which is which.
         """
-        one, other = (f"{name} {number:.3g}" for name, number in zip(names or ("", ""), (value, limit), strict=True))
+        one, other = (
+            f"{name} {digits(number)}" for name, number in zip(names or ("", ""), (value, limit), strict=True)
+        )
         share = "" if factor == 1.0 else f"{factor:g} × "
         number = f"{one.strip()} against {share}{other.strip()} {unit}".strip()
         return cls(statement, number, None if math.isnan(value) or math.isnan(limit) else value < factor * limit)
@@ -48,7 +50,7 @@ class Claim:
     @classmethod
     def within(cls, statement: str, value: float, low: float, high: float, unit: str = "") -> Claim:
         """Holds if ``low <= value <= high``."""
-        number = f"{value:.3g} {unit}".strip() + f" ({low:.3g} … {high:.3g})"
+        number = f"{digits(value)} {unit}".strip() + f" ({low:.3g} … {high:.3g})"
         return cls(statement, number, None if math.isnan(value) else low <= value <= high)
 
     @classmethod
@@ -78,3 +80,8 @@ class Claim:
         number += f" ({', '.join(f'{name} {values[name]:.3g}' for name in order)} {unit})"
         rises = all(one < other for one, other in itertools.pairwise(found))
         return cls(statement, number, None if any(map(math.isnan, found)) else rises)
+
+
+def digits(value: float) -> str:
+    """Three significant digits; a dash for what is not known."""
+    return "–" if math.isnan(value) else f"{value:.3g}"

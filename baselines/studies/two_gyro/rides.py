@@ -168,7 +168,9 @@ def scenarios(report: Report, results: dict[str, list[dict[str, Any]]]) -> None:
             peak = mean_of(each["peak"][name] for each in found)
             theta = mean(settled.get(f"θ{i}", np.nan) for i in (1, 2, 3))
             row = {"φ": settled["φ"], "φ, last 20 s": late["φ"], "peak of φ": peak["φ"], "θ, mean of three": theta}
-            rows.append({"scenario": scenario, "filter": name, **rounded(row)})
+            rows.append(
+                {"scenario": scenario, "filter": name, **rounded(row), **rounded({"peak of φ": row["peak of φ"]}, 1)}
+            )
         for name in RIDES.checked:
             statistics = mean_of(each["consistency"][name] for each in found)
             consistency.append({"scenario": scenario, "filter": name, **rounded(statistics)})
