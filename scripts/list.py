@@ -1,4 +1,4 @@
-"""What there is: estimators, environments, sensors, gestures, scenarios of rides, file formats.
+"""What there is by name: estimators, environments, sensors and their kinds, gestures, scenarios of rides, formats.
 
 Each list is read from the table that the package itself uses. Pages of the documentation hold these lists between
 ``<!-- list: NAME -->`` and ``<!-- end of list -->``; ``--update`` writes them anew.
@@ -29,7 +29,8 @@ class Args:
     """Arguments of ``poise list``."""
 
     lists: tyro.conf.Positional[tuple[str, ...]] = ()
-    """which lists: estimators, environments, sensors, gestures, scenarios, formats; all if none is named"""
+    """which lists: estimators, environments, sensors, sensor-kinds, gestures, scenarios, formats; all if none is
+    named"""
     markdown: bool = False
     """print the tables in Markdown, as the documentation has them"""
     update: tuple[Path, ...] = ()
@@ -53,7 +54,7 @@ def run(args: Args) -> int:
                 out.say(f"{placed(name)}\n")
             else:
                 out.rows(rows(), name)
-                out.show(rows(), name, ["name", *[key for key in rows()[0] if key in ("kind", "unit", "description")]])
+                out.show(rows(), name, [key for key in rows()[0] if key not in ("channels", "outputs", "source")])
     return 0
 
 
@@ -115,6 +116,22 @@ def sensors() -> Rows:
     return [{"name": each.name, "kind": kind, "description": each.source} for some, kind in kinds for each in some]
 
 
+def sensor_kinds() -> Rows:
+    """Every kind of sensor that a preset or a user may give by name."""
+    from ..envs.sensors.kinds import KINDS
+
+    return [
+        {
+            "name": name,
+            "channel": f"…/{kind.suffix}",
+            "values": kind.size,
+            "unit": kind.unit or None,
+            "full scale": kind.full_scale if kind.unit else None,
+        }
+        for name, kind in KINDS.items()
+    ]
+
+
 def gestures() -> Rows:
     """Every motion of a hand with the first sentence of its configuration."""
     from ..envs.hand.gestures import GESTURES
@@ -137,7 +154,8 @@ def formats() -> Rows:
 
 
 LISTS: Mapping[str, Callable[[], Rows]] = {
-    function.__name__: function for function in (estimators, environments, sensors, gestures, scenarios, formats)
+    function.__name__.replace("_", "-"): function
+    for function in (estimators, environments, sensors, sensor_kinds, gestures, scenarios, formats)
 }
 """Name → rows."""
 

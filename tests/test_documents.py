@@ -1,11 +1,13 @@
 """Examples in the documents run; tables and links in them are true."""
 
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
-from poise.scripts.list import LISTS, PLACED, updated
+from poise.scripts.list import LISTS, PLACED
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCUMENTS = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
@@ -29,10 +31,13 @@ def test_links_lead_somewhere(path):
         assert target.startswith("http") or (path.parent / target).exists(), target
 
 
-@pytest.mark.parametrize("path", DOCUMENTS, ids=lambda path: path.name)
-def test_lists_are_those_of_the_package(path):
-    text = path.read_text(encoding="utf-8")
-    assert updated(text) == text, f"run: poise list --update {path.relative_to(ROOT)}"
+def test_lists_are_those_of_the_package():
+    # a process of its own: examples may register kinds of sensors
+    words = [sys.executable, "-m", "poise.scripts.main", "list", "--markdown"]
+    printed = subprocess.run(words, capture_output=True, text=True, check=True).stdout
+    for path in DOCUMENTS:
+        for found in PLACED.finditer(path.read_text(encoding="utf-8")):
+            assert found[0] in printed, f"run: poise list --update {path.relative_to(ROOT)}"
 
 
 def test_every_list_is_in_a_document():

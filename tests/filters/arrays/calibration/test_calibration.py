@@ -62,7 +62,7 @@ def test_degenerate_runs_are_refused_with_their_reason():
     level = mounting != "up"
     with pytest.raises(ValueError, match="no pose in which the axis points up"):
         calibrate_accelerometer(raw[level], rate[level], mounting[level], UPWARD)
-    with pytest.raises(ValueError, match=r"scale, offset apart \(singular normal matrix\)"):
+    with pytest.raises(ValueError, match=r"do not separate scale, offset \(singular normal matrix\)"):
         calibrate_accelerometer(np.full(50, 3.0), np.zeros(50), np.full(50, "up"), UPWARD)
     one_rate = (mounting == "up") | (rate == rate[0])
     with pytest.raises(ValueError, match="'first' needs at least two different rates"):
@@ -117,7 +117,7 @@ def test_gyroscope_needs_three_rates():
         calibrate_gyroscope(raw, rate)
     with pytest.raises(ValueError, match="got 0"):
         calibrate_gyroscope(*gyroscope(), saturation=1.0)
-    with pytest.raises(ValueError, match="tell scale, offset apart"):
+    with pytest.raises(ValueError, match="do not separate scale, offset"):
         calibrate_gyroscope(np.full(60, 5.0), np.repeat([1.0, 2.0, 3.0], 20), saturation=9.0)
 
 
