@@ -4,7 +4,7 @@ SHELL := /bin/bash
 .SHELLFLAGS := -eu -o pipefail -c
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help install benchmark speed test test-slow check lint types format clean
+.PHONY: help install benchmark speed test test-slow core check lint types format clean
 
 VENV := .venv
 BIN := $(abspath $(VENV))/bin
@@ -43,6 +43,9 @@ test: check ## lint, types and the tests of every day; ARGS="-k name" picks some
 
 test-slow: $(STAMP) ## the long tests: training, long rollouts
 	$(BIN)/python -m pytest -m slow $(ARGS)
+
+core: $(STAMP) ## the core without extras, from the wheel, on every newer Python found here
+	.ci/core
 
 check: lint types ## lint, formatting, types
 
