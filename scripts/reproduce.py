@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import dataclasses
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,6 +21,7 @@ from .main import run_command
 from .output import Output
 
 if TYPE_CHECKING:
+    from ..baselines.studies.kit import Study
     from ..baselines.studies.report import Entry, Report
 
 
@@ -53,34 +56,55 @@ class Args:
 def run(args: Args) -> int:
     """Do the study, print what it finds as it is found, and leave a run folder with a report."""
     from ..baselines.studies import find_paper
+
+    reproduce = find_paper(args.paper)
+    args = filled(args)
+    for path in args.recordings:
+        if not path.exists():
+            raise FileNotFoundError(f"no recording at {path}: there is no such file or folder")
+    shared = ("quick", "seed", "subjects", "seeds", "duration", "processes", "recordings")
+    settings = {name: getattr(args, name) for name in shared}
+    with studying("reproduce", args, settings, f"poise reproduce {args.paper}") as (study, _, report):
+        reproduce(study, report)
+    return 0
+
+
+@contextmanager
+def studying(
+    command: str, args: Any, settings: dict[str, Any], title: str, width: int | None = None
+) -> Iterator[tuple[Study, Output, Report]]:
+    """A study in a new or resumed run folder: entries of its report are printed and written as they are found.
+
+    Args:
+        command: its name.
+        args: its arguments.
+        settings: fields of :class:`.Study`.
+        title: of the report.
+        width: columns of a table that does not go to a terminal.
+
+    Raises:
+        ValueError: a setting is out of its range, or what :func:`.open_run` refuses.
+    """
     from ..baselines.studies.kit import Study
     from ..baselines.studies.report import Report
     from ..envs.bicycle.rider.anthropometry import SUBJECTS
 
-    reproduce = find_paper(args.paper)
-    args = filled(args)
-    if not all(0 <= subject < len(SUBJECTS) for subject in args.subjects or ()):
-        raise ValueError(f"subjects must be numbers from 0 to {len(SUBJECTS) - 1}, got {list(args.subjects or ())}")
-    for path in args.recordings:
-        if not path.exists():
-            raise FileNotFoundError(f"no recording at {path}: there is no such file or folder")
+    if not all(0 <= subject < len(SUBJECTS) for subject in settings["subjects"]):
+        raise ValueError(f"subjects must be numbers from 0 to {len(SUBJECTS) - 1}, got {list(settings['subjects'])}")
     # Refuses wrong numbers before a folder is made.
-    shared = ("quick", "seed", "subjects", "seeds", "duration", "processes", "recordings")
-    settings: dict[str, Any] = {name: getattr(args, name) for name in shared}
     Study(Path(), **settings)
-    folder = open_run("reproduce", args)
+    folder = open_run(command, args)
     study = Study(folder.folder.resolve(), **settings)
-    with Output("reproduce", args) as out:
+    with Output(command, args) as out:
 
         def publish(entry: Entry) -> None:
-            show(entry, out)
-            write(args, folder, report)
+            show(entry, out, width)
+            write(title, folder, report)
 
         report = Report(folder.folder, publish)
-        reproduce(study, report)
+        yield study, out, report
         folder.write_results(report.results)
-        out.report(write(args, folder, report))
-    return 0
+        out.report(write(title, folder, report))
 
 
 def filled(args: Args) -> Args:
@@ -96,10 +120,10 @@ def filled(args: Args) -> Args:
     )
 
 
-def show(entry: Entry, out: Output) -> None:
+def show(entry: Entry, out: Output, width: int | None = None) -> None:
     """Print one entry; the document gets its rows, and figures as they are named."""
     if entry.rows:
-        out.table(entry.rows, entry.title)
+        out.table(entry.rows, entry.title, console=console(width))
         text = entry.text
     elif entry.figure is not None:
         text = f"figure: {entry.figure} ({entry.title})"
@@ -109,13 +133,22 @@ def show(entry: Entry, out: Output) -> None:
         out.say(f"{text}\n" if text else "")
 
 
-def write(args: Args, folder: Run, report: Report) -> Path:
+def console(width: int | None) -> Any:
+    """A console that has this many columns where the output is not a terminal; None for the usual one."""
+    import sys
+
+    from rich.console import Console
+
+    return None if width is None or sys.stdout.isatty() else Console(width=width)
+
+
+def write(title: str, folder: Run, report: Report) -> Path:
     """Write ``report.md`` with all entries so far."""
     from ..filters.support.files import write_text
     from .report import provenance
     from .tables import markdown_table
 
-    parts = [f"# poise reproduce {args.paper}"]
+    parts = [f"# {title}"]
     for entry in report.entries:
         if entry.title:
             parts.append(f"## {entry.title}")

@@ -260,10 +260,9 @@ def claims(scenario: str, every: list[dict[str, Any]]) -> list[Claim]:
         ),
         Claim.less(
             "More than half of what is read in τ_φh is not in the dynamic model",
-            read["read"]["τ_φh std"],
+            0.5 * read["read"]["τ_φh std"],
             read["dynamic"]["τ_φh − read, rms"],
             "N·m",
-            factor=0.5,
         ),
         Claim.less("φ_h that starts 35° off is right within 1° after 6 s at most", max(starts), 6.0, "s"),
         Claim.less(

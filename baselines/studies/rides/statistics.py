@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import json
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
-from itertools import product
-from pathlib import Path
+from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -154,54 +151,3 @@ def ride(scenario: str, subject: int, duration: float, fidelity: str, seed: int)
         env.close()
     gaps = loop_gaps(trajectory.truth, sit(env.parameters, rider_body(subject))) if fidelity == "full" else None
     return ride_statistics(trajectory, scenario=scenario, subject=subject, gaps=gaps)
-
-
-def ride_once(folder: Path, scenario: str, subject: int, duration: float, fidelity: str, seed: int) -> RideStatistics:
-    """:func:`ride`, or what it found if its file is in the folder already; the file appears whole or not at all."""
-    path = folder / f"{scenario}-{subject}.json"
-    if path.exists():
-        return RideStatistics(**json.loads(path.read_text(encoding="utf-8")))
-    found = ride(scenario, subject, duration, fidelity, seed)
-    part = path.with_suffix(".part")
-    part.write_text(json.dumps(asdict(found)), encoding="utf-8")
-    part.replace(path)
-    return found
-
-
-def ride_all(
-    folder: Path,
-    scenarios: Sequence[str],
-    subjects: Sequence[int],
-    *,
-    duration: float,
-    fidelity: str,
-    seeds: Mapping[tuple[str, int], int],
-    processes: int = 1,
-) -> Iterator[RideStatistics]:
-    """Ride every scenario with every rider, several at a time; what is in the folder is not ridden again.
-
-    Args:
-        folder: where each ride leaves a file.
-        scenarios: names.
-        subjects: numbers of riders.
-        duration: s.
-        fidelity: ``full`` or ``lumped``.
-        seeds: seed of each scenario and rider.
-        processes: how many rides at a time.
-
-    Returns:
-        Statistics in the order in which rides are finished.
-
-    Raises:
-        ValueError: ``processes`` is not positive, or what :func:`ride` raises.
-    """
-    if processes < 1:
-        raise ValueError(f"processes must be at least 1, got {processes}")
-    folder.mkdir(parents=True, exist_ok=True)
-    jobs = [(folder, *which, duration, fidelity, seeds[which]) for which in product(scenarios, subjects)]
-    if processes == 1:
-        yield from (ride_once(*job) for job in jobs)
-        return
-    from joblib import Parallel, delayed
-
-    yield from Parallel(n_jobs=processes, return_as="generator_unordered")(delayed(ride_once)(*job) for job in jobs)

@@ -7,6 +7,7 @@ import pytest
 
 from poise.baselines.studies.rides import checks as ride_checks
 from poise.baselines.studies.rides import inclinations as ride_inclinations
+from poise.baselines.studies.rides import study as ride_study
 from poise.scripts.main import main
 
 
@@ -43,8 +44,8 @@ def test_inclinations_are_those_of_the_evaluation():
 
 def test_the_command_prints_both_tables(monkeypatch, tmp_path, capsys):
     one = ride_checks.Check("weight", "small", "small")
-    monkeypatch.setattr(ride_checks, "all_checks", lambda: iter([one]))
-    monkeypatch.setattr(ride_inclinations, "inclination_rows", lambda: iter([{"scenario": "slow", "tilt": "1.0"}]))
+    monkeypatch.setattr(ride_study, "all_checks", lambda: iter([one]))
+    monkeypatch.setattr(ride_study, "inclination_rows", lambda: iter([{"scenario": "slow", "tilt": "1.0"}]))
     assert main(["rides", "--checks", "--json", "--runs", str(tmp_path)]) == 0
     rows = json.loads(capsys.readouterr().out)["rows"]
     assert [{name: row[name] for name in row if name != "table"} for row in rows] == [
