@@ -33,7 +33,7 @@ def inclination_rows(
     """Rows: scenario and place, then the RMS error of inclination (deg) of each estimator.
 
     Args:
-        estimators: names of the zoo.
+        estimators: names of estimators.
         rides: scenario and place of the IMU of each row; rides of one scenario are the same ride.
         subject: number of the rider, lumped, with the papers' sensors.
         seed: of the rides.

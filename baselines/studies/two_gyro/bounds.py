@@ -98,9 +98,11 @@ def bounds(study: Study, report: Report) -> None:
         "Bounds: what figure 4 says, and what holds",
         [
             Claim.less("(a) Σ2 converges while the platform turns: at most a tenth of the prior", last["(a) Σ2"], 0.5),
-            Claim.less("(a) Σ1 does not: more than the prior", 5.0, last["(a) Σ1"]),
+            Claim.less("(a) Σ1 does not converge while the platform turns: more than the prior", 5.0, last["(a) Σ1"]),
             Claim.less("(b) without turning Σ2 is as good as Σ1, within 2 %", 100.0 * apart, 2.0, "%"),
-            Claim.less("(b) neither converges: more than the prior", 5.0, min(last["(b) Σ2"], last["(b) Σ1"])),
+            Claim.less(
+                "(b) without turning neither converges: more than the prior", 5.0, min(last["(b) Σ2"], last["(b) Σ1"])
+            ),
             *claims,
         ],
     )

@@ -176,12 +176,17 @@ def claims_of_motions(found: dict[tuple[str, str, str], dict[str, Any]]) -> list
             Claim.less(f"{motion}: Σ2 converges to less than 0.5°, from 60 s on", late(motion, "sigma2"), 0.5)
             for motion in ("circle", "sine", "vibration", "pulses")
         ),
-        Claim.less("circle: Σ1 does not", 0.5, late("circle", "sigma1")),
-        Claim.less("straight: Σ2 does not converge either", 0.5, late("straight", "sigma2")),
+        Claim.less("circle: Σ1 does not converge to 0.5°", 0.5, late("circle", "sigma1")),
+        Claim.less("straight: Σ2 does not converge to 0.5°", 0.5, late("straight", "sigma2")),
         Claim.within(
             "circle: the error of Σ2 is as large as its covariance says, midpoint", ratios["midpoint"], 0.8, 1.2
         ),
-        Claim.within("circle: the same with the published Euler step", ratios["euler"], 0.8, 1.2),
+        Claim.within(
+            "circle: the error of Σ2 is as large as its covariance says, published Euler step",
+            ratios["euler"],
+            0.8,
+            1.2,
+        ),
     ]
 
 
@@ -238,9 +243,9 @@ def disturbed(study: Study, report: Report, count: int) -> list[Claim]:
             factor=1.1,
         ),
         Claim.less("20° of pitch do not degrade φ beyond 5°", peak[bumped], 5.0),
-        Claim.less("Inflation keeps the peak below 5°", peak[inflated_], 5.0),
+        Claim.less("20° of pitch: inflation keeps the peak of φ below 5°", peak[inflated_], 5.0),
         Claim.less("With inflation the bump is forgotten: less than 1° after 30 s", late[inflated_], 1.0),
-        Claim.less("Without inflation too", late[bumped], 1.0),
+        Claim.less("Without inflation the bump is forgotten: less than 1° after 30 s", late[bumped], 1.0),
         Claim.less("A constant camera error of 2° passes to φ by at least half where nothing moves", 1.0, still),
         Claim.less("A moving body tells the camera's error apart: less of it passes to φ", moving, still),
     ]
