@@ -14,6 +14,7 @@ from typing import Any
 
 import tyro
 
+from ..filters.support.optional import MissingExtraError
 from .main import run_command
 from .output import Output
 from .tables import markdown_table
@@ -102,8 +103,11 @@ def environments() -> Rows:
     rows = []
     for name, place in ENTRY_POINTS.items():
         module, kind = place.split(":")
-        described = getattr(importlib.import_module(module), kind).__doc__
-        rows.append({"name": name, "description": first_sentence(described)})
+        try:
+            described = first_sentence(getattr(importlib.import_module(module), kind).__doc__)
+        except MissingExtraError as reason:
+            described = str(reason)
+        rows.append({"name": name, "description": described})
     return rows
 
 

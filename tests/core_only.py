@@ -111,6 +111,9 @@ def command(*words: str) -> subprocess.CompletedProcess[str]:
 
 def the_rest_says_what_it_needs() -> None:
     """One line that names the extra; an ImportError from Python."""
+    listed = command("list")
+    assert listed.returncode == 0, listed.stderr
+    assert "pip install 'poise[sim]'" in listed.stdout
     for words, extra in (
         (("record", "rider-bicycle", "--episodes", "1"), "sim"),
         (("train", "gru"), "learn"),

@@ -35,7 +35,6 @@ TOGETHER = {frozenset({"filters.core", "filters.compile"})}
 """The Kalman filter runs compiled models, which are made from the core's; no two modules import each other."""
 CIRCLES: dict[frozenset[str], str] = {
     frozenset({"filters.compile.run", "filters.core.kalman", "filters.core.observer"}): "types of states",
-    frozenset({"envs.data.resampling", "envs.data.storage", "envs.data.trajectory"}): "methods of Trajectory",
 }
 """Modules that import each other in a circle, and why no move cures it."""
 MODULES = 16

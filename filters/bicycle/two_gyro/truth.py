@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Literal
+from typing import Any, Literal
 
 import numpy as np
 
 from ...core.rotation import conjugate, multiply, to_euler_zyx, up_in_body
 from ..relative_sensor import relative_angles
 from .kinematics import in_paper_axes, platform_rate
-
-if TYPE_CHECKING:
-    from .filter import TwoGyro
 
 
 def true_angles(
@@ -52,12 +49,12 @@ def true_angles(
     return angles
 
 
-def true_states(truth: Mapping[str, np.ndarray], model: TwoGyro) -> np.ndarray:
+def true_states(truth: Mapping[str, np.ndarray], model: Any) -> np.ndarray:
     """True states ``(T, n)`` of a filter, for bounds; biases that the truth does not hold are zero.
 
     Args:
         truth: as for :func:`true_angles`, with ``trunk_imu/gyroscope_bias`` (or ``disk/gyroscope_bias``) for biases.
-        model: the filter.
+        model: the filter, a :class:`.TwoGyro`.
     """
     angles = true_angles(truth, model.body, model.imu_tilt)
     main = angles["bicycle/roll"] if model.platform == "bicycle" else angles["two-gyro/pitch"]
