@@ -61,7 +61,7 @@ def every_filter_runs() -> None:
         if hasattr(estimator, "compiled") and name not in FAST:
             estimator = poise.make_estimator(name, compiled=False)
         data = {channel.name: sample(channel.name, channel.size, 12) for channel in estimator.channels}
-        estimate = poise.run(estimator, data)
+        estimate = poise.run(estimator, data, dt=estimator.dt)
         assert set(estimate.pose) == set(info.outputs), (name, set(estimate.pose), info.outputs)
         assert all(len(values) == 12 for values in estimate.pose.values()), name
 
