@@ -1,8 +1,8 @@
 """Orientation filters of several works on the same motions: gestures with a controller, and recordings of an IMU.
 
 Every estimator starts from its first samples and keeps its default constants, but that the two that have the noise of
-each sample among their constants (``array-orientation``, ``marins``) are told that of the simulated sensors. Filters
-that know of one accelerometer get the array's by least squares
+each sample among their constants (``array-orientation``, ``marins``) get that of the simulated sensors. Filters
+that read one accelerometer get the array's by least squares
 (:func:`~poise.filters.arrays.equivalent_imu.array_to_imu`).
 """
 
@@ -24,6 +24,9 @@ from ....filters.arrays.spatial.orientation import ArrayOrientation
 from ....filters.core.kalman import KalmanFilter
 from ....filters.imu.marins import Marins
 from ...evaluation import evaluate
+from ..kit import Study
+from ..report import Report
+from .tables import Row, grouped
 
 RATE = 100.0
 """Hz of the simulated gestures"""
@@ -33,6 +36,7 @@ GESTURES = ("slow", "fast", "severe", "pointing", "shaking")
 SENSORS = ("array-calibrated", "paper-array")
 """Errors of the simulated controller: calibrated chips with residual biases, and the white noise of the thesis"""
 METRICS = ("total", "inclination", "heading")
+QUICK_SECONDS, QUICK_RECORDINGS = 30.0, 2
 
 
 def held(gesture: str, sensors: str, seed: int, duration: float) -> Trajectory:
@@ -48,7 +52,7 @@ def contenders(array: str, noise: Mapping[str, Any]) -> dict[str, Any]:
 
     Args:
         array: ``controller`` or ``triaxial``.
-        noise: ``array_deviation``, ``gyroscope_deviation``, ``magnetometer_deviation``; what is absent stays default.
+        noise: see :func:`noise_of`; what is absent stays default.
     """
     model = ArrayOrientation(array=array, **noise)
     printed = ArrayOrientation(array=array, exact_rotation=False, orthonormalise=False, **noise)
@@ -73,7 +77,7 @@ def noise_of(sensors: str) -> dict[str, float]:
     }
 
 
-def gesture_errors(gesture: str, sensors: str, seed: int, duration: float) -> list[dict[str, Any]]:
+def gesture_errors(gesture: str, sensors: str, seed: int, duration: float) -> list[Row]:
     """Errors of every estimator on one gesture, degrees rms.
 
     Returns:
@@ -84,7 +88,7 @@ def gesture_errors(gesture: str, sensors: str, seed: int, duration: float) -> li
     return [{"gesture": gesture, "sensors": sensors, "seed": seed, **row} for row in rows]
 
 
-def recording_errors(path: Path, seconds: float | None) -> list[dict[str, Any]]:
+def recording_errors(path: Path, seconds: float | None) -> list[Row]:
     """Errors of every estimator on a recording with a magnetometer and a truth.
 
     Args:
@@ -103,7 +107,7 @@ def recording_errors(path: Path, seconds: float | None) -> list[dict[str, Any]]:
     return [{"recording": trajectory.name, **row} for row in scores(trajectory, contenders("triaxial", {}))]
 
 
-def scores(trajectory: Trajectory, estimators: Mapping[str, Any]) -> list[dict[str, Any]]:
+def scores(trajectory: Trajectory, estimators: Mapping[str, Any]) -> list[Row]:
     """Root mean square errors of orientation (of ``up`` where there is none), degrees, a row for each estimator."""
     frame = evaluate(estimators, [trajectory])
     rows = []
@@ -118,6 +122,58 @@ def scores(trajectory: Trajectory, estimators: Mapping[str, Any]) -> list[dict[s
     return rows
 
 
-def recordings_of(paths: tuple[Path, ...]) -> list[Path]:
-    """The BROAD trials among recordings: other files have no truth."""
-    return [path for path in recording_files(paths) if path.suffix in (".mat", ".hdf5")]
+def comparison(study: Study, report: Report) -> None:
+    """Gestures with the simulated controller, and recordings with an optical truth where there are any."""
+    seeds, duration = (1, 20.0) if study.quick else (max(3, study.seeds), 60.0)
+    gestures, sensors = (("fast", "pointing"), SENSORS[:1]) if study.quick else (GESTURES, SENSORS)
+    jobs = [
+        (gesture, kind, study.seed_of("comparison", gesture, index), duration)
+        for kind in sensors
+        for gesture in gestures
+        for index in range(seeds)
+    ]
+    rows = [row for found in study.map("comparison", gesture_errors, jobs) for row in found]
+    note = (
+        "Degrees rms, means over the motions; the external-acceleration filter has no heading. All start from their "
+        "first samples and learn the field there; only the two filters of the thesis get the noise."
+    )
+    for kind in sensors:
+        for metric in ("total", "inclination"):
+            title = f"Works compared: {metric} error on gestures, {kind}"
+            report.table(title, pivoted([row for row in rows if row["sensors"] == kind], "gesture", metric), note)
+    # Of the files, those of BROAD have what is needed.
+    paths = [path for path in recording_files(study.recordings) if path.suffix in (".mat", ".hdf5")]
+    if not paths:
+        report.text("No recordings were given (`--recordings`, or the folder in `POISE_DATA`).")
+        return
+    seconds, paths = (QUICK_SECONDS, paths[:QUICK_RECORDINGS]) if study.quick else (None, paths)
+    found = study.map("recordings", recording_errors, [(path, seconds) for path in paths])
+    rows = [row for part in found for row in part]
+    if not rows:
+        report.text("None of the recordings has a magnetometer and an optical truth.")
+        return
+    note = (
+        "Degrees rms. One IMU at 286 Hz (BROAD); `array-orientation` reads its accelerometer as an array of three, "
+        "with the thesis' noises. Neither it nor Marins estimates the bias of the gyroscope or tests the field for "
+        "disturbances, and it takes a sample of the gyroscope for the rate at that instant."
+    )
+    for metric in ("total", "inclination"):
+        report.table(f"Works compared: {metric} error on recordings", pivoted(rows, "recording", metric), note)
+
+
+def pivoted(rows: list[Row], column: str, metric: str) -> list[Row]:
+    """One row an estimator, one column a motion (means over seeds), and the mean of all at the end, the best first.
+
+    Args:
+        rows: with ``estimator``, ``column`` and metrics.
+        column: key of the motions; a recording is named by what is before the first ``_``, the number of the trial.
+        metric: which.
+    """
+    rows = [row for row in rows if row.get(metric) is not None]
+    means = grouped(rows, {"estimator": "estimator", column: "motion"}, {"value": (metric, np.mean)})
+    lines: dict[str, Row] = {}
+    for entry in means:
+        line = lines.setdefault(entry["estimator"], {"estimator": entry["estimator"]})
+        line[entry["motion"].split("_")[0]] = entry["value"]
+    table = [line | {"mean": float(np.mean(list(line.values())[1:]))} for line in lines.values()]
+    return sorted(table, key=lambda line: line["mean"])

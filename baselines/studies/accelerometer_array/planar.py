@@ -1,15 +1,11 @@
-"""Orientation in a vertical plane: the comparison of chapter 3 of the thesis, on the environment's planar controller.
+"""Chapter 3 of the thesis: orientation in a vertical plane, on the environment's planar controller.
 
-P. He, "Estimating the orientation of a game controller from inertial and magnetic measurements", thesis, Université
-Laval. Motions are ``planar-walk`` and ``infinity``, noises the thesis'; functions return rows that JSON can hold, for
-:class:`~poise.baselines.studies.kit.Study`.
+Motions are ``planar-walk`` and ``infinity``, noises the thesis'.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
-from functools import partial
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -23,18 +19,25 @@ from ....filters.core import metrics
 from ....filters.core.estimator import Estimator, run
 from ....filters.core.rotation import wrap
 from ....filters.registry import make
+from ...plots import new_figure
+from ..claims import Claim
+from ..kit import Study
+from ..report import OVER_MOTIONS, Report
+from .tables import Row, grouped, mean_of, values_of
 
 RATE = 100.0
 """Hz"""
 DURATION = 100.0
 """s of a run, as in the thesis"""
-DROPPED = 5.0
+SETTLED = 5.0
 """s at the start that are not scored"""
-WITHIN = np.deg2rad(10.0)
-"""the share of samples whose error is below is reported"""
+LIMIT = np.deg2rad(10.0)
+"""rad: the share of samples whose error is smaller is reported"""
 
 WALK_ACCELERATION = float(np.sqrt(Walk(planar=True).acceleration_variance))
 """m/s² per axis (3.58)"""
+INFINITY_ACCELERATION = (3.5, 7.0)
+"""m/s² rms of the two axes on the ∞"""
 MOTIONS: Mapping[str, Mapping[str, Mapping[str, float]]] = {
     "planar-walk": {
         "planar-mean": {"inertial_acceleration": WALK_ACCELERATION},
@@ -44,46 +47,50 @@ MOTIONS: Mapping[str, Mapping[str, Mapping[str, float]]] = {
     },
     "infinity": {"planar-mean": {"inertial_acceleration": 30.0}},
 }
-"""Gesture → name of the zoo → what a filter is told of the motion. The walk's acceleration is white. That of the ∞ is
-correlated (3.5 and 7 m/s² rms), so what takes it for white is told more: by default 10 m/s²; the mean 30."""
+"""Gesture → registered name → parameters for that motion. The walk's acceleration is white. That of the ∞ is
+correlated, so what takes it for white gets a larger one: by default 10 m/s²; the mean 30."""
 THESIS_POSE = {"angular_jerk": 100.0, "jerk": 1000.0, "acceleration_decay": 0.0}
 """The thesis' model of the complete pose, with jerks of our choice: it gives none"""
 
-
-@dataclass(frozen=True)
-class Way:
-    """One way of estimating: a name for tables, a name of the zoo, and parameters."""
-
-    name: str
-    estimator: str
-    parameters: Mapping[str, Any] = field(default_factory=dict)
-    told_as: str = ""
-    """of which name of the zoo it takes what it is told of the motion; empty for its own"""
-
-    def estimator_for(self, motion: str, **parameters: Any) -> Estimator[Any]:
-        """The estimator, told what :data:`MOTIONS` says unless told otherwise."""
-        told = dict(MOTIONS[motion].get(self.told_as or self.estimator, {})) | dict(self.parameters) | parameters
-        return make(self.estimator, dt=1.0 / RATE, **told)
-
-
-WAYS = (
-    Way("time integration", "planar-mean", {"method": "integration"}),
-    Way("tilt", "planar-mean", {"method": "tilt"}),
-    Way("mean, literal", "planar-mean", {"wrapped": False}),
-    Way("mean, wrapped difference", "planar-mean"),
-    Way("linear filter, literal", "planar-orientation", {"method": "linear", "wrapped": False}, "planar-mean"),
-    Way("linear filter, wrapped difference", "planar-orientation", {"method": "linear"}, "planar-mean"),
-    Way("extended filter", "planar-orientation"),
-    Way("unscented filter", "planar-unscented"),
-    Way("complete pose, thesis", "planar-pose", THESIS_POSE),
-    Way("complete pose, thesis, jerks of 10", "planar-pose", THESIS_POSE | {"angular_jerk": 10.0, "jerk": 10.0}),
-    Way("complete pose, thesis, printed R", "planar-pose", THESIS_POSE | {"form": "printed-noise"}),
-    Way("complete pose, thesis, printed H", "planar-pose", THESIS_POSE | {"form": "printed-jacobian"}),
-    Way("complete pose, acceleration returns to zero", "planar-pose"),
-)
-"""What is compared"""
+EXTENDED, INTEGRATION, POSE = "extended filter", "time integration", "complete pose, thesis"
+LITERAL, WRAPPED = "linear filter, literal", "linear filter, wrapped difference"
+RETURNING = "complete pose, acceleration returns to zero"
+METHODS: dict[str, tuple[str, dict[str, Any]]] = {
+    INTEGRATION: ("planar-mean", {"method": "integration"}),
+    "tilt": ("planar-mean", {"method": "tilt"}),
+    "mean, literal": ("planar-mean", {"wrapped": False}),
+    "mean, wrapped difference": ("planar-mean", {}),
+    LITERAL: ("planar-orientation", {"method": "linear", "wrapped": False}),
+    WRAPPED: ("planar-orientation", {"method": "linear"}),
+    EXTENDED: ("planar-orientation", {}),
+    "unscented filter": ("planar-unscented", {}),
+    POSE: ("planar-pose", THESIS_POSE),
+    "complete pose, thesis, jerks of 10": ("planar-pose", THESIS_POSE | {"angular_jerk": 10.0, "jerk": 10.0}),
+    "complete pose, thesis, printed R": ("planar-pose", THESIS_POSE | {"form": "printed-noise"}),
+    "complete pose, thesis, printed H": ("planar-pose", THESIS_POSE | {"form": "printed-jacobian"}),
+    RETURNING: ("planar-pose", {}),
+}
+"""Name in tables → registered name and parameters"""
 INFLATIONS = (10.0, 30.0, 100.0, 300.0, 1000.0)
 """(m/s²)²: values of R on the ∞"""
+
+PUBLISHED: tuple[tuple[str, str, str], ...] = (
+    ("planar-walk", INTEGRATION, "about 50 (Fig. 3.5)"),
+    ("planar-walk", EXTENDED, "about 10 (Fig. 3.6)"),
+    ("planar-walk", LITERAL, "200 (Fig. 3.12)"),
+    ("infinity", INTEGRATION, "drifts (Fig. 3.9)"),
+    ("infinity", EXTENDED, "about 10 (Fig. 3.10)"),
+)
+"""Motion, method, largest error that the figure shows, deg"""
+SHOWN = (INTEGRATION, "tilt", EXTENDED, POSE, "mean, wrapped difference")
+
+
+def estimator(method: str, motion: str, **parameters: Any) -> Estimator[Any]:
+    """The estimator of that name with the parameters of the motion, unless others are given."""
+    name, own = METHODS[method]
+    # A linear filter averages as the mean does, and gets the acceleration of the mean.
+    like = "planar-mean" if own.get("method") == "linear" else name
+    return make(name, dt=1.0 / RATE, **{**MOTIONS[motion].get(like, {}), **own, **parameters})
 
 
 def moved(seed: int, motion: str, duration: float = DURATION) -> Trajectory:
@@ -91,82 +98,141 @@ def moved(seed: int, motion: str, duration: float = DURATION) -> Trajectory:
     return simulate_hand(motion, seed, rate=RATE, duration=duration, device="planar")
 
 
-def planar_errors(seed: int, motion: str, duration: float = DURATION) -> list[dict[str, Any]]:
-    """Errors of every way on one motion.
+def planar_errors(seed: int, motion: str, duration: float = DURATION) -> list[Row]:
+    """Errors of every method on one motion.
 
     Returns:
-        A row for each of :data:`WAYS`: ``way``, ``motion``, ``seed``; ``rms`` and ``largest`` in degrees, ``within``,
-        the share of samples within 10°; ``rate``, the rms error of ω in rad/s (None if it is not estimated).
+        A row for each of :data:`METHODS`: ``method``, ``motion``, ``seed``; ``rms`` and ``largest`` in degrees,
+        ``within``, the share of samples within 10°; ``rate``, the rms error of ω in rad/s (None if it is not
+        estimated).
     """
     trajectory = moved(seed, motion, duration)
-    return [_row(trajectory, way, motion, seed) | {"way": way.name} for way in WAYS]
+    common = {"motion": motion, "seed": seed}
+    return [common | {"method": name} | errors_of(trajectory, estimator(name, motion)) for name in METHODS]
 
 
-def _row(trajectory: Trajectory, way: Way, motion: str, seed: int, **parameters: Any) -> dict[str, Any]:
-    pose = run(way.estimator_for(motion, **parameters), trajectory.measurements).pose
-    scored = trajectory.time >= DROPPED
-    truth = trajectory.truth
-    error = metrics.error(PLANAR_ANGLE, pose[PLANAR_ANGLE.name], truth[PLANAR_ANGLE.name])[scored]
-    rate = None
-    if PLANAR_RATE.name in pose:
-        rate_error = metrics.error(PLANAR_RATE, pose[PLANAR_RATE.name], truth[PLANAR_RATE.name])[scored]
-        rate = float(metrics.rms(rate_error))
-    return {
-        "motion": motion,
-        "seed": seed,
-        "rms": float(np.rad2deg(metrics.rms(error))),
-        "largest": float(np.rad2deg(error.max())),
-        "within": float(np.mean(error < WITHIN)),
-        "rate": rate,
-    }
-
-
-def inflation_errors(seed: int, duration: float = DURATION) -> list[dict[str, Any]]:
+def inflation_errors(seed: int, duration: float = DURATION) -> list[Row]:
     """Rows as above of the extended filter on the ∞, for each value of R in :data:`INFLATIONS` (``R``)."""
-    trajectory, way = moved(seed, "infinity", duration), WAYS[6]
-    row = partial(_row, trajectory, way, "infinity", seed)
-    return [row(inertial_acceleration=float(np.sqrt(R))) | {"R": R} for R in INFLATIONS]
+    trajectory, rows = moved(seed, "infinity", duration), []
+    for R in INFLATIONS:
+        filter = estimator(EXTENDED, "infinity", inertial_acceleration=float(np.sqrt(R)))
+        rows.append({"motion": "infinity", "seed": seed, "R": R} | errors_of(trajectory, filter))
+    return rows
+
+
+def errors_of(trajectory: Trajectory, filter: Estimator[Any]) -> Row:
+    """The numbers of a row."""
+    pose, scored = run(filter, trajectory.measurements).pose, trajectory.time >= SETTLED
+
+    def error(quantity: Any) -> np.ndarray:
+        return metrics.error(quantity, pose[quantity.name], trajectory.truth[quantity.name])[scored]
+
+    angle = error(PLANAR_ANGLE)
+    return {
+        "rms": float(np.rad2deg(metrics.rms(angle))),
+        "largest": float(np.rad2deg(angle.max())),
+        "within": float(np.mean(angle < LIMIT)),
+        "rate": float(metrics.rms(error(PLANAR_RATE))) if PLANAR_RATE.name in pose else None,
+    }
 
 
 def unscented_difference(seed: int, motion: str, duration: float = 20.0) -> float:
     """Largest difference between the unscented and the extended filter, degrees."""
     trajectory = moved(seed, motion, duration)
-    angles = [
-        run(Way(name, name).estimator_for(motion), trajectory.measurements).pose[PLANAR_ANGLE.name]
-        for name in ("planar-orientation", "planar-unscented")
-    ]
-    return float(np.rad2deg(np.abs(wrap(angles[0] - angles[1])).max()))
+    one, other = (
+        run(estimator(name, motion), trajectory.measurements).pose[PLANAR_ANGLE.name]
+        for name in (EXTENDED, "unscented filter")
+    )
+    return float(np.rad2deg(np.abs(wrap(one - other)).max()))
 
 
-def planar_table(rows: Iterable[dict[str, Any]], key: str = "way") -> list[dict[str, Any]]:
-    """Means over the seeds, a row for each motion and each way (or another ``key`` of the rows)."""
-    rows = list(rows)
-    table = []
-    for motion in MOTIONS:
-        for name in dict.fromkeys(row[key] for row in rows):
-            found = [row for row in rows if row["motion"] == motion and row[key] == name]
-            if found:
-                rates = [row["rate"] for row in found if row["rate"] is not None]
-                table.append(
-                    {
-                        "motion": motion,
-                        "method" if key == "way" else key: name,
-                        "rms (°)": float(np.mean([row["rms"] for row in found])),
-                        "largest rms of a seed (°)": max(row["rms"] for row in found),
-                        "largest error (°)": float(np.mean([row["largest"] for row in found])),
-                        "within 10°": float(np.mean([row["within"] for row in found])),
-                        "ω (rad/s)": float(np.mean(rates)) if rates else None,
-                    }
-                )
-    return table
+def planar_table(rows: list[Row], key: str = "method") -> list[Row]:
+    """Means over the seeds, a row for each motion and each method (or another ``key`` of the rows)."""
+    columns = {
+        "rms (°)": ("rms", np.mean),
+        "largest rms of a seed (°)": ("rms", max),
+        "largest error (°)": ("largest", np.mean),
+        "within 10°": ("within", np.mean),
+        "ω (rad/s)": ("rate", np.mean),
+    }
+    return grouped(rows, {"motion": "motion", key: key}, columns)
 
 
 def planar_curves(seed: int, motion: str, duration: float = DURATION, every: int = 10) -> dict[str, Any]:
     """Errors over time as in Figures 3.5, 3.6, 3.9, 3.10 and 3.12: name → list in degrees, for a figure."""
     trajectory = moved(seed, motion, duration)
     curves: dict[str, Any] = {"time": trajectory.time[::every].tolist()}
-    for way in WAYS:
-        angle = run(way.estimator_for(motion), trajectory.measurements).pose[PLANAR_ANGLE.name]
+    for method in METHODS:
+        angle = run(estimator(method, motion), trajectory.measurements).pose[PLANAR_ANGLE.name]
         error = wrap(angle - trajectory.truth[PLANAR_ANGLE.name])
-        curves[way.name] = np.rad2deg(error[::every, 0]).tolist()
+        curves[method] = np.rad2deg(error[::every, 0]).tolist()
     return curves
+
+
+def claims(rows: list[Row], inflated: list[Row], difference: float) -> list[Claim]:
+    """What chapter 3 says, and what one would read off the tables."""
+    found = []
+    for motion, figure in (("planar-walk", "3.6"), ("infinity", "3.10")):
+        rms = {method: mean_of(rows, "rms", motion=motion, method=method) for method in METHODS}
+        largest = max(values_of(rows, "largest", motion=motion, method=EXTENDED))
+        share = mean_of(rows, "within", motion=motion, method=EXTENDED)
+        literal, wrapped, extended = rms[LITERAL], rms[WRAPPED], rms[EXTENDED]
+        found += [
+            Claim.less(f"{motion}: the extended filter never errs by more than 10° (Figure {figure})", largest, 10.0),
+            Claim.within(f"{motion}: it is within 10° in at least four of five samples", share, 0.8, 1.0),
+            Claim.less(f"{motion}: the linear filter fails by averaging raw angles", wrapped, literal, factor=0.5),
+            Claim.less(f"{motion}: wrapped, it is near the extended filter", wrapped, extended, factor=1.5),
+            Claim.less(f"{motion}: the thesis' complete pose is worse than that", extended, rms[POSE]),
+        ]
+    rms = {method: mean_of(rows, "rms", motion="infinity", method=method) for method in METHODS}
+    by_R = {R: mean_of(inflated, "rms", R=R) for R in INFLATIONS}
+    names, best = ("variance", "best R"), min(by_R, key=by_R.__getitem__)
+    for letter, equation in (("R", "3.44"), ("H", "3.45")):
+        statement = f"infinity: the printed {letter} ({equation}) is worse than the corrected one"
+        found.append(Claim.less(statement, rms[POSE], rms[f"complete pose, thesis, printed {letter}"]))
+    statement = "infinity: misprints alone make the complete pose fail: corrected, it beats the extended filter"
+    wide = "infinity: the correlated acceleration wants an R larger than its variance"
+    return [
+        *found,
+        Claim.less(statement, rms[POSE], rms[EXTENDED]),
+        Claim.best("infinity: a complete pose whose acceleration returns to zero (ours) is the best", RETURNING, rms),
+        Claim.less(wide, INFINITY_ACCELERATION[1] ** 2, best, "(m/s²)²", names=names),
+        Claim.less("Unscented and extended filter are about equal (Figure 3.12)", difference, 0.1),
+    ]
+
+
+def planar(study: Study, report: Report) -> None:
+    """Figures 3.5 to 3.15."""
+    seeds, duration = (2, 30.0) if study.quick else (10, DURATION)
+    roots = [study.seed_of("planar", index) for index in range(seeds)]
+    jobs = [(seed, motion, duration) for motion in MOTIONS for seed in roots]
+    rows = [row for found in study.map("planar", planar_errors, jobs) for row in found]
+    report.compare(
+        "Figures 3.5 to 3.12: errors of the angle in the plane",
+        [
+            {"motion": motion, "method": method, "quantity": "largest error", "printed": printed, "unit": "deg"}
+            | {"values": values_of(rows, "largest", motion=motion, method=method)}
+            for motion, method, printed in PUBLISHED
+        ],
+        f"{seeds} motions of {duration:g} s.",
+        interval=OVER_MOTIONS,
+    )
+    note = "*Literal* averages raw angles; *printed R* and *printed H* are (3.44) and (3.45) as in the thesis."
+    report.table("Planar methods", planar_table(rows), note)
+    found = study.map("planar inflation", inflation_errors, [(seed, duration) for seed in roots])
+    inflated = [row for part in found for row in part]
+    report.table("Extended filter on the ∞ by R", planar_table(inflated, "R"), "R in (m/s²)².")
+    difference = study.cached("unscented", unscented_difference, roots[0], "planar-walk")
+    report.claims("Chapter 3: what holds here", claims(rows, inflated, difference))
+    for motion, number in (("planar-walk", "3.5 and 3.6"), ("infinity", "3.9 and 3.10")):
+        curves = study.cached(f"planar curves {motion}", planar_curves, roots[0], motion, duration)
+        figure, (ax,) = new_figure(7.5, 3.2)
+        for name in SHOWN:
+            faint = name == "tilt"
+            style: dict[str, Any] = {"linewidth": 0.5 if faint else 1.0, "alpha": 0.4 if faint else 1.0}
+            ax.plot(curves["time"], curves[name], label=name, zorder=1 if faint else 2, **style)
+        ax.set_ylim(-60.0, 60.0)
+        ax.set_xlabel("time, s")
+        ax.set_ylabel("error of the angle, °")
+        figure.legend(fontsize=7.5, ncols=3, loc="outside lower center")
+        report.figure(f"planar-{motion}", figure, f"Figures {number}: errors on {motion}", "Errors beyond 60° are cut.")

@@ -1,15 +1,11 @@
-"""Angular rate of a shaken array without a gyroscope: the comparison of chapter 2 of the thesis, on simulated OCTAs.
+"""Chapter 2 of the thesis: angular rate of a shaken array without a gyroscope, on simulated OCTAs.
 
-P. He, "Estimating the orientation of a game controller from inertial and magnetic measurements", thesis, Université
-Laval. Motions are those of ``gesture="shaking"``, readings those of the environment's device ``octa``; functions return
-rows that JSON can hold, for :class:`~poise.baselines.studies.kit.Study`.
+Motions are those of ``gesture="shaking"``, readings those of the environment's device ``octa``.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
-from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
@@ -22,81 +18,62 @@ from ....filters.arrays.rate import ANGULAR_RATE, ArrayRate
 from ....filters.core import metrics
 from ....filters.core.estimator import run
 from ....filters.core.observer import Observer
+from ...plots import new_figure
+from ..claims import Claim
+from ..kit import Study
+from ..report import OVER_MOTIONS, Report
+from .tables import Row, grouped, mean_of, values_of
 
 RATE = 100.0
 """Hz"""
 DURATION = 100.0
 """s of a run, as in the thesis"""
 
-PRINTED = {
+PUBLISHED = {
     "weighted": (0.4195, 0.6350, 0.6781, 0.6456, 0.6714, 0.6274),
-    "parsa": (2.7579, 2.3780, 3.1036, 4.3302, 5.5671, 4.8877),
-    "polynomial-roots": (1.3577, 3.2347, 2.9325, 3.7612, 5.1620, 4.8051),
+    "Parsa": (2.7579, 2.3780, 3.1036, 4.3302, 5.5671, 4.8877),
+    "polynomial roots": (1.3577, 3.2347, 2.9325, 3.7612, 5.1620, 4.8051),
 }
 """Table 2.1, rad/s: six runs of a real OCTA that is shaken by hand"""
 
-
-@dataclass(frozen=True)
-class Way:
-    """One way of estimating: a name for tables, and the parameters of :class:`.ArrayRate`."""
-
-    name: str
-    method: str
-    variant: str = "sound"
-    bias_noise: float = 0.0
-
-    def observer(self, noise: float) -> Observer:
-        """The estimator, told the white noise of the accelerometers (m/s²)."""
-        return Observer(
-            ArrayRate(
-                dt=1.0 / RATE,
-                method=self.method,  # type: ignore[arg-type]
-                variant=self.variant,  # type: ignore[arg-type]
-                bias_noise=self.bias_noise,
-                accelerometer_noise=noise,
-            )
-        )
+SOUND, WITH_BIASES = "weighted, sound", "weighted, sound, with biases"
+METHODS: dict[str, dict[str, Any]] = {
+    "time integration": {"method": "time-integration"},
+    "polynomial roots": {"method": "polynomial-roots"},
+    "Parsa": {"method": "parsa"},
+    "weighted, as printed": {"method": "weighted", "variant": "printed"},
+    "weighted, corrected": {"method": "weighted", "variant": "corrected"},
+    SOUND: {"method": "weighted"},
+    WITH_BIASES: {"method": "weighted", "bias_noise": 0.1},
+}
+"""Name in tables → parameters of :class:`.ArrayRate`; the last one is the default of the filter ``array-rate``"""
+ROWS_OF_TABLE_2_1 = {SOUND: "weighted", WITH_BIASES: None, "Parsa": "Parsa", "polynomial roots": "polynomial roots"}
+"""Method → row of Table 2.1; None where the thesis has none"""
 
 
-WAYS = (
-    Way("time integration", "time-integration"),
-    Way("polynomial roots", "polynomial-roots"),
-    Way("Parsa", "parsa"),
-    Way("weighted, as printed", "weighted", "printed"),
-    Way("weighted, corrected", "weighted", "corrected"),
-    Way("weighted, sound", "weighted"),
-    Way("weighted, sound, with biases", "weighted", bias_noise=0.1),
-)
-"""What is compared; the last one is the default of the filter ``array-rate``."""
-
-NOISE_OF_FILTER = 0.1
-"""m/s²: what the filter that knows biases takes for white; without biases it does not matter"""
-
-
-def _white(deviation: float, bias: float = 0.0, axes: float = 0.0, positions: float = 0.0) -> ArrayPreset:
+def white(std: float, bias: float = 0.0, axes: float = 0.0, positions: float = 0.0) -> ArrayPreset:
+    """Errors of readings: white noise and biases in m/s², angles of the axes in deg, positions in m."""
     gyroscope = array_preset("array-data-sheet").gyroscope
-    accelerometer = per_sample(deviation, 1000.0, turn_on_bias=bias)
-    name = f"white {deviation:g}" + (f", bias {bias:g}, {axes:g}°, {1e3 * positions:g} mm" if bias else "")
+    accelerometer = per_sample(std, 1000.0, turn_on_bias=bias)
+    name = f"white {std:g}" + (f", bias {bias:g}, {axes:g}°, {1e3 * positions:g} mm" if bias else "")
     return ArrayPreset(name, name, gyroscope, accelerometer, axis_error=math.radians(axes), position_error=positions)
 
 
 ERRORS: dict[str, ArrayPreset] = {
     preset.name: preset
-    for preset in (
-        _white(0.022),
-        _white(0.1),
-        _white(0.3),
-        _white(0.05, 0.1, 0.5, 1e-3),
-        _white(0.05, 0.3, 1.0, 2e-3),
-    )
+    for preset in (white(0.022), white(0.1), white(0.3), white(0.05, 0.1, 0.5, 1e-3), white(0.05, 0.3, 1.0, 2e-3))
 }
-"""Name → errors of the readings: white noise and biases in m/s², angles of the axes, positions. The first is the data
-sheet's; the fourth what a calibration may leave (the environment's preset ``array-calibrated``)."""
+"""Name → errors of the readings. The first is the data sheet's; the fourth what a calibration may leave (the
+environment's preset ``array-calibrated``)."""
+DATA_SHEET, CALIBRATED = next(iter(ERRORS)), list(ERRORS)[3]
+"""White noise alone, and the errors with which Table 2.1 is compared"""
+SPEEDS = {"below 1 rad/s": 0.0, "1 to 3": 1.0, "3 to 6": 3.0, "above 6": 6.0}
+"""Column → smallest |ω|, rad/s, of the range in which weights are averaged"""
 
-CALIBRATED = list(ERRORS)[3]
-"""Errors with which Table 2.1 is compared"""
-SPEEDS = (0.0, 1.0, 3.0, 6.0, math.inf)
-"""rad/s: borders of the ranges of |ω| in which weights are averaged"""
+
+def estimator(method: str) -> Observer:
+    """The estimator of that name; only the one with biases uses the white noise of 0.1 m/s²."""
+    return Observer(ArrayRate(dt=1.0 / RATE, **{"bias_noise": 0.0, "accelerometer_noise": 0.1} | METHODS[method]))
 
 
 def shaken(seed: int, errors: str, duration: float = DURATION) -> Trajectory:
@@ -104,89 +81,42 @@ def shaken(seed: int, errors: str, duration: float = DURATION) -> Trajectory:
     return simulate_hand("shaking", seed, ERRORS[errors], RATE, duration, device="octa", magnetometer=False)
 
 
-def rate_errors(seed: int, errors: str, duration: float = DURATION) -> list[dict[str, Any]]:
-    """Root mean square of |ω̂ − ω| of every way on one motion, rad/s (2.57), and the mean weights by |ω|.
+def rate_errors(seed: int, errors: str, duration: float = DURATION) -> list[Row]:
+    """Root mean square of |ω̂ − ω| of every method on one motion, rad/s (2.57), and the mean weights by |ω|.
 
     Returns:
-        A row for each of :data:`WAYS`: ``way``, ``errors``, ``seed``, ``rms``; ``weights`` (None unless weighted).
+        A row for each of :data:`METHODS`: ``method``, ``errors``, ``seed``, ``rms``; ``weights`` (None unless
+        weighted).
     """
     trajectory, rows = shaken(seed, errors, duration), []
     truth = trajectory.truth["angular_rate"]
-    for way in WAYS:
-        pose = run(way.observer(NOISE_OF_FILTER), trajectory.measurements).pose
-        error = metrics.error(ANGULAR_RATE, pose[ANGULAR_RATE.name], truth)
-        weights = pose.get("array-rate/weights")
-        rows.append(
-            {
-                "way": way.name,
-                "errors": errors,
-                "seed": seed,
-                "rms": float(metrics.rms(error)),
-                "weights": None if weights is None else weights_by_speed(weights, truth),
-            }
-        )
+    for method in METHODS:
+        pose = run(estimator(method), trajectory.measurements).pose
+        rms = float(metrics.rms(metrics.error(ANGULAR_RATE, pose[ANGULAR_RATE.name], truth)))
+        weights = weights_by_speed(pose["array-rate/weights"], truth) if "array-rate/weights" in pose else None
+        rows.append({"method": method, "errors": errors, "seed": seed, "rms": rms, "weights": weights})
     return rows
 
 
-def weights_by_speed(weights: np.ndarray, truth: np.ndarray) -> list[float | None]:
+def weights_by_speed(weights: np.ndarray, truth: np.ndarray) -> dict[str, float | None]:
     """Mean of all weights ``(T, 3)`` where |ω| lies in each range of :data:`SPEEDS`; None where it never does."""
-    speed = np.linalg.norm(truth, axis=-1)
-    means: list[float | None] = []
-    for low, high in pairwise(SPEEDS):
+    speed, means = np.linalg.norm(truth, axis=-1), {}
+    for column, (low, high) in zip(SPEEDS, pairwise([*SPEEDS.values(), math.inf]), strict=True):
         inside = (speed >= low) & (speed < high)
-        means.append(float(weights[inside].mean()) if inside.any() else None)
+        means[column] = float(weights[inside].mean()) if inside.any() else None
     return means
 
 
-def rate_table(rows: Iterable[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Smallest, mean and largest error over the seeds (rad/s), a row for each kind of errors and each way."""
-    rows = list(rows)
-    table = []
-    for errors in ERRORS:
-        for way in WAYS:
-            found = [row["rms"] for row in rows if row["errors"] == errors and row["way"] == way.name]
-            if found:
-                least, mean, largest = min(found), float(np.mean(found)), max(found)
-                table.append({"errors": errors, "method": way.name, "mean": mean, "least": least, "largest": largest})
-    return table
+def rate_table(rows: list[Row]) -> list[Row]:
+    """Mean, smallest and largest error over the seeds (rad/s), a row for each kind of errors and each method."""
+    columns = {"mean": ("rms", np.mean), "least": ("rms", min), "largest": ("rms", max)}
+    return grouped(rows, {"errors": "errors", "method": "method"}, columns)
 
 
-def weight_table(rows: Iterable[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Mean weights by |ω| over the seeds, a row for each kind of errors and each weighted way."""
-    rows = list(rows)
-    labels = ["below 1 rad/s", "1 to 3", "3 to 6", "above 6"]
-    table = []
-    for errors in ERRORS:
-        for way in WAYS:
-            found = [row["weights"] for row in rows if row["errors"] == errors and row["way"] == way.name]
-            found = [weights for weights in found if weights is not None]
-            if found:
-                means = np.nanmean(np.array(found, dtype=float), axis=0)
-                table.append({"errors": errors, "method": way.name} | dict(zip(labels, means.tolist(), strict=True)))
-    return table
-
-
-def rankings(rows: Iterable[dict[str, Any]], errors: str = CALIBRATED) -> list[dict[str, Any]]:
-    """Per seed: errors of the three methods of Table 2.1, and whether they are ranked as there (weighted first)."""
-    by_seed: dict[int, dict[str, float]] = {}
-    for row in rows:
-        if row["errors"] == errors:
-            by_seed.setdefault(row["seed"], {})[row["way"]] = row["rms"]
-    table = []
-    for seed, found in sorted(by_seed.items()):
-        ours, thesis = found[WAYS[-1].name], found["weighted, sound"]
-        others = found["Parsa"], found["polynomial roots"]
-        table.append(
-            {
-                "seed": seed,
-                "with biases": ours,
-                "sound": thesis,
-                "Parsa": others[0],
-                "polynomial roots": others[1],
-                "weighted is best": max(ours, thesis) < min(others),
-            }
-        )
-    return table
+def weight_table(rows: list[Row]) -> list[Row]:
+    """Mean weights by |ω| over the seeds, a row for each kind of errors and each weighted method."""
+    weighted = [row | row["weights"] for row in rows if row["weights"] is not None]
+    return grouped(weighted, {"errors": "errors", "method": "method"}, {name: (name, np.mean) for name in SPEEDS})
 
 
 def rate_curves(seed: int, errors: str = CALIBRATED, start: float = 10.0, length: float = 10.0) -> dict[str, Any]:
@@ -197,10 +127,91 @@ def rate_curves(seed: int, errors: str = CALIBRATED, start: float = 10.0, length
         "time": trajectory.time[part].tolist(),
         "true": trajectory.truth["angular_rate"][part, 0].tolist(),
     }
-    for way in WAYS:
-        if way.variant != "sound":
-            continue
-        pose = run(way.observer(NOISE_OF_FILTER), trajectory.measurements).pose
-        curves[way.name] = pose[ANGULAR_RATE.name][part, 0].tolist()
-    curves["weight"] = pose["array-rate/weights"][part, 0].tolist()
+    for method, parameters in METHODS.items():
+        if "variant" not in parameters:
+            pose = run(estimator(method), trajectory.measurements).pose
+            curves[method] = pose[ANGULAR_RATE.name][part, 0].tolist()
+            if "array-rate/weights" in pose:
+                curves["weight"] = pose["array-rate/weights"][part, 0].tolist()
     return curves
+
+
+def claims(rows: list[Row]) -> list[Claim]:
+    """What chapter 2 says, and what one would read off the tables."""
+    mean = {method: mean_of(rows, "rms", method=method, errors=CALIBRATED) for method in METHODS}
+    white_only = {name: mean_of(rows, "rms", method=name, errors=DATA_SHEET) for name in METHODS if name != WITH_BIASES}
+    thesis, order = PUBLISHED["weighted"], ("weighted", "polynomial roots", "Parsa")
+    named = {row: mean[method] for method, row in ROWS_OF_TABLE_2_1.items() if row}
+    weights = next(row for row in weight_table(rows) if row["method"] == SOUND and row["errors"] == CALIBRATED)
+    slow, *_, fast = (weights[name] for name in SPEEDS)
+    least = min(weights[name] for name in SPEEDS if weights[name] is not None)
+    growth = f"{slow:.3f} below 1 rad/s, {fast:.3f} above 6 rad/s"
+    published = "Table 2.1: the weighted error lies within the six published runs"
+    noise = "White noise of the data sheet alone explains less than a tenth of the published error"
+    jacobian = "With white noise, the Jacobian at the integrated rate (sound) is better than at the polynomial roots"
+    weighted = {name: value for name, value in white_only.items() if name.startswith("weighted")}
+    return [
+        Claim.best("Table 2.1: the weighted method has the smallest error", "weighted", named, "rad/s"),
+        Claim.ranked("Table 2.1: weighted before polynomial roots before Parsa", order, named, "rad/s"),
+        Claim.within(published, mean[SOUND], min(thesis), max(thesis), "rad/s"),
+        Claim.less(noise, white_only[SOUND], float(np.mean(thesis)), "rad/s", factor=0.1),
+        Claim.less("Estimating biases too lowers the error", mean[WITH_BIASES], mean[SOUND], "rad/s"),
+        Claim.best(jacobian, SOUND, weighted, "rad/s"),
+        Claim.within("Figure 2.12: weights are near one", least, 0.8, 1.0),
+        Claim("Figure 2.13: the weight grows with the angular rate", growth, fast > slow),
+    ]
+
+
+def angular_rates(study: Study, report: Report) -> None:
+    """Table 2.1 and Figures 2.9 to 2.13."""
+    seeds, duration = (2, 40.0) if study.quick else (10, DURATION)
+    kinds = [DATA_SHEET, CALIBRATED] if study.quick else list(ERRORS)
+    jobs = [(study.seed_of("shaking", index), kind, duration) for kind in kinds for index in range(seeds)]
+    rows = [row for found in study.map("angular rate", rate_errors, jobs) for row in found]
+    report.compare(
+        "Table 2.1: angular rate of a shaken OCTA",
+        [
+            {"method": method, "quantity": "rms of |ω̂ − ω|", "unit": "rad/s"}
+            | {"printed": mean_and_range(PUBLISHED[row]) if row else None}
+            | {"values": values_of(rows, "rms", method=method, errors=CALIBRATED)}
+            for method, row in ROWS_OF_TABLE_2_1.items()
+        ],
+        f"Printed: mean and range of six runs of the real device. Ours: {seeds} simulated motions of {duration:g} s "
+        f"with the errors *{CALIBRATED}* that a calibration leaves.",
+        interval=OVER_MOTIONS,
+    )
+    report.table(
+        "Angular rate by method and errors",
+        rate_table(rows),
+        "Rms in rad/s: mean, smallest and largest over the motions. *As printed* and *corrected* evaluate the Jacobian "
+        "at the polynomial roots, *sound* at the integrated rate; *with biases* estimates constant errors too and is "
+        "ours.",
+    )
+    report.table("Figures 2.12 and 2.13: mean weight of the integration by angular rate", weight_table(rows))
+    report.claims("Chapter 2: what holds here", claims(rows))
+    draw(report, study.cached("angular rate curves", rate_curves, study.seed_of("shaking", 0)))
+
+
+def draw(report: Report, curves: dict[str, Any]) -> None:
+    """Angular rates and weights over ten seconds."""
+    figure, (top, below) = new_figure(7.5, 4.6, 2)
+    time = curves["time"]
+    top.plot(time, curves["true"], color="black", linewidth=2.2, alpha=0.6, label="true")
+    for name, values in curves.items():
+        if name not in ("time", "true", "weight"):
+            top.plot(time, values, linewidth=0.8, label=name)
+    limit = 1.8 * float(np.abs(curves["true"]).max())
+    top.set_ylim(-limit, limit)
+    top.set_ylabel("ω_x, rad/s")
+    figure.legend(*top.get_legend_handles_labels(), fontsize=7.5, ncols=3, loc="outside lower center")
+    below.plot(time, curves["weight"], color="#1f5fa8", linewidth=0.8)
+    below.set_ylabel("weight w_x")
+    below.set_ylim(0.0, 1.05)
+    below.set_xlabel("time, s")
+    title = "Figures 2.9 to 2.12: angular rate and weights"
+    report.figure("angular-rate", figure, title, f"Rates beyond {limit:.0f} rad/s are cut.")
+
+
+def mean_and_range(values: tuple[float, ...]) -> str:
+    """Published numbers in short."""
+    return f"{np.mean(values):.2f} ({min(values):.2f} … {max(values):.2f})"

@@ -13,7 +13,7 @@ from ....filters.core.metrics import DEGREES
 from ....filters.imu.external_acceleration import ExternalAcceleration
 from ...plots import new_figure
 from ...registry import make_estimator
-from .simulation import MODES, RATE, Trial, estimate, simulate
+from .simulation import MODES, RATE, Trial, estimate, reference, simulate
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -34,17 +34,12 @@ def angles(up: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def seconds(trial: Trial) -> np.ndarray:
-    """Time of the ticks."""
+    """Time of the samples, s."""
     return np.arange(len(trial.up)) / RATE
 
 
-def referred(trial: Trial) -> np.ndarray:
-    """The paper's reference acceleration y_A − g Z_ref of the first trial, ``(T, 3)``."""
-    return (trial.measurements["imu/acc"] - GRAVITY * trial.up)[:, 0]
-
-
 def beside(ax: Any, time: np.ndarray, ours: np.ndarray, true: np.ndarray, label: str) -> None:
-    """An estimate (solid) over its reference (dashed)."""
+    """An estimate (solid) and its reference (dashed)."""
     ax.plot(time, ours, color=OURS, linewidth=0.9)
     ax.plot(time, true, color=TRUE, linewidth=0.9, linestyle="--")
     ax.set_ylabel(label, fontsize=8.5)
@@ -93,11 +88,11 @@ def figure_4(seed: int) -> Figure:
     true, time = angles(trial.up), seconds(trial)
     for column, mode in enumerate(MODES):
         pose = estimate(trial, printed(mode))
-        for row, (ours, reference) in enumerate(zip(angles(pose["up"]), true, strict=True)):
-            beside(axes[3 * row + column], time, ours, reference, f"{('roll', 'pitch')[row]}, deg")
+        for row, (ours, expected) in enumerate(zip(angles(pose["up"]), true, strict=True)):
+            beside(axes[3 * row + column], time, ours, expected, f"{('roll', 'pitch')[row]}, deg")
         for axis in range(3):
-            ours, reference = pose["external_acceleration"][:, 0, axis], referred(trial)[:, axis]
-            beside(axes[3 * (2 + axis) + column], time, ours, reference, f"a_{'xyz'[axis]}, m/s²")
+            ours, true_a = pose["external_acceleration"][:, 0, axis], reference(trial)[:, 0, axis]
+            beside(axes[3 * (2 + axis) + column], time, ours, true_a, f"a_{'xyz'[axis]}, m/s²")
         axes[column].set_title(f"mode {mode}", fontsize=10)
         axes[12 + column].set_xlabel("time, s")
     return figure
@@ -110,7 +105,7 @@ def figure_5(seed: int) -> Figure:
     axes[0].plot(seconds(trial), np.linalg.norm(trial.acceleration[:, 0], axis=-1), color=TRUE, linewidth=0.8)
     axes[0].set_ylabel("‖a‖, m/s²")
     for ax, mode in zip(axes[1:], MODES, strict=True):
-        off = estimate(trial, printed(mode))["external_acceleration"][:, 0] - referred(trial)
+        off = estimate(trial, printed(mode))["external_acceleration"][:, 0] - reference(trial)[:, 0]
         ax.plot(seconds(trial), np.linalg.norm(off, axis=-1), color=OURS, linewidth=0.8)
         ax.set_ylabel(f"error, mode {mode}\nm/s²", fontsize=8.5)
     axes[-1].set_xlabel("time, s")
@@ -129,7 +124,7 @@ def figure_6(seed: int) -> Figure:
     ):
         beside(ax, time, wrapped(ours - true), wrapped(true), name)
     for axis, ax in enumerate(axes[3:]):
-        true = referred(trial)[:, axis]
+        true = reference(trial)[:, 0, axis]
         beside(ax, time, pose["external_acceleration"][:, 0, axis] - true, true, f"a_{'xyz'[axis]}, m/s²")
     axes[-1].set_xlabel("time, s (solid: error, dashed: reference)")
     return figure
@@ -158,22 +153,16 @@ def swept(trial: Trial) -> tuple[tuple[str, np.ndarray], ...]:
     return tuple((f"c_a = {c_a:g}", estimate(trial, printed(1, c_a=c_a))["up"]) for c_a in (0.001, 1.0))
 
 
-FIGURES: dict[str, Callable[[int], Figure]] = {
-    "fig-2": figure_2,
-    "fig-3": figure_3,
-    "fig-4": figure_4,
-    "fig-5": figure_5,
-    "fig-6": figure_6,
-    "fig-7": figure_7,
+FIGURES: dict[str, tuple[str, str, Callable[[int], Figure]]] = {
+    "fig-2": ("Figure 2: test A, errors of modes 1 and 2", "Of one trial, like all figures here.", figure_2),
+    "fig-3": (
+        "Figure 3: test B, external acceleration and accelerometer",
+        "Dashed: the threshold of mode 3.",
+        figure_3,
+    ),
+    "fig-4": ("Figure 4: test B, the three modes", "Solid: estimate, dashed: reference.", figure_4),
+    "fig-5": ("Figure 5: test C, errors of the external acceleration", "", figure_5),
+    "fig-6": ("Figure 6: test C, errors of mode 1", "Solid: error, dashed: reference.", figure_6),
+    "fig-7": ("Figure 7: roll of tests A and B against c_a", "Solid: estimate, dashed: reference.", figure_7),
 }
-"""Name → what draws it from a seed."""
-
-TITLES = {
-    "fig-2": ("Figure 2: test A, errors of modes 1 and 2", "Of one trial, like all figures here."),
-    "fig-3": ("Figure 3: test B, external acceleration and accelerometer", "Dashed: the threshold of mode 3."),
-    "fig-4": ("Figure 4: test B, the three modes", "Solid: estimate, dashed: reference."),
-    "fig-5": ("Figure 5: test C, errors of the external acceleration", ""),
-    "fig-6": ("Figure 6: test C, errors of mode 1", "Solid: error, dashed: reference."),
-    "fig-7": ("Figure 7: roll of tests A and B against c_a", "Solid: estimate, dashed: reference."),
-}
-"""Name → title and note."""
+"""Name → title, note, and what draws it from a seed."""

@@ -6,10 +6,14 @@ import numpy as np
 import pytest
 
 from poise.baselines.studies.accelerometer_array import comparison as array_comparison
-from poise.baselines.studies.accelerometer_array import comparison_report as array_comparison_report
 from poise.baselines.studies.accelerometer_array import spatial as spatial_study
-from poise.baselines.studies.accelerometer_array import spatial_report as array_spatial_report
-from poise.baselines.studies.accelerometer_array.spatial import PROPOSED, WAYS, attitude_errors, attitude_table, pointed
+from poise.baselines.studies.accelerometer_array.spatial import (
+    METHODS,
+    PROPOSED,
+    attitude_errors,
+    attitude_table,
+    pointed,
+)
 from poise.baselines.studies.kit import Study
 from poise.baselines.studies.report import Report
 from poise.filters.arrays.array import CONTROLLER
@@ -22,8 +26,8 @@ def study(tmp_path):
 
 
 def test_a_row_tells_the_errors_of_pointing():
-    (row,) = attitude_errors("controller", 3, 12.0, names=(PROPOSED,))
-    assert (row["device"], row["way"], row["seed"]) == ("controller", PROPOSED, 3)
+    (row,) = attitude_errors("controller", 3, 12.0, methods=(PROPOSED,))
+    assert (row["device"], row["method"], row["seed"]) == ("controller", PROPOSED, 3)
     assert 0.0 < row["pitch"] < row["pitch_max"] < 4.0
     assert row["pitch"] < row["total"] < 3.0
     assert row["inside"] > 0.95
@@ -54,15 +58,16 @@ def test_errors_of_pitch_are_signed_and_those_of_azimuth_wrap():
     assert total[0] > 0.1
 
 
-def canned(device, seed, duration, dip=0.0, names=()):
+def canned(device, seed, duration, dip=0.0, methods=()):
     """What :func:`attitude_errors` would say, without simulating."""
     keys = ("pitch", "pitch_max", "azimuth", "azimuth_max", "inside", "total")
     numbers = dict(zip(keys, (0.5, 2.0, 0.6, 2.5, 0.9, 1.5), strict=True))
-    return [
-        {"device": device, "way": way.name, "seed": seed} | numbers
-        for way in WAYS[device]
-        if not names or way.name in names
-    ]
+    chosen = [method for method in METHODS[device] if not methods or method in methods]
+    return [{"device": device, "method": method, "seed": seed} | numbers for method in chosen]
+
+
+PRIORS = ("closed prior", "open prior", "open prior, first order")
+SHARES = ("proposed, sound, beyond the arcsine", "tilt sensor, beyond the arcsine")
 
 
 def canned_curves(device, seed, duration):
@@ -71,19 +76,21 @@ def canned_curves(device, seed, duration):
 
 
 def test_the_section_has_its_tables_and_figures(study, monkeypatch, tmp_path):
-    monkeypatch.setattr(array_spatial_report, "attitude_errors", canned)
-    monkeypatch.setattr(array_spatial_report, "attitude_curves", canned_curves)
-    monkeypatch.setattr(array_spatial_report, "wrong_start", lambda seed: {"seed": seed, "closed prior": [3.0, 1.0]})
-    monkeypatch.setattr(array_spatial_report, "cone", lambda seed, duration: {"beyond": 0.1})
+    monkeypatch.setattr(spatial_study, "attitude_errors", canned)
+    monkeypatch.setattr(spatial_study, "attitude_curves", canned_curves)
+    monkeypatch.setattr(spatial_study, "wrong_start", lambda seed: {prior: [3.0, 1.0] for prior in PRIORS})
+    monkeypatch.setattr(spatial_study, "cone", lambda seed, duration: dict.fromkeys(SHARES, 0.1))
     report = Report(tmp_path / "run")
-    array_spatial_report.spatial(study, report)
+    spatial_study.spatial(study, report)
     titles = [entry.title for entry in report.entries]
     assert [title.split(":")[0] for title in titles] == [
         "Figures 5.6 to 5.10 and Table 5.1, simulation",
         "Figures 5.6 to 5.10",
+        "Chapter 5",
         "Inclined field, 70° below the horizon",
         "Start rolled by 40°",
         "Figure 5.22",
+        "Chapter 5, beyond the figures",
         "Figures 5.6 and 5.7",
         "Figure 5.8",
         "Figures 5.9 and 5.10",
@@ -124,9 +131,9 @@ def test_works_are_compared_in_tables(study, monkeypatch, tmp_path):
         both = {"estimator": "b", "total": 2.0, "inclination": 1.0, "heading": 1.0}
         return [common | both, common | {"estimator": "a", "total": None, "inclination": 0.5, "heading": None}]
 
-    monkeypatch.setattr(array_comparison_report, "gesture_errors", gestures)
+    monkeypatch.setattr(array_comparison, "gesture_errors", gestures)
     report = Report(tmp_path / "run")
-    array_comparison_report.comparison(study, report)
+    array_comparison.comparison(study, report)
     total, inclination, nothing = report.entries
     assert [row["estimator"] for row in total.rows] == ["b"]
     assert [row["estimator"] for row in inclination.rows] == ["a", "b"]
@@ -137,8 +144,10 @@ def test_works_are_compared_in_tables(study, monkeypatch, tmp_path):
 @pytest.mark.slow
 def test_the_controller_keeps_three_degrees_over_ten_motions():
     """The figures that the page quotes: ten motions of 100 s, sound form."""
-    rows = [attitude_errors("controller", seed, names=(PROPOSED,))[0] for seed in range(10)]
-    octa = [row for seed in range(3) for row in attitude_errors("octa", seed, names=("proposed, sound, no gyroscope",))]
+    rows = [attitude_errors("controller", seed, methods=(PROPOSED,))[0] for seed in range(10)]
+    octa = [
+        row for seed in range(3) for row in attitude_errors("octa", seed, methods=("proposed, sound, no gyroscope",))
+    ]
     assert np.mean([row["pitch"] for row in rows]) < 0.65
     assert np.mean([row["inside"] for row in rows]) > 0.98
     assert np.mean([row["total"] for row in rows]) < 2.0

@@ -7,8 +7,14 @@ import pytest
 
 from poise.baselines.studies import find_paper
 from poise.baselines.studies.external_acceleration.published import LEVELS, TABLE_I, TABLE_II, TABLE_III
-from poise.baselines.studies.external_acceleration.simulation import MODES, RATE, estimate, simulate
-from poise.baselines.studies.external_acceleration.study import QUANTITIES, STILL, errors, reference
+from poise.baselines.studies.external_acceleration.simulation import MODES, RATE, errors, estimate, reference, simulate
+from poise.baselines.studies.external_acceleration.study import (
+    QUANTITIES,
+    STILL,
+    claims,
+    errors_of_test,
+    sweep_of_mode_1,
+)
 from poise.baselines.studies.kit import Study
 from poise.baselines.studies.report import Report
 from poise.envs.hand.sensing import simulate_hand
@@ -75,6 +81,16 @@ def test_the_study_runs_and_says_what_it_must(tmp_path):
     assert recorded[0]["bounded-motion"] < recorded[0]["mode 2"]
     assert {path.name for path in (tmp_path / "run" / "figures").iterdir()} == {f"fig-{n}.png" for n in range(2, 8)}
     assert len(report.results) == 18
-    failing = {row["claim"]: row["holds"] for row in tables["What the paper says, and the inclination errors here"]}
-    assert failing["Mode 2 fails in test B"]
-    assert failing["Mode 2 fails in test C"]
+    holds = {row["statement"]: row["holds"] for row in tables["What the paper says, and the inclination errors here"]}
+    assert holds["Mode 2 fails in test B (more than three times mode 1)"]
+    assert holds["Mode 2 fails in test C (more than three times mode 1)"]
+
+
+def test_claims_follow_the_numbers():
+    tests, still = {test: errors_of_test(test, [1]) for test in "ABC"}, sweep_of_mode_1("A", [1], {"duration": 5.0})
+    as_found = {claim.statement: claim.holds for claim in claims(tests, still)}
+    modes = tests["B"]["modes"]
+    worse = tests | {"B": {**tests["B"], "modes": modes | {"2 printed": modes["1 printed"]}}}
+    changed = {claim.statement: claim.holds for claim in claims(worse, still)}
+    failed = {statement for statement in as_found if as_found[statement] != changed[statement]}
+    assert failed == {"Mode 2 fails in test B (more than three times mode 1)"}

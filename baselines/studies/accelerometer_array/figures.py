@@ -1,0 +1,53 @@
+"""Figures of chapter 5 of the thesis."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from ...plots import new_figure
+from ..report import Report
+
+LINES = ("#1f5fa8", "#c2571a", "#2c8c5a", "#b08d1a", "#7a4fa3", "#6d737c", "#b03060")
+NUMBERS = {"controller": ("5.6 and 5.7", "5.8"), "octa": ("5.9 and 5.10", "5.11")}
+"""Device → numbers of its figures: errors over time, path"""
+
+
+def pointing_figures(report: Report, device: str, curves: dict[str, Any]) -> None:
+    """Figures 5.6 to 5.8, or 5.9 to 5.11, from :func:`.spatial.attitude_curves`."""
+    errors_name, path_name = NUMBERS[device]
+    figure, axes = new_figure(7.5, 7.0, 4)
+    time = curves["time"]
+    for row, (angle, true) in enumerate((("pitch", curves["pitch"]), ("azimuth", curves["azimuth"]))):
+        top, below = axes[2 * row], axes[2 * row + 1]
+        top.plot(time, true, color="black", linewidth=1.0, label="true")
+        top.plot(time, curves["found"][row], color=LINES[0], linewidth=1.0, linestyle="--", label="proposed")
+        top.set_ylabel(f"{angle}, °")
+        drawn = list(zip(LINES, curves["errors"].items(), strict=False))
+        for place, (colour, (name, both)) in enumerate(drawn):
+            first = place == 0
+            style: dict[str, Any] = {"linewidth": 1.4 if first else 0.8, "alpha": 1.0 if first else 0.65}
+            below.plot(time, both[row], color=colour, label=name, zorder=3 if first else 2, **style)
+        below.set_ylim(-30.0, 30.0)
+        below.set_ylabel(f"error of {angle}, °")
+    axes[0].legend(loc="upper right", fontsize=7, ncols=2)
+    figure.legend(*axes[1].get_legend_handles_labels(), loc="outside lower center", fontsize=7.5, ncols=3)
+    axes[-1].set_xlabel("time, s")
+    report.figure(
+        f"pointing-{device}",
+        figure,
+        f"Figures {errors_name}: pitch and azimuth of the {device}",
+        "Errors beyond 30° are cut.",
+    )
+    figure, (ax,) = new_figure(5.0, 4.6)
+    limit = math.degrees(math.pi / 4.0)
+    ax.plot([-limit, limit, limit, -limit, -limit], [-limit, -limit, limit, limit, -limit], "k:", linewidth=0.8)
+    ax.plot(curves["azimuth"], curves["pitch"], color="black", linewidth=0.9, label="true")
+    ax.plot(curves["found"][1], curves["found"][0], color=LINES[0], linewidth=0.9, linestyle="--", label="proposed")
+    ax.set_xlabel("azimuth, °")
+    ax.set_ylabel("pitch, °")
+    ax.set_aspect("equal")
+    ax.legend(loc="upper right", fontsize=8)
+    report.figure(
+        f"path-{device}", figure, f"Figure {path_name}: where the {device} points", "Dotted: targets' limits."
+    )

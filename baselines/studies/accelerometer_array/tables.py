@@ -1,0 +1,44 @@
+"""Rows of results, one an estimate, as tables of a report."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+Row = dict[str, Any]
+
+
+def grouped(
+    rows: Iterable[Row], by: Mapping[str, str], columns: Mapping[str, tuple[str, Callable[[Sequence[float]], Any]]]
+) -> list[Row]:
+    """One line for each combination of keys, in order of first appearance.
+
+    Args:
+        rows: results; None where there is none.
+        by: key of the rows → column that shows it.
+        columns: column → key of the rows, and the mean, smallest … of its values.
+    """
+    groups: dict[tuple[Any, ...], list[Row]] = {}
+    for row in rows:
+        groups.setdefault(tuple(row[key] for key in by), []).append(row)
+    table = []
+    for names, found in groups.items():
+        line: Row = dict(zip(by.values(), names, strict=True))
+        for column, (key, summary) in columns.items():
+            values = [row[key] for row in found if row[key] is not None]
+            line[column] = float(summary(values)) if values else None
+        table.append(line)
+    return table
+
+
+def values_of(rows: Iterable[Row], key: str, **chosen: Any) -> list[Any]:
+    """``row[key]`` of the rows that have all the ``chosen`` entries."""
+    return [row[key] for row in rows if all(row[name] == value for name, value in chosen.items())]
+
+
+def mean_of(rows: Iterable[Row], key: str, **chosen: Any) -> float:
+    """Mean of :func:`values_of`; NaN if there are none."""
+    values = values_of(rows, key, **chosen)
+    return float(np.mean(values)) if values else float("nan")
