@@ -23,7 +23,7 @@ RIDER_RATE, RIDER_PHYSICS = 100.0, 500.0
 
 
 def environment_speeds() -> Iterator[Speed]:
-    """Steps a CPU second of hand motion, replay and gain tuning; simulation without steps; riders on bicycles."""
+    """Steps per CPU second of hand motion, replay and gain tuning; simulation without steps; riders on bicycles."""
     group = "environments at 100 Hz"
     bare = measure(bare_steps(STEPS * PHYSICS_PER_TICK), STEPS * PHYSICS_PER_TICK)
     yield Speed(group, "bare stepSimulation of one free body, 10 a tick", bare / PHYSICS_PER_TICK, "ticks/s", 1.0)

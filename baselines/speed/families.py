@@ -15,7 +15,7 @@ from ...filters.core.kalman import KalmanFilter
 from ...filters.core.model import Model, equations_of
 from ..registry import list_estimators, make_estimator
 from .filters import Speed, measure
-from .fixtures import example
+from .fixtures import plausible_measurements
 
 FAMILIES: dict[str, tuple[str, ...]] = {
     "bicycle": (
@@ -40,7 +40,7 @@ FAMILIES: dict[str, tuple[str, ...]] = {
 """Part of ``poise speed`` → estimators; those that the registry lacks are left out."""
 
 SAMPLES = 200
-"""of an example; longer sequences repeat it"""
+"""of the measurements; longer sequences repeat them"""
 BATCHES = (64, 256, 1024)
 STEPS = 1_000
 LONG = 20_000
@@ -66,7 +66,7 @@ def family_speeds(family: str) -> Iterator[Speed]:
 def estimator_speeds(name: str) -> Iterator[Speed]:
     """Rates of one estimator; the yardstick is filterpy, or for what is no Kalman filter stepping in arrays."""
     estimator = make_estimator(name, dt=0.01)
-    data = example(estimator, 0, SAMPLES)
+    data = plausible_measurements(estimator, 0, SAMPLES)
     equations = equations_of(estimator)
     slow, short = (repeated(data, length) for length in (ARRAYS, STEPS))
     is_kalman = isinstance(estimator, KalmanFilter)
@@ -76,7 +76,7 @@ def estimator_speeds(name: str) -> Iterator[Speed]:
         yardstick = rate
         yield Speed(group, "filterpy.ExtendedKalmanFilter, same model functions", rate, "updates/s", 1.0)
     else:
-        group = f"{name} (no Kalman filter)"
+        group = f"{name} (not a Kalman filter)"
     arrays = in_arrays(estimator)
     rate = measure(lambda: run_by_steps(arrays, slow), ARRAYS)
     if not is_kalman:
@@ -125,7 +125,7 @@ def in_arrays(estimator: Estimator[Any]) -> Estimator[Any]:
 
 
 def repeated(data: Mapping[str, np.ndarray], length: int) -> dict[str, np.ndarray]:
-    """Samples that go forth and back until they are ``length``."""
+    """Samples forth and back, repeated to ``length``."""
     there_and_back = {name: np.concatenate([array, array[::-1]]) for name, array in data.items()}
     return {name: np.resize(array, (length, *array.shape[1:])) for name, array in there_and_back.items()}
 

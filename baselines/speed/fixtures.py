@@ -1,6 +1,7 @@
-"""Plausible data for every estimator of the catalogue, by the family of its channels: for contracts and speed.
+"""Test fixtures: plausible measurements for any registered estimator, for contract tests and for ``poise speed``.
 
-A new family is a line in :data:`FAMILIES`: which channels it has, and a function that makes them.
+They follow from the channels that an estimator reads, so a new estimator needs nothing here unless its channels are of
+a new family: a line in :data:`FAMILIES`.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ LEVEL_AXIS = rotation.exp(np.array([0.5 * np.pi, 0.0, 0.0]))
 """A body whose z axis is horizontal: planar arrays move in its x-y plane."""
 
 
-def shaken(estimator: Estimator[Any], seed: int, length: int, dt: float) -> Data:
+def shaken_imu(estimator: Estimator[Any], seed: int, length: int, dt: float) -> Data:
     """An IMU that turns and is shaken."""
     rng = np.random.default_rng(seed)
     rate = rng.normal(0.0, 1.0, 3) + np.cumsum(rng.normal(0.0, 0.2, (length, 3)), axis=0)
@@ -44,7 +45,7 @@ def shaken(estimator: Estimator[Any], seed: int, length: int, dt: float) -> Data
     }
 
 
-def array_moved(estimator: Estimator[Any], seed: int, length: int, dt: float) -> Data:
+def moving_array(estimator: Estimator[Any], seed: int, length: int, dt: float) -> Data:
     """A body with an array of accelerometers and an IMU, from rest; a planar array stays in its plane."""
     rng = np.random.default_rng(seed)
     array = array_of(estimator)
@@ -92,7 +93,7 @@ def ride() -> Data:
         env.close()
 
 
-def ridden(estimator: Estimator[Any], seed: int, length: int, dt: float) -> Data:
+def piece_of_ride(estimator: Estimator[Any], seed: int, length: int, dt: float) -> Data:
     """A piece of a ride."""
     every = round(100.0 * dt)
     rng = np.random.default_rng(seed)
@@ -102,14 +103,14 @@ def ridden(estimator: Estimator[Any], seed: int, length: int, dt: float) -> Data
 
 
 FAMILIES: tuple[tuple[frozenset[str], Callable[..., Data]], ...] = (
-    (frozenset(("imu/gyr", "imu/acc", "imu/mag")), shaken),
-    (frozenset(("array/acc", "imu/gyr", "planar/gyr", "imu/acc", "imu/mag")), array_moved),
-    (frozenset(BICYCLE_CHANNELS), ridden),
+    (frozenset(("imu/gyr", "imu/acc", "imu/mag")), shaken_imu),
+    (frozenset(("array/acc", "imu/gyr", "planar/gyr", "imu/acc", "imu/mag")), moving_array),
+    (frozenset(BICYCLE_CHANNELS), piece_of_ride),
 )
-"""Channels that a family has, and what makes an example of them; the first family that fits is taken."""
+"""Channels of a family, and what simulates them; the first family that has all channels of an estimator is taken."""
 
 
-def example(estimator: Estimator[Any], seed: int, length: int = 80, dt: float = 0.01) -> Data:
+def plausible_measurements(estimator: Estimator[Any], seed: int, length: int = 80, dt: float = 0.01) -> Data:
     """Plausible samples of the channels that an estimator reads.
 
     Args:
@@ -129,4 +130,4 @@ def example(estimator: Estimator[Any], seed: int, length: int = 80, dt: float = 
         if channels.issuperset(names):
             data = make(estimator, seed, length, dt)
             return {name: data[name] for name in names}
-    raise ValueError(f"no example data for the channels {names}: add their family to {__name__}.FAMILIES")
+    raise ValueError(f"no measurements for the channels {names}: add their family to {__name__}.FAMILIES")

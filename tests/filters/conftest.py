@@ -7,10 +7,10 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from poise.baselines.speed.fixtures import example
+from poise.baselines.speed.fixtures import plausible_measurements
 
 
 @pytest.fixture(scope="session")
 def motion() -> Callable[..., dict[str, np.ndarray]]:
     """Plausible samples for an estimator: ``motion(estimator, seed, length=80, dt=0.01)``."""
-    return example
+    return plausible_measurements

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import poise
-from poise.baselines.gain_policy.adaptive import AdaptiveEstimator, shipped_external_acceleration
+from poise.baselines.gain_policy.adaptive import AdaptiveEstimator, shipped
 from poise.baselines.gain_policy.constant_gains import best_constant_gains, constant_errors, policy_errors
 from poise.baselines.gain_policy.policy import GainPolicy
 from poise.envs.gain_tuning import ReplayGainEnv
@@ -125,7 +125,7 @@ def test_what_does_not_fit_is_refused():
     with pytest.raises(ValueError, match="the policy sets the gains"):
         AdaptiveEstimator(tunable_filter("external-acceleration"), bounded)
     with pytest.raises(ValueError, match="unknown parameters"):
-        shipped_external_acceleration(nose=1.0)
+        shipped("external_acceleration_policy", nose=1.0)
     with pytest.raises(ValueError, match="lack the channels"):
         adaptive("bounded-motion").run({"imu/gyr": np.zeros((3, 3))})
     with pytest.raises(ValueError, match="at least one"):

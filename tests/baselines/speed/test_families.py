@@ -10,7 +10,7 @@ import pytest
 from poise.baselines.registry import list_estimators, make_estimator
 from poise.baselines.speed import families as speed_families
 from poise.baselines.speed import filters as speed_filters
-from poise.baselines.speed.fixtures import example
+from poise.baselines.speed.fixtures import plausible_measurements
 from poise.filters.core.kalman import KalmanFilter
 from poise.scripts.main import main
 
@@ -30,7 +30,7 @@ def _hurry(monkeypatch):
 @pytest.mark.parametrize("name", KALMAN)
 def test_filterpy_computes_the_same_filter(name):
     estimator = make_estimator(name, compiled=False)
-    data = speed_families.repeated(example(estimator, 1, 40), 60)
+    data = speed_families.repeated(plausible_measurements(estimator, 1, 40), 60)
     theirs = speed_families.filterpy_run(estimator.model, data)
     memory = estimator.init({channel: array[0] for channel, array in data.items()})
     for t in range(60):
@@ -64,4 +64,4 @@ def test_unknown_channels_are_named():
         channels = (type("Channel", (), {"name": "nose/cold"}),)
 
     with pytest.raises(ValueError, match="nose/cold"):
-        example(Odd(), 0)
+        plausible_measurements(Odd(), 0)
