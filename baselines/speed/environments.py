@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from .filters import REPEATS, Speed, measure
+from .measure import REPEATS, Speed, measure
 
 if TYPE_CHECKING:
     from ...envs.bicycle.ride.ride import Ride

@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import replace
+from collections.abc import Iterator, Mapping
+from functools import partial
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 
-from ...filters.core.estimator import Estimator, run, run_by_steps
 from ...filters.core.kalman import KalmanFilter
-from ...filters.core.model import Model, equations_of
+from ...filters.core.model import Model
 from ..registry import list_estimators, make_estimator
-from .filters import Speed, measure
 from .fixtures import plausible_measurements
+from .measure import Speed, form_rates, measure
 
 FAMILIES: dict[str, tuple[str, ...]] = {
     "bicycle": (
@@ -64,78 +61,25 @@ def family_speeds(family: str) -> Iterator[Speed]:
 
 
 def estimator_speeds(name: str) -> Iterator[Speed]:
-    """Rates of one estimator; the yardstick is filterpy, or for what is no Kalman filter stepping in arrays."""
+    """Rates of one estimator; the yardstick is filterpy, or for what is not a Kalman filter stepping in arrays."""
     estimator = make_estimator(name, dt=0.01)
     data = plausible_measurements(estimator, 0, SAMPLES)
-    equations = equations_of(estimator)
-    slow, short = (repeated(data, length) for length in (ARRAYS, STEPS))
-    is_kalman = isinstance(estimator, KalmanFilter)
-    if is_kalman:
+    if isinstance(estimator, KalmanFilter):
+        equations = estimator.model
         group = f"{name} ({equations.state_size} states, {equations.residual_size} rows)"
-        rate = measure(lambda: filterpy_run(equations, slow), ARRAYS)
-        yardstick = rate
-        yield Speed(group, "filterpy.ExtendedKalmanFilter, same model functions", rate, "updates/s", 1.0)
+        yardstick = measure(lambda: filterpy_run(equations, repeated(data, ARRAYS)), ARRAYS)
+        yield Speed(group, "filterpy.ExtendedKalmanFilter, same model functions", yardstick, "updates/s", 1.0)
     else:
-        group = f"{name} (not a Kalman filter)"
-    arrays = in_arrays(estimator)
-    rate = measure(lambda: run_by_steps(arrays, slow), ARRAYS)
-    if not is_kalman:
-        yardstick = rate
-    yield Speed(group, "step by step, arrays", rate, "updates/s", rate / yardstick)
-    forms: list[tuple[str, Callable[[], Any], int, Callable[[], float]]] = []
-    if arrays is not estimator:
-        whole = repeated(data, LONG)
-        slim = replace(estimator, keep_covariance=False) if is_kalman else estimator  # type: ignore[type-var]
-        forms += [
-            ("step by step, compiled", lambda: run_by_steps(estimator, short), STEPS, time.process_time),
-            ("whole sequence, compiled", lambda: run(estimator, whole), LONG, time.process_time),
-        ]
-        if is_kalman:
-            forms.append(
-                ("whole sequence, compiled, no covariances", lambda: run(slim, whole), LONG, time.process_time)
-            )
-        for batch in BATCHES:
-            wide = widened(repeated(data, SAMPLES), batch)
-            forms.append(
-                (
-                    f"batch of {batch}, compiled",
-                    lambda wide=wide: run(slim, wide),  # type: ignore[misc]
-                    SAMPLES * batch,
-                    time.perf_counter,
-                )
-            )
-    for batch in BATCHES:
-        narrow = widened(slow, batch)
-        forms.append(
-            (
-                f"batch of {batch}, arrays",
-                lambda narrow=narrow: run(arrays, narrow),  # type: ignore[misc]
-                ARRAYS * batch,
-                time.perf_counter,
-            )
-        )
-    for what, work, count, clock in forms:
-        rate = measure(work, count, clock=clock)
+        group, yardstick = f"{name} (not a Kalman filter)", None
+    for what, rate in form_rates(estimator, partial(repeated, data), STEPS, LONG, ARRAYS, SAMPLES, BATCHES):
+        yardstick = yardstick or rate
         yield Speed(group, what, rate, "updates/s", rate / yardstick)
-
-
-def in_arrays(estimator: Estimator[Any]) -> Estimator[Any]:
-    """The same without the compiled form; the estimator itself if it has none."""
-    return replace(estimator, compiled=False) if hasattr(estimator, "compiled") else estimator  # type: ignore[type-var]
 
 
 def repeated(data: Mapping[str, np.ndarray], length: int) -> dict[str, np.ndarray]:
     """Samples forth and back, repeated to ``length``."""
     there_and_back = {name: np.concatenate([array, array[::-1]]) for name, array in data.items()}
     return {name: np.resize(array, (length, *array.shape[1:])) for name, array in there_and_back.items()}
-
-
-def widened(data: Mapping[str, np.ndarray], batch: int) -> dict[str, np.ndarray]:
-    """The same sequence ``batch`` times, ``(T, batch, size)``."""
-    return {
-        name: np.ascontiguousarray(np.broadcast_to(array[:, None], (len(array), batch, array.shape[-1])))
-        for name, array in data.items()
-    }
 
 
 def filterpy_run(model: Model, measurements: Mapping[str, np.ndarray]) -> np.ndarray:

@@ -3,61 +3,27 @@
 from __future__ import annotations
 
 import os
-import statistics
 import subprocess
 import sys
 import tempfile
-import time
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
-from typing import Any
+from collections.abc import Iterator
 
 import numpy as np
 
-from ...filters.core.estimator import run, run_by_steps
+from ...filters.core.estimator import run
 from ...filters.core.kalman import KalmanFilter
 from ...filters.imu.external_acceleration import ExternalAcceleration
 from ..registry import make_estimator
+from .measure import Speed, form_rates, measure
 
 BATCHES = (256, 1024)
-REPEATS = 5
 
 
-@dataclass(frozen=True)
-class Speed:
-    """One row: what was timed, how often a second it happens, and how often the yardstick does.
-
-    Attributes:
-        group: rows of one group are compared.
-        what: what was timed.
-        rate: times a second of CPU time (wall-clock for batches, which use several cores).
-        unit: of the rate.
-        ratio: rate divided by the rate of the group's yardstick; None for a latency.
-    """
-
-    group: str
-    what: str
-    rate: float
-    unit: str
-    ratio: float | None = None
-
-
-def measure(work: Callable[[], Any], count: int, *, clock: Callable[[], float] = time.process_time) -> float:
-    """Median rate of ``count`` things that ``work`` does, after one call that is not counted."""
-    work()
-    rates = []
-    for _ in range(REPEATS):
-        start = clock()
-        work()
-        rates.append(count / max(clock() - start, 1e-9))
-    return statistics.median(rates)
-
-
-def samples(length: int, batch: tuple[int, ...] = (), seed: int = 0) -> dict[str, np.ndarray]:
+def samples(length: int, seed: int = 0) -> dict[str, np.ndarray]:
     """Six-axis samples of a tumbling sensor; what they are does not change what they cost."""
     generator = np.random.default_rng(seed)
-    force = generator.standard_normal((length, *batch, 3)) + np.array([0.0, 0.0, 9.8])
-    return {"imu/gyr": generator.standard_normal((length, *batch, 3)), "imu/acc": force}
+    force = generator.standard_normal((length, 3)) + np.array([0.0, 0.0, 9.8])
+    return {"imu/gyr": generator.standard_normal((length, 3)), "imu/acc": force}
 
 
 def filterpy_run(model: ExternalAcceleration, measurements: dict[str, np.ndarray]) -> np.ndarray:
@@ -91,28 +57,12 @@ def filterpy_run(model: ExternalAcceleration, measurements: dict[str, np.ndarray
 
 def filter_speeds() -> Iterator[Speed]:
     """Updates a second of the three-state filter in every form, beside filterpy; then of larger filters and VQF."""
-    model = ExternalAcceleration()
-    compiled, arrays = KalmanFilter(model), KalmanFilter(model, compiled=False)
-    short, long = samples(2_000), samples(100_000)
+    model, short = ExternalAcceleration(), samples(2_000)
     group = "external-acceleration (3 states, 3 rows)"
     yardstick = measure(lambda: filterpy_run(model, short), 2_000)
     yield Speed(group, "filterpy.KalmanFilter, same equations", yardstick, "updates/s", 1.0)
-
-    def row(what: str, rate: float) -> Speed:
-        return Speed(group, what, rate, "updates/s", rate / yardstick)
-
-    yield row("step by step, compiled", measure(lambda: run_by_steps(compiled, short), 2_000))
-    yield row("step by step, arrays", measure(lambda: run_by_steps(arrays, samples(200)), 200))
-    yield row("whole sequence, compiled", measure(lambda: run(compiled, long), 100_000))
-    slim = replace(compiled, keep_covariance=False)
-    yield row("whole sequence, compiled, no covariances", measure(lambda: run(slim, long), 100_000))
-    for batch in BATCHES:
-        wide = samples(200, (batch,))
-        rate = measure(lambda wide=wide: run(slim, wide), 200 * batch, clock=time.perf_counter)  # type: ignore[misc]
-        yield row(f"batch of {batch}, compiled", rate)
-        narrow = samples(20, (batch,))
-        rate = measure(lambda narrow=narrow: run(arrays, narrow), 20 * batch, clock=time.perf_counter)  # type: ignore[misc]
-        yield row(f"batch of {batch}, arrays", rate)
+    for what, rate in form_rates(KalmanFilter(model), samples, 2_000, 100_000, 100, 200, BATCHES):
+        yield Speed(group, what, rate, "updates/s", rate / yardstick)
     for name in ("mekf", "bounded-motion", "mahony", "gru", "vqf"):
         try:
             estimator = make_estimator(name, dt=0.01)

@@ -9,7 +9,7 @@ import pytest
 
 from poise.baselines.registry import list_estimators, make_estimator
 from poise.baselines.speed import families as speed_families
-from poise.baselines.speed import filters as speed_filters
+from poise.baselines.speed import measure as speed_measure
 from poise.baselines.speed.fixtures import plausible_measurements
 from poise.filters.core.kalman import KalmanFilter
 from poise.scripts.main import main
@@ -20,7 +20,7 @@ KALMAN = [name for name in NAMES if isinstance(make_estimator(name), KalmanFilte
 
 @pytest.fixture
 def _hurry(monkeypatch):
-    monkeypatch.setattr(speed_filters, "REPEATS", 1)
+    monkeypatch.setattr(speed_measure, "REPEATS", 1)
     for name, value in (("BATCHES", (4,)), ("STEPS", 20), ("LONG", 50), ("ARRAYS", 3), ("SAMPLES", 20)):
         monkeypatch.setattr(speed_families, name, value)
     monkeypatch.setitem(speed_families.FAMILIES, "bicycle", ("platform-gyro", "to-come"))
@@ -41,7 +41,7 @@ def test_filterpy_computes_the_same_filter(name):
 def test_samples_are_repeated_forth_and_back():
     data = {"a/b": np.arange(3.0)[:, None]}
     assert speed_families.repeated(data, 8)["a/b"][:, 0].tolist() == [0, 1, 2, 2, 1, 0, 0, 1]
-    wide = speed_families.widened(data, 5)["a/b"]
+    wide = speed_measure.widened(data, 5)["a/b"]
     assert wide.shape == (3, 5, 1)
     assert (wide == data["a/b"][:, None]).all()
 

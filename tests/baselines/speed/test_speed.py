@@ -7,6 +7,7 @@ import pytest
 
 from poise.baselines.speed import environments as speed_environments
 from poise.baselines.speed import filters as speed_filters
+from poise.baselines.speed import measure as speed_measure
 from poise.filters.core.estimator import run
 from poise.filters.core.kalman import KalmanFilter
 from poise.filters.imu.external_acceleration import ExternalAcceleration
@@ -15,7 +16,7 @@ from poise.scripts.main import main
 
 @pytest.fixture(autouse=True)
 def hurry(monkeypatch):
-    monkeypatch.setattr(speed_filters, "REPEATS", 1)
+    monkeypatch.setattr(speed_measure, "REPEATS", 1)
     monkeypatch.setattr(speed_filters, "BATCHES", (8,))
     monkeypatch.setattr(speed_environments, "REPEATS", 1)
     monkeypatch.setattr(speed_environments, "STEPS", 20)
