@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from poise.envs.sensors.kinds import KINDS
 from poise.scripts.list import LISTS, PLACED
 
 ROOT = Path(__file__).resolve().parents[1]
