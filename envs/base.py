@@ -1,4 +1,4 @@
-"""What every environment of this package shares: spaces, reward, info, seeds, snapshots, rendering.
+"""What every environment whose agent estimates a pose shares: spaces, reward, info, seeds, snapshots.
 
 An environment is a source of ticks. Estimates do not act on what is estimated, so a subclass hands over ticks in
 :class:`Block` objects, many at once, and :class:`PoseEnv` deals them out one a step.
@@ -9,18 +9,17 @@ from __future__ import annotations
 import copy
 import functools
 import math
-import time
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar, NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
-import gymnasium
 import numpy as np
 from gymnasium import spaces
 
 from ..filters.core import metrics
 from ..filters.core.quantity import ORIENTATION, RELATIVE_ORIENTATION, Channel, Quantity
+from .drawn import DrawnEnv, Shown
 
 Observation = dict[str, np.ndarray]
 
@@ -81,22 +80,6 @@ class Sensing(Protocol):
         ...
 
 
-class Scene(Protocol):
-    """What an environment is drawn with, see :mod:`poise.envs.rendering`."""
-
-    def draw(self, pose: Mapping[str, np.ndarray], truth: Mapping[str, np.ndarray], estimate: np.ndarray) -> None:
-        """Put everything in its place; ``estimate`` is the last action."""
-        ...
-
-    def image(self) -> np.ndarray:
-        """What is seen, ``(height, width, 3)`` uint8."""
-        ...
-
-    def close(self) -> None:
-        """Free the window."""
-        ...
-
-
 @dataclass(frozen=True)
 class Snapshot:
     """The whole state of an environment between two steps; plain data that can be pickled."""
@@ -111,7 +94,7 @@ class Snapshot:
     estimate: np.ndarray
 
 
-class PoseEnv(gymnasium.Env[Observation, np.ndarray]):
+class PoseEnv(DrawnEnv):
     """An agent reads sensors and says a pose; the reward is minus the error of what it says.
 
     The action of a step is the estimate for the observation *before* the step. Rotations and directions may have any
@@ -124,22 +107,14 @@ class PoseEnv(gymnasium.Env[Observation, np.ndarray]):
         rate: ticks a second, Hz.
     """
 
-    metadata: dict[str, Any] = {"render_modes": ["human", "rgb_array"], "render_fps": 100}  # noqa: RUF012
-    reset_options: ClassVar[tuple[str, ...]] = ()
-    """Names that ``reset(options=...)`` understands."""
-
     def __init__(self, suite: Sensing, quantity: Quantity, rate: float, render_mode: str | None = None) -> None:
-        if render_mode is not None and render_mode not in self.metadata["render_modes"]:
-            raise ValueError(f"render_mode must be None or one of {self.metadata['render_modes']}, got {render_mode!r}")
-        self.suite, self.quantity, self.rate, self.render_mode = suite, quantity, float(rate), render_mode
-        self.metadata = {**type(self).metadata, "render_fps": max(1, round(rate))}
+        super().__init__(render_mode, rate)
+        self.suite, self.quantity, self.rate = suite, quantity, float(rate)
         self.observation_space: spaces.Space[Any] = suite.observation_space
         self.action_space = spaces.Box(-1.0, 1.0, (quantity.size,), np.float32)
-        self._scene: Scene | None = None
         self._block: Block | None = None
         self._estimate = self.neutral_action
         self._row = self._tick = self._last_tick = 0
-        self._drawn = -math.inf
 
     @property
     def neutral_action(self) -> np.ndarray:
@@ -172,10 +147,6 @@ class PoseEnv(gymnasium.Env[Observation, np.ndarray]):
     def restore_source(self, saved: Any) -> None:
         """Undo :meth:`save_source`."""
 
-    def make_scene(self, gui: bool) -> Scene:
-        """Make what the environment is drawn with."""
-        raise NotImplementedError
-
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:
@@ -189,18 +160,13 @@ class PoseEnv(gymnasium.Env[Observation, np.ndarray]):
             ValueError: an unknown option, or an unusable value of one.
         """
         super().reset(seed=seed)
-        options = dict(options or {})
-        unknown = sorted(set(options) - set(self.reset_options))
-        if unknown:
-            raise ValueError(f"unknown reset options {unknown}; known are {list(self.reset_options)}")
+        options = self.checked_options(options)
         motion, sensors = self.np_random.spawn(2)
         self._last_tick = self.begin(motion, sensors, options)
         self._block = self.next_block(self._last_tick + 1)
         self._row = self._tick = 0
         self._estimate = self.neutral_action
-        self._drawn = -math.inf
-        if self.render_mode == "human":
-            self._show()
+        self._show(self._tick)
         return self._observe(), self._info()
 
     def step(self, action: np.ndarray) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
@@ -218,8 +184,7 @@ class PoseEnv(gymnasium.Env[Observation, np.ndarray]):
         self._row += 1
         if self._row == len(self._block.time):
             self._block, self._row = self.next_block(self._last_tick + 1 - self._tick), 0
-        if self.render_mode == "human":
-            self._show()
+        self._show(self._tick)
         return self._observe(), reward, False, self._tick >= self._last_tick, self._info()
 
     def _checked(self, action: np.ndarray) -> np.ndarray:
@@ -286,44 +251,21 @@ class PoseEnv(gymnasium.Env[Observation, np.ndarray]):
         self.suite.restore(snapshot.sensors)
         self.restore_source(snapshot.source)
 
-    def render(self) -> np.ndarray | None:
-        """An image ``(height, width, 3)`` uint8 with ``render_mode="rgb_array"``; a window is drawn by itself.
+    def save_episode(self) -> Snapshot | None:
+        """A snapshot; None where there is no episode."""
+        return None if self._block is None else self.snapshot()
 
-        Raises:
-            RuntimeError: :meth:`reset` was not called.
-        """
-        if self._block is None:
-            raise RuntimeError("call reset first: there is nothing to draw")
-        if self.render_mode is None:
-            gymnasium.logger.warn("render() does nothing without a render_mode, such as rgb_array")
-            return None
-        return self._draw().image() if self.render_mode == "rgb_array" else None
+    def restore_episode(self, saved: Snapshot) -> None:
+        """Return to a snapshot."""
+        self.restore(saved)
 
-    def _draw(self) -> Scene:
-        if self._scene is None:
-            self._scene = self.make_scene(self.render_mode == "human")
+    def shown(self) -> Shown | None:
+        """True pose, truth and the last estimate."""
         block, row = self._block, self._row
-        assert block is not None
+        if block is None:
+            return None
         pose, truth = ({name: values[row] for name, values in part.items()} for part in (block.pose, block.truth))
-        self._scene.draw(pose, truth, self._estimate)
-        return self._scene
-
-    def _show(self) -> None:
-        """Keep the window up to date, at most fifty times a second and not faster than time passes."""
-        stride = max(1, round(self.rate / 50.0))
-        if self._tick % stride:
-            return
-        wait = self._drawn + stride / self.rate - time.monotonic()
-        if 0.0 < wait < 1.0:
-            time.sleep(wait)
-        self._drawn = time.monotonic()
-        self._draw()
-
-    def close(self) -> None:
-        """Close window and worlds; may be called twice."""
-        scene, self._scene = self._scene, None
-        if scene is not None:
-            scene.close()
+        return Shown(pose, truth, self._estimate)
 
 
 def pose_error(quantity: Quantity, estimate: np.ndarray, truth: np.ndarray) -> float:
@@ -374,6 +316,7 @@ def renamed(**names: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
                 kwargs.setdefault(names[old], kwargs.pop(old))
             return function(*args, **kwargs)
 
+        call.former_names = names  # type: ignore[attr-defined]
         return call
 
     return decorate

@@ -6,9 +6,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
-import gymnasium
 import numpy as np
 from gymnasium import spaces
 
@@ -21,6 +20,7 @@ from ..filters.core.quantity import Estimate, Quantity
 from .base import renamed
 from .data.formats.load import load_recording
 from .data.trajectory import Trajectory
+from .drawn import DrawnEnv, Scene, Shown
 from .hand.gestures import GestureConfig
 from .hand.trajectories import HandTrajectories
 from .sensors.presets import SensorPreset
@@ -30,7 +30,7 @@ NIS_FLOOR = 1e-6
 """Smallest mean NIS that the consistency term tells from zero."""
 
 
-class GainTuningEnv(gymnasium.Env[np.ndarray, np.ndarray]):
+class GainTuningEnv(DrawnEnv):
     """What the gain-tuning environments share; subclasses say where trajectories come from.
 
     Args:
@@ -42,12 +42,16 @@ class GainTuningEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         interval: time from decision to decision, s, rounded to ticks.
         reward: ``error`` or ``improvement``, see the subclasses.
         consistency: weight of the consistency term of the reward, rad.
+        render_mode: ``human`` (a window), ``rgb_array`` or None.
 
     Raises:
         ValueError: an unknown filter, gain, quantity or kind of reward, or a number out of its range.
     """
 
-    metadata = {"render_modes": []}  # noqa: RUF012
+    _episode_fields: ClassVar[tuple[str, ...]] = (
+        *("trajectory", "tuned", "_measurements", "_truth", "_reference", "_tick", "_state", "_estimates"),
+    )
+    """Attributes that belong to an episode."""
 
     def __init__(
         self,
@@ -58,19 +62,18 @@ class GainTuningEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         interval: float = 0.1,
         reward: RewardKind = "error",
         consistency: float = 0.0,
-        render_mode: None = None,
+        render_mode: str | None = None,
     ) -> None:
         if reward not in ("error", "improvement"):
             raise ValueError(f"reward must be 'error' or 'improvement', got {reward!r}")
         if not 0.0 <= consistency < math.inf:
             raise ValueError(f"consistency must be a weight of 0 or more, got {consistency}")
-        if render_mode is not None:
-            raise ValueError(f"render_mode must be None: there is nothing to see, got {render_mode!r}")
+        super().__init__(render_mode, 1.0 / interval if interval > 0.0 else 1.0)
         names = None if gains is None else tuple(gains)
         self.tuned = TunedFilter.of(tunable_filter(filter), names, InnovationFeatures(interval))
         self._published = self.tuned.kalman
         self.quantity = scored_quantity(self.tuned.kalman, quantity)
-        self.reward_kind, self.consistency, self.render_mode = reward, float(consistency), render_mode
+        self.reward_kind, self.consistency = reward, float(consistency)
         size, actions = self.tuned.observation_size, self.tuned.actions
         self.observation_space = spaces.Box(-1.0, 1.0, (size,), np.float32)
         self.action_space = spaces.Box(-1.0, 1.0, (actions,), np.float32)
@@ -84,8 +87,13 @@ class GainTuningEnv(gymnasium.Env[np.ndarray, np.ndarray]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[np.ndarray, dict[str, Any]]:
-        """Begin a new trajectory; the filter has seen nothing yet."""
+        """Begin a new trajectory; the filter has seen nothing yet.
+
+        Raises:
+            ValueError: an unknown option (there are none), or a trajectory that lacks a channel of the filter.
+        """
         super().reset(seed=seed)
+        self.checked_options(options)
         self.trajectory = trajectory = self.next_trajectory()
         channels = [channel.name for channel in self.tuned.kalman.channels]
         missing = [name for name in channels if name not in trajectory.measurements]
@@ -102,7 +110,9 @@ class GainTuningEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             self._reference = error(self.quantity, estimate.pose[self.quantity.name], self._truth)
         self._tick = 0
         self._state = self.tuned.init({name: values[0] for name, values in self._measurements.items()})
-        return self.tuned.observe(self._state), self._info(None, math.nan)
+        self._estimates = {output.name: np.full(output.size, np.nan) for output in self.tuned.kalman.outputs}
+        self._show(0)
+        return self.tuned.observe(self._state), self._info(math.nan)
 
     def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
         """Run the filter over one interval with the gains of ``action``.
@@ -130,23 +140,44 @@ class GainTuningEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         if self.consistency:
             reward -= self.consistency * inconsistency(estimate, self.tuned.kalman.model.residual_size)
         truncated = self._tick + self.tuned.ticks > len(self.trajectory)
-        return self.tuned.observe(self._state), reward, False, truncated, self._info(estimate, mean_error)
+        self._estimates = {name: np.array(estimate.pose[name][-1]) for name in self._estimates}
+        self._show(self._tick // self.tuned.ticks)
+        return self.tuned.observe(self._state), reward, False, truncated, self._info(mean_error)
 
-    def _info(self, estimate: Estimate | None, mean_error: float) -> dict[str, Any]:
+    def make_scene(self, gui: bool) -> Scene:
+        """A device above the ground, and the axes of the filter's estimate."""
+        from .rendering import DeviceScene
+
+        return DeviceScene(gui=gui)
+
+    def shown(self) -> Shown | None:
+        """Truth of the last sample, and the filter's attitude (its first output where it has none)."""
+        if self.trajectory is None:
+            return None
+        truth = {name: values[max(self._tick - 1, 0)] for name, values in self.trajectory.truth.items()}
+        wanted = (self.quantity.name, "up", "orientation", "relative_orientation")
+        known = [name for name in wanted if name in self._estimates and self._estimates[name].size in (3, 4)]
+        return Shown(truth, truth, self._estimates[known[0]] if known else np.zeros(3))
+
+    def save_episode(self) -> dict[str, Any] | None:
+        """Trajectory, filter and place in it; None where there is no episode."""
+        return None if self.trajectory is None else {name: getattr(self, name) for name in self._episode_fields}
+
+    def restore_episode(self, saved: dict[str, Any]) -> None:
+        """Undo :meth:`save_episode`."""
+        for name, value in saved.items():
+            setattr(self, name, value)
+
+    def _info(self, mean_error: float) -> dict[str, Any]:
         assert self.trajectory is not None
         row = max(self._tick - 1, 0)
         pose = self._truth[row]
-        outputs = self.tuned.kalman.outputs
-        if estimate is None:
-            estimates = {output.name: np.full(output.size, np.nan) for output in outputs}
-        else:
-            estimates = {output.name: np.array(estimate.pose[output.name][-1]) for output in outputs}
         sizes = gain_sizes(self.tuned.kalman.model, self.tuned.gains(self._state.action))
         return {
             "time": float(self.trajectory.time[row]),
             "pose": {self.quantity.name: np.array(pose)},
             "truth": {name: np.array(values[row]) for name, values in self.trajectory.truth.items()},
-            "estimate": estimates,
+            "estimate": {name: values.copy() for name, values in self._estimates.items()},
             "error_deg": math.degrees(mean_error),
             "gains": {name: float(size) for name, size in sizes.items()},
         }
@@ -274,7 +305,8 @@ class ReplayGainEnv(GainTuningEnv):
         items = [given] if isinstance(given, Trajectory | str | Path) else list(given)
         if not items:
             raise ValueError("trajectory must name at least one trajectory, got none")
-        self.trajectories = tuple(item if isinstance(item, Trajectory) else load_recording(item) for item in items)
+        loaded = (item if isinstance(item, Trajectory) else load_recording(item) for item in items)
+        self.trajectories = tuple(item.on_grid() for item in loaded)
         for item in self.trajectories:
             true_values(item, self.quantity, self.tuned.kalman)
             shortest = self.tuned.features.ticks(item.dt)

@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+import inspect
+from typing import Any
+
 import gymnasium
+
+from ..filters.support.names import look_up
 
 ENTRY_POINTS: dict[str, str] = {
     "poise/HandMotion-v0": "poise.envs.hand.environment:HandMotionEnv",
@@ -21,6 +26,48 @@ def register_environments() -> None:
     for identity, entry_point in ENTRY_POINTS.items():
         if identity not in gymnasium.registry:
             gymnasium.register(id=identity, entry_point=entry_point)
+
+
+def make_environment(identity: str, **options: Any) -> gymnasium.Env[Any, Any]:
+    """An environment of a registered id.
+
+    Raises:
+        ValueError: the id is unknown, or an option is: the message lists the arguments that the environment takes.
+    """
+    register_environments()
+    try:
+        known = accepted_arguments(identity)
+        for name in options:
+            look_up("option", name, dict.fromkeys([*known, *former_arguments(identity)]))
+        return gymnasium.make(identity, **options)
+    except gymnasium.error.Error as reason:
+        raise ValueError(str(reason)) from reason
+    except (TypeError, AttributeError) as reason:
+        cause = str(reason).split(" was raised from the environment creator")[0]
+        raise ValueError(f"{identity} cannot be made with {options}: {cause}; its arguments are {known}") from reason
+
+
+def environment_class(identity: str) -> Any:
+    """The class (or function) that makes the environments of a registered id."""
+    entry_point = gymnasium.spec(identity).entry_point
+    return gymnasium.envs.registration.load_env_creator(entry_point) if isinstance(entry_point, str) else entry_point
+
+
+def former_arguments(identity: str) -> list[str]:
+    """Former names of arguments that are understood with a warning."""
+    return list(getattr(environment_class(identity).__init__, "former_names", ()))
+
+
+def accepted_arguments(identity: str) -> list[str]:
+    """Names of the arguments of an environment, also of those that it hands on to its base."""
+    kind = environment_class(identity)
+    names: dict[str, None] = {}
+    for each in getattr(kind, "__mro__", (kind,)):
+        parameters = inspect.signature(each.__init__ if inspect.isclass(each) else each).parameters
+        names |= dict.fromkeys(name for name, one in parameters.items() if one.kind != one.VAR_KEYWORD)
+        if all(one.kind != one.VAR_KEYWORD for one in parameters.values()):
+            break
+    return [name for name in names if name != "self"]
 
 
 def list_environments() -> tuple[str, ...]:

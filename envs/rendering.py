@@ -99,6 +99,12 @@ class DeviceScene:
         position = np.asarray(truth.get("position", np.full(3, np.nan)))
         self._target = position if np.isfinite(position).all() else np.array([0.0, 0.0, 0.5])
         known = pose["orientation"] if "orientation" in pose else pose["up"]
+        if len(known) == 4 and len(estimate) == 3 and np.any(estimate) and np.isfinite(estimate).all():
+            # an inclination leaves the heading open: it is drawn with that of the device
+            up, estimated = rotation.up_in_body(known), rotation.normalize(estimate)
+            axis = rotation.cross(estimated, up)
+            angle = np.arctan2(np.linalg.norm(axis), estimated @ up)
+            estimate = rotation.multiply(known, rotation.exp(rotation.normalize(axis) * angle if axis.any() else axis))
         for body, shown in ((self._device, known), (self._ghost, estimate)):
             if np.isfinite(shown).all() and np.any(shown):
                 self._place(body, rotation.normalize(shown) if len(shown) == 4 else rotation.level(shown))

@@ -11,20 +11,22 @@ import numpy as np
 from gymnasium import spaces
 
 from ..filters.core.quantity import ORIENTATION, RELATIVE_ORIENTATION, UP, Channel, Quantity
-from .base import Block, Observation, PoseEnv, Scene, choose_quantity
+from .base import Block, Observation, PoseEnv, choose_quantity
 from .data.formats.load import load_recording
 from .data.trajectory import Trajectory
+from .drawn import Scene
 from .hand.sensing import check_duration, simulate_hand
+from .sensors.kinds import KINDS
 from .sensors.observation import ObservationLayout
 
-UNITS = {"gyr": "rad/s", "acc": "m/s²", "mag": "µT"}
+UNITS = {kind.suffix: kind.unit for kind in KINDS.values() if kind.unit}
 """Units by the last part of a channel's name."""
 POSE = ("orientation", "relative_orientation", "up")
 """Truth that belongs to the pose."""
 
 
 class RecordedSensors:
-    """The channels of a trajectory, with the face of a :class:`poise.envs.sensors.suite.SensorSuite`.
+    """The channels of a trajectory, with the interface of a :class:`poise.envs.sensors.suite.SensorSuite`.
 
     Args:
         trajectory: what was recorded; the largest magnitude of each channel bounds its observation.
@@ -81,8 +83,9 @@ class ReplayEnv(PoseEnv):
 
     ## Description
 
-    Any :class:`poise.Trajectory` as an environment with the interface of ``poise/HandMotion-v0``. Nothing is random but
-    where an episode starts.
+    Any :class:`poise.Trajectory` as an environment with the interface of ``poise/HandMotion-v0``. It keeps the
+    recording's time: on its uniform grid (:meth:`poise.Trajectory.on_grid`) a gap is a stretch without samples, of its
+    true length, that is not scored. Nothing is random but where an episode starts.
 
     ## Action Space
 
@@ -158,6 +161,7 @@ class ReplayEnv(PoseEnv):
         elif not isinstance(trajectory, Trajectory):
             trajectory = load_recording(trajectory)
         check_duration(duration)
+        trajectory = trajectory.on_grid()
         if len(trajectory) < 2:
             raise ValueError(f"trajectory must have two ticks at least, {trajectory.name!r} has {len(trajectory)}")
         self.trajectory, self.random_start = trajectory, random_start

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ast
-import inspect
 import re
 from dataclasses import dataclass
 from pathlib import Path
@@ -69,32 +68,15 @@ def option(text: str) -> tuple[str, Any]:
         return name, value
 
 
-def check_options(env_id: str, options: dict[str, Any]) -> None:
-    """Make the environment once, here, where a wrong option can be explained.
-
-    Raises:
-        ValueError: an argument that the environment does not have, or cannot compute with.
-    """
-    import gymnasium
-    from gymnasium.envs.registration import load_env_creator
-
-    known = inspect.signature(load_env_creator(str(gymnasium.spec(env_id).entry_point))).parameters
-    for name in options:
-        look_up("option", name, known)
-    try:
-        gymnasium.make(env_id, **options).close()
-    except (TypeError, AttributeError) as reason:
-        cause = str(reason).split(" was raised from the environment creator")[0]
-        raise ValueError(f"{env_id} cannot be made with {options}: {cause}") from reason
-
-
 def run(args: Args) -> int:
     """Record and say where the files are."""
-    from ..envs.batch_record import record_episodes
+    from ..envs.record import record_episodes
+    from ..envs.registration import make_environment
 
     env_id = environment_id(args.environment)
     options = dict(option(text) for text in args.options)
-    check_options(env_id, options)
+    # once, here, where a wrong option is explained in one line
+    make_environment(env_id, **options).close()
     with Output("record", args) as out:
         with progress_bar(args.episodes, f"record {env_id}", "episode") as bar:
             paths = record_episodes(

@@ -13,9 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from ...envs.batch_record import record_episode
 from ...envs.data.trajectory import Trajectory, load_trajectory
-from ...envs.record import plain
+from ...envs.record import plain, record_episode
 from ...filters.support.files import write_text
 from ...filters.support.parallel import in_parallel
 from ...filters.support.resume import is_kept, keep, kept

@@ -11,11 +11,13 @@ from gymnasium import spaces
 
 from ...filters.bicycle.geometry import RiderGeometry
 from ...filters.core.quantity import Quantity
-from ..base import Block, Observation, PoseEnv, Scene, pose_error, renamed
+from ..base import Block, Observation, PoseEnv, pose_error, renamed
+from ..drawn import Scene
 from ..sensors.ideal import STANDARD_GRAVITY, Sampling
 from ..sensors.sensor import Sensor
 from .course.scenarios import Scenario
 from .course.scenarios import scenario as named_scenario
+from .course.terrain import Ground
 from .frame.parameters import BICYCLES, BicycleParameters
 from .frame.tyre import TyreParameters
 from .ride.control import ControlSettings
@@ -206,6 +208,11 @@ class RiderBicycleEnv(PoseEnv):
         return rider_geometry(self._posture, self._sites)
 
     @property
+    def scenery(self) -> tuple[Posture, Ground]:
+        """The person on the bicycle and the ground of the present ride, for a picture."""
+        return self._posture, self._source.ground
+
+    @property
     def neutral_action(self) -> np.ndarray:
         """``(size,)`` float32: no rotations, zero angles."""
         parts = [np.eye(1, q.size, dtype=np.float32)[0] * (q.kind == "rotation") for q in self.quantities]
@@ -301,7 +308,7 @@ class RiderBicycleEnv(PoseEnv):
         from .course.scene import RideScene
 
         self._drawn_ground = self._source.ground
-        return RideScene(self._posture, self._source.ground, gui=gui)
+        return RideScene(*self.scenery, gui=gui)
 
     def close(self) -> None:
         """Close window and physics; may be called twice."""

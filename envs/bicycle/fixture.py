@@ -16,7 +16,8 @@ import numpy as np
 from ...filters.bicycle.geometry import RiderGeometry
 from ...filters.core import rotation
 from ...filters.core.quantity import Quantity
-from ..base import Block, PoseEnv, Scene, choose_quantity, renamed
+from ..base import Block, PoseEnv, choose_quantity, renamed
+from ..drawn import Scene
 from ..sensors.ideal import BodyState
 from .frame.parameters import MOUNTAIN_BIKE
 from .rider.anthropometry import SUBJECTS
@@ -160,7 +161,7 @@ class BicycleFixtureEnv(PoseEnv):
         duration: s.
         score: one of the quantities of ``info["pose"]``.
         noise_scale: factor on all errors.
-        render_mode: None; there is no picture of it.
+        render_mode: ``human`` (a window), ``rgb_array`` or None.
 
     Raises:
         ValueError: an argument out of its range or an unknown name.
@@ -184,8 +185,6 @@ class BicycleFixtureEnv(PoseEnv):
     ) -> None:
         if not 0.1 <= duration < math.inf:
             raise ValueError(f"duration must be at least 0.1 s and finite, got {duration}")
-        if render_mode is not None:
-            raise ValueError(f"render_mode must be None: there is no picture of the fixture, got {render_mode!r}")
         self._posture = sit(MOUNTAIN_BIKE, SUBJECTS[0])
         self.sites = fixture_sites(sensor_sites(self._posture), DISK_CENTRE)
         self._suite = rider_bicycle_suite(suite, sensors=sensors, rate=rate, noise_scale=noise_scale, sites=self.sites)
@@ -194,7 +193,6 @@ class BicycleFixtureEnv(PoseEnv):
         if missing or forces:
             raise ValueError(f"suite must not need a rider, but it has sensors on {sorted(missing) or forces}")
         super().__init__(self._suite, choose_quantity(score, QUANTITIES), self._suite.rate, render_mode)
-        self.metadata = {**self.metadata, "render_modes": []}
         self.duration = float(duration)
         self._motion: FixtureMotion | None = None
         self._ticks = 0
@@ -251,5 +249,7 @@ class BicycleFixtureEnv(PoseEnv):
         self._motion, self._ticks = saved
 
     def make_scene(self, gui: bool) -> Scene:
-        """There is none."""
-        raise NotImplementedError("the fixture has no picture")
+        """Bicycle, disk and a level ground."""
+        from .course.scene import FixtureScene
+
+        return FixtureScene(MOUNTAIN_BIKE, DISK_CENTRE, gui=gui)

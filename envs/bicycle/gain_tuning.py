@@ -8,6 +8,7 @@ from typing import Any
 from ...filters.core.kalman import KalmanFilter
 from ..base import renamed
 from ..data.trajectory import Trajectory
+from ..drawn import Scene, Shown
 from ..gain_tuning import GainTuningEnv
 from ..record import record
 from ..sensors.ideal import Sampling
@@ -96,7 +97,7 @@ class RiderBicycleGainEnv(GainTuningEnv):
         noise_scale: factor on all sensor errors.
         sampling: ``interval`` or ``instant``.
         common: ``gains``, ``quantity``, ``interval`` (s), ``reward``, ``consistency`` of
-            :class:`poise.envs.gain_tuning.GainTuningEnv`.
+            :class:`poise.envs.gain_tuning.GainTuningEnv`, and ``render_mode``.
 
     Raises:
         ValueError: an unknown site, filter, scenario or rider, or a number out of its range.
@@ -105,6 +106,8 @@ class RiderBicycleGainEnv(GainTuningEnv):
 
     * v0: first release.
     """
+
+    _episode_fields = (*GainTuningEnv._episode_fields, "_ridden", "_scenery")
 
     @renamed(grade="noise_scale", place="site")
     def __init__(
@@ -160,8 +163,25 @@ class RiderBicycleGainEnv(GainTuningEnv):
         """A new ride and new sensor errors."""
         generator = self.np_random.spawn(1)[0]
         ride = self.rides[int(generator.integers(len(self.rides)))]
-        ridden = record(ride, seed=int(generator.integers(2**32)))
-        return ridden if self.of_rides else imu_of(ridden, self.site)
+        self._ridden = record(ride, seed=int(generator.integers(2**32)))
+        self._scenery = ride.scenery
+        # another person or another ground: the picture is made anew when it is asked for
+        super().close()
+        return self._ridden if self.of_rides else imu_of(self._ridden, self.site)
+
+    def make_scene(self, gui: bool) -> Scene:
+        """Rider, bicycle and ground of the episode."""
+        from .course.scene import RideScene
+
+        return RideScene(*self._scenery, gui=gui)
+
+    def shown(self) -> Shown | None:
+        """The whole ride."""
+        shown = super().shown()
+        if shown is None:
+            return None
+        truth = {name: values[max(self._tick - 1, 0)] for name, values in self._ridden.truth.items()}
+        return Shown(truth, truth, shown.estimate)
 
     def close(self) -> None:
         """Close the worlds of the rides; may be called twice."""

@@ -9,7 +9,8 @@ import numpy as np
 
 from ...filters.arrays.array import AccelerometerArray
 from ...filters.core.quantity import ORIENTATION, RELATIVE_ORIENTATION
-from ..base import Block, PoseEnv, Scene, choose_quantity
+from ..base import Block, PoseEnv, choose_quantity
+from ..drawn import Scene
 from ..sensors.ideal import Mounting, Sampling, vector
 from ..sensors.presets import SensorPreset
 from ..sensors.suite import SensorSuite

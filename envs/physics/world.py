@@ -337,6 +337,12 @@ class Physics:
             with contextlib.suppress(pybullet.error):
                 pybullet.disconnect(physicsClientId=client)
 
+    def __reduce__(self) -> str:
+        raise TypeError(
+            "a PyBullet world can neither be copied nor pickled; copy or pickle the environment, which makes a world "
+            "of its own, or use its snapshot() and restore()"
+        )
+
     def __enter__(self) -> Self:
         return self
 

@@ -13,11 +13,11 @@ import poise
 from poise import make_estimator
 from poise.baselines.evaluation import evaluate
 from poise.baselines.gain_policy.adaptive import AdaptiveEstimator
-from poise.envs.batch_record import record_episodes
 from poise.envs.bicycle.environment import RiderBicycleEnv
 from poise.envs.data.trajectory import load_trajectory
 from poise.envs.hand.devices import DEVICES
 from poise.envs.hand.sensing import simulate_hand
+from poise.envs.record import record_episodes
 from poise.filters.arrays.array import OCTA
 from poise.filters.bicycle.geometry import RiderEquations, RiderGeometry
 from poise.filters.bicycle.two_gyro.filter import TwoGyro

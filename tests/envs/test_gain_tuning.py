@@ -174,7 +174,7 @@ def test_recordings_are_read_from_files(tmp_path, trajectory):
         ({"duration": 0.05}, "duration must be one interval at least"),
         ({"drive": "magnetic"}, "drive must be one of"),
         ({"mounting": "upside-down"}, "mounting must be one of"),
-        ({"render_mode": "human"}, "render_mode must be None"),
+        ({"render_mode": "ascii"}, "render_mode must be None or one of"),
     ],
 )
 def test_wrong_arguments_are_explained(arguments, words):

@@ -1,53 +1,51 @@
-"""Pictures of rider and bicycle: the same shapes as in the physics, in a world of their own."""
+"""Pictures of rider and bicycle and of the fixture: the same shapes as in the physics, in a world of their own."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from ....filters.core import rotation
 from ....filters.support.optional import extra
+from ...physics.urdf import Tree, rod_shape
 from ...physics.world import Physics
-from ...rendering import TILE_COLOURS, take_picture
+from ...rendering import AXIS_COLOURS, TILE_COLOURS, take_picture
 from ...sensors.ideal import BodyState
 from ..frame.bicycle import bicycle_tree
+from ..frame.parameters import BicycleParameters
 from ..rider.links import TRUNK_JOINTS, add_full_rider, limb_joints
 from ..rider.posture import LIMBS, Posture
-from .terrain import Ground
+from .terrain import FlatGround, Ground
 
 with extra("sim"):
     import pybullet
 
+DISK_RADIUS, DISK_COLOUR, POST_COLOUR = 0.2, (0.93, 0.86, 0.62), (0.55, 0.57, 0.6)
+"""m; what a disk of the two-gyroscope paper's fixture looks like"""
 TILE, TILES = 1.0, 8
 """m, and tiles on each side of the bicycle"""
 
 
-class RideScene:
-    """The rider on the bicycle over a ground of tiles that follows them.
+class BicycleScene:
+    """A bicycle over a ground of tiles that follows it.
 
     Args:
-        posture: the person on the bicycle.
-        ground: what they ride on.
+        tree: the bicycle, and what hangs on it.
+        ground: what it rolls on.
         gui: open a window.
     """
 
-    def __init__(self, posture: Posture, ground: Ground, *, gui: bool = False) -> None:
+    def __init__(self, tree: Tree, ground: Ground, *, gui: bool = False) -> None:
         self._physics, self._ground = Physics(gui=gui), ground
         client = self._physics.client
         if gui:
             pybullet.configureDebugVisualizer(pybullet.COV_ENABLE_GUI, 0, physicsClientId=client)
             pybullet.configureDebugVisualizer(pybullet.COV_ENABLE_RENDERING, 0, physicsClientId=client)
         self._gui = gui
-        tree = bicycle_tree(posture.bicycle)
-        add_full_rider(tree, posture)
-        self._rider = self._physics.load_urdf(tree.text())
-        links = self._physics.links(self._rider)
-        self._riding = [links["front_assembly"], links["crank"], links["rear_wheel"], links["front_wheel"]]
-        joints = [*TRUNK_JOINTS, *(name for limb in LIMBS for name in limb_joints(limb))]
-        self._joints = [links[name] for name in joints]
+        self._bicycle = self._physics.load_urdf(tree.text())
         self._tiles = [self._tile(i, j) for i in range(-TILES, TILES) for j in range(-TILES, TILES)]
-        self._wheels = posture.bicycle.rear_wheel.radius / posture.bicycle.front_wheel.radius
         self._target, self._heading = np.zeros(3), 0.0
         if gui:
             pybullet.configureDebugVisualizer(pybullet.COV_ENABLE_RENDERING, 1, physicsClientId=client)
@@ -62,17 +60,11 @@ class RideScene:
         return self._physics.create_body(0.0, (0.0, 0.0, 0.0), visual=visual)
 
     def draw(self, pose: Mapping[str, np.ndarray], truth: Mapping[str, np.ndarray], estimate: np.ndarray) -> None:
-        """Put rider, bicycle and ground in place; the estimate is not shown."""
+        """Put bicycle and ground in place; the estimate is not shown."""
         zero, physics = np.zeros(3), self._physics
-        position = np.asarray(truth["bicycle/position"])
-        physics.set_state(self._rider, BodyState(0.0, position, np.asarray(pose["bicycle/orientation"]), zero, zero))
-        wheel = float(truth["wheel/angle"][0])
-        angles = [float(pose["bicycle/steer"][0]), float(pose["bicycle/crank"][0]), wheel, wheel * self._wheels]
-        for link, angle in zip(
-            [*self._riding, *self._joints], [*angles, *truth["joints/angles"].tolist()], strict=True
-        ):
-            pybullet.resetJointState(self._rider, link, angle, 0.0, physicsClientId=physics.client)
-        self._heading = float(pose["bicycle/yaw"][0])
+        position, orientation = np.asarray(truth["bicycle/position"]), np.asarray(pose["bicycle/orientation"])
+        physics.set_state(self._bicycle, BodyState(0.0, position, orientation, zero, zero))
+        self._heading = float(rotation.to_euler_zyx(orientation)[0])
         self._target = position + np.array([0.5 * math.cos(self._heading), 0.5 * math.sin(self._heading), 0.75])
         centre = np.floor(position[:2] / (2.0 * TILE)) * 2.0 * TILE
         places = [(i, j) for i in range(-TILES, TILES) for j in range(-TILES, TILES)]
@@ -96,3 +88,66 @@ class RideScene:
     def close(self) -> None:
         """Close the world or the window."""
         self._physics.close()
+
+
+class RideScene(BicycleScene):
+    """The rider on the bicycle.
+
+    Args:
+        posture: the person on the bicycle.
+        ground: what they ride on.
+        gui: open a window.
+    """
+
+    def __init__(self, posture: Posture, ground: Ground, *, gui: bool = False) -> None:
+        tree = bicycle_tree(posture.bicycle)
+        add_full_rider(tree, posture)
+        super().__init__(tree, ground, gui=gui)
+        links = self._physics.links(self._bicycle)
+        joints = [*TRUNK_JOINTS, *(name for limb in LIMBS for name in limb_joints(limb))]
+        self._joints = [links[name] for name in ("front_assembly", "crank", "rear_wheel", "front_wheel", *joints)]
+        self._wheels = posture.bicycle.rear_wheel.radius / posture.bicycle.front_wheel.radius
+
+    def draw(self, pose: Mapping[str, np.ndarray], truth: Mapping[str, np.ndarray], estimate: np.ndarray) -> None:
+        """Put rider, bicycle and ground in place; the estimate is not shown."""
+        wheel = float(truth["wheel/angle"][0])
+        angles = [float(pose["bicycle/steer"][0]), float(pose["bicycle/crank"][0]), wheel, wheel * self._wheels]
+        for link, angle in zip(self._joints, [*angles, *truth["joints/angles"].tolist()], strict=True):
+            pybullet.resetJointState(self._bicycle, link, angle, 0.0, physicsClientId=self._physics.client)
+        super().draw(pose, truth, estimate)
+
+
+class FixtureScene(BicycleScene):
+    """A bicycle without a rider and the tilted disk above it.
+
+    Args:
+        bicycle: the bicycle.
+        disk: point of the bicycle frame that carries the disk's centre, m.
+        gui: open a window.
+    """
+
+    def __init__(self, bicycle: BicycleParameters, disk: Sequence[float], *, gui: bool = False) -> None:
+        super().__init__(bicycle_tree(bicycle), FlatGround(), gui=gui)
+        flat, axle = (0.0, 0.0, 0.006), (0.0, 0.0, 0.012)
+        marked = [rod_shape((0.0, 0.0, -0.006), flat, DISK_RADIUS, DISK_COLOUR)]
+        # markers of three colours: the disk's rotation can be told
+        for angle, colour in zip(np.radians([90.0, 210.0, 330.0]), AXIS_COLOURS, strict=True):
+            place = 0.15 * np.array([math.cos(angle), math.sin(angle), 0.0])
+            marked.append(rod_shape(place + flat, place + axle, 0.035, colour))
+        tree = Tree("disk")
+        tree.link("disk", 1.0, (1.0, 1.0, 1.0), (0.0, 0.0, 0.0), marked)
+        self._disk = self._physics.load_urdf(tree.text())
+        post = Tree("post")
+        post.link("post", 1.0, (1.0, 1.0, 1.0), (0.0, 0.0, 0.0), [rod_shape(bicycle.saddle, disk, 0.02, POST_COLOUR)])
+        self._post = self._physics.load_urdf(post.text())
+
+    def draw(self, pose: Mapping[str, np.ndarray], truth: Mapping[str, np.ndarray], estimate: np.ndarray) -> None:
+        """Put bicycle, disk and ground in place; the estimate is not shown."""
+        zero = np.zeros(3)
+        for body, name, position in (
+            (self._disk, "disk", truth["disk/position"]),
+            (self._post, "bicycle", truth["bicycle/position"]),
+        ):
+            orientation = np.asarray(pose[f"{name}/orientation"])
+            self._physics.set_state(body, BodyState(0.0, np.asarray(position), orientation, zero, zero))
+        super().draw(pose, truth, estimate)

@@ -1,0 +1,162 @@
+"""What lies beneath every environment of this package: pictures, reset options, copies and pickles."""
+
+from __future__ import annotations
+
+import copy
+import math
+import time
+from collections.abc import Mapping
+from typing import Any, ClassVar, NamedTuple, Protocol, Self
+
+import gymnasium
+import numpy as np
+
+RENDER_MODES = ("human", "rgb_array")
+
+
+class Scene(Protocol):
+    """What an environment is drawn with, see :mod:`poise.envs.rendering`."""
+
+    def draw(self, pose: Mapping[str, np.ndarray], truth: Mapping[str, np.ndarray], estimate: np.ndarray) -> None:
+        """Put everything in its place; ``estimate`` is the agent's."""
+        ...
+
+    def image(self) -> np.ndarray:
+        """What is seen, ``(height, width, 3)`` uint8."""
+        ...
+
+    def close(self) -> None:
+        """Free the window."""
+        ...
+
+
+class Shown(NamedTuple):
+    """What a picture shows: true pose and further truth at one time step, and the estimate of it."""
+
+    pose: Mapping[str, np.ndarray]
+    truth: Mapping[str, np.ndarray]
+    estimate: np.ndarray
+
+
+class DrawnEnv(gymnasium.Env[Any, np.ndarray]):
+    """An environment that can be drawn, copied and pickled.
+
+    A copy is made anew with the arguments of the original and put where the original is in its episode: both continue
+    with the same numbers, share nothing, and closing one leaves the other alone. It has no picture or window until it
+    draws one.
+
+    Args:
+        render_mode: ``human`` (a window), ``rgb_array`` or None.
+        rate: steps a second of the environment, Hz.
+
+    Raises:
+        ValueError: another render mode.
+    """
+
+    metadata: dict[str, Any] = {"render_modes": list(RENDER_MODES), "render_fps": 100}  # noqa: RUF012
+    reset_options: ClassVar[tuple[str, ...]] = ()
+    """Names that ``reset(options=...)`` understands."""
+
+    def __new__(cls, *args: Any, **kwargs: Any) -> Self:
+        """Remember the arguments, for copies."""
+        made = super().__new__(cls)
+        made._made_with = args, kwargs
+        return made
+
+    def __init__(self, render_mode: str | None, rate: float) -> None:
+        if render_mode not in (None, *RENDER_MODES):
+            raise ValueError(f"render_mode must be None or one of {list(RENDER_MODES)}, got {render_mode!r}")
+        self.render_mode = render_mode
+        self.metadata = {**type(self).metadata, "render_fps": max(1, round(rate))}
+        self._steps_a_second = float(rate)
+        self._scene: Scene | None = None
+        self._drawn = -math.inf
+
+    def shown(self) -> Shown | None:
+        """What a picture shows now; None where there is no episode."""
+        raise NotImplementedError
+
+    def make_scene(self, gui: bool) -> Scene:
+        """Make what the environment is drawn with."""
+        raise NotImplementedError
+
+    def save_episode(self) -> Any:
+        """Where the environment is in its episode, for a copy of it."""
+        raise NotImplementedError
+
+    def restore_episode(self, saved: Any) -> None:
+        """Undo :meth:`save_episode`, in an environment made with equal arguments."""
+        raise NotImplementedError
+
+    def checked_options(self, options: Mapping[str, Any] | None) -> dict[str, Any]:
+        """The options of a reset.
+
+        Raises:
+            ValueError: an unknown one; the message lists those that are known.
+        """
+        given = dict(options or {})
+        unknown = sorted(set(given) - set(self.reset_options))
+        if unknown:
+            known = f"known are {list(self.reset_options)}" if self.reset_options else "this environment has none"
+            raise ValueError(f"unknown reset options {unknown}; {known}")
+        return given
+
+    def render(self) -> np.ndarray | None:
+        """An image ``(height, width, 3)`` uint8 with ``render_mode="rgb_array"``; a window is drawn by itself.
+
+        Raises:
+            RuntimeError: :meth:`reset` was not called.
+        """
+        shown = self.shown()
+        if shown is None:
+            raise RuntimeError("call reset first: there is nothing to draw")
+        if self.render_mode is None:
+            gymnasium.logger.warn("render() does nothing without a render_mode, such as rgb_array")
+            return None
+        return self._draw(shown).image() if self.render_mode == "rgb_array" else None
+
+    def _draw(self, shown: Shown) -> Scene:
+        if self._scene is None:
+            self._scene = self.make_scene(self.render_mode == "human")
+        self._scene.draw(*shown)
+        return self._scene
+
+    def _show(self, step: int) -> None:
+        """Keep a window up to date, at most fifty times a second and not faster than time passes."""
+        stride = max(1, round(self._steps_a_second / 50.0))
+        if self.render_mode != "human" or step % stride:
+            return
+        if step == 0:
+            self._drawn = -math.inf
+        wait = self._drawn + stride / self._steps_a_second - time.monotonic()
+        if 0.0 < wait < 1.0:
+            time.sleep(wait)
+        self._drawn = time.monotonic()
+        shown = self.shown()
+        assert shown is not None
+        self._draw(shown)
+
+    def close(self) -> None:
+        """Close the window; may be called twice."""
+        scene, self._scene = self._scene, None
+        if scene is not None:
+            scene.close()
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Arguments and place in the episode: what copies and pickles are made of."""
+        state = self.save_episode(), self._np_random, self._np_random_seed, self.spec
+        return _made_again, (type(self), *self._made_with, state)
+
+    def __copy__(self) -> Self:
+        """Copies are always deep: two environments cannot share an episode."""
+        return copy.deepcopy(self)
+
+
+def _made_again(cls: type[DrawnEnv], args: tuple[Any, ...], kwargs: dict[str, Any], state: tuple[Any, ...]) -> DrawnEnv:
+    episode, generator, seed, spec = state
+    made = cls(*args, **kwargs)
+    made.spec = spec
+    if episode is not None:
+        made.restore_episode(episode)
+    made._np_random, made._np_random_seed = generator, seed
+    return made

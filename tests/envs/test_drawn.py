@@ -1,0 +1,134 @@
+"""Every environment: pictures for stable-baselines3, copies and pickles, options that are refused."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from stable_baselines3 import PPO
+from stable_baselines3.common.env_util import make_vec_env
+
+from poise.envs import list_environments
+from poise.envs.hand.environment import HandMotionEnv
+from poise.envs.physics.world import Physics
+from poise.envs.registration import make_environment
+
+SHORT = {
+    "poise/RiderBicycle-v0": {"duration": 2.0},
+    "poise/RiderBicycleGain-v0": {"duration": 2.0, "scenario": ("slalom", "slow")},
+}
+"""Arguments that keep a reset cheap."""
+
+
+@pytest.fixture(params=list_environments())
+def identity(request):
+    return request.param
+
+
+def same(one, other):
+    if isinstance(one, dict):
+        return one.keys() == other.keys() and all(same(one[name], other[name]) for name in one)
+    return np.array_equal(one, other, equal_nan=True)
+
+
+def neutral_steps(env, count):
+    action = env.unwrapped.neutral_action
+    return [env.step(action) for _ in range(count)]
+
+
+def assert_equal_steps(one, other):
+    for first, second in zip(one, other, strict=True):
+        assert first[1:4] == second[1:4]
+        assert same(first[0], second[0])
+        assert same(first[4], second[4])
+
+
+def test_stable_baselines3_makes_draws_and_trains_it(identity):
+    envs = make_vec_env(identity, seed=0)
+    envs.reset()
+    picture = envs.render()
+    assert picture.shape == (360, 480, 3)
+    assert picture.dtype == np.uint8
+    # something dark and something coloured stands in the middle of it
+    middle = picture[90:270, 120:360].astype(int)
+    assert (middle.sum(axis=2) < 400).mean() > 0.005
+    assert (np.ptp(middle, axis=2) > 60).mean() > 0.002
+    policy = "MlpPolicy" if isinstance(envs.observation_space, gym.spaces.Box) else "MultiInputPolicy"
+    envs.close()
+    model = PPO(policy, identity, n_steps=4, batch_size=4, n_epochs=1, device="cpu")
+    if identity != "poise/RiderBicycleGain-v0":
+        # there a reset rides for 20 s
+        model.learn(4)
+    model.env.close()
+
+
+def test_copies_and_pickles_continue_alone(identity):
+    env = gym.make(identity, render_mode="rgb_array", **SHORT.get(identity, {}))
+    env.reset(seed=4)
+    neutral_steps(env, 5)
+    copied, stored = copy.deepcopy(env), pickle.loads(pickle.dumps(env))
+    # an independent one: steps of the original do not move it
+    ahead = neutral_steps(env, 6)
+    picture = env.render()
+    env.close()
+    assert_equal_steps(neutral_steps(copied, 6), ahead)
+    np.testing.assert_array_equal(copied.render(), picture)
+    copied.close()
+    assert_equal_steps(neutral_steps(stored, 6), ahead)
+    assert same(stored.reset()[0], copied.reset()[0])
+    stored.close()
+    copied.close()
+
+
+def test_a_copy_before_the_first_episode_draws_the_same_ones():
+    env = HandMotionEnv("fast", "kinematic", duration=1.0)
+    env.reset(seed=3)
+    env.close()
+    fresh = HandMotionEnv("fast", "kinematic", duration=1.0)
+    _ = fresh.np_random
+    other = copy.copy(fresh)
+    assert same(fresh.reset()[0], other.reset()[0])
+    assert same(fresh.reset()[1], other.reset()[1])
+
+
+def test_a_world_is_not_copied():
+    with Physics() as world:
+        for duplicate in (copy.deepcopy, pickle.dumps):
+            with pytest.raises(TypeError, match=r"a PyBullet world can neither be copied nor pickled; copy or pickle"):
+                duplicate(world)
+
+
+def test_unknown_reset_options_are_refused(identity):
+    env = gym.make(identity, **SHORT.get(identity, {}))
+    known = env.unwrapped.reset_options
+    with pytest.raises(
+        ValueError, match=r"unknown reset options \['mood'\]; (known are|this environment has none)"
+    ) as caught:
+        env.reset(seed=0, options={"mood": "good"})
+    for name in known:
+        assert repr(name) in str(caught.value)
+    env.close()
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"foo": 1}, r"unknown option 'foo' \(options: .*score"),
+        ({"duration": "long"}, "cannot be made with .*its arguments are .*'duration'"),
+    ],
+)
+def test_wrong_arguments_are_a_value_error_that_names_the_right_ones(options, message):
+    with pytest.raises(ValueError, match=message):
+        make_environment("poise/Replay-v0", **options)
+
+
+def test_arguments_of_the_base_and_former_names_are_known():
+    with pytest.raises(ValueError, match=r"unknown option 'foo' \(options: .*gesture.*consistency"):
+        make_environment("poise/HandMotionGain-v0", foo=1)
+    with pytest.raises(ValueError, match="Environment `Nothing` doesn't exist"):
+        make_environment("poise/Nothing-v0")
+    with pytest.warns(DeprecationWarning, match="argument grade is now called noise_scale"):
+        make_environment("poise/BicycleFixture-v0", grade=0.5).close()
