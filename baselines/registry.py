@@ -13,29 +13,25 @@ from ..filters.core.estimator import Estimator
 from ..filters.registry import FILTERS, Entry, Kind
 from ..filters.support.names import look_up
 
+HERE = "this package"
 TRAINED: dict[str, Entry] = {
-    "external-acceleration+policy": Entry(
-        "baselines.gain_policy.adaptive:shipped",
-        "adaptive",
-        "external-acceleration, gains set by a policy trained with PPO",
-        "this package",
-        {"weights": "external_acceleration_policy"},
-        "filters.imu.external_acceleration:ExternalAcceleration",
-    ),
-    "bounded-motion+policy": Entry(
-        "baselines.gain_policy.adaptive:shipped",
-        "adaptive",
-        "bounded-motion, gains set by a policy trained with PPO",
-        "this package",
-        {"weights": "bounded_motion_policy"},
-        "filters.imu.bounded_motion:BoundedMotion",
-    ),
+    **{
+        f"{name}+policy": Entry(
+            "..baselines.gain_policy.adaptive:shipped",
+            f"{name}, gains set by a policy trained with PPO",
+            HERE,
+            "adaptive",
+            {"weights": f"{name.replace('-', '_')}_policy"},
+            FILTERS[name].factory,
+        )
+        for name in ("external-acceleration", "bounded-motion")
+    },
     "gru": Entry(
-        "baselines.learned.estimator:shipped",
-        "learned",
+        "..baselines.learned.estimator:shipped",
         "recurrent network, trained on simulated hand motion",
-        "this package",
-        describes="baselines.learned.estimator:LearnedEstimator",
+        HERE,
+        "learned",
+        describes="..baselines.learned.estimator:LearnedEstimator",
     ),
 }
 """Name → estimator with shipped weights."""

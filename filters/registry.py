@@ -21,7 +21,6 @@ from .core.observer import Observer
 from .support.names import look_up
 
 Kind = Literal["filter", "adaptive", "learned", "baseline", "external"]
-ROOT = __package__.rpartition(".")[0]
 
 
 @dataclass(frozen=True)
@@ -30,21 +29,21 @@ class Entry:
 
     Attributes:
         factory: a class of equations, a class of estimators, or a function that makes an estimator; or where it is,
-            ``package.module:name`` below the root of this package.
-        kind: ``filter`` (published or this package's), ``adaptive`` (a filter whose gains a policy sets), ``learned``,
-            ``baseline`` (a classical reference without tuning), ``external`` (another package's).
+            ``.module:name`` relative to this package.
         description: what it estimates and how, in one line.
         source: where it was published.
+        kind: ``filter`` (published or this package's), ``adaptive`` (a filter whose gains a policy sets), ``learned``,
+            ``baseline`` (a classical reference without tuning), ``external`` (another package's).
         fixed: parameters that the name stands for; they cannot be given.
         describes: the class whose channels and outputs are those of the estimator, where ``factory`` is a function.
     """
 
     factory: str | Callable[..., Any]
-    kind: Kind
     description: str
     source: str
+    kind: Kind = "filter"
     fixed: Mapping[str, Any] = field(default_factory=dict)
-    describes: str | type = ""
+    describes: str | Callable[..., Any] = ""
 
     @cached_property
     def made_by(self) -> Callable[..., Any]:
@@ -101,151 +100,129 @@ def _load(place: Any) -> Any:
     if not isinstance(place, str):
         return place
     module, name = place.split(":")
-    return getattr(importlib.import_module(f"{ROOT}.{module}"), name)
+    return getattr(importlib.import_module(module, __package__), name)
 
 
 HE = "He, thesis, Université Laval"
-THIS = "this package"
-TWO_GYRO = "Zhang, Chen, Yi et al."
-FORCE_INERTIAL = "Zhang, Chen, Yi 2013"
-WHOLE_BODY = "Zhang, Chen, Yi, Liu, Pan 2016"
+HERE = "this package"
+TWO_GYRO, FORCE_INERTIAL, WHOLE_BODY = (
+    "Zhang, Chen, Yi et al.",
+    "Zhang, Chen, Yi 2013",
+    "Zhang, Chen, Yi, Liu, Pan 2016",
+)
 MAHONY = "Mahony, Hamel, Pflimlin 2008"
-WITH_MAGNETOMETER = "the same with a magnetometer"
+SPATIAL, PLANAR, BICYCLE = ".arrays.spatial.orientation:ArrayOrientation", ".arrays.planar", ".bicycle"
+WITH_HEADING = "the same with the heading of a magnetometer"
 
 FILTERS: dict[str, Entry] = {
     "external-acceleration": Entry(
-        "filters.imu.external_acceleration:ExternalAcceleration",
-        "filter",
+        ".imu.external_acceleration:ExternalAcceleration",
         "inclination and external acceleration; mode=1, 2 or 3",
         "Lee, Park, Robinovitch 2012",
     ),
     "mekf": Entry(
-        "filters.imu.mekf:MEKF",
-        "filter",
+        ".imu.mekf:MEKF",
         "multiplicative extended Kalman filter with gyroscope bias",
         "Lefferts, Markley, Shuster 1982",
     ),
-    "mekf-9": Entry("filters.imu.mekf:MEKF9", "filter", "the same with the heading of a magnetometer", THIS),
+    "mekf-9": Entry(".imu.mekf:MEKF9", WITH_HEADING, HERE),
     "bounded-motion": Entry(
-        "filters.imu.bounded_motion:BoundedMotion",
-        "filter",
+        ".imu.bounded_motion:BoundedMotion",
         "accelerates, but does not go anywhere: velocity near zero as pseudo-measurement",
-        THIS,
+        HERE,
     ),
-    "bounded-motion-9": Entry(
-        "filters.imu.bounded_motion:BoundedMotion9", "filter", "the same with the heading of a magnetometer", THIS
-    ),
+    "bounded-motion-9": Entry(".imu.bounded_motion:BoundedMotion9", WITH_HEADING, HERE),
     "array-orientation": Entry(
-        "filters.arrays.spatial.orientation:ArrayOrientation",
-        "filter",
-        'orientation from an accelerometer array; array="controller", "octa" or your own',
-        HE,
+        SPATIAL, 'orientation from an accelerometer array; array="controller", "octa" or your own', HE
     ),
     "array-orientation-imu": Entry(
-        "filters.arrays.spatial.orientation:ArrayOrientation",
-        "filter",
-        "the same with the accelerometer of one IMU",
-        HE,
-        {"array": "triaxial"},
+        SPATIAL, "the same with the accelerometer of one IMU", HE, fixed={"array": "triaxial"}
     ),
     "array-rate": Entry(
-        "filters.arrays.rate:ArrayRate",
-        "filter",
+        ".arrays.rate:ArrayRate",
         "angular rate from twelve accelerometers; method=weighted, time-integration, polynomial-roots or parsa",
         HE,
     ),
     "planar-orientation": Entry(
-        "filters.arrays.planar.orientation:PlanarOrientation",
-        "filter",
+        f"{PLANAR}.orientation:PlanarOrientation",
         "angle in a vertical plane; method=extended (on the specific force) or linear (on the tilt angle)",
         HE,
     ),
     "planar-pose": Entry(
-        "filters.arrays.planar.pose:PlanarPose",
-        "filter",
-        "complete pose in a vertical plane, from accelerometers alone",
-        HE,
+        f"{PLANAR}.pose:PlanarPose", "complete pose in a vertical plane, from accelerometers alone", HE
     ),
     "planar-unscented": Entry(
-        "filters.arrays.planar.unscented:PlanarUnscented",
-        "filter",
+        f"{PLANAR}.unscented:PlanarUnscented",
         "angle in a vertical plane by the unscented filter of the package filterpy",
         HE,
     ),
     "planar-mean": Entry(
-        "filters.arrays.planar.mean:PlanarMean",
-        "filter",
+        f"{PLANAR}.mean:PlanarMean",
         "angle in a vertical plane; method=weighted mean of the other two, integration or tilt",
         HE,
     ),
-    "marins": Entry(
-        "filters.imu.marins:Marins", "filter", "quaternion by Gauss-Newton, then a Kalman filter", "Marins et al. 2001"
-    ),
+    "marins": Entry(".imu.marins:Marins", "quaternion by Gauss-Newton, then a Kalman filter", "Marins et al. 2001"),
     "two-gyro": Entry(
-        "filters.bicycle.two_gyro.filter:TwoGyro",
-        "filter",
+        f"{BICYCLE}.two_gyro.filter:TwoGyro",
         "roll of a bicycle, attitude of the trunk; two gyroscopes and a camera; model=sigma1 or sigma2",
         TWO_GYRO,
     ),
     "force-inertial": Entry(
-        "filters.bicycle.force_inertial.filter:ForceInertial",
-        "filter",
+        f"{BICYCLE}.force_inertial.filter:ForceInertial",
         "roll of a bicycle, angles of the trunk; two IMUs, forces at seat and handlebar",
         FORCE_INERTIAL,
     ),
     "whole-body": Entry(
-        "filters.bicycle.whole_body.filter:WholeBody",
-        "filter",
+        f"{BICYCLE}.whole_body.filter:WholeBody",
         "a rider's trunk, arms and legs from six gyroscopes and the constraints at hands and feet",
         WHOLE_BODY,
     ),
     "odometry-aided": Entry(
-        "filters.bicycle.odometry_aided:OdometryAided",
-        "filter",
+        f"{BICYCLE}.odometry_aided:OdometryAided",
         "roll and pitch of a bicycle from its IMU and the wheel's speed: the wheel rolls and does not slide",
-        THIS,
+        HERE,
     ),
-    "two-gyro-integration": Entry(
-        "filters.bicycle.platform_gyro:TwoGyroIntegration",
-        "baseline",
-        "both gyroscopes integrated, no update",
-        TWO_GYRO,
-    ),
-    "platform-gyro": Entry(
-        "filters.bicycle.platform_gyro:PlatformGyro",
-        "baseline",
-        "roll from the bicycle's gyroscope alone: pitch rate near zero as pseudo-measurement",
-        THIS,
-    ),
-    "force-inertial-integration": Entry(
-        "filters.bicycle.force_inertial.integration:ForceInertialIntegration",
-        "baseline",
-        "gyroscopes integrated from the angles that the first forces determine",
-        FORCE_INERTIAL,
-    ),
-    "whole-body-integration": Entry(
-        "filters.bicycle.whole_body.integration:WholeBodyIntegration",
-        "baseline",
-        "six gyroscopes integrated, no update",
-        WHOLE_BODY,
-    ),
-    "gyroscope-integration": Entry(
-        "filters.imu.classical:GyroscopeIntegration",
-        "baseline",
-        "gyroscope alone, from the first inclination",
-        "textbook",
-    ),
-    "tilt": Entry("filters.imu.classical:Tilt", "baseline", "accelerometer alone, sample by sample", "textbook"),
-    "mahony": Entry(
-        "filters.imu.classical:Mahony",
-        "baseline",
-        "explicit complementary filter with bias, published gains",
-        MAHONY,
-    ),
-    "mahony-9": Entry("filters.imu.classical:Mahony9", "baseline", WITH_MAGNETOMETER, MAHONY),
+    **{
+        name: Entry(place, description, source, "baseline")
+        for name, place, description, source in (
+            (
+                "two-gyro-integration",
+                f"{BICYCLE}.platform_gyro:TwoGyroIntegration",
+                "both gyroscopes integrated",
+                TWO_GYRO,
+            ),
+            (
+                "platform-gyro",
+                f"{BICYCLE}.platform_gyro:PlatformGyro",
+                "roll from the bicycle's gyroscope alone: pitch rate near zero as pseudo-measurement",
+                HERE,
+            ),
+            (
+                "force-inertial-integration",
+                f"{BICYCLE}.force_inertial.integration:ForceInertialIntegration",
+                "gyroscopes integrated from the angles that the first forces determine",
+                FORCE_INERTIAL,
+            ),
+            (
+                "whole-body-integration",
+                f"{BICYCLE}.whole_body.integration:WholeBodyIntegration",
+                "six gyroscopes integrated",
+                WHOLE_BODY,
+            ),
+            (
+                "gyroscope-integration",
+                ".imu.classical:GyroscopeIntegration",
+                "gyroscope alone, from the first inclination",
+                "textbook",
+            ),
+            ("tilt", ".imu.classical:Tilt", "accelerometer alone, sample by sample", "textbook"),
+            ("mahony", ".imu.classical:Mahony", "explicit complementary filter with bias, published gains", MAHONY),
+            ("mahony-9", ".imu.classical:Mahony9", "the same with a magnetometer", MAHONY),
+        )
+    },
     **{
         f"{name}{suffix}": Entry(
-            f"filters.external.{place}", "external", f"{text} (package {place.split(':')[0]})", source, {"axes": axes}
+            f".external.{place}", f"{text} (package {place.split(':')[0]})", source, "external", {"axes": axes}
         )
         for name, place, description, source in (
             ("vqf", "vqf:VQF", "VQF, causal form", "Laidig, Seel 2023"),
@@ -254,7 +231,7 @@ FILTERS: dict[str, Entry] = {
             ("ahrs-mahony", "ahrs:AHRSMahony", "explicit complementary filter", MAHONY),
             ("ahrs-ekf", "ahrs:AHRSEKF", "extended Kalman filter on the quaternion", "documentation of ahrs"),
         )
-        for suffix, axes, text in (("", 6, description), ("-9", 9, WITH_MAGNETOMETER))
+        for suffix, axes, text in (("", 6, description), ("-9", 9, "the same with a magnetometer"))
     },
 }
 """Name → filter. A new one is an entry here; its class says the rest."""
@@ -283,5 +260,5 @@ def make(name: str, *, metadata: Mapping[str, Any] | None = None, **parameters: 
 def name_of(equations: Equations) -> str | None:
     """The name under which equations are registered; None if they are not."""
     kind = type(equations)
-    place = f"{kind.__module__.removeprefix(f'{ROOT}.')}:{kind.__qualname__}"
+    place = f"{kind.__module__.removeprefix(__package__)}:{kind.__qualname__}"
     return next((name for name, entry in FILTERS.items() if entry.factory in (kind, place)), None)

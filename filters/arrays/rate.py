@@ -43,13 +43,13 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from ..core.backend import Array, constant, expand, namespace
-from ..core.matrices import solve_positive
+from ..core.matrices import diagonal_matrix, solve_positive
 from ..core.model import Recurrence, check_positive
 from ..core.quantity import ANGULAR_RATE, GYROSCOPE, Channel, Measurement, Quantity
 from .array import OCTA, AccelerometerArray
 from .files import ArrayEquations
 from .products import product_jacobian, products, symmetric
-from .symmetric_matrix import diagonal, largest_eigenpair
+from .symmetric_matrix import largest_eigenpair
 
 Method = Literal["weighted", "time-integration", "polynomial-roots", "parsa"]
 Variant = Literal["sound", "corrected", "printed"]
@@ -73,7 +73,7 @@ def polynomial_roots(xi: Array) -> Array:
     """
     xp = namespace(xi)
     trace = xp.sum(xi[..., :3], axis=-1)[..., None, None]
-    N = symmetric(xi[..., 3:]) + diagonal(xi[..., :3]) + trace * constant(UNIT, xi)
+    N = symmetric(xi[..., 3:]) + diagonal_matrix(xi[..., :3]) + trace * constant(UNIT, xi)
     value, vector = largest_eigenpair(N)
     positive = xp.greater(value, 0.0)
     length = xp.sqrt(0.5 * xp.where(positive, value, 1.0 + 0.0 * value))
@@ -85,7 +85,7 @@ def roots_jacobian(rate: Array) -> Array:
     xp = namespace(rate)
     square = _square_length(rate)
     Z = constant(UNIT, rate) - 0.75 * rate[..., :, None] * rate[..., None, :] / square
-    return Z / square @ xp.concat([rate[..., :, None] + diagonal(rate), symmetric(rate)], axis=-1)
+    return Z / square @ xp.concat([rate[..., :, None] + diagonal_matrix(rate), symmetric(rate)], axis=-1)
 
 
 def printed_jacobian(xi: Array, integrated: Array, roots: Array) -> Array:
@@ -94,8 +94,8 @@ def printed_jacobian(xi: Array, integrated: Array, roots: Array) -> Array:
     square = xp.sum(xi[..., :3] ** 2, axis=-1) + 2.0 * xp.sum(xi[..., 3:] ** 2, axis=-1)
     square = xp.where(xp.greater(square, SLOWEST**4), square, SLOWEST**4 + 0.0 * square)[..., None, None]
     trace = xp.sum(xi[..., :3], axis=-1)[..., None, None]
-    Z = 0.75 * (symmetric(xi[..., 3:]) + diagonal(xi[..., :3])) - trace * constant(UNIT, xi)
-    return Z / square @ xp.concat([integrated[..., :, None] + diagonal(integrated), symmetric(roots)], axis=-1)
+    Z = 0.75 * (symmetric(xi[..., 3:]) + diagonal_matrix(xi[..., :3])) - trace * constant(UNIT, xi)
+    return Z / square @ xp.concat([integrated[..., :, None] + diagonal_matrix(integrated), symmetric(roots)], axis=-1)
 
 
 def _square_length(rate: Array) -> Array:
@@ -195,7 +195,7 @@ class ArrayRate(ArrayEquations, Recurrence):
         B, weights = constant(self.array.B_T, x), x[..., 12:15]
         T = 0.25 * dt**2 * _flat(2.0 * B + B * weights[..., None, :] + weights[..., :, None] * B)
         bias, shared, own = x[..., 24:27], x[..., 27:30], x[..., 30:]
-        known = x[..., 3:12] + T + 0.5 * dt * x[..., 15:24] + _flat(diagonal(dt**2 * own - 2.0 * dt * shared))
+        known = x[..., 3:12] + T + 0.5 * dt * x[..., 15:24] + _flat(diagonal_matrix(dt**2 * own - 2.0 * dt * shared))
         drift = dt * expand(self._bias_ratio(self.bias_noise) / self.bias_time, 1) * self._spread(x)
         return xp.concat([rate - dt * bias, known, x[..., 12:27], shared - dt * own, own + drift], axis=-1)
 

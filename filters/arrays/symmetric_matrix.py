@@ -11,7 +11,7 @@ makes one element zero with
 
 from __future__ import annotations
 
-from ..core.backend import Array, constant, namespace
+from ..core.backend import Array, namespace
 
 SWEEPS = 4
 """Each of three rotations; three leave up to 10⁻⁵ of the norm beside the diagonal, four no more than rounding."""
@@ -65,8 +65,3 @@ def _rotate(
     new[p] = [c * one - s * other for one, other in zip(vectors[p], vectors[q], strict=True)]
     new[q] = [s * one + c * other for one, other in zip(vectors[p], vectors[q], strict=True)]
     return turned, new
-
-
-def diagonal(vector: Array) -> Array:
-    """Diagonal matrices ``(..., 3, 3)`` of vectors ``(..., 3)``."""
-    return vector[..., :, None] * constant([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], vector)

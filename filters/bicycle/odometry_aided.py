@@ -31,17 +31,16 @@ import math
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from ..core.backend import Array, constant, expand, namespace
+from ..core.backend import Array, expand, namespace
+from ..core.matrices import block_matrix, covariance_of, diagonal_matrix, identity, vector_of, zeros
 from ..core.model import Gain, Model, check_positive
 from ..core.quantity import GRAVITY, Channel, Measurement, Quantity
 from ..core.rotation import cross, level, normalize, roll_pitch, rotate, rotate_back, skew, to_matrix, up_in_body
 from ..imu.strapdown import (
-    UNIT,
     accelerated,
     advance,
     clipped_inflation,
     corrected,
-    prior_covariance,
     process_noise,
     transition,
 )
@@ -143,19 +142,11 @@ class OdometryAided(RiderEquations, Model):
         along = xp.concat([wheel, zero[..., :2]], axis=-1) - cross(rate, self._lever(f))
         q = level(f - cross(rate, along))
         v = rotate(q, along)
-        none = 0.0 * self.tilt_prior
-        tilt = [self.tilt_prior, self.tilt_prior, none]
-        D = prior_covariance([*tilt, *[self.bias_prior] * 3, *[self.velocity_prior] * 3], f)
+        tilt = [self.tilt_prior, self.tilt_prior, 0.0 * self.tilt_prior]
+        D = covariance_of([*tilt, *[self.bias_prior] * 3, *[self.velocity_prior] * 3], zero[..., :1])
         # the velocity is known in bicycle axes, so an error of the tilt turns it
-        unit = constant(UNIT, f) + zero[..., None]
-        J = xp.concat(
-            [
-                xp.concat([unit, 0.0 * unit, 0.0 * unit], axis=-1),
-                xp.concat([0.0 * unit, unit, 0.0 * unit], axis=-1),
-                xp.concat([-skew(v), 0.0 * unit, to_matrix(q)], axis=-1),
-            ],
-            axis=-2,
-        )
+        unit, none = identity(3, f), zeros(f, 3, 3)
+        J = block_matrix([[unit, none, none], [none, unit, none], [-skew(v), none, to_matrix(q)]])
         return xp.concat([q, zero, v, zero[..., :1]], axis=-1), J @ D @ J.mT
 
     def predict(self, x: Array, z: Measurement, previous: Measurement) -> tuple[Array, Array, Array]:
@@ -185,14 +176,13 @@ class OdometryAided(RiderEquations, Model):
         r = xp.concat([wheel - contact[..., :1], -contact[..., 1:]], axis=-1)
         turned = to_matrix(q).mT
         H = xp.concat([turned @ skew(v), skew(c), turned], axis=-1)
-        one = 1.0 + 0.0 * x[..., :1]
+        zero = 0.0 * x[..., :1]
         variances = [(self.wheel_step / self.dt) ** 2 / 12.0, self.lateral_slip**2 / self.dt]
         variances.append(self.vertical_slip**2 / self.dt)
-        usual = xp.concat([one * expand(self.wheel_step / self.dt, 1), 0.0 * one, 0.0 * one], axis=-1)
+        usual = vector_of([self.wheel_step / self.dt, 0.0, 0.0], zero)
         far = xp.where(xp.isfinite(r), r, 0.0 * usual) / (usual + expand(self.jump, 1))
         weight = 1.0 + far * far
-        diagonal = xp.concat([one * expand(value, 1) for value in variances], axis=-1) * weight * weight
-        return r, H, diagonal[..., :, None] * constant(UNIT, x)
+        return r, H, diagonal_matrix(vector_of(variances, zero) * weight * weight)
 
     def retract(self, x: Array, dx: Array) -> Array:
         """The attitude is corrected by a turn in the level frame, the rest by sums."""

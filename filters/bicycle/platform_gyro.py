@@ -15,11 +15,11 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from ..core.backend import Array, constant, expand, namespace
+from ..core.matrices import covariance_of, diagonal, zero_where_known
 from ..core.model import Gain, Model, Recurrence, check_positive
 from ..core.quantity import Channel, Measurement, Quantity
 from ..core.rotation import conjugate, exp, from_euler_xyz, multiply, normalize, to_euler_zyx
 from .geometry import RiderEquations, RiderGeometry
-from .parameter_matrices import diagonal, zero_where_known
 from .relative_sensor import relative_angles
 from .two_gyro.kinematics import SIGNS, level_constraint, platform_rate
 from .two_gyro.truth import true_angles
@@ -83,7 +83,7 @@ class PlatformGyro(RiderEquations, Model):
         """The given roll, no bias."""
         known = zero_where_known(z["bicycle_imu/gyr"])
         x = namespace(known).concat([expand(self.initial_roll, 1) + known, known, known, known], axis=-1)
-        return x, diagonal([self.roll_prior**2, *[self.bias_prior**2] * 3], known)
+        return x, covariance_of([self.roll_prior, *[self.bias_prior] * 3], known)
 
     def predict(self, x: Array, z: Measurement, previous: Measurement) -> tuple[Array, Array, Array]:
         """Equation (8); biases as in (2)."""

@@ -9,7 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Self
 
-from ..core.backend import Array, constant, expand, namespace, rows
+from ..core.backend import Array, constant, namespace, rows
+from ..core.matrices import vector_of
 from ..core.rotation import cross, from_euler_xyz, rotate, to_euler_xyz
 from .geometry import Point, RiderGeometry
 from .two_gyro.kinematics import SIGNS
@@ -81,14 +82,9 @@ def marker_distances(theta: Array, places: MarkerPlaces) -> tuple[Array, Array]:
     ]
     distances, slopes = [], []
     for marker, viewpoint in zip(places.markers, places.viewpoints, strict=True):
-        arm = rotate(orientation, _point(marker, zero))
-        line = _point(places.pivot, zero) + arm - _point(viewpoint, zero)
+        arm = rotate(orientation, vector_of(marker, zero))
+        line = vector_of(places.pivot, zero) + arm - vector_of(viewpoint, zero)
         distance = xp.sqrt(xp.sum(line * line, axis=-1))
         distances.append(distance)
         slopes.append([xp.sum(line * cross(axis, arm), axis=-1) / distance for axis in axes])
     return xp.stack(distances, axis=-1), rows(slopes)
-
-
-def _point(values: Point, zero: Array) -> Array:
-    """A point whose coordinates are parameters, as an array ``(*batch, 3)``."""
-    return namespace(zero).concat([expand(value, 1) + zero for value in values], axis=-1)

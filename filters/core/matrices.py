@@ -1,8 +1,14 @@
-"""Block matrices and small systems of equations in straight-line form, for model code that is traced and compiled."""
+"""Small matrices, block matrices and systems of equations, for model code that is traced and compiled.
+
+Entries may be numbers, traced scalars or arrays ``(*batch,)``.
+"""
 
 from __future__ import annotations
 
-from .backend import Array, namespace
+from collections.abc import Sequence
+from typing import Any
+
+from .backend import Array, constant, expand, namespace
 
 
 def solve_positive(matrix: Array, right: Array) -> Array:
@@ -60,3 +66,47 @@ def block_diagonal(blocks: list[Array]) -> Array:
         column = 0.0 * block[..., :1]
         rows.append(xp.concat([column] * sum(sizes[:index]) + [block] + [column] * sum(sizes[index + 1 :]), axis=-1))
     return xp.concat(rows, axis=-2)
+
+
+def identity(size: int, like: Array) -> Array:
+    """Identity matrices ``(*batch, size, size)`` for a batch of vectors ``(*batch, n)``."""
+    return constant([[float(i == j) for j in range(size)] for i in range(size)], like) + 0.0 * like[..., :1, None]
+
+
+def zeros(like: Array, rows: int, columns: int) -> Array:
+    """Zeros ``(*batch, rows, columns)`` for a batch of vectors ``(*batch, n)``."""
+    return 0.0 * like[..., :1, None] + constant([[0.0] * columns] * rows, like)
+
+
+def vector_of(entries: Sequence[Any], zero: Array) -> Array:
+    """Parameters as a vector ``(*batch, n)``; ``zero`` is ``(*batch, 1)``."""
+    return namespace(zero).concat([expand(entry, 1) + zero for entry in entries], axis=-1)
+
+
+def diagonal(entries: Sequence[Any], zero: Array) -> Array:
+    """Parameters as a diagonal matrix ``(*batch, n, n)``; ``zero`` is ``(*batch, 1)``."""
+    return diagonal_matrix(vector_of(entries, zero))
+
+
+def diagonal_matrix(vector: Array) -> Array:
+    """Diagonal matrices ``(..., n, n)`` of vectors ``(..., n)``."""
+    size = vector.shape[-1]
+    return vector[..., None] * constant([[float(i == j) for j in range(size)] for i in range(size)], vector)
+
+
+def covariance_of(deviations: Sequence[Any], zero: Array) -> Array:
+    """Diagonal covariance ``(*batch, n, n)`` of standard deviations; ``zero`` is ``(*batch, 1)``."""
+    return diagonal([deviation**2 for deviation in deviations], zero)
+
+
+def times(matrix: Array, vector: Array) -> Array:
+    """Product of ``(..., m, n)`` with ``(..., n)``."""
+    return (matrix @ vector[..., None])[..., 0]
+
+
+def zero_where_known(*samples: Array) -> Array:
+    """Zeros ``(*batch, 1)`` where all of the samples ``(*batch, n)`` are there, else NaN: a prior waits for them."""
+    xp = namespace(*samples)
+    joined = xp.concat(samples, axis=-1)
+    found = xp.all(xp.isfinite(joined), axis=-1)[..., None]
+    return xp.where(found, xp.zeros_like(joined[..., :1]), xp.nan)

@@ -67,7 +67,8 @@ class Equations:
 
     def __post_init__(self) -> None:
         """Refuse parameters that are not finite numbers, choices that there are not, and intervals of no length."""
-        for name, choices in _choices(type(self)).items():
+        kind: Any = type(self)
+        for name, choices in _choices(kind).items():
             if getattr(self, name) not in choices:
                 raise ValueError(f"{name} must be one of {choices}, got {getattr(self, name)!r}")
         for field in fields(self):

@@ -33,7 +33,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from ..core.backend import Array, constant, expand, namespace
+from ..core.backend import Array, expand, namespace
+from ..core.matrices import covariance_of, identity
 from ..core.model import Gain, Model
 from ..core.quantity import (
     ACCELEROMETER,
@@ -52,12 +53,10 @@ from ..core.quantity import (
 from ..core.rotation import level, normalize, up_in_body
 from .magnetic_heading import MagneticHeading
 from .strapdown import (
-    UNIT,
     accelerated,
     advance,
     clipped_inflation,
     corrected,
-    prior_covariance,
     process_noise,
     transition,
 )
@@ -119,7 +118,7 @@ class BoundedMotion(Model):
         q, zero = level(f), 0.0 * f
         x = xp.concat([q, zero, zero, self._external(q, f), zero[..., :2]], axis=-1)
         deviations = [*[self.tilt_prior] * 3, *[self.bias_prior] * 3, *[self.velocity_prior] * 3]
-        return x, prior_covariance(deviations, f)
+        return x, covariance_of(deviations, 0.0 * f[..., :1])
 
     def predict(self, x: Array, z: Measurement, previous: Measurement) -> tuple[Array, Array, Array]:
         """Strapdown integration in the attitude of the middle of the interval."""
@@ -144,7 +143,7 @@ class BoundedMotion(Model):
         xp = namespace(x)
         v = x[..., 7:10]
         r = xp.where(self._is_due(x, z), -v, xp.nan + 0.0 * v)
-        unit = constant(UNIT, x) + 0.0 * x[..., :3, None]
+        unit = identity(3, x)
         H = xp.concat([0.0 * unit, 0.0 * unit, unit], axis=-1)
         return r, H, unit * (expand(self.velocity_bound**2, 1) / self._elapsed(x))[..., None]
 

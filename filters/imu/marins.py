@@ -37,7 +37,7 @@ from dataclasses import dataclass
 from typing import ClassVar, Literal
 
 from ..core.backend import Array, constant, expand, namespace
-from ..core.matrices import block_diagonal, block_matrix, solve_positive
+from ..core.matrices import block_diagonal, block_matrix, covariance_of, identity, solve_positive, vector_of
 from ..core.model import Gain, Model, checked_quaternion
 from ..core.quantity import (
     ACCELEROMETER,
@@ -113,15 +113,13 @@ class Marins(Model):
         xp, field, rate = namespace(z["imu/mag"]), z["imu/mag"], z["imu/gyr"]
         q = align(z["imu/acc"], field, self.declination)
         if self.start == "given":
-            q = 0.0 * q + xp.concat([0.0 * q[..., :1] + expand(value, 1) for value in self.start_orientation], axis=-1)
+            q = 0.0 * q + vector_of(self.start_orientation, 0.0 * q[..., :1])
         world = rotate(q, normalize(field))
         if self.field == "given":
             world = field_direction(self.declination, self.dip, q)
         x = xp.concat([rate, q, world], axis=-1)
-        one = 1.0 + 0.0 * x[..., :1]
         deviations = [self.gyroscope_deviation] * 3 + [self.orientation_prior] * 4
-        diagonal = xp.concat([one * expand(value**2, 1) for value in deviations], axis=-1)
-        return x, diagonal[..., :, None] * _unit(7, x)
+        return x, covariance_of(deviations, 0.0 * x[..., :1])
 
     def predict(self, x: Array, z: Measurement, previous: Measurement) -> tuple[Array, Array, Array]:
         """Equations (5.45), (5.46), corrected."""
@@ -136,7 +134,7 @@ class Marins(Model):
         axes = (multiply(multiply(multiply(q, half), _basis(index, q)), half) for index in (1, 2, 3))
         lever = _columns([0.5 * expand(self.dt, 1) * axis for axis in axes])
         right = _columns([multiply(_basis(index, q), exp(turn)) for index in range(4)])
-        three, none = _unit(3, x) + 0.0 * zero[..., None], 0.0 * lever
+        three, none = identity(3, x), 0.0 * lever
         F = block_matrix([[decay[..., None] * three, none.mT], [lever, right]])
         power = expand(self.rate_deviation**2, 1) * (1.0 - decay * decay)
         Q = block_diagonal([power[..., None] * three, 0.0 * right])
@@ -153,11 +151,8 @@ class Marins(Model):
         field = normalize(xp.where(complete, field, rotate_back(normalize(q), world)))
         found = solve_orientation(normalize(q), (up, world), (force, field))
         r = xp.concat([z["imu/gyr"] - x[..., :3], xp.where(complete, found - q, xp.nan + 0.0 * q)], axis=-1)
-        seven = _unit(7, x) + 0.0 * x[..., :1, None]
         deviations = [self.gyroscope_deviation] * 3 + [self.quaternion_deviation] * 4
-        one = 1.0 + 0.0 * x[..., :1]
-        diagonal = xp.concat([one * expand(value**2, 1) for value in deviations], axis=-1)
-        return r, seven, diagonal[..., :, None] * seven
+        return r, identity(7, x), covariance_of(deviations, 0.0 * x[..., :1])
 
     def retract(self, x: Array, dx: Array) -> Array:
         """A sum."""
@@ -225,7 +220,3 @@ def _columns(vectors: list[Array]) -> Array:
 def _basis(index: int, like: Array) -> Array:
     """The quaternion with a one at ``index``, in the batch shape of ``like`` ``(..., 4)``."""
     return 0.0 * like + constant([float(index == i) for i in range(4)], like)
-
-
-def _unit(size: int, like: Array) -> Array:
-    return constant([[float(i == j) for j in range(size)] for i in range(size)], like)

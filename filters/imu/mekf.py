@@ -33,6 +33,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from ..core.backend import Array, constant, expand, namespace
+from ..core.matrices import block_diagonal, block_matrix, covariance_of, identity
 from ..core.model import Gain, Model
 from ..core.quantity import (
     ACCELEROMETER,
@@ -50,7 +51,6 @@ from ..core.quantity import (
 from ..core.rotation import exp, level, multiply, norm, normalize, to_matrix, up_in_body
 from .magnetic_heading import MagneticHeading
 
-UNIT = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
 UP_CROSS = [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0]]
 
 
@@ -92,32 +92,17 @@ class MEKF(Model):
         """Sensor at rest: inclination from the first accelerometer sample, heading and bias zero."""
         f = z["imu/acc"]
         x = namespace(f).concat([level(f), 0.0 * f], axis=-1)
-        one = 1.0 + 0.0 * f[..., :1]
-        deviations = [*[self.tilt_prior] * 3, *[self.bias_prior] * 3]
-        diagonal = namespace(f).concat([one * expand(value**2, 1) for value in deviations], axis=-1)
-        return x, diagonal[..., :, None] * constant([[float(i == j) for j in range(6)] for i in range(6)], f)
+        return x, covariance_of([*[self.tilt_prior] * 3, *[self.bias_prior] * 3], 0.0 * f[..., :1])
 
     def predict(self, x: Array, z: Measurement, previous: Measurement) -> tuple[Array, Array, Array]:
         """Integrate the gyroscope less its bias; F and Q as in the head of this file."""
         xp = namespace(x)
         q, b = x[..., :4], x[..., 4:7]
-        unit = constant(UNIT, x) + 0.0 * x[..., :3, None]
-        none = 0.0 * unit
+        unit = identity(3, x)
         turned = normalize(multiply(q, exp(expand(self.dt, 1) * (z["imu/gyr"] - b))))
-        F = xp.concat(
-            [
-                xp.concat([unit, -expand(self.dt, 2) * to_matrix(q)], axis=-1),
-                xp.concat([none, unit], axis=-1),
-            ],
-            axis=-2,
-        )
-        Q = xp.concat(
-            [
-                xp.concat([expand(self.gyroscope_noise**2 * self.dt, 2) * unit, none], axis=-1),
-                xp.concat([none, expand(self.bias_noise**2 * self.dt, 2) * unit], axis=-1),
-            ],
-            axis=-2,
-        )
+        F = block_matrix([[unit, -expand(self.dt, 2) * to_matrix(q)], [0.0 * unit, unit]])
+        powers = (self.gyroscope_noise, self.bias_noise)
+        Q = block_diagonal([expand(power**2 * self.dt, 2) * unit for power in powers])
         return xp.concat([turned, x[..., 4:]], axis=-1), F, Q
 
     def residual(self, x: Array, z: Measurement) -> tuple[Array, Array, Array]:
@@ -128,7 +113,7 @@ class MEKF(Model):
         deviation = expand(self.norm_adaptation, 1) * (norm(f) - g)
         deviation = xp.where(xp.isfinite(deviation), deviation, xp.zeros_like(deviation))
         variance = expand(self.accelerometer_noise**2 / self.dt, 1) + deviation * deviation
-        unit = constant(UNIT, x) + 0.0 * x[..., :3, None]
+        unit = identity(3, x)
         turn = expand(self.gravity, 2) * (to_matrix(q).mT @ constant(UP_CROSS, x))
         return f - g * up_in_body(q), xp.concat([turn, 0.0 * unit], axis=-1), variance[..., None] * unit
 

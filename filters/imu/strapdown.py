@@ -14,9 +14,9 @@ from __future__ import annotations
 from typing import Any
 
 from ..core.backend import Array, constant, expand, namespace
+from ..core.matrices import block_diagonal, block_matrix, identity
 from ..core.rotation import exp, multiply, normalize, rotate, skew, to_matrix
 
-UNIT = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
 UPWARDS = [0.0, 0.0, 1.0]
 
 
@@ -47,16 +47,14 @@ def transition(q: Array, force: Array, dt: Any, felt: Array, kept: Array) -> Arr
         felt: ``(..., 1, 1)``, 1 where the velocity was integrated, else 0.
         kept: ``(..., 1, 1)``, 1 where the velocity before counts, 0 where it was set anew.
     """
-    xp = namespace(q)
-    unit = constant(UNIT, q) + 0.0 * q[..., :3, None]
+    unit = identity(3, q)
     none = 0.0 * unit
-    return xp.concat(
+    return block_matrix(
         [
-            xp.concat([unit, -dt * to_matrix(q), none], axis=-1),
-            xp.concat([none, unit, none], axis=-1),
-            xp.concat([-felt * dt * skew(force), none, kept * unit], axis=-1),
-        ],
-        axis=-2,
+            [unit, -dt * to_matrix(q), none],
+            [none, unit, none],
+            [-felt * dt * skew(force), none, kept * unit],
+        ]
     )
 
 
@@ -68,25 +66,8 @@ def process_noise(turn: Any, bias: Any, velocity: Array) -> Array:
         bias: rad²/s², likewise.
         velocity: m²/s², ``(..., 1)``.
     """
-    xp = namespace(velocity)
-    unit = constant(UNIT, velocity) + 0.0 * velocity[..., None]
-    none = 0.0 * unit
-    return xp.concat(
-        [
-            xp.concat([expand(turn, 2) * unit, none, none], axis=-1),
-            xp.concat([none, expand(bias, 2) * unit, none], axis=-1),
-            xp.concat([none, none, velocity[..., None] * unit], axis=-1),
-        ],
-        axis=-2,
-    )
-
-
-def prior_covariance(deviations: list[Any], like: Array) -> Array:
-    """Diagonal covariance ``(..., n, n)`` of n standard deviations, each a number or ``(*batch,)``."""
-    xp, n = namespace(like), len(deviations)
-    one = 1.0 + 0.0 * like[..., :1]
-    diagonal = xp.concat([one * expand(value**2, 1) for value in deviations], axis=-1)
-    return diagonal[..., :, None] * constant([[float(i == j) for j in range(n)] for i in range(n)], like)
+    unit = identity(3, velocity)
+    return block_diagonal([expand(turn, 2) * unit, expand(bias, 2) * unit, velocity[..., None] * unit])
 
 
 def corrected(x: Array, dx: Array) -> Array:

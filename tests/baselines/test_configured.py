@@ -63,7 +63,7 @@ class Wheelbase(RiderEquations, Recurrence):
 
 @pytest.fixture
 def _fake(monkeypatch):
-    entry = Entry(Wheelbase, "filter", "fake", "nowhere", {"scale": 1.0})
+    entry = Entry(Wheelbase, "fake", "nowhere", fixed={"scale": 1.0})
     monkeypatch.setitem(FILTERS, "fake", entry)
     monkeypatch.setitem(FILTERS, "fake-twice", replace(entry, fixed={"scale": 2.0}))
 

@@ -27,6 +27,7 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from ...core.backend import Array, constant, expand, namespace, rows
+from ...core.matrices import diagonal_matrix, vector_of
 from ...core.model import Gain, Model, with_parameters
 from ...core.quantity import Channel, Measurement, Quantity
 from .orientation import PLANAR_ANGLE, PlanarEquations
@@ -98,8 +99,8 @@ class PlanarPose(PlanarEquations, Model):
         angle, variance = with_parameters(self, {"inertial_acceleration": self.acceleration_prior}).first(z)
         xp, zero = namespace(angle), 0.0 * angle
         rest = [self.rate_prior, self.angular_acceleration_prior, 1.0, 1.0, 1.0, 1.0, *(self.acceleration_prior,) * 2]
-        diagonal = xp.concat([variance, *(zero + expand(value**2, 1) for value in rest)], axis=-1)
-        return xp.concat([angle, *(zero,) * 8], axis=-1), diagonal[..., None, :] * constant(np.eye(9), angle)
+        variances = xp.concat([variance, vector_of([value**2 for value in rest], zero)], axis=-1)
+        return xp.concat([angle, *(zero,) * 8], axis=-1), diagonal_matrix(variances)
 
     def predict(self, x: Array, z: Measurement, previous: Measurement) -> tuple[Array, Array, Array]:
         """Equations (3.40), (3.41), (3.43)."""

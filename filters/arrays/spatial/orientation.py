@@ -47,7 +47,7 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from ...core.backend import Array, constant, expand, namespace
-from ...core.matrices import block_diagonal, block_matrix
+from ...core.matrices import block_diagonal, block_matrix, covariance_of, identity, vector_of
 from ...core.model import Gain, Model, check_positive, checked_quaternion
 from ...core.quantity import (
     ANGULAR_RATE,
@@ -68,7 +68,6 @@ from ..files import ArrayEquations
 from ..products import product_jacobian, products
 from .virtual_controller import VIRTUAL_POSITION, advance
 
-UNIT = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
 ORTHOGONAL_PAIRS = ((1, 2), (2, 0), (0, 1))
 
 
@@ -198,7 +197,7 @@ class ArrayOrientation(ArrayEquations, Model):
         zero = 0.0 * field + 0.0 * xp.sum(readings, axis=-1)[..., None]
         q = align((constant(self._mean, readings) @ readings[..., None])[..., 0], field, self.declination)
         if self.start == "given":
-            q = 0.0 * q + self._vector(self.start_orientation, q)
+            q = 0.0 * q + vector_of(self.start_orientation, 0.0 * q[..., :1])
         world = rotate(q, normalize(field))
         if self.field == "given":
             world = field_direction(self.declination, self.dip, q)
@@ -207,16 +206,14 @@ class ArrayOrientation(ArrayEquations, Model):
         rows = [matrix[..., index, :] + zero for index in range(3)]
         x = xp.concat([*rows, zero, rate, world, zero, zero, zero], axis=-1)
         deviations = [self.orientation_prior] * 9 + [self.angular_acceleration_prior] * 3 + [self.rate_prior] * 3
-        one = 1.0 + zero[..., :1]
-        diagonal = xp.concat([one * expand(value**2, 1) for value in deviations], axis=-1)
-        return x, diagonal[..., :, None] * constant(np.eye(15).tolist(), readings)
+        return x, covariance_of(deviations, zero[..., :1])
 
     def predict(self, x: Array, z: Measurement, previous: Measurement) -> tuple[Array, Array, Array]:
         """Equations (5.26)–(5.29): the rows turn back with the body, α and ω are driven by white jerk."""
         xp = namespace(x)
         Q, alpha, rate = self._matrix(x), x[..., 9:12], x[..., 12:15]
         dt, dt2 = expand(self.dt, 1), expand(self.dt, 2)
-        unit = constant(UNIT, x) + 0.0 * Q
+        unit = identity(3, x)
         none = 0.0 * unit
         # q_i ← Φ q_i (5.26): the rows of Q turn back with the body
         turn = dt * rate
@@ -245,7 +242,7 @@ class ArrayOrientation(ArrayEquations, Model):
     def residual(self, x: Array, z: Measurement) -> tuple[Array, Array, Array]:
         """Measured less expected, equations (5.30)–(5.34)."""
         xp = namespace(x)
-        unit = constant(UNIT, x) + 0.0 * x[..., :3, None]
+        unit = identity(3, x)
         none, zero3 = 0.0 * unit, 0.0 * x[..., :3]
         r, H, R = [], [], []
         if self.method != "integration":
@@ -257,9 +254,8 @@ class ArrayOrientation(ArrayEquations, Model):
             r.append(z[self.readings.name] - expected[..., 0])
             nothing = (P @ none) + 0.0
             H.append([nothing, nothing, gravity * (P @ unit), T @ unit, C @ product_jacobian(rate)])
-            identity = constant(np.eye(self.geometry.size), x) + 0.0 * x[..., :1, None]
             shared = 0.0 if self.method == "tilt" else expand(self.acceleration_deviation**2, 2)
-            R.append(shared * (P @ P.mT) + expand(self.array_deviation**2, 2) * identity)
+            R.append(shared * (P @ P.mT) + expand(self.array_deviation**2, 2) * identity(self.geometry.size, x))
         if self.has_rate_rows:
             # gyroscope: ω
             r.append(z["imu/gyr"] - x[..., 12:15])
@@ -268,7 +264,7 @@ class ArrayOrientation(ArrayEquations, Model):
         if self.method != "integration":
             # magnetometer (5.23): R_BOᵀ Qᵀ m, linear in each row of Q
             field, there = known(z["imu/mag"])
-            to_sensor = to_matrix(self._vector(self.magnetometer_mounting, x)).mT + 0.0 * unit
+            to_sensor = to_matrix(vector_of(self.magnetometer_mounting, 0.0 * x[..., :1])).mT + 0.0 * unit
             world = x[..., 15:18]
             expected = to_sensor @ (self._matrix(x).mT @ world[..., None])
             r.append(xp.where(there, normalize(field), xp.nan + zero3) - expected[..., 0])
@@ -277,9 +273,8 @@ class ArrayOrientation(ArrayEquations, Model):
         # orthogonality (5.31), (5.32): six zeros
         zeros, jacobian = _orthogonality(xp, x)
         r.append(-zeros)
-        six = constant(np.eye(6), x) + 0.0 * x[..., :1, None]
         H.append([jacobian, 0.0 * jacobian[..., :6]])
-        R.append(expand(self.orthogonality_deviation**2, 2) * six)
+        R.append(expand(self.orthogonality_deviation**2, 2) * identity(6, x))
         return xp.concat(r, axis=-1), block_matrix(H), block_diagonal(R)
 
     def retract(self, x: Array, dx: Array) -> Array:
@@ -328,17 +323,11 @@ class ArrayOrientation(ArrayEquations, Model):
         return np.linalg.pinv(self.geometry.A_P)
 
     def _body_field(self, z: Measurement) -> Array:
-        return rotate(self._vector(self.magnetometer_mounting, z["imu/mag"]), z["imu/mag"])
+        return rotate(vector_of(self.magnetometer_mounting, 0.0 * z["imu/mag"][..., :1]), z["imu/mag"])
 
     @staticmethod
     def _matrix(x: Array) -> Array:
         return namespace(x).stack([x[..., 0:3], x[..., 3:6], x[..., 6:9]], axis=-2)
-
-    @staticmethod
-    def _vector(values: tuple[Array, ...], like: Array) -> Array:
-        """Parameters as a vector of the batch shape of ``like``."""
-        zero = 0.0 * like[..., :1]
-        return namespace(like).concat([zero + expand(value, 1) for value in values], axis=-1)
 
 
 def _orthogonality(xp: Any, x: Array) -> tuple[Array, Array]:

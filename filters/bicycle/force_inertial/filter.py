@@ -38,10 +38,10 @@ from typing import Any, ClassVar, Literal, Self
 
 from ...analysis.forward_mode import Scalar, atan2, cos, gradient, sin, value, variables
 from ...core.backend import Array, constant, namespace, rows
+from ...core.matrices import diagonal
 from ...core.model import Gain, Model
 from ...core.quantity import Channel, Measurement, Quantity
 from ...core.rotation import wrap
-from ..parameter_matrices import diagonal
 from .accelerometer import accelerometer_accelerations
 from .forces import Needed, apparent_vertical, in_bicycle, needed_load, pedal_moment
 from .kinematics import (

@@ -28,12 +28,21 @@ from dataclasses import dataclass
 from typing import Any, Literal, Self
 
 from ...core.backend import Array, constant, expand, namespace
-from ...core.matrices import block_diagonal, block_matrix
+from ...core.matrices import (
+    block_diagonal,
+    block_matrix,
+    covariance_of,
+    diagonal,
+    identity,
+    times,
+    vector_of,
+    zero_where_known,
+    zeros,
+)
 from ...core.model import Gain, Model, check_positive
 from ...core.quantity import Channel, Measurement, Quantity
 from ...core.rotation import rotate_back, wrap
 from ..geometry import Point, RiderEquations, RiderGeometry
-from ..parameter_matrices import diagonal, times, values, zero_where_known, zeros
 from ..platform_gyro import ROLL
 from ..relative_sensor import MarkerPlaces, marker_distances, relative_angles, relative_orientation
 from .kinematics import (
@@ -236,14 +245,14 @@ class TwoGyro(RiderEquations, Model):
             spread = self.angle_prior
         x = xp.concat([expand(self.initial_roll, 1) + known, theta + known, *[known] * (3 + count)], axis=-1)
         deviations = [self.roll_prior, *[spread] * 3, *[self.body_bias_prior] * 3, *[self.platform_bias_prior] * count]
-        return x, diagonal([value**2 for value in deviations], known)
+        return x, covariance_of(deviations, known)
 
     def predict(self, x: Array, z: Measurement, previous: Measurement) -> tuple[Array, Array, Array]:
         """Equations (23) to (26), and F; a midpoint step has F = 1 + T G(middle) (1 + T G / 2)."""
         T, T3 = expand(self.dt, 1), expand(self.dt, 2)
         samples = in_paper_axes(z[self.body_gyroscope]), self._platform_rates(z)
         rate, G, noise = self._dynamics(x, *samples)
-        unit = diagonal([1.0] * self.state_size, 0.0 * x[..., :1])
+        unit = identity(self.state_size, x)
         if self.integration == "midpoint":
             # the kinematics in the middle of the interval, which half an Euler step reaches
             rate, middle, noise = self._dynamics(x + 0.5 * T * rate, *samples)
@@ -258,7 +267,7 @@ class TwoGyro(RiderEquations, Model):
             seen = xp.all(xp.isfinite(y), axis=-1)[..., None]
             angles = relative_angles(xp.where(seen, y, constant([1.0, 0.0, 0.0, 0.0], x)))
             r = xp.where(seen, wrap(angles - x[..., 1:4]), xp.nan)
-            slope, spread = diagonal([1.0] * 3, 0.0 * x[..., :1]), self.orientation_noise
+            slope, spread = identity(3, x), self.orientation_noise
         else:
             distances, slope = marker_distances(x[..., 1:4], MarkerPlaces(self.pivot, self.markers, self.viewpoints))
             r, spread = y - distances, self.distance_noise
@@ -321,7 +330,7 @@ class TwoGyro(RiderEquations, Model):
         """S, and the derivative of S ``used`` by φ, which is zero below the guard's yaw rate."""
         xp, angle, yaw_rate = namespace(x), x[..., 0], used[..., -1]
         if self.model == "sigma1":
-            return diagonal([1.0] * 3, 0.0 * x[..., :1]), 0.0 * x[..., 1:4]
+            return identity(3, x), 0.0 * x[..., 1:4]
         slope = substitution_derivative(angle, yaw_rate, self.platform)
         quiet = xp.less(xp.abs(yaw_rate), expand(self.zero_yaw_guard, 0))[..., None]
         return substitution(angle, self.platform), xp.where(quiet, 0.0 * slope, slope)
@@ -339,7 +348,7 @@ class TwoGyro(RiderEquations, Model):
         first = constant([[float(index == self._first) for index in range(count)]], x) + zeros(x, 1, count)
         decays = [-1.0 / self.body_bias_time] * 3 + [-1.0 / self.platform_bias_time] * count
         angles = times(A, body) + times(M, platform)
-        rate = xp.concat([times(first, used), angles, values(decays, 0.0 * x[..., :1]) * biases], axis=-1)
+        rate = xp.concat([times(first, used), angles, vector_of(decays, 0.0 * x[..., :1]) * biases], axis=-1)
 
         # G = ∂f/∂x by rows φ, θ, biases; ∂(D δω^p)/∂φ is where Σ2 sees the roll, E of (21)
         by_theta = body_rate_derivative(theta, body) + platform_rate_derivative(theta, platform)
@@ -361,7 +370,7 @@ class TwoGyro(RiderEquations, Model):
         used = [self.platform_gyroscope_noise[axis] for axis in self.used_axes]
         densities = [*self.body_gyroscope_noise, *used, self.pitch_rate_noise, self.roll_rate_noise]
         # C^v of (25) for φ and θ as a product of its scaled columns
-        L = noise * values(densities, 0.0 * x[..., :1])[..., None, :]
+        L = noise * vector_of(densities, 0.0 * x[..., :1])[..., None, :]
         # C^u of (25): variance per √s that keeps the Markov processes (2), (10) at σ_b
         drifts = [(self.body_bias_drift, self.body_bias_time)] * 3
         drifts += [(self.platform_bias_drift, self.platform_bias_time)] * self.platform_rates

@@ -18,11 +18,6 @@ BLOCKS = (
 """Parts of the state, in its order."""
 
 
-def unit(x: Array, size: int) -> Array:
-    """Identity matrix ``(..., size, size)`` with the batch shape of ``x``."""
-    return constant([[float(i == j) for j in range(size)] for i in range(size)], x) + 0.0 * x[..., :1, None]
-
-
 def assemble(blocks: dict[tuple[int, int], Array], x: Array) -> Array:
     """A matrix ``(..., 20, 20)`` from blocks by index of row and column; the rest is zero."""
     xp = namespace(x)

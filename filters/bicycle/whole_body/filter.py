@@ -34,12 +34,13 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, Literal
 
 from ...core.backend import Array, constant, expand, namespace
+from ...core.matrices import diagonal_matrix, identity
 from ...core.model import Gain, Model, check_positive
 from ...core.quantity import STANDARD_GRAVITY, Measurement
 from ...core.rotation import cross, euler_axes, euler_matrix, norm, skew
 from ..geometry import Point, RiderGeometry
 from . import constraints as limb_constraints
-from .blocks import BLOCKS, assemble, row_of, unit
+from .blocks import BLOCKS, assemble, row_of
 from .linkage import (
     CRANK,
     ERROR_SIZE,
@@ -192,8 +193,8 @@ class WholeBody(RiderLinkage, Model):
         x = xp.concat([x, rate, 0.0 * rate, force, speed, zero], axis=-1)
         deviations = [self.roll_prior, self.yaw_acceleration_deviation, *[self.trunk_prior] * 3]
         deviations += [*[self.relative_acceleration_deviation] * 3, *[self.limb_prior] * 12]
-        diagonal = xp.concat([1.0 + zero * 0.0 + expand(value**2 - 1.0, 1) for value in deviations], axis=-1)
-        return x, diagonal[..., :, None] * unit(zero, ERROR_SIZE)
+        variances = xp.concat([1.0 + zero * 0.0 + expand(value**2 - 1.0, 1) for value in deviations], axis=-1)
+        return x, diagonal_matrix(variances)
 
     def _seat_force(self, z: Measurement, rate: Array, change: Array) -> Array:
         """f: specific force at the trunk's pivot ``(..., 3)``, from the bicycle's accelerometer."""
@@ -222,9 +223,9 @@ class WholeBody(RiderLinkage, Model):
         for index, part, time, deviation in memories:
             keep = xp.exp(-(dt / time) * one)
             parts[index] = keep * x[..., part]
-            F[index, index] = keep[..., None] * unit(x, part.stop - part.start)
+            F[index, index] = keep[..., None] * identity(part.stop - part.start, x)
             spread = expand(deviation**2, 2) * (1.0 - keep * keep)[..., None]
-            Q[index, index] = spread * unit(x, part.stop - part.start)
+            Q[index, index] = spread * identity(part.stop - part.start, x)
         # Euler angles of trunk (6), shoulders (10) and hips (15): blocks 2, 4 to 7, each against its parent
         steps: dict[int, Rates] = {}
         joints = [(2, "zxy", TRUNK, trunk, bicycle)]
@@ -310,7 +311,7 @@ class WholeBody(RiderLinkage, Model):
         r = xp.concat([row[0] for row in rows], axis=-1)
         H = xp.concat([row_of(row[1], x) for row in rows], axis=-2)
         variances = xp.concat([row[2] + zero for row in rows], axis=-1)
-        return r, H, variances[..., :, None] * unit(x, len(rows))
+        return r, H, diagonal_matrix(variances)
 
     def _calm(self, x: Array) -> Array:
         """Factor ``(..., 1)`` on variances: 1, more during a shock."""

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 import torch
 
-from poise.filters.arrays.symmetric_matrix import diagonal, largest_eigenpair
+from poise.filters.arrays.symmetric_matrix import largest_eigenpair
 from poise.filters.compile.trace import Tape, print_code
+from poise.filters.core.matrices import diagonal_matrix
 
 COUNT = 20_000
 
@@ -92,4 +93,4 @@ def test_tensors_traces_and_gradients() -> None:
 
 
 def test_diagonal() -> None:
-    np.testing.assert_array_equal(diagonal(np.array([[1.0, 2.0, 3.0]])), np.diag([1.0, 2.0, 3.0])[None])
+    np.testing.assert_array_equal(diagonal_matrix(np.array([[1.0, 2.0, 3.0]])), np.diag([1.0, 2.0, 3.0])[None])
