@@ -12,17 +12,20 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import torch
-from stable_baselines3 import PPO
-from stable_baselines3.common.policies import ActorCriticPolicy
-from stable_baselines3.common.torch_layers import MlpExtractor
-from stable_baselines3.common.vec_env import VecNormalize
 
 from ...filters.adaptation.tuned import TunedFilter
+from ...filters.support.optional import extra
 from .batch import PRIVILEGED, TuningBatch
 from .config import TrainingConfig
 from .oracle_warm_start import OracleNetwork
 from .policy import GainPolicy
+
+with extra("rl"):
+    import torch
+    from stable_baselines3 import PPO
+    from stable_baselines3.common.policies import ActorCriticPolicy
+    from stable_baselines3.common.torch_layers import MlpExtractor
+    from stable_baselines3.common.vec_env import VecNormalize
 
 
 class AsymmetricExtractor(MlpExtractor):

@@ -13,12 +13,15 @@ from typing import Any
 
 import numpy as np
 from gymnasium import spaces
-from stable_baselines3.common.vec_env import VecEnv
 
 from ...envs.data.trajectory import Trajectory
 from ...filters.adaptation.tuned import TunedFilter, TunedState
 from ...filters.core.metrics import error
+from ...filters.support.optional import extra
 from .stack import TrajectoryStack
+
+with extra("rl"):
+    from stable_baselines3.common.vec_env import VecEnv
 
 AHEAD = (1, 10, 40)
 """Decisions over which the critic looks ahead."""

@@ -10,15 +10,18 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-import torch
-from torch import nn
 
+from ...filters.support.optional import extra
 from ...filters.support.seeds import child_seed, child_seeds
 from ..checkpoint import load_checkpoint, save_checkpoint
 from .dataset import LearnedDataset
 from .domain_randomisation import DomainRandomisation
 from .gravity_aligned_frame import GravityAlignedFrame
 from .gru_module import GruModule, inclination_loss
+
+with extra("learn"):
+    import torch
+    from torch import nn
 
 CHECKPOINT = "checkpoint.pt"
 MOST_BAD_STEPS = 10
