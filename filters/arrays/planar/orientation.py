@@ -23,7 +23,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, ClassVar, Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 
@@ -177,16 +177,3 @@ class PlanarOrientation(PlanarEquations, Model):
     def pose(self, x: Array) -> dict[str, Array]:
         """The angle; whole turns are counted."""
         return {PLANAR_ANGLE.name: x}
-
-
-def planar_force(angle: Any, acceleration: Any, gravity: float = GRAVITY) -> np.ndarray:
-    """c̈ = Qᵀ(b̈ − g) ``(..., 2)``: what a point feels in body axes, m/s².
-
-    Args:
-        angle: φ ``(...)``, rad.
-        acceleration: b̈ ``(..., 2)`` in the plane's axes, m/s².
-        gravity: g, m/s².
-    """
-    c, s = np.cos(angle), np.sin(angle)
-    x, y = acceleration[..., 0], acceleration[..., 1] + gravity
-    return np.stack([c * x + s * y, c * y - s * x], axis=-1)

@@ -12,7 +12,7 @@ from poise.envs.data.trajectory import Trajectory
 from poise.envs.hand.sensing import simulate_hand
 from poise.filters.arrays.array import OCTA, PLANAR, PlanarArray
 from poise.filters.arrays.planar.mean import PlanarMean
-from poise.filters.arrays.planar.orientation import UNKNOWN_ANGLE, PlanarOrientation, planar_force
+from poise.filters.arrays.planar.orientation import UNKNOWN_ANGLE, PlanarOrientation
 from poise.filters.arrays.planar.pose import PlanarPose
 from poise.filters.arrays.planar.unscented import PlanarUnscented
 from poise.filters.core.kalman import KalmanFilter
@@ -36,6 +36,13 @@ def angle(estimator: object, data: Data) -> np.ndarray:
 def rms_error(estimator: object, trajectory: Trajectory) -> float:
     error = wrap(angle(estimator, trajectory.measurements) - trajectory.truth["planar/angle"][:, 0])
     return float(np.rad2deg(np.sqrt(np.mean(error[trajectory.time > 3.0] ** 2))))
+
+
+def planar_force(angle: Any, acceleration: Any, gravity: float = 9.81) -> np.ndarray:
+    """c̈ = Qᵀ(b̈ − g) ``(..., 2)``: the specific force of a point in body axes, m/s²."""
+    c, s = np.cos(angle), np.sin(angle)
+    x, y = acceleration[..., 0], acceleration[..., 1] + gravity
+    return np.stack([c * x + s * y, c * y - s * x], axis=-1)
 
 
 def differences(function: object, x: np.ndarray, step: float = 1e-6) -> np.ndarray:
