@@ -21,7 +21,7 @@ from ....filters.core.quantity import Estimate
 from ...plots import TRUTH_COLOR, legend_above, new_figure
 from ..claims import Claim
 from ..kit import Study
-from ..report import Report
+from ..report import DEVIATION, Report
 from ..ride_study import MEAN, SETTLED, ZERO, RideStudy, Variant, mean_of, mean_rms, windowed
 from ..sensors import without_errors
 from .angles import ANGLES, STATES, TABLE_III, short
@@ -156,7 +156,7 @@ def tables(report: Report, course: str, every: list[dict[str, Any]]) -> None:
         | {"unit": "deg"}
         for angle, value in TABLE_III[course].items()
     ]
-    report.compare(f"Table III, {course}", rows, f"RMS from {SETTLED:g} s on.")
+    report.compare(f"Table III, {course}", rows, f"RMS from {SETTLED:g} s on.", interval=DEVIATION)
     drift = {f"integration, {span}": mean_rms(every, "integration", span) for span in _windows(np.zeros(1))}
     drift = {name: row for name, row in drift.items() if "settled" not in name and np.isfinite(row["φ"])}
     drift["filter, last quarter"] = mean_rms(every, "filter", "last quarter")
