@@ -1,11 +1,11 @@
-"""A paper's filter on recorded rides: variants, sensors without some errors, baselines, consistency, tables of all."""
+"""A paper's filter on recorded rides: variants, sensors without some errors, baselines, consistency, and the report."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -16,6 +16,9 @@ from ...filters.core.consistency import nees
 from ...filters.core.kalman import KalmanFilter
 from ...filters.core.observer import Observer
 from ...filters.core.quantity import Estimate
+from ..evaluation import COLUMNS
+from ..plots import TRUTH_COLOR, legend_above, new_figure
+from .claims import Claim
 from .kit import Study, load_ride
 from .report import DEVIATION, Report
 
@@ -40,6 +43,17 @@ class Variant:
     """class in the place of the study's"""
 
 
+class Less(NamedTuple):
+    """A claim about every course: one method's error of an angle is less than ``factor`` times another's."""
+
+    statement: str
+    angle: str
+    method: str
+    other: str
+    factor: float = 1.0
+    window: str = "settled"
+
+
 def whole_ride(time: np.ndarray) -> dict[str, tuple[float, float]]:
     """Window → begin and end, s: all that counts."""
     return {"settled": (SETTLED, np.inf)}
@@ -61,9 +75,14 @@ class RideStudy:
         checked: variants whose consistency is looked at.
         sampled: channel whose samples are measurements; innovations count where it has one (None: everywhere).
         published: course and variant → the paper's value of each angle.
+        table: what the paper calls its table of them.
+        tabled: methods in that table.
+        comparisons: what is claimed of every course.
+        drawn: methods in the figure of a ride; the last sets the scale.
         windows: time → named spans in which errors are averaged, ``settled`` among them.
         prepare: cuts or completes a ride before it is used.
         extra: further numbers of a ride, from the ride and the estimates of its variants.
+        cells: a row of errors as cells of a table; None rounds them.
     """
 
     name: str
@@ -76,10 +95,15 @@ class RideStudy:
     parts: Mapping[str, Sequence[str]]
     checked: Sequence[str]
     published: Mapping[tuple[str, str], Mapping[str, str]]
+    table: str
+    tabled: Sequence[str]
+    comparisons: Sequence[Less]
+    drawn: Sequence[str]
     sampled: str | None = None
     windows: Callable[[np.ndarray], dict[str, tuple[float, float]]] = whole_ride
     prepare: Callable[[Trajectory], Trajectory] | None = None
     extra: Callable[[RideStudy, Trajectory, dict[str, Estimate]], dict[str, Any]] | None = None
+    cells: Callable[[Mapping[str, float]], Mapping[str, Any]] | None = None
 
     def load(self, path: Path) -> Trajectory:
         """A recorded ride, prepared."""
@@ -140,7 +164,7 @@ class RideStudy:
                 name: {span: windowed(each, ride.time, *ends) for span, ends in spans.items()}
                 for name, each in errors.items()
             },
-            "peak": {name: windowed(each, ride.time, SETTLED, statistic=_peak) for name, each in errors.items()},
+            "peak": {name: windowed(each, ride.time, SETTLED, statistic=largest) for name, each in errors.items()},
             "consistency": {name: self.consistency(ride, estimates[name], errors[name]) for name in self.checked},
         }
         return found | ({} if self.extra is None else self.extra(self, ride, estimates))
@@ -165,38 +189,105 @@ class RideStudy:
         paths = study.ride_files(scenario, suite)
         return paths, study.map(f"rides {scenario}", assessed, [(self, path) for path in paths])
 
-    def published_table(
-        self, report: Report, title: str, course: str, results: list[dict[str, Any]], note: str
-    ) -> None:
-        """The paper's errors beside those of every variant and baseline that has the angle."""
+    def report(self, report: Report, course: str, results: list[dict[str, Any]], claims: Sequence[Claim] = ()) -> None:
+        """Tables of a course (published errors, variants, ablations, windows, consistency), claims, ``results.csv``.
+
+        Args:
+            report: where they go.
+            course: in the titles, and in ``published``.
+            results: of :meth:`run`.
+            claims: further ones of this study.
+        """
         rows = []
-        for name in (*self.variants, ZERO, MEAN):
+        for name in self.tabled:
             printed = self.published.get((course, name), {})
             for angle in self.angles:
                 values = [each["rms"][name]["settled"].get(angle, float("nan")) for each in results]
                 if np.isfinite(values).any():
                     row = {"filter": name, "quantity": angle, "printed": printed.get(angle)}
                     rows.append(row | {"values": values, "unit": "deg"})
-        report.compare(title, rows, f"RMS from {SETTLED:g} s on. {BASELINES} {note}".strip(), interval=DEVIATION)
+        report.compare(f"{self.table}, {course}", rows, f"RMS from {SETTLED:g} s on.", interval=DEVIATION)
+        cells = self.cells or rounded
+        methods = [*self.variants, ZERO, MEAN]
+        report.table(
+            f"Variants, {course}, mean RMS in deg",
+            [{"filter": name, **cells(mean_rms(results, name))} for name in methods],
+            f"*{ZERO}* needs no sensor; *{MEAN}* is the best constant, known in hindsight only.",
+        )
+        if self.ablations:
+            rows = [{"sensors": name, **cells(mean_rms(results, name))} for name in (methods[0], *self.ablations)]
+            report.table(f"Where errors come from, {course}, mean RMS in deg", rows)
+        spans = [name for name in results[0]["rms"][methods[0]] if name != "settled"]
+        windows = {(name, span): mean_rms(results, name, span) for name in self.drawn for span in spans}
+        known = {key: row for key, row in windows.items() if np.isfinite(list(row.values())).all()}
+        if known:
+            rows = [{"method": name, "time": span, **cells(row)} for (name, span), row in known.items()]
+            report.table(f"Drift, {course}, mean RMS in deg", rows)
+        report.table(
+            f"Consistency, {course}",
+            [
+                {"filter": name, **rounded(mean_of(each["consistency"][name] for each in results))}
+                for name in self.checked
+            ],
+            "For each degree of freedom; 1 if the filter's covariance is right.",
+        )
+        report.claims(f"What holds, {course}", [*self.claims(course, results), *claims])
+        report.numbers(self.results(results))
+
+    def claims(self, course: str, results: list[dict[str, Any]]) -> list[Claim]:
+        """What holds of the errors of a course: against the paper, the baselines and each other; and of consistency."""
+        first = next(iter(self.variants))
+        ours, best = mean_rms(results, first), mean_rms(results, MEAN)
+        published = self.published.get((course, first), {})
+        ratios = {angle: ours[angle] / float(value.replace("±", " ").split()[0]) for angle, value in published.items()}
+        constant = {angle: error / best[angle] for angle, error in ours.items()}
+        roll = next(angle for angle, (name, _) in self.angles.items() if name == "bicycle/roll")
+        found = [Claim.every("Every error is at or below the published one", ratios, 1.0, "of it")] if ratios else []
+        found += [
+            Claim.every("Every angle is estimated better than by the best constant", constant, 1.0, "of its error"),
+            Claim.less("The roll is estimated better than by zero", ours[roll], mean_rms(results, ZERO)[roll]),
+        ]
+        for each in self.comparisons:
+            pair = [mean_rms(results, name, each.window)[each.angle] for name in (each.method, each.other)]
+            found.append(Claim.less(each.statement, *pair, factor=each.factor, names=(each.method, each.other)))
+        for name in self.checked:
+            for statistic, value in mean_of(each["consistency"][name] for each in results).items():
+                found.append(Claim.within(f"{name}: {statistic} is right within a factor of two", value, 0.5, 2.0))
+        return found
 
     def results(self, results: Iterable[dict[str, Any]]) -> list[dict[str, Any]]:
         """Rows of ``results.csv``: RMS error of every method and angle on every ride."""
         return [
-            {
-                "estimator": f"{self.name}: {name}",
-                "trajectory": each["name"],
-                "quantity": angle,
-                "metric": "rms",
-                "value": value,
-                "unit": "deg",
-            }
+            dict(zip(COLUMNS, (f"{self.name}: {name}", each["name"], angle, "rms", value, "deg"), strict=True))
             for each in results
             for name, spans in each["rms"].items()
             for angle, value in spans["settled"].items()
         ]
 
+    def figure(self, report: Report, path: Path, title: str, angles: Sequence[str] | None = None) -> None:
+        """Angles of one ride, true and estimated; the scale is that of the truth and of the last method drawn."""
+        ride, shown = self.load(path), list(angles or self.angles)
+        truth = self.truth(ride.truth)
+        errors = {name: self.errors(self.estimate(ride, self.variants[name]).pose, truth) for name in self.drawn}
+        figure, axes = new_figure(7.5, 0.6 + 1.9 * len(shown), len(shown))
+        for ax, angle in zip(axes, shown, strict=True):
+            name, part = self.angles[angle]
+            true = np.degrees(np.unwrap(truth[name][:, part]))
+            ax.plot(ride.time, true, color=TRUTH_COLOR, linewidth=1.2, label="truth")
+            for method, color in zip(self.drawn, DRAWN[-len(self.drawn) :], strict=True):
+                if angle in errors[method]:
+                    ax.plot(ride.time, true + errors[method][angle], color=color, linewidth=0.9, label=method)
+            scale = np.concatenate([true, true + errors[self.drawn[-1]][angle]])
+            low, high = np.nanmin(scale), np.nanmax(scale)
+            margin = 0.25 * (high - low) + 1.0
+            ax.set(ylabel=f"{angle}, deg", ylim=(low - margin, high + margin))
+            legend_above(ax)
+        axes[-1].set_xlabel("time, s")
+        report.figure(title, figure, title, "Scales are those of truth and filter; what drifts leaves the picture.")
 
-BASELINES = f"*{ZERO}* needs no sensor; *{MEAN}* is the best constant, known in hindsight only."
+
+DRAWN = ("#2c8c5a", "#b08d1a", "#c2571a", "#1f5fa8")
+"""Colours of the methods of a figure; the last is that of the study's filter."""
 
 
 def assessed(study: RideStudy, path: Path) -> dict[str, Any]:
@@ -221,7 +312,8 @@ def _rms(values: np.ndarray) -> float:
     return float(np.sqrt(np.mean(values**2)))
 
 
-def _peak(values: np.ndarray) -> float:
+def largest(values: np.ndarray) -> float:
+    """Largest size."""
     return float(np.abs(values).max())
 
 

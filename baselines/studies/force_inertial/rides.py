@@ -6,7 +6,6 @@ import zlib
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,17 +18,16 @@ from ....filters.bicycle.force_inertial.integration import ForceInertialIntegrat
 from ....filters.bicycle.force_inertial.kinematics import true_angles
 from ....filters.bicycle.geometry import RiderGeometry
 from ....filters.core.quantity import Estimate
-from ...plots import TRUTH_COLOR, legend_above, new_figure
 from ..claims import Claim
 from ..kit import Study
 from ..report import Report
-from ..ride_study import MEAN, SETTLED, ZERO, RideStudy, Variant, mean, mean_of, mean_rms, rounded
+from ..ride_study import MEAN, SETTLED, ZERO, Less, RideStudy, Variant, mean_of, mean_rms, rounded
 from ..sensors import without_errors
 from ..signals import DEG
 from .states import from_the_truth, torques, true_states
 
 ANGLES = ("φ_h", "θ", "φ", "φ_b")
-OURS, CELLS = "this filter", "without load cells"
+OURS, CELLS, SIMPLE = "this filter", "without load cells", "no pedals, no pelvis, sum of the hands"
 POINT_MASS = {
     "carried_mass": 0.0,
     "pedal_share": 0.0,
@@ -126,7 +124,7 @@ RIDES = RideStudy(
         "static torque": Variant({"torque_model": "static"}),
         "raw (13)": Variant({"roll_model": "printed"}),
         "(12) without N_z": Variant({"torque_reading": "without-z"}),
-        "no pedals, no pelvis, sum of the hands": Variant(POINT_MASS),
+        SIMPLE: Variant(POINT_MASS),
         "geometry measured": Variant(geometry=_tape_measure),
         CELLS: Variant(samples=_without_cells),
         "integration": Variant(model=ForceInertialIntegration),
@@ -144,6 +142,17 @@ RIDES = RideStudy(
     parts={"NEES": ANGLES},
     checked=(OURS,),
     published={key: dict(zip(ANGLES, values, strict=True)) for key, values in TABLE_II.items()},
+    table="Table II",
+    tabled=(OURS, "no bias model", ZERO, MEAN),
+    comparisons=(
+        Less("(13) taken as it stands doubles the error of φ_b", "φ_b", OURS, "raw (13)", 0.5),
+        Less("Leaving out pedals, pelvis and grips doubles the error of φ_h", "φ_h", OURS, SIMPLE, 0.5),
+        Less("Level shoulders (17) alone double the error of φ", "φ", OURS, "level shoulders (17) alone", 0.5),
+        Less("Zeros make more than a quarter of φ_h's error", "φ_h", "force sensors: zeros known", OURS, 0.75),
+        Less("Zeros make more than a quarter of θ's error", "θ", "force sensors: zeros known", OURS, 0.75),
+        Less("After 50 s integration is more than twice as wrong", "φ_h", OURS, "integration", 0.5, "after 50 s"),
+    ),
+    drawn=("integration", OURS),
     windows=_windows,
     prepare=_from_first_whole_sample,
     extra=_more,
@@ -154,149 +163,39 @@ def rides(study: Study, report: Report) -> None:
     """Tables, claims and a figure of both courses."""
     for scenario in ("indoor_circle", "outdoor"):
         paths, every = RIDES.run(study, scenario, "force-inertial")
-        report.numbers(RIDES.results(every))
-        tables(report, scenario, every)
-        report.claims(f"What holds, {scenario}", claims(scenario, every))
-        figure(report, scenario, paths[0])
+        mean = {name: mean_of(each["torques"][name] for each in every) for name in ("read", "dynamic", "static")}
+        bound = mean_of(each["bound"] for each in every)
+        RIDES.report(report, scenario, every, claims(every, mean, bound))
+        report.table(
+            f"Lower bound, {scenario}, deg",
+            [rounded(bound)],
+            "Cramér–Rao, along the true states, for white noises of the sizes that the filter assumes. Exact sensors "
+            "leave what the model does not know of the rider: pedalling, and shoulders that are not level.",
+        )
+        report.table(
+            f"Torques at the true pose, {scenario}",
+            [{"N·m": name, **rounded(torque, 1)} for name, torque in mean.items()],
+            "Smoothed over 0.2 s. Means of all rides.",
+        )
+        RIDES.figure(report, paths[0], f"Figure 6: angles of one ride, {scenario}")
 
 
-def tables(report: Report, scenario: str, every: list[dict[str, Any]]) -> None:
-    """Published errors, variants, sources of error, drift, torques."""
-    RIDES.published_table(report, f"Table II, {scenario}", scenario, every, "")
-    report.table(
-        f"Variants, {scenario}, mean RMS in deg",
-        [{"filter": name, **rounded(mean_rms(every, name))} for name in (*RIDES.variants, ZERO, MEAN)],
-        "*Geometry measured*: segment lengths within 2 %, joints within 1 cm, trunk mass within 3 %. *Without load "
-        "cells*: they read a constant.",
-    )
-    names = {OURS: "all errors", **{name: name for name in RIDES.ablations}}
-    rows = [{"sensors": label, **rounded(mean_rms(every, name))} for name, label in names.items()]
-    bound = {"sensors": "lower bound for the filter's noises", **rounded(mean_of(each["bound"] for each in every))}
-    report.table(
-        f"Where errors come from, {scenario}, mean RMS in deg",
-        [*rows, bound],
-        "The bound (Cramér–Rao, along the true states) supposes white noises of the sizes that the filter assumes. "
-        "Exact sensors leave what the model does not know of the rider: pedalling, and shoulders that are not level.",
-    )
-    rows = []
-    for name in ("integration", OURS):
-        for span in ("before 50 s", "after 50 s"):
-            values = mean_rms(every, name, span)
-            if np.isfinite(list(values.values())).any():
-                rows.append({"method": name, "time": span, **rounded(values)})
-    report.table(f"Drift, {scenario}, mean RMS in deg", rows)
-    report.table(
-        f"Torques at the true pose, {scenario}",
-        [{"N·m": name, **rounded(torque, 1)} for name, torque in mean_torques(every).items()],
-        "Smoothed over 0.2 s. Means of all rides.",
-    )
-
-
-def mean_torques(every: list[dict[str, Any]]) -> dict[str, dict[str, float]]:
-    """Means over rides of :func:`torque_numbers`."""
-    return {name: mean_of(each["torques"][name] for each in every) for name in ("read", "dynamic", "static")}
-
-
-def claims(scenario: str, every: list[dict[str, Any]]) -> list[Claim]:
-    """What the paper says, and what one would read off the tables."""
-    rms = {name: mean_rms(every, name) for name in (*RIDES.variants, *RIDES.ablations, ZERO, MEAN)}
-    ours, read = rms[OURS], mean_torques(every)
-    worst = {
-        name: max(abs(rms[name][angle] - ours[angle]) / ours[angle] for angle in ANGLES)
+def claims(every: list[dict[str, Any]], torque: dict[str, dict[str, float]], bound: dict[str, float]) -> list[Claim]:
+    """What the paper says of biases, torques and wrong starts, and what one would read off the tables."""
+    ours, exact = mean_rms(every, OURS), mean_rms(every, "both exact")
+    change = {
+        name: 100.0 * max(abs(error / ours[angle] - 1.0) for angle, error in mean_rms(every, name).items())
         for name in ("no bias model", CELLS)
     }
-    starts = [time for each in every for time in each["wrong start"]]
-    late = {name: mean_rms(every, name, "after 50 s")["φ_h"] for name in (OURS, "integration")}
-    statistics = mean_of(each["consistency"][OURS] for each in every)
-    bound = mean(each["bound"]["φ_b"] for each in every)
-    found = [
-        Claim.less(f"The error of {angle} is at most the published one", ours[angle], float(value.split()[0]))
-        for angle, value in RIDES.published[scenario, OURS].items()
+    std, off = ({name: torque[name][f"τ_φh{label}"] for name in torque} for label in (" std", " − read, rms"))
+    start = max(time for each in every for time in each["wrong start"])
+    return [
+        Claim.best("φ_b has the smallest error of the four angles", "φ_b", ours),
+        Claim.less("With exact sensors φ_b is at its bound", exact["φ_b"], bound["φ_b"], factor=1.1),
+        Claim.less("The bias model changes no angle by more than a fifth", change["no bias model"], 20.0, "%"),
+        Claim.less("Without load cells no angle changes by 0.1 %", change[CELLS], 0.1, "%"),
+        Claim.less("The static torque underestimates how much τ_φh fluctuates", std["static"], std["read"], "N·m"),
+        Claim.less("The dynamic torque is nearer to what is read", off["dynamic"], off["static"], "N·m"),
+        Claim.less("The dynamic torque lacks less than half of what is read", off["dynamic"], 0.5 * std["read"], "N·m"),
+        Claim.less("φ_h that starts 35° off is right within 1° after 6 s at most", start, 6.0, "s"),
     ]
-    found += [
-        Claim.less(f"{angle} is estimated better than by the best constant", ours[angle], rms[MEAN][angle])
-        for angle in ANGLES
-    ]
-    low = dict(ours)
-    found += [
-        Claim.best("φ_b has the smallest error of the four angles", "φ_b", low),
-        Claim.less("The bias model changes no angle by more than a fifth", 100.0 * worst["no bias model"], 20.0, "%"),
-        Claim.less(
-            "(13) taken as it stands doubles the error of φ_b at least", ours["φ_b"], rms["raw (13)"]["φ_b"], factor=0.5
-        ),
-        Claim.less(
-            "Leaving out pedals, pelvis and grips doubles the error of φ_h at least",
-            ours["φ_h"],
-            rms["no pedals, no pelvis, sum of the hands"]["φ_h"],
-            factor=0.5,
-        ),
-        Claim.less(
-            "Level shoulders (17) alone double the error of φ at least",
-            ours["φ"],
-            rms["level shoulders (17) alone"]["φ"],
-            factor=0.5,
-        ),
-        Claim.less(
-            "The load cells add nothing: without them no angle changes by 0.1 %", 100.0 * worst[CELLS], 0.1, "%"
-        ),
-    ]
-    for angle in ("φ_h", "θ"):
-        known = rms["force sensors: zeros known"][angle]
-        statement = f"Zeros of the force sensors make more than a quarter of the error of {angle}"
-        found.append(Claim.less(statement, known, ours[angle], factor=0.75))
-    found += [
-        Claim.less("With exact sensors φ_b is at its bound", rms["both exact"]["φ_b"], bound, factor=1.1),
-        Claim.less(
-            "The static torque underestimates how much τ_φh fluctuates",
-            read["static"]["τ_φh std"],
-            read["read"]["τ_φh std"],
-            "N·m",
-        ),
-        Claim.less(
-            "The dynamic model is nearer to what is read than the static one",
-            read["dynamic"]["τ_φh − read, rms"],
-            read["static"]["τ_φh − read, rms"],
-            "N·m",
-        ),
-        Claim.less(
-            "More than half of what is read in τ_φh is not in the dynamic model",
-            0.5 * read["read"]["τ_φh std"],
-            read["dynamic"]["τ_φh − read, rms"],
-            "N·m",
-        ),
-        Claim.less("φ_h that starts 35° off is right within 1° after 6 s at most", max(starts), 6.0, "s"),
-        Claim.less(
-            "Integration drifts: after 50 s the filter is less than half as wrong",
-            late[OURS],
-            late["integration"],
-            factor=0.5,
-        ),
-        Claim.within("The covariance is right within a factor of two (NEES)", statistics["NEES"], 0.5, 2.0),
-        Claim.within("The innovations are right within a factor of two (NIS)", statistics["NIS"], 0.5, 2.0),
-    ]
-    return found
-
-
-def figure(report: Report, scenario: str, path: Path) -> None:
-    """Estimates and truth of the first ride, beside integration."""
-    ride = RIDES.load(path)
-    truth = _truth(ride.truth)
-    figure, axes = new_figure(8.0, 8.0, 4)
-    errors = {
-        name: RIDES.errors(RIDES.estimate(ride, RIDES.variants[name]).pose, truth) for name in ("integration", OURS)
-    }
-    for ax, angle in zip(axes, ANGLES, strict=True):
-        name, part = RIDES.angles[angle]
-        true = np.degrees(truth[name][:, part])
-        ax.plot(ride.time, true, color=TRUTH_COLOR, linewidth=1.2, label="truth")
-        for label, color in (("integration", "#b08d1a"), (OURS, "#1f5fa8")):
-            ax.plot(ride.time, true + errors[label][angle], color=color, linewidth=0.9, label=label)
-        scale = np.concatenate([true, true + errors[OURS][angle]])
-        low, high = float(np.nanmin(scale)), float(np.nanmax(scale))
-        margin = 0.25 * (high - low) + 1.0
-        ax.set_ylim(low - margin, high + margin)
-        ax.set_ylabel(f"{angle}, deg")
-        legend_above(ax)
-    axes[-1].set_xlabel("time, s")
-    note = "As the paper's figure 6. Scales are those of truth and filter; what drifts leaves the picture."
-    report.figure(f"angles-{scenario}", figure, f"Angles of one ride, {scenario}", note)

@@ -19,8 +19,8 @@ from ...plots import legend_above, new_figure
 from ..claims import Claim
 from ..kit import Study
 from ..report import Report
+from ..ride_study import DRAWN
 from ..signals import DEG
-from .figures import COLOURS
 from .motion import MOTIONS, Errors, filter_of, simulate
 from .rides import RIDES
 
@@ -166,28 +166,18 @@ def simulations(study: Study, report: Report) -> None:
 
 def claims_of_motions(found: dict[tuple[str, str, str], dict[str, Any]]) -> list[Claim]:
     """What the table of motions says of both models and steps."""
-
-    def late(motion: str, model: str, step: str = "midpoint") -> float:
-        return float(found[motion, model, step]["late"][3])
-
-    ratios = {step: found["circle", "sigma2", step]["ratio"] for step in ("midpoint", "euler")}
-    return [
-        *(
-            Claim.less(f"{motion}: Σ2 converges to less than 0.5°, from 60 s on", late(motion, "sigma2"), 0.5)
-            for motion in ("circle", "sine", "vibration", "pulses")
-        ),
-        Claim.less("circle: Σ1 does not converge to 0.5°", 0.5, late("circle", "sigma1")),
-        Claim.less("straight: Σ2 does not converge to 0.5°", 0.5, late("straight", "sigma2")),
-        Claim.within(
-            "circle: the error of Σ2 is as large as its covariance says, midpoint", ratios["midpoint"], 0.8, 1.2
-        ),
-        Claim.within(
-            "circle: the error of Σ2 is as large as its covariance says, published Euler step",
-            ratios["euler"],
-            0.8,
-            1.2,
-        ),
+    late = {key: float(result["late"][3]) for key, result in found.items()}
+    cases = [(motion, "sigma2") for motion in ("circle", "sine", "vibration", "pulses", "straight")]
+    claims = [
+        Claim.less(
+            f"{motion}: {model} converges to less than 0.5° of φ from 60 s on", late[motion, model, "midpoint"], 0.5
+        )
+        for motion, model in (*cases, ("circle", "sigma1"))
     ]
+    for step in ("midpoint", "euler"):
+        statement = f"circle: the error of sigma2 is as large as its covariance says, {step} step"
+        claims.append(Claim.within(statement, found["circle", "sigma2", step]["ratio"], 0.8, 1.2))
+    return claims
 
 
 def disturbed(study: Study, report: Report, count: int) -> list[Claim]:
@@ -231,21 +221,15 @@ def disturbed(study: Study, report: Report, count: int) -> list[Claim]:
     )
     peak = {name: result["peak"] for name, result in zip(named, found, strict=True)}
     late = {name: float(result["late"][3]) for name, result in zip(named, found, strict=True)}
-    bumped, inflated_ = "20° of pitch in 4 s", "20° of pitch in 4 s, inflation 10/10"
-    still, moving = late["camera off by 2° (sd), nothing moves"], late["camera off by 2° (sd), moving body"]
+    bumps = ("20° of pitch in 4 s", "20° of pitch in 4 s, inflation 10/10")
+    guarded, other = late["no yaw rate, guard 0.5 °/s"], late["no yaw rate, Σ1"]
+    still, moving = (late[f"camera off by 2° (sd), {what}"] for what in ("nothing moves", "moving body"))
     starts = {name: value for name, value in peak.items() if name.startswith("start")}
     return [
         Claim.every("A start up to 30° wrong leaves less than 1° after 10 s", starts, 1.0),
-        Claim.less(
-            "No yaw rate: the guard keeps Σ2 from being worse than Σ1",
-            late["no yaw rate, guard 0.5 °/s"],
-            late["no yaw rate, Σ1"],
-            factor=1.1,
-        ),
-        Claim.less("20° of pitch do not degrade φ beyond 5°", peak[bumped], 5.0),
-        Claim.less("20° of pitch: inflation keeps the peak of φ below 5°", peak[inflated_], 5.0),
-        Claim.less("With inflation the bump is forgotten: less than 1° after 30 s", late[inflated_], 1.0),
-        Claim.less("Without inflation the bump is forgotten: less than 1° after 30 s", late[bumped], 1.0),
+        Claim.less("No yaw rate: the guard keeps Σ2 from being worse than Σ1", guarded, other, factor=1.1),
+        *(Claim.less(f"{name}: φ is never off by 5°", peak[name], 5.0) for name in bumps),
+        *(Claim.less(f"{name}: forgotten, less than 1° after 30 s", late[name], 1.0) for name in bumps),
         Claim.less("A constant camera error of 2° passes to φ by at least half where nothing moves", 1.0, still),
         Claim.less("A moving body tells the camera's error apart: less of it passes to φ", moving, still),
     ]
@@ -326,31 +310,28 @@ def ideal_consistency(study: Study, report: Report) -> None:
     )
 
 
+def with_band(ax: Any, time: np.ndarray, error: np.ndarray, estimate: Estimate, color: str, label: str) -> None:
+    """An error of φ, deg, within three of the filter's standard deviations."""
+    assert estimate.covariance is not None
+    band = 3.0 * np.sqrt(estimate.covariance[: len(time), 0, 0]) / DEG
+    ax.plot(time, error[: len(time)], color=color, linewidth=0.9, label=label)
+    ax.plot(time, np.stack([-band, band], axis=-1), color=color, linewidth=0.6, alpha=0.6)
+
+
 def roll_figure() -> Any:
-    """Roll errors of single runs with three standard deviations."""
+    """Roll errors of single runs."""
     figure, axes = new_figure(7.5, 8.0, 3)
-    guard = Case("straight", duration=60.0, guard=0.5)
+    straight, bump = Case("straight", duration=60.0), Case("bump", duration=60.0)
     shown = (
-        ("turning, about 30 °/s", [("Σ2", Case()), ("Σ1", Case(model="sigma1"))], 12.0),
-        ("no yaw rate", [("Σ2", replace(guard, guard=0.0)), ("Σ2 with guard", guard)], 25.0),
-        (
-            "20° of pitch at 15 s",
-            [
-                ("Σ2", Case("bump", duration=60.0)),
-                ("Σ2, inflated", Case("bump", duration=60.0, inflation=(ROUGH, ROUGH))),
-            ],
-            25.0,
-        ),
+        ("turning, about 30 °/s", {"Σ1": Case(model="sigma1"), "Σ2": Case()}, 12.0),
+        ("no yaw rate", {"Σ2 with guard": replace(straight, guard=0.5), "Σ2": straight}, 25.0),
+        ("20° of pitch at 15 s", {"Σ2, inflated": replace(bump, inflation=(ROUGH, ROUGH)), "Σ2": bump}, 25.0),
     )
     for ax, (title, cases, limit) in zip(axes, shown, strict=True):
-        for (label, case), colour in zip(cases, (COLOURS["Σ2"], COLOURS["Σ1"]), strict=True):
+        for (label, case), color in zip(cases.items(), DRAWN[-2:], strict=True):
             ride, estimate, _ = case.run(1)
-            shown_until = ride.time <= 60.0
             error = angle_errors(estimate, true_angles(ride.truth))[:, 3]
-            deviation = 3.0 * np.sqrt(estimate.covariance[:, 0, 0]) / DEG  # type: ignore[index]
-            ax.plot(ride.time[shown_until], error[shown_until], color=colour, linewidth=1.0, label=label)
-            for sign in (-1.0, 1.0):
-                ax.plot(ride.time[shown_until], sign * deviation[shown_until], color=colour, linewidth=0.7, alpha=0.5)
+            with_band(ax, ride.time[ride.time <= 60.0], error, estimate, color, label)
         ax.set_title(title, loc="left", fontsize=10)
         ax.set(ylabel="error of φ, deg", ylim=(-limit, limit))
         legend_above(ax)
