@@ -199,14 +199,16 @@ class RideStudy:
             claims: further ones of this study.
         """
         rows = []
-        for name in self.tabled:
+        compared = self.tabled if any(key[0] == course for key in self.published) else ()
+        for name in compared:
             printed = self.published.get((course, name), {})
             for angle in self.angles:
                 values = [each["rms"][name]["settled"].get(angle, float("nan")) for each in results]
                 if np.isfinite(values).any():
                     row = {"filter": name, "quantity": angle, "printed": printed.get(angle)}
                     rows.append(row | {"values": values, "unit": "deg"})
-        report.compare(f"{self.table}, {course}", rows, f"RMS from {SETTLED:g} s on.", interval=DEVIATION)
+        if rows:
+            report.compare(f"{self.table}, {course}", rows, f"RMS from {SETTLED:g} s on.", interval=DEVIATION)
         cells = self.cells or rounded
         methods = [*self.variants, ZERO, MEAN]
         report.table(
@@ -219,6 +221,7 @@ class RideStudy:
             report.table(f"Where errors come from, {course}, mean RMS in deg", rows)
         spans = [name for name in results[0]["rms"][methods[0]] if name != "settled"]
         windows = {(name, span): mean_rms(results, name, span) for name in self.drawn for span in spans}
+        windows |= {(name, "largest error"): mean_of(each["peak"][name] for each in results) for name in self.drawn}
         known = {key: row for key, row in windows.items() if np.isfinite(list(row.values())).all()}
         if known:
             rows = [{"method": name, "time": span, **cells(row)} for (name, span), row in known.items()]

@@ -105,7 +105,7 @@ def figure(push: Trajectory) -> Any:
         with_band(axes[0], push.time, errors[name]["φ"], every[name], color, name)
     axes[0].set(ylabel="error of φ, deg", ylim=(-15.0, 15.0))
     for i, ax in enumerate(axes[1:]):
-        true = truth["two-gyro/relative_angles"][:, i] / DEG
+        true = np.unwrap(truth["two-gyro/relative_angles"][:, i]) / DEG
         ax.plot(push.time, true, color=TRUTH_COLOR, linewidth=1.2, label="truth")
         error = errors["Σ2, distances"][f"θ{i + 1}"]
         ax.plot(push.time, true + error, color=DRAWN[-1], linewidth=0.9, label="Σ2, distances")

@@ -325,7 +325,7 @@ def roll_figure() -> Any:
     shown = (
         ("turning, about 30 °/s", {"Σ1": Case(model="sigma1"), "Σ2": Case()}, 12.0),
         ("no yaw rate", {"Σ2 with guard": replace(straight, guard=0.5), "Σ2": straight}, 25.0),
-        ("20° of pitch at 15 s", {"Σ2, inflated": replace(bump, inflation=(ROUGH, ROUGH)), "Σ2": bump}, 25.0),
+        ("20° of pitch at 15 s", {"Σ2, inflated": replace(bump, inflation=(ROUGH, ROUGH)), "Σ2": bump}, 30.0),
     )
     for ax, (title, cases, limit) in zip(axes, shown, strict=True):
         for (label, case), color in zip(cases.items(), DRAWN[-2:], strict=True):
