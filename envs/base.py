@@ -12,14 +12,15 @@ import math
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 from gymnasium import spaces
 
 from ..filters.core import metrics
-from ..filters.core.quantity import ORIENTATION, RELATIVE_ORIENTATION, Channel, Quantity
+from ..filters.core.quantity import ORIENTATION, RELATIVE_ORIENTATION, Quantity
 from .drawn import DrawnEnv, Shown
+from .sensors.observation import Sensing
 
 Observation = dict[str, np.ndarray]
 
@@ -40,44 +41,6 @@ class Block(NamedTuple):
     pose: Mapping[str, np.ndarray]
     truth: Mapping[str, np.ndarray]
     scored: np.ndarray
-
-
-class Sensing(Protocol):
-    """What an environment needs of its sensors, see :class:`poise.envs.sensors.suite.SensorSuite`."""
-
-    @property
-    def channels(self) -> tuple[Channel, ...]:
-        """What is measured."""
-        ...
-
-    @property
-    def observation_space(self) -> spaces.Dict:
-        """Every channel, and ``fresh``."""
-        ...
-
-    def reset(self, rng: np.random.Generator) -> None:
-        """Begin an episode."""
-        ...
-
-    def to_observation(self, measurement: Mapping[str, np.ndarray]) -> Observation:
-        """Observation of the measurement of one tick."""
-        ...
-
-    def to_measurement(self, observation: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-        """Measurement of an observation."""
-        ...
-
-    def describe(self) -> dict[str, Any]:
-        """Everything about the sensors, for JSON."""
-        ...
-
-    def save(self) -> Any:
-        """All memory."""
-        ...
-
-    def restore(self, state: Any) -> None:
-        """Go on from saved memory."""
-        ...
 
 
 @dataclass(frozen=True)

@@ -8,16 +8,15 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
-from gymnasium import spaces
 
 from ..filters.core.quantity import ORIENTATION, RELATIVE_ORIENTATION, UP, Channel, Quantity
-from .base import Block, Observation, PoseEnv, choose_quantity
+from .base import Block, PoseEnv, choose_quantity
 from .data.formats.load import load_recording
 from .data.trajectory import Trajectory
 from .drawn import Scene
 from .hand.sensing import check_duration, simulate_hand
 from .sensors.kinds import KINDS
-from .sensors.observation import ObservationLayout
+from .sensors.observation import Sensing
 
 UNITS = {kind.suffix: kind.unit for kind in KINDS.values() if kind.unit}
 """Units by the last part of a channel's name."""
@@ -25,57 +24,28 @@ POSE = ("orientation", "relative_orientation", "up")
 """Truth that belongs to the pose."""
 
 
-class RecordedSensors:
-    """The channels of a trajectory, with the interface of a :class:`poise.envs.sensors.suite.SensorSuite`.
+class RecordedSensors(Sensing):
+    """The channels of a trajectory.
 
     Args:
         trajectory: what was recorded; the largest magnitude of each channel bounds its observation.
     """
 
     def __init__(self, trajectory: Trajectory) -> None:
-        self.channels = tuple(
-            Channel(name, values.shape[1], UNITS.get(name.rsplit("/", 1)[-1], "?"))
-            for name, values in trajectory.measurements.items()
-        )
-        largest = {
-            name: float(np.max(np.abs(values), where=np.isfinite(values), initial=0.0))
-            for name, values in trajectory.measurements.items()
-        }
-        self._layout = ObservationLayout(self.channels, {name: value or 1.0 for name, value in largest.items()})
+        channels, limits = [], {}
+        for name, values in trajectory.measurements.items():
+            channels.append(Channel(name, values.shape[1], UNITS.get(name.rsplit("/", 1)[-1], "?")))
+            limits[name] = float(np.max(np.abs(values), where=np.isfinite(values), initial=0.0)) or 1.0
+        super().__init__(channels, limits)
         self._described = {
             "rate": 1.0 / trajectory.dt,
             "recording": trajectory.name,
             "sensors": trajectory.metadata.get("sensors"),
         }
 
-    @property
-    def observation_space(self) -> spaces.Dict:
-        """Every channel as a float32 Box, and ``fresh``."""
-        return self._layout.space
-
-    def reset(self, rng: np.random.Generator) -> None:
-        """Forget the last values; nothing is random here."""
-        self._layout.reset()
-
-    def to_observation(self, measurement: Mapping[str, np.ndarray]) -> Observation:
-        """Observation of the measurement of one tick."""
-        return self._layout.observe(measurement)
-
-    def to_measurement(self, observation: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-        """Measurement of an observation, NaN where not fresh."""
-        return self._layout.to_measurement(observation)
-
     def describe(self) -> dict[str, Any]:
-        """What the trajectory tells about its sensors."""
+        """What the trajectory says about its sensors."""
         return dict(self._described)
-
-    def save(self) -> dict[str, np.ndarray]:
-        """The last values."""
-        return {name: values.copy() for name, values in self._layout.held.items()}
-
-    def restore(self, state: dict[str, np.ndarray]) -> None:
-        """Go on from saved values."""
-        self._layout.held = {name: values.copy() for name, values in state.items()}
 
 
 class ReplayEnv(PoseEnv):

@@ -1,4 +1,4 @@
-"""Fast, exact access to a multibody in PyBullet: what is read and driven in every physics step.
+"""Fast, exact access to a multibody in PyBullet, also to its closed loops: what each physics step reads and drives.
 
 Everything here belongs to *centre-of-mass frames* (principal axes), which PyBullet keeps in double precision. Numbers
 leave this file with quaternions scalar first.
@@ -13,7 +13,7 @@ import numpy as np
 
 from ...filters.core import rotation
 from ...filters.support.optional import extra
-from .world import BASE, Physics, Vector
+from .world import BASE, Physics, Vector, floats
 
 with extra("sim"):
     import pybullet
@@ -144,3 +144,41 @@ def spin_momentum(motion: CentreMotion, moments: np.ndarray) -> np.ndarray:
     """Angular momentum ``(..., n, 3)`` of links about their own centres of mass, N·m·s, world axes."""
     rate = rotation.rotate_back(motion.orientation, motion.angular_velocity)
     return rotation.rotate(motion.orientation, moments * rate)
+
+
+def connect_points(
+    physics: Physics,
+    parent: tuple[int, int],
+    parent_point: Vector,
+    child: tuple[int, int],
+    child_point: Vector,
+    max_force: float = 5e4,
+) -> int:
+    """Hold two points of two links together.
+
+    Args:
+        physics: the world.
+        parent: (body, link).
+        parent_point: ``(3,)`` m in that link's body frame.
+        child: (body, link).
+        child_point: ``(3,)`` m in that link's body frame.
+        max_force: N.
+
+    Returns:
+        The constraint's number, for :func:`constraint_force`.
+    """
+    pivots = []
+    for (body, link), point in ((parent, parent_point), (child, child_point)):
+        offset, axes = physics.inertial_frame(body, link)
+        # PyBullet counts pivots from the frame of principal axes
+        pivots.append(floats(rotation.rotate_back(axes, np.asarray(point, dtype=float) - offset)))
+    constraint = pybullet.createConstraint(
+        *parent, *child, pybullet.JOINT_POINT2POINT, [0.0, 0.0, 0.0], *pivots, physicsClientId=physics.client
+    )
+    pybullet.changeConstraint(constraint, maxForce=max_force, physicsClientId=physics.client)
+    return int(constraint)
+
+
+def constraint_force(physics: Physics, constraint: int) -> np.ndarray:
+    """Force ``(3,)`` on the child of a point-to-point constraint during the last step, N, world axes."""
+    return np.array(pybullet.getConstraintState(constraint, physicsClientId=physics.client)[:3])

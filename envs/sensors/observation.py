@@ -1,9 +1,14 @@
-"""Measurements as observations: what was not sampled keeps its last value and is marked as not fresh."""
+"""What environments sense with: channels whose measurements become observations.
+
+What was not sampled keeps its last valid sample (zero-order hold) and is marked as not fresh.
+"""
 
 from __future__ import annotations
 
+import copy
 import math
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from gymnasium import spaces
@@ -14,8 +19,8 @@ FRESH = "fresh"
 """Key of the flags in an observation."""
 
 
-class ObservationLayout:
-    """Channels, their bounds, and the last value of each.
+class Sensing:
+    """Channels, their bounds, and the last valid sample of each.
 
     Args:
         channels: in the order of the flags.
@@ -42,15 +47,31 @@ class ObservationLayout:
             boxes[channel.name] = spaces.Box(-bound, bound, dtype=np.float32)
         boxes[FRESH] = spaces.MultiBinary(len(names))
         self.channels = tuple(channels)
-        self.space = spaces.Dict(boxes)
+        self.observation_space = spaces.Dict(boxes)
         self._limits = {name: np.asarray(limits[name], np.float32).astype(float) for name in names}
-        self.reset()
+        self._forget()
 
-    def reset(self) -> None:
-        """Forget: zeros stand for channels without a sample so far."""
+    def _forget(self) -> None:
+        """Begin anew: zeros stand for channels without a sample so far."""
         self.held = {channel.name: np.zeros(channel.size, np.float32) for channel in self.channels}
 
-    def observe(self, measurement: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    def reset(self, rng: np.random.Generator) -> None:
+        """Begin an episode."""
+        self._forget()
+
+    def save(self) -> Any:
+        """A copy of all memory."""
+        return copy.deepcopy(self.held)
+
+    def restore(self, state: Any) -> None:
+        """Continue from saved memory, exactly."""
+        self.held = copy.deepcopy(state)
+
+    def describe(self) -> dict[str, Any]:
+        """Everything about the sensors, for JSON."""
+        raise NotImplementedError
+
+    def to_observation(self, measurement: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Turn one measurement into an observation.
 
         Args:
@@ -72,7 +93,7 @@ class ObservationLayout:
         return {**{name: value.copy() for name, value in self.held.items()}, FRESH: fresh}
 
     def to_measurement(self, observation: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-        """Undo :meth:`observe`, over any leading (batch, time) dimensions.
+        """Undo :meth:`to_observation`, over any leading (batch, time) dimensions.
 
         Args:
             observation: channel name → ``(..., size)``, and ``fresh`` ``(..., channels)``.

@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-import copy
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from gymnasium import spaces
 
 from ...filters.core.quantity import Channel
 from .ideal import STANDARD_GRAVITY, BodyState, Mounting, Sampling, magnetic_field, mounted, vector
 from .kinds import SiteMotion, sensor_kind
 from .noise import NoiseProcess, NoiseState
-from .observation import ObservationLayout
+from .observation import Sensing
 from .presets import SensorPreset, sensor_preset
 from .sensor import Placement, Sensor, due
 
@@ -47,7 +45,7 @@ class Sensed(NamedTuple):
     motions: dict[Placement, SiteMotion]
 
 
-class SensorSuite:
+class SensorSuite(Sensing):
     """Sensors that are sampled together.
 
     The sample of a time step describes the interval that ends there. A sensor slower than the suite is sampled at the
@@ -83,17 +81,11 @@ class SensorSuite:
                 )
         self.sensors, self.rate, self.gravity = tuple(sensors), float(rate), float(gravity)
         self.field = vector("field", magnetic_field() if field is None else field, 3)
-        self.channels = tuple(sensor.channel for sensor in sensors)
         limits = {sensor.channel.name: sensor.limit for sensor in sensors}
-        self._layout = ObservationLayout(self.channels, limits)
+        super().__init__([sensor.channel for sensor in sensors], limits)
         self._noise: list[NoiseProcess] = []
         self._last: dict[Placement, BodyState] = {}
         self._step = 0
-
-    @property
-    def observation_space(self) -> spaces.Dict:
-        """Every channel as a float32 Box with finite bounds, and ``fresh``: MultiBinary, one flag a channel."""
-        return self._layout.space
 
     def reset(self, rng: np.random.Generator) -> None:
         """Begin an episode: draw what is constant in it and forget the last one.
@@ -101,10 +93,10 @@ class SensorSuite:
         Args:
             rng: every sensor draws from a child of its own, so adding sensors at the end changes nothing before them.
         """
+        super().reset(rng)
         children = rng.spawn(len(self.sensors))
         self._noise = [sensor.errors(child) for sensor, child in zip(self.sensors, children, strict=True)]
         self._last.clear()
-        self._layout.reset()
         self._step = 0
 
     def simulate(
@@ -192,20 +184,10 @@ class SensorSuite:
         self._last[placement] = path.at(slice(-1, None))
         return SiteMotion(now, path, None, sampling, self.gravity, self.field, surroundings)
 
-    def to_observation(self, measurement: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-        """Observation of a measurement; see :meth:`ObservationLayout.observe`."""
-        return self._layout.observe(measurement)
-
-    def to_measurement(self, observation: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-        """Measurement of an observation; see :meth:`ObservationLayout.to_measurement`."""
-        return self._layout.to_measurement(observation)
-
     def save(self) -> SuiteState:
         """A copy of all memory."""
         self._check_ready()
-        return SuiteState(
-            self._step, [noise.save() for noise in self._noise], dict(self._last), copy.deepcopy(self._layout.held)
-        )
+        return SuiteState(self._step, [noise.save() for noise in self._noise], dict(self._last), super().save())
 
     def restore(self, state: SuiteState) -> None:
         """Continue from a saved state, exactly (in this suite or in another one of the same sensors)."""
@@ -216,7 +198,7 @@ class SensorSuite:
         self._step, self._last = state.step, dict(state.last)
         for noise, saved in zip(self._noise, state.noise, strict=True):
             noise.restore(saved)
-        self._layout.held = copy.deepcopy(state.held)
+        super().restore(state.held)
 
     def describe(self) -> dict[str, Any]:
         """Everything about the suite, for JSON."""

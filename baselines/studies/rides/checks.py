@@ -18,8 +18,7 @@ from ....envs.bicycle.frame.whipple import whipple_model
 from ....envs.bicycle.ride.contact_forces import contact, rider_motion, saddle_point
 from ....envs.bicycle.ride.ride import Ride
 from ....envs.bicycle.rider.anthropometry import SUBJECTS
-from ....envs.bicycle.rider.loop_closure import loop_gaps
-from ....envs.bicycle.rider.posture import sit
+from ....envs.bicycle.rider.posture import loop_closure_error, sit
 from ....envs.bicycle.rider.style import STYLES, RiderMotion
 from ....envs.bicycle.sensors.sites import BICYCLE_IMU_SITE, BICYCLE_IMU_TILT, pitched
 from ....envs.data.trajectory import Trajectory
@@ -194,7 +193,7 @@ def sensor_checks(duration: float = 10.0) -> Iterator[Check]:
         what = f"strapdown of the ideal bicycle IMU, {name}, {duration:g} s"
         holds = position <= 0.01 and math.degrees(attitude) <= 0.01
         yield Check(what, "10 mm, 0.01°", f"{1e3 * position:.2f} mm, {math.degrees(attitude):.5f}°", holds)
-        gap = loop_gaps(ride.truth, sit(MOUNTAIN_BIKE, SUBJECTS[0])).max()
+        gap = loop_closure_error(ride.truth, sit(MOUNTAIN_BIKE, SUBJECTS[0])).max()
         yield Check(
             f"largest gap of hands and feet, {name}, {duration:g} s", "1 mm", f"{1e3 * gap:.3f} mm", bool(gap <= 1e-3)
         )

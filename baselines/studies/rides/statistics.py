@@ -82,7 +82,7 @@ def ride_statistics(
         trajectory: of ``poise/RiderBicycle-v0`` with the channel ``bicycle_imu/acc``.
         scenario: its name.
         subject: number of the rider.
-        gaps: ``(T, 4)`` m, see :func:`.rider.loop_closure`; None if there is nothing to tell.
+        gaps: ``(T, 4)`` m, see :func:`.loop_closure_error`; None if there is nothing to tell.
     """
     truth = trajectory.truth
     speed, roll, pitch = (truth[f"bicycle/{name}"][:, 0] for name in ("speed", "roll", "pitch"))
@@ -133,8 +133,7 @@ def ride(scenario: str, subject: int, duration: float, fidelity: str, seed: int)
     """
     from ....envs.bicycle.environment import RiderBicycleEnv
     from ....envs.bicycle.rider.anthropometry import rider_body
-    from ....envs.bicycle.rider.loop_closure import loop_gaps
-    from ....envs.bicycle.rider.posture import sit
+    from ....envs.bicycle.rider.posture import loop_closure_error, sit
     from ....envs.record import record
 
     env = RiderBicycleEnv(
@@ -149,5 +148,7 @@ def ride(scenario: str, subject: int, duration: float, fidelity: str, seed: int)
         trajectory = record(env, seed=seed)
     finally:
         env.close()
-    gaps = loop_gaps(trajectory.truth, sit(env.parameters, rider_body(subject))) if fidelity == "full" else None
+    gaps = (
+        loop_closure_error(trajectory.truth, sit(env.parameters, rider_body(subject))) if fidelity == "full" else None
+    )
     return ride_statistics(trajectory, scenario=scenario, subject=subject, gaps=gaps)

@@ -112,35 +112,3 @@ def whipple_model(bicycle: BicycleParameters, gravity: float = STANDARD_GRAVITY)
         ]
     )
     return WhippleModel(M, C1, K0, K2, gravity)
-
-
-def self_stable_range(model: WhippleModel, speeds: np.ndarray) -> tuple[float, float]:
-    """Lowest and highest speed (m/s) of the first interval of ``speeds`` ``(n,)`` in which all motions die out.
-
-    The limits are refined by bisection to 1e-6 m/s.
-
-    Raises:
-        ValueError: the bicycle is stable at no speed of the grid, or at the first one.
-    """
-
-    def growth(speed: float) -> float:
-        return float(model.eigenvalues(speed)[0].real)
-
-    stable = np.array([growth(speed) < 0.0 for speed in speeds])
-    if not stable.any() or stable[0]:
-        raise ValueError(
-            f"speeds must begin below a self-stable range and reach it, got {speeds[0]} … {speeds[-1]} m/s"
-        )
-    first = int(np.argmax(stable))
-    rest = np.flatnonzero(~stable[first:])
-    limits = [(float(speeds[first - 1]), float(speeds[first]))]
-    if rest.size:
-        limits.append((float(speeds[first + rest[0] - 1]), float(speeds[first + rest[0]])))
-    found = []
-    for low, high in limits:
-        sign = growth(low) > 0.0
-        while high - low > 1e-6:
-            middle = 0.5 * (low + high)
-            low, high = (middle, high) if (growth(middle) > 0.0) == sign else (low, middle)
-        found.append(0.5 * (low + high))
-    return found[0], found[1] if len(found) > 1 else math.inf

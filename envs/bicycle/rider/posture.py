@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -217,3 +217,37 @@ def sit(bicycle: BicycleParameters, body: RiderBody) -> Posture:
 
     message = f"{body.name} of {body.stature} m cannot reach the handlebar of {bicycle.name!r}"
     return replace(posture, flexion=_root(bent, math.radians(2.0), math.radians(75.0), message))
+
+
+def loop_closure_error(truth: Mapping[str, np.ndarray], posture: Posture) -> np.ndarray:
+    """Distance between each hand or foot and what it holds, from the truth of a ride alone.
+
+    The chain of the limb's orientations leads to the tip, steering and crank angle to the grip or the pedal.
+
+    Args:
+        truth: of a ride, quantity → ``(T, size)``.
+        posture: the rider of that ride on that bicycle.
+
+    Returns:
+        ``(T, 4)`` m: left and right hand, left and right foot. A lumped rider has none (1e-15) unless an arm is too
+        short for what the trunk does.
+    """
+    frame, trunk = truth["bicycle/orientation"], truth["trunk/orientation"]
+    steer, crank = truth["bicycle/steer"][:, 0], truth["bicycle/crank"][:, 0]
+    relative = rotation.multiply(rotation.conjugate(frame), trunk)
+    # the pelvis with shoulders and hips bounces on the saddle
+    bounce = rotation.rotate_back(frame, truth["trunk/position"] - truth["bicycle/position"]) - posture.lumbar
+    errors = []
+    for name in LIMBS:
+        kind, side = name.split("_")
+        limb = posture.limb(name)
+        if kind == "arm":
+            root, parts = trunk, ("upper_arm", "forearm")
+            target = posture.arm_target(side, steer, relative) - rotation.rotate_back(relative, bounce)
+        else:
+            root, parts, target = frame, ("thigh", "shank"), posture.leg_target(side, crank) - bounce
+        upper, lower = (truth[f"{part}_{side}/orientation"] for part in parts)
+        reached = rotation.rotate(upper, np.array([0.0, 0.0, -limb.upper]))
+        reached = reached + rotation.rotate(lower, np.array([limb.tip[0], 0.0, limb.tip[1]]))
+        errors.append(np.linalg.norm(rotation.rotate_back(root, reached) - target, axis=1))
+    return np.stack(errors, axis=1)

@@ -16,7 +16,7 @@ from typing import Literal
 import numpy as np
 
 from ....filters.core import rotation
-from ...physics.joints import connect_points, constraint_force
+from ...physics.multibody import connect_points, constraint_force
 from ...physics.straight_line import straight_line
 from ...physics.urdf import Tree
 from ...physics.world import BASE

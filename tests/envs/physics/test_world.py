@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from poise.envs.physics.joints import connect_points, constraint_force, joint_states, set_joint_state, set_joint_torques
+from poise.envs.physics.multibody import Multibody, connect_points, constraint_force
 from poise.envs.physics.world import BASE, Physics, PhysicsError, principal_axes
 from poise.envs.sensors.ideal import BodyState
 from poise.filters.core import rotation
@@ -75,14 +75,16 @@ def test_link_velocities_are_those_of_the_body_frame():
         body = physics.load_urdf(PENDULUM, position=(0, 0, 5), fixed=True)
         links = physics.links(body)
         assert links == {"base": BASE, "arm": 0}
-        set_joint_state(physics, body, 0, 0.7, 3.0)
+        Multibody(physics, body).set_joint(0, 0.7, 3.0)
         before = physics.states(body, [BASE, 0])
         physics.step()
         after = physics.states(body, [BASE, 0])
         velocity = (after.position - before.position) / physics.time_step
         np.testing.assert_allclose(velocity, after.velocity, atol=1e-3)
         np.testing.assert_allclose(after.position[1], [0, 0, 5.5], atol=1e-12)
-        np.testing.assert_allclose(after.angular_velocity[1], [joint_states(physics, body, [0])[1][0], 0, 0], atol=1e-9)
+        np.testing.assert_allclose(
+            after.angular_velocity[1], [Multibody(physics, body).joint_tuples([0])[0][1], 0, 0], atol=1e-9
+        )
 
 
 def test_pendulum_swings_like_the_equation_of_motion():
@@ -90,10 +92,11 @@ def test_pendulum_swings_like_the_equation_of_motion():
 
     with Physics(time_step=2e-4, gravity=9.81) as physics:
         body = physics.load_urdf(PENDULUM, fixed=True)
-        set_joint_state(physics, body, 0, 0.5, 0.0)
+        arm = Multibody(physics, body)
+        arm.set_joint(0, 0.5)
         for _ in range(5000):
             physics.step()
-        angle = joint_states(physics, body, [0])[0][0]
+        angle = arm.joint_tuples([0])[0][0]
     rotated = rotation.to_matrix(rotation.from_euler_zyx(*(np.array(a) for a in (0.1, 0.0, 0.3))))
     inertia = (rotated @ np.array([[0.02, 0.001, 0], [0.001, 0.025, 0], [0, 0, 0.01]]) @ rotated.T)[0, 0]
     inertia += 1.5 * (0.02**2 + 0.4**2)
@@ -109,11 +112,12 @@ def test_pendulum_swings_like_the_equation_of_motion():
 def test_joint_torque_holds_the_arm():
     with Physics(gravity=9.81) as physics:
         body = physics.load_urdf(PENDULUM, fixed=True)
-        set_joint_state(physics, body, 0, np.pi / 2)
+        arm = Multibody(physics, body)
+        arm.set_joint(0, np.pi / 2)
         for _ in range(20):
-            set_joint_torques(physics, body, [0], [0.4 * 1.5 * 9.81])
+            arm.drive_joints([0], [0.4 * 1.5 * 9.81])
             physics.step()
-        assert abs(joint_states(physics, body, [0])[0][0] - np.pi / 2) < 1e-5
+        assert abs(arm.joint_tuples([0])[0][0] - np.pi / 2) < 1e-5
 
 
 def test_point_to_point_carries_the_weight():

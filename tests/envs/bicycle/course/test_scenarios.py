@@ -7,7 +7,7 @@ import pytest
 
 from poise.envs.bicycle.course.scenarios import list_scenarios, scenario
 from poise.envs.bicycle.environment import RiderBicycleEnv
-from poise.envs.bicycle.rider.loop_closure import loop_gaps
+from poise.envs.bicycle.rider.posture import loop_closure_error
 from poise.envs.record import record
 from poise.envs.sensors.ideal import STANDARD_GRAVITY
 
@@ -49,7 +49,7 @@ def test_two_minutes_of_every_scenario_with_every_rider(name, subject):
         subject, scenario=name, duration=120.0, subject=subject, suite=["wheel/speed"], fidelity="full"
     )
     assert len(ride) == 12001
-    assert loop_gaps(ride.truth, posture).max() < 1e-3
+    assert loop_closure_error(ride.truth, posture).max() < 1e-3
 
 
 def test_scenarios_compose():

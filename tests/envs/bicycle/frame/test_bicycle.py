@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 from poise.baselines.studies.rides.checks import GRAVITY, by_kind, measured_eigenvalues
 from poise.envs.bicycle.course.terrain import Bump, FlatGround, GroundSum, Ramp, RoughGround
@@ -19,7 +20,7 @@ from poise.envs.bicycle.frame.parameters import (
     combine,
 )
 from poise.envs.bicycle.frame.tyre import BENCHMARK_TYRE, Tyre, TyreParameters
-from poise.envs.bicycle.frame.whipple import self_stable_range, whipple_model
+from poise.envs.bicycle.frame.whipple import whipple_model
 from poise.envs.physics.world import Physics
 
 
@@ -34,7 +35,8 @@ def test_whipple_matrices_are_those_of_the_benchmark():
     )
     np.testing.assert_allclose(model.K2, [[0.0, 76.59734589573222], [0.0, 2.65431523794604]], rtol=1e-13)
     np.testing.assert_allclose(model.C1, [[0.0, 33.86641391492494], [-0.85035641456978, 1.68540397397560]], rtol=1e-13)
-    stable = self_stable_range(model, np.arange(1.0, 9.0, 0.2))
+    # weave dies out above the lower speed, capsize grows above the higher one
+    stable = [brentq(lambda speed: model.eigenvalues(speed)[0].real, *limits) for limits in ((4.0, 5.0), (5.5, 6.5))]
     np.testing.assert_allclose(stable, (4.29238253634111, 6.02426201538837), atol=2e-6)
 
 
@@ -296,7 +298,6 @@ def test_parts_combine_like_rigid_bodies():
         (lambda: Ramp((0.0, 0.0), 0.0, angle=1.2), "ramp"),
         (lambda: RoughGround.random(np.random.default_rng(0), waves=0), "waves"),
         (lambda: whipple_model(BENCHMARK, 0.0), "gravity"),
-        (lambda: self_stable_range(whipple_model(BENCHMARK), np.arange(1.0, 3.0)), "self-stable"),
     ],
 )
 def test_impossible_parameters_are_refused(make, message):

@@ -7,8 +7,7 @@ import poise
 from poise.envs.bicycle.environment import RiderBicycleEnv
 from poise.envs.bicycle.frame.parameters import MOUNTAIN_BIKE
 from poise.envs.bicycle.rider.anthropometry import rider_body
-from poise.envs.bicycle.rider.loop_closure import loop_gaps
-from poise.envs.bicycle.rider.posture import sit
+from poise.envs.bicycle.rider.posture import loop_closure_error, sit
 from poise.envs.bicycle.sensors.single_imu import SITES, imu_of
 from poise.envs.bicycle.sensors.sites import BICYCLE_IMU_TILT, pitched
 from poise.envs.bicycle.sensors.suites import IMUS
@@ -105,7 +104,7 @@ def test_what_is_missing_is_named(ride):
 def test_gaps_from_the_truth_are_those_of_the_physics(fidelity):
     env = RiderBicycleEnv("outdoor", 4, suite=IMUS, fidelity=fidelity, duration=0.49)
     trajectory = poise.record(env, seed=1)
-    gaps = loop_gaps(trajectory.truth, sit(MOUNTAIN_BIKE, rider_body(4)))
+    gaps = loop_closure_error(trajectory.truth, sit(MOUNTAIN_BIKE, rider_body(4)))
     assert gaps.shape == (50, 4)
     assert gaps.max() < 1e-3
     # the only block of this short ride has just been computed: the world is in its last state
