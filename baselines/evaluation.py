@@ -2,31 +2,44 @@
 
 from __future__ import annotations
 
+import os
+import warnings
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
-
-import numpy as np
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from ..envs.data.formats.load import load_recording
+from ..envs.data.plausibility import check_recording
 from ..envs.data.trajectory import Trajectory
-from ..filters.core import rotation
-from ..filters.core.consistency import consistency
-from ..filters.core.estimator import Estimator, run
-from ..filters.core.metrics import score
-from ..filters.core.model import Equations, equations_of
-from ..filters.core.quantity import ORIENTATION, RELATIVE_ORIENTATION, UP, Estimate, Quantity
+from ..filters.core.estimator import Estimator
 from ..filters.support.parallel import progress_bar
-from .registry import make_estimator
+from .registry import list_estimators, make_estimator
+from .run import fitted, run_on
+from .scoring import (
+    COLUMNS,
+    ONBOARD,
+    Row,
+    StandIn,
+    automatic_reference,
+    errors,
+    family,
+    reference_pose,
+    with_up,
+    without_truth,
+)
 
 if TYPE_CHECKING:
-    import pandas
-
-COLUMNS = ("estimator", "trajectory", "quantity", "metric", "value", "unit")
-"""Columns of the table, one number a row."""
+    from .error_table import ErrorTable
 
 Estimators = str | Estimator[Any] | Sequence[str | Estimator[Any]] | Mapping[str, str | Estimator[Any]]
 Trajectories = Trajectory | str | Path | Iterable[Trajectory | str | Path]
+ReferenceClock = Literal["recorded", "corrected"]
+
+AUTO = "auto"
+LARGEST_NIS = {"bounded-motion": 5.0}
+"""Family → NIS a degree of freedom that no sound recording reaches (0.5 at most in 27 of four benchmarks); other
+filters' noise is set so that theirs tells nothing."""
 
 
 def evaluate(
@@ -34,68 +47,198 @@ def evaluate(
     trajectories: Trajectories,
     *,
     reference: str | Estimator[Any] | None = None,
+    reference_clock: ReferenceClock = "recorded",
+    check: bool = True,
     progress: bool = False,
-) -> pandas.DataFrame:
-    """Run every estimator over every trajectory and tabulate the errors over the scored ticks.
+) -> ErrorTable:
+    """Run every estimator over every trajectory and tabulate the errors over the evaluation mask.
 
     Args:
         estimators: names (see :func:`poise.list_estimators`), estimators, or a mapping label → name or estimator.
-            Each is adjusted to the sampling interval of each trajectory; those that are named are configured with the
-            rider, bicycle or device that its metadata describe (:func:`poise.make_estimator`).
-        trajectories: trajectories, or paths of recordings.
-        reference: estimator that stands in for the truth of trajectories that know none. Such rows name it in
-            ``metric`` (``inclination to mekf-9``): they show agreement, not error.
+            Each runs at the clock of each trajectory (:func:`poise.run`); those that are named are configured with the
+            rider, bicycle or device that its metadata describe.
+        trajectories: trajectories, or paths of recordings. Recordings of one name get the part of their path that
+            tells them apart.
+        reference: what stands in for the truth of trajectories that know none: an estimator, ``"onboard"`` for the
+            orientation that the device computed, or ``"auto"`` for ``mekf-9`` or ``bounded-motion``, whichever the
+            channels suffice for. Such rows name it in ``metric`` (``inclination to mekf-9``): they show agreement, not
+            error. None or ``"auto"`` compares every estimator with every other (:func:`.error_table.agreement`).
+        reference_clock: ``"recorded"`` takes the truth as it is; ``"corrected"`` moves it by the offset between its
+            clock and the gyroscope's, which loaders measure (``metadata["reference_clock_offset"]``).
+        check: warn of implausible recordings (:func:`poise.check_recording`).
         progress: show a progress bar.
 
     Returns:
         A data frame with the columns estimator, trajectory, quantity, metric, value, unit: root mean square errors
-        (``inclination``, ``heading``, ``total`` in deg, ``distance`` in the quantity's unit), the share of scored ticks
-        with an estimate (``valid``), and for filters with a covariance the normalised innovation squared per degree of
-        freedom (``nis``; 1 if consistent). ``frame.attrs["skipped"]`` lists (estimator, trajectory, reason) of pairs
-        that could not be run: a channel that the trajectory lacks, or a package that is not installed.
+        (``inclination``, ``heading``, ``total`` in deg, ``distance`` in the quantity's unit), the share of samples of
+        the mask with an estimate (``valid``), and for filters with a covariance the normalised innovation squared per
+        degree of freedom (``nis``; 1 if consistent). In ``frame.attrs``: ``skipped``, (estimator, trajectory, reason)
+        of what could not be run; ``references``, trajectory → what stood in for its truth; ``reference_clock``.
 
     Raises:
-        ValueError: an unknown estimator, no estimator or no trajectory, two trajectories or estimators of one name.
+        ValueError: an unknown estimator or option, no estimator or no trajectory, two trajectories or estimators of
+            one name, or nothing could be run.
         FileNotFoundError: a recording that is not there.
-    """
-    import pandas
 
+    Warns:
+        UserWarning: for every finding about a recording, and for what could not be run.
+    """
+    from .error_table import ErrorTable
+
+    if reference_clock not in get_args(ReferenceClock):
+        raise ValueError(f"reference_clock must be one of {get_args(ReferenceClock)}, got {reference_clock!r}")
     contenders = named_estimators(estimators)
-    paths = [trajectories] if isinstance(trajectories, Trajectory | str | Path) else list(trajectories)
-    if not contenders or not paths:
-        raise ValueError(f"evaluate needs estimators and trajectories, got {len(contenders)} and {len(paths)}")
+    loaded = named_trajectories(trajectories)
+    if not contenders or not loaded:
+        raise ValueError(f"evaluate needs estimators and trajectories, got {len(contenders)} and {len(loaded)}")
+    for name in (*contenders.values(), reference):
+        if isinstance(name, str) and name not in (AUTO, ONBOARD) and name not in list_estimators():
+            make_estimator(name)  # raises, with the names that there are
     rows: list[tuple[Any, ...]] = []
     skipped: list[tuple[str, str, str]] = []
-    seen: set[str] = set()
-    bar = progress_bar(len(paths) * len(contenders), "evaluate", "run", show=progress)
-    for path in paths:
-        trajectory = path if isinstance(path, Trajectory) else load_recording(path)
-        if trajectory.name in seen:
-            raise ValueError(f"two trajectories are named {trajectory.name!r}; give them different names")
-        seen.add(trajectory.name)
-        stand_in = None if trajectory.truth or reference is None else reference_truth(reference, trajectory)
-        for label, contender in contenders.items():
+    references: dict[str, str] = {}
+    bar = progress_bar(len(loaded) * len(contenders), "evaluate", "run", show=progress)
+    for trajectory in loaded:
+        if check:
+            report_findings(trajectory)
+        one = Evaluation(trajectory, contenders, reference, reference_clock)
+        for label in contenders:
             bar.set_postfix_str(f"{label} on {trajectory.name}")
-            try:
-                estimator = fitted(contender, trajectory)
-            except ImportError as reason:
-                skipped.append((label, trajectory.name, str(reason)))
-                bar.update()
-                continue
-            missing = [channel.name for channel in estimator.channels if channel.name not in trajectory.measurements]
-            if missing:
-                skipped.append((label, trajectory.name, f"no channel {', '.join(missing)}"))
-            else:
-                estimate = run(estimator, trajectory.measurements)
-                # That the stand-in agrees with itself says nothing.
-                other = None if stand_in is not None and stand_in[0] == label else stand_in
-                for quantity, metric, value, unit in errors(estimator, estimate, trajectory, other):
-                    rows.append((label, trajectory.name, quantity, metric, value, unit))
+            one.run(label)
             bar.update()
+        rows += [(label, trajectory.name, *row) for label, found in one.rows().items() for row in found]
+        skipped += [(label, trajectory.name, reason) for label, reason in one.skipped.items()]
+        if one.reference is not None:
+            references[trajectory.name] = one.reference[0]
     bar.close()
-    frame = pandas.DataFrame(rows, columns=list(COLUMNS))
-    frame.attrs["skipped"] = skipped
+    for label, name, reason in skipped:
+        warnings.warn(f"{label} was not run on {name}: {reason}", stacklevel=2)
+    if not rows:
+        reasons = "; ".join(dict.fromkeys(f"{label}: {reason}" for label, _, reason in skipped))
+        raise ValueError(f"nothing could be run: {reasons}")
+    frame = ErrorTable(rows, columns=list(COLUMNS))
+    frame.attrs |= {"skipped": skipped, "references": references, "reference_clock": reference_clock}
     return frame
+
+
+class Evaluation:
+    """All estimators on one trajectory: what they gave, or why they could not be run."""
+
+    def __init__(
+        self,
+        trajectory: Trajectory,
+        contenders: Mapping[str, str | Estimator[Any]],
+        reference: str | Estimator[Any] | None,
+        clock: ReferenceClock,
+    ) -> None:
+        self.contenders = contenders
+        self.skipped: dict[str, str] = {}
+        self.reference: StandIn | None = None
+        self.everyone = reference is None or reference == AUTO
+        self.estimates: dict[str, tuple[Estimator[Any], Any]] = {}
+        try:
+            if clock == "corrected":
+                from ..envs.data.reference_clock import KEY, corrected, measured
+
+                trajectory = corrected(trajectory if KEY in trajectory.metadata else measured(trajectory))
+            trajectory = trajectory.on_grid()
+        except ValueError as reason:
+            self.skipped = dict.fromkeys(contenders, str(reason))
+        self.trajectory = trajectory
+        self.blind = without_truth(trajectory)
+        if self.blind and reference is not None and not self.skipped:
+            chosen = automatic_reference(trajectory) if reference == AUTO else reference
+            if chosen is not None:
+                label = chosen if isinstance(chosen, str) else label_of(chosen)
+                try:
+                    self.reference = reference_pose(chosen, label, trajectory)
+                except (ValueError, ImportError) as reason:
+                    warnings.warn(f"{reason}; estimators are compared with each other", stacklevel=4)
+                    self.everyone = True
+
+    def run(self, label: str) -> None:
+        """Run one estimator; whatever it raises on these data is the reason why it is left out."""
+        if label in self.skipped:
+            return
+        try:
+            estimator = fitted(self.contenders[label], self.trajectory)
+            names = [channel.name for channel in estimator.channels]
+            lacking = [name for name in names if name not in self.trajectory.measurements]
+            if lacking:
+                self.skipped[label] = f"no channel {', '.join(lacking)}"
+                return
+            self.estimates[label] = (estimator, run_on(estimator, self.trajectory))
+        except Exception as reason:  # an estimator may be anybody's: one that fails must not cost the others' results
+            kind = "" if isinstance(reason, ValueError | ImportError) else f"{type(reason).__name__}: "
+            self.skipped[label] = f"{kind}{reason}"
+
+    def rows(self) -> dict[str, list[Row]]:
+        """Label → rows of the table."""
+        others: list[StandIn] = []
+        if self.blind:
+            others = [] if self.reference is None else [self.reference]
+            known = {label for label, _ in others}
+            if self.everyone:
+                poses = {label: with_up(estimate.pose) for label, (_, estimate) in self.estimates.items()}
+                others += [(label, pose) for label, pose in poses.items() if label not in known]
+        found = {}
+        for label, (estimator, estimate) in self.estimates.items():
+            # That an estimator agrees with itself says nothing.
+            found[label] = errors(estimator, estimate, self.trajectory, [one for one in others if one[0] != label])
+            nis = next((value for _, metric, value, _ in found[label] if metric == "nis"), 0.0)
+            if nis > LARGEST_NIS.get(family(label), float("inf")):
+                warnings.warn(
+                    f"{self.trajectory.name}: the innovations of {label} are {nis:.3g} times as large (squared) as it "
+                    "expects; likely causes: wrong units or signs, or a motion that goes far away (a vehicle)",
+                    stacklevel=3,
+                )
+        return found
+
+
+def report_findings(trajectory: Trajectory) -> None:
+    """Warn of everything that makes estimates wrong."""
+    for finding in check_recording(trajectory):
+        if finding.severity == "warning":
+            warnings.warn(f"{trajectory.name}: {finding}", stacklevel=3)
+
+
+def named_trajectories(trajectories: Trajectories) -> list[Trajectory]:
+    """Trajectories, loaded, each of a name of its own.
+
+    Raises:
+        ValueError: two that were given as objects have one name.
+        FileNotFoundError: a recording that is not there.
+    """
+    items = [trajectories] if isinstance(trajectories, Trajectory | str | Path) else list(trajectories)
+    loaded = [item if isinstance(item, Trajectory) else load_recording(item) for item in items]
+    return distinct(loaded, [None if isinstance(item, Trajectory) else Path(item) for item in items])
+
+
+def distinct(trajectories: Sequence[Trajectory], paths: Sequence[Path | None]) -> list[Trajectory]:
+    """The same trajectories; those that share a name are named after their paths, as far as these differ.
+
+    Raises:
+        ValueError: two without a path have one name.
+    """
+    count = Counter(trajectory.name for trajectory in trajectories)
+    shared = {name for name, times in count.items() if times > 1}
+    files = [path.resolve() for path, one in zip(paths, trajectories, strict=True) if path and one.name in shared]
+    root = Path(os.path.commonpath([file.parent for file in files])) if files else Path()
+    named: list[Trajectory] = []
+    for path, trajectory in zip(paths, trajectories, strict=True):
+        if trajectory.name in shared and path is not None:
+            relative = path.resolve().relative_to(root)
+            name = relative.with_suffix("").as_posix()
+            # One file may hold several sensors, and files may differ in their ending only.
+            if relative.stem != trajectory.name:
+                name = f"{name}/{trajectory.name}"
+            if any(one.name == name for one in named):
+                name = f"{relative.as_posix()}"
+            trajectory = trajectory.replace(metadata={**trajectory.metadata, "name": name})
+        if any(one.name == trajectory.name for one in named):
+            raise ValueError(f"two trajectories are named {trajectory.name!r}; give them different names")
+        named.append(trajectory)
+    return named
 
 
 def named_estimators(estimators: Estimators) -> dict[str, str | Estimator[Any]]:
@@ -118,95 +261,3 @@ def label_of(estimator: Estimator[Any]) -> str:
     """The name an estimator has of itself, or that of its model's class."""
     name = getattr(estimator, "name", None)
     return str(name) if name else type(getattr(estimator, "model", estimator)).__name__
-
-
-def fitted(contender: str | Estimator[Any], trajectory: Trajectory) -> Estimator[Any]:
-    """An estimator at the trajectory's sampling interval; one that is named is configured with its metadata."""
-    if isinstance(contender, str):
-        return make_estimator(contender, dt=trajectory.dt, metadata=trajectory.metadata)
-    return at_interval(contender, trajectory.dt)
-
-
-def at_interval(contender: str | Estimator[Any], dt: float) -> Estimator[Any]:
-    """An estimator for samples ``dt`` seconds apart."""
-    if isinstance(contender, str):
-        return make_estimator(contender, dt=dt)
-    return contender if abs(contender.dt - dt) <= 1e-6 * dt else contender.with_dt(dt)
-
-
-def has_truth(trajectory: Trajectory) -> bool:
-    """Whether the trajectory knows where up is."""
-    return UP.name in trajectory.quantities
-
-
-def reference_truth(reference: str | Estimator[Any], trajectory: Trajectory) -> tuple[str, dict[str, np.ndarray]]:
-    """Label and pose of the estimator that stands in for the truth.
-
-    Raises:
-        ValueError: the trajectory lacks a channel that the reference needs.
-    """
-    estimator = at_interval(reference, trajectory.dt)
-    label = reference if isinstance(reference, str) else label_of(reference)
-    return label, with_up(run(estimator, trajectory.measurements).pose)
-
-
-def with_up(pose: Mapping[str, Any]) -> dict[str, Any]:
-    """The pose with ``up``, which every orientation contains."""
-    for name in (ORIENTATION.name, RELATIVE_ORIENTATION.name):
-        if UP.name not in pose and name in pose:
-            return {**pose, UP.name: rotation.up_in_body(pose[name])}
-    return dict(pose)
-
-
-def errors(
-    estimator: Estimator[Any],
-    estimate: Estimate,
-    trajectory: Trajectory,
-    stand_in: tuple[str, dict[str, np.ndarray]] | None = None,
-) -> list[tuple[str, str, float, str]]:
-    """Rows (quantity, metric, value, unit) of one run."""
-    pose = with_up(estimate.pose)
-    equations = equations_of(estimator)
-    derived = equations.truth(trajectory.truth) if isinstance(equations, Equations) else {}
-    if derived:
-        trajectory = trajectory.replace(truth={**derived, **trajectory.truth})
-    outputs = {quantity.name: quantity for quantity in (UP, *estimator.outputs)}
-    rows: list[tuple[str, str, float, str]] = []
-    for name, quantity in outputs.items():
-        truth, suffix = truth_of(quantity, trajectory, stand_in)
-        # The inclination of an orientation is scored once, as that of its upward vertical.
-        if truth is None or name not in pose or name == RELATIVE_ORIENTATION.name:
-            continue
-        for metric, (value, unit) in score(quantity, pose[name], truth, trajectory.mask).items():
-            if quantity.kind != "rotation" or metric not in ("inclination", "valid"):
-                rows.append((name, metric + (suffix if metric != "valid" else ""), value, unit))
-    if estimate.nis is not None and estimate.innovation is not None:
-        degrees = (np.asarray(estimate.innovation) != 0.0).sum(axis=-1)
-        rows.append(("innovation", "nis", consistency(estimate.nis, degrees, trajectory.mask).ratio, "1"))
-    return rows
-
-
-def truth_of(
-    quantity: Quantity, trajectory: Trajectory, stand_in: tuple[str, dict[str, np.ndarray]] | None
-) -> tuple[np.ndarray | None, str]:
-    """What an estimate is compared with, and what to add to the name of the metric."""
-    if quantity.name in trajectory.quantities:
-        return trajectory.truth_of(quantity.name), ""
-    if stand_in is not None and quantity.name in stand_in[1] and quantity.kind in ("direction", "rotation"):
-        return stand_in[1][quantity.name], f" to {stand_in[0]}"
-    return None, ""
-
-
-def summary(table: pandas.DataFrame, metric: str = "inclination", groups: Mapping[str, str] | None = None) -> Any:
-    """Means over trajectories as a wide table: a row an estimator, a column a group, best estimators first.
-
-    Args:
-        table: from :func:`evaluate`, with one quantity that has this metric.
-        metric: which metric.
-        groups: trajectory → group; by default every trajectory is its own. The column ``mean`` is over trajectories.
-    """
-    chosen = table[table["metric"] == metric]
-    labels = chosen["trajectory"].map(lambda name: (groups or {}).get(name, name))
-    wide = chosen.assign(group=labels).pivot_table(index="estimator", columns="group", values="value", sort=False)
-    wide["mean"] = chosen.groupby("estimator")["value"].mean()
-    return wide.sort_values("mean")

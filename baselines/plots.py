@@ -11,7 +11,7 @@ import numpy as np
 from ..envs.data.trajectory import Trajectory
 from ..filters.core.metrics import DEGREES, error
 from ..filters.core.quantity import UP, Estimate
-from .evaluation import summary, with_up
+from .scoring import with_up
 
 if TYPE_CHECKING:
     import pandas
@@ -56,42 +56,65 @@ def save(figure: Figure, path: Path) -> Path:
     return path
 
 
-def rms_bars(
-    table: pandas.DataFrame, kinds: Mapping[str, str], metric: str = "inclination", title: str = "", limit: float = 12.0
-) -> Figure:
+def rms_bars(table: pandas.DataFrame, kinds: Mapping[str, str], metric: str = "inclination", title: str = "") -> Figure:
     """Mean error of every estimator as bars, best on top, with each trajectory as a dot.
+
+    The scale is that of the better half of the estimators: what lies beyond is cut, the cut bar is open at its end,
+    and a triangle at the edge tells how many trajectories lie outside and the largest of them.
 
     Args:
         table: from :func:`poise.evaluate`.
         kinds: estimator → kind, for the colours.
         metric: which metric.
         title: above the axes.
-        limit: bars and dots beyond it are cut (the number at the right is not).
     """
-    means = summary(table, metric)["mean"]
+    from .error_table import summary
+
+    means = summary(table, metric)["mean"].dropna()
     chosen = table[table["metric"] == metric]
     unit = chosen["unit"].iloc[0]
-    figure, (ax,) = new_figure(7.5, 1.1 + 0.3 * len(means))
+    figure, (ax,) = new_figure(7.5, 1.1 + 0.3 * max(len(means), 1))
     positions = np.arange(len(means))[::-1]
-    limit = min(limit, 1.15 * float(means.max()))
+    limit = scale_of(means, chosen)
     for position, (name, mean) in zip(positions, means.items(), strict=True):
         colour = COLOURS.get(kinds.get(str(name), ""), COLOURS["baseline"])
         ax.barh(position, min(mean, limit), height=0.62, color=colour, alpha=0.85)
         values = chosen.loc[chosen["estimator"] == name, "value"]
-        inside = values[values <= limit]
+        inside, outside = values[values <= limit], values[values > limit]
         ax.plot(inside, np.full(len(inside), position), "o", color="black", markersize=2.6, alpha=0.55)
         # Values stand in a column of their own, where no dot can lie.
-        ax.text(1.02 * limit, position, f"{mean:.2f}", va="center", fontsize=8.5)
+        text = f"{mean:.2f}"
+        if len(outside):
+            ax.plot(limit, position, ">", color="black", markersize=4.5, clip_on=False)
+            text += f"   ({len(outside)} beyond, up to {outside.max():.3g})"
+        ax.text(1.03 * limit, position, text, va="center", fontsize=8.5)
     ax.set_yticks(positions, [str(name) for name in means.index])
-    ax.set_xlim(0.0, 1.12 * limit)
-    ax.set_xlabel(f"{metric} error, RMS, {unit} (bar: mean, dot: one trajectory)")
+    ax.set_xlim(0.0, (1.45 if (chosen["value"] > limit).any() else 1.12) * limit)
+    ax.set_xticks([tick for tick in ax.get_xticks() if tick <= 1.001 * limit])
+    beyond = ", triangle: cut" if (chosen["value"] > limit).any() else ""
+    ax.set_xlabel(f"{metric} error, RMS, {unit} (bar: mean, dot: one trajectory{beyond})")
     ax.grid(axis="y", visible=False)
     present = [kind for kind in COLOURS if kind in {kinds.get(str(name)) for name in means.index}]
     patches = [_patch(COLOURS[kind]) for kind in present]
-    figure.legend(patches, present, loc="outside upper right", ncols=len(present), frameon=False, fontsize=8.5)
+    if present:
+        figure.legend(patches, present, loc="outside upper right", ncols=len(present), frameon=False, fontsize=8.5)
     if title:
         ax.set_title(title, loc="left", fontsize=10.5)
     return figure
+
+
+def scale_of(means: pandas.Series, chosen: pandas.DataFrame) -> float:
+    """End of the scale: all values of the better half of the estimators, and the bars of those nearly as good."""
+    better = list(means.index[: max(1, (len(means) + 1) // 2)])
+    values = chosen.loc[chosen["estimator"].isin(better), "value"].to_numpy()
+    values = values[np.isfinite(values)]
+    if not len(values) or not values.max() > 0.0:
+        return 1.0
+    # A single bad trajectory of a good estimator must not set the scale either.
+    middle = max(float(np.quantile(values, 0.9)), float(means[better].max()))
+    limit = min(float(values.max()), 2.0 * middle)
+    near = means[means <= 1.5 * limit]
+    return 1.08 * max(limit, float(near.max()) if len(near) else 0.0)
 
 
 def _patch(colour: str) -> Any:
@@ -122,21 +145,108 @@ def error_curves(
         if values is not None:
             length, label = np.linalg.norm(values, axis=-1), read if channel in trajectory.measurements else true
             motion.plot(time, length, color=colour, linewidth=0.6, label=label)
-    motion.legend(loc="upper left", frameon=False, fontsize=8, ncols=2)
+    legend_above(motion)
     truth = trajectory.truth_of(UP.name)
     styles: Sequence[str] = ("-", "--", ":", "-.")
     used: dict[str, int] = {}
+    usual: list[float] = []
     for label, estimate in estimates.items():
         kind = kinds.get(label, "")
         style = styles[used.get(kind, 0) % len(styles)]
         used[kind] = used.get(kind, 0) + 1
         per_tick = error(UP, with_up(estimate.pose)[UP.name], truth) * DEGREES
+        usual.append(float(np.nanquantile(per_tick, 0.995)) if np.isfinite(per_tick).any() else 0.0)
         colour = COLOURS.get(kind, COLOURS["baseline"])
         errors.plot(time, per_tick, color=colour, linestyle=style, linewidth=0.9, label=label)
     errors.set_ylabel("inclination error, deg")
     errors.set_xlabel("time, s")
-    errors.set_ylim(bottom=0.0)
-    errors.legend(loc="upper left", frameon=False, fontsize=8, ncols=3)
+    # The better half sets the scale: one estimator that is lost would flatten all others.
+    end = 1.3 * sorted(usual)[(len(usual) - 1) // 2] if usual else 1.0
+    errors.set_ylim(0.0, max(end, 1e-3))
+    legend_above(errors)
+    cut = [label for label, value in zip(estimates, usual, strict=True) if value > end]
+    if cut:
+        errors.text(0.0, 1.02, f"cut: {', '.join(cut)}", transform=errors.transAxes, fontsize=8)
     if title:
-        motion.set_title(title, loc="left", fontsize=10.5)
+        figure.suptitle(title, x=0.01, ha="left", fontsize=10.5)
+    return figure
+
+
+def angle_curves(trajectories: Mapping[str, Trajectory], estimates: Mapping[str, Estimate]) -> Figure:
+    """Roll, pitch and yaw of sensors over time, with two standard deviations to either side, and the truth if known.
+
+    Args:
+        trajectories: sensor → recording.
+        estimates: sensor → estimate, from :func:`poise.run`.
+    """
+    from ..filters.core.frames import ANGLES, attitude_columns
+
+    frames = {name: estimate.to_frame() for name, estimate in estimates.items()}
+    shown = [angle for angle in ANGLES if any(angle in frame for frame in frames.values())]
+    figure, axes = new_figure(8.5, 1.0 + 1.7 * len(shown), rows=len(shown))
+    colours = list(COLOURS.values())
+    spans: dict[str, list[float]] = {}
+    for number, (name, frame) in enumerate(frames.items()):
+        trajectory, colour = trajectories[name], colours[number % len(colours)]
+        # A heading that no magnetometer gave is not that of the truth.
+        absolute = "orientation" in estimates[name].pose
+        truth = attitude_columns(trajectory.truth)
+        for ax, angle in zip(axes, shown, strict=True):
+            if angle not in frame:
+                continue
+            if angle in truth and (absolute or angle != "yaw"):
+                ax.plot(trajectory.time, unwrapped(truth[angle]), color=TRUTH_COLOR, linewidth=0.9, label="truth")
+            values = unwrapped(frame[angle].to_numpy())
+            ax.plot(frame["time"], values, color=colour, linewidth=0.9, label=name)
+            if f"std_{angle}" in frame and (absolute or angle != "yaw"):
+                # Where an angle is undefined (pitch ±90°) its band would hide everything.
+                band = np.minimum(2.0 * frame[f"std_{angle}"].to_numpy(), 180.0)
+                ax.fill_between(frame["time"], values - band, values + band, color=colour, alpha=0.2, linewidth=0.0)
+            ax.set_ylabel(f"{angle}, deg")
+            span = [np.nanmin(values), np.nanmax(values)] if np.isfinite(values).any() else [0.0, 1.0]
+            spans.setdefault(angle, []).extend(span)
+    for ax, angle in zip(axes, shown, strict=True):
+        low, high = min(spans[angle]), max(spans[angle])
+        # Bands that leave the picture tell enough there; the angles set the scale.
+        ax.set_ylim(low - 0.1 * (high - low) - 1.0, high + 0.1 * (high - low) + 1.0)
+    axes[-1].set_xlabel("time, s")
+    handles = dict(zip(*axes[0].get_legend_handles_labels()[::-1], strict=True))
+    figure.legend(handles.values(), handles, loc="outside upper right", ncols=6, frameon=False, fontsize=8)
+    return figure
+
+
+def unwrapped(degrees: np.ndarray) -> np.ndarray:
+    """Angles with a gap instead of a line where they wrap."""
+    jump = np.abs(np.diff(degrees, prepend=degrees[:1])) > 180.0
+    return np.where(jump, np.nan, degrees)
+
+
+def signals(trajectory: Trajectory, rest: Mapping[str, np.ndarray]) -> Figure:
+    """Lengths of angular rate, specific force and magnetic field of every sensor over time; rest is shaded.
+
+    Args:
+        trajectory: a recording.
+        rest: sensor → ``(T,)`` bool, from :func:`poise.envs.data.inspection.inspect_recording`.
+    """
+    labels = {"gyr": "|rate|, rad/s", "acc": "|force|, m/s²", "mag": "|field|"}
+    kinds = [kind for kind in labels if any(f"{place}/{kind}" in trajectory.measurements for place in rest)]
+    figure, axes = new_figure(8.5, 0.8 + 1.5 * max(len(kinds), 1), rows=max(len(kinds), 1))
+    for kind, ax in zip(kinds, axes, strict=False):
+        for number, place in enumerate(rest):
+            values = trajectory.measurements.get(f"{place}/{kind}")
+            if values is not None:
+                colour = list(COLOURS.values())[number % len(COLOURS)]
+                ax.plot(trajectory.time, np.linalg.norm(values, axis=1), color=colour, linewidth=0.6, label=place)
+        ax.set_ylabel(labels[kind])
+        ax.set_ylim(bottom=0.0)
+    if len(rest) == 1:
+        (resting,) = rest.values()
+        for ax in axes:
+            ax.fill_between(
+                trajectory.time, 0, 1, where=resting, transform=ax.get_xaxis_transform(), color="#d9dde3", step="post"
+            )
+    elif kinds:
+        legend_above(axes[0])
+    axes[0].set_title(f"{trajectory.name}{' (shaded: rest)' if len(rest) == 1 else ''}", loc="left", fontsize=10)
+    axes[-1].set_xlabel("time, s")
     return figure

@@ -46,7 +46,13 @@ COMMANDS: dict[str, Command] = {
     "rides": Command(".rides", "ride every scenario with every rider; numbers beside those of the papers"),
     "train": Command(".train", "train a learned estimator"),
     "tune": Command(".tune", "fit the gains of a filter: constant ones, or a policy that sets them"),
-    "evaluate": Command(".evaluate", "measure estimators on recorded trajectories"),
+    "inspect": Command(
+        ".recordings.inspect", "what a recording holds, and whether its units, signs and clock are plausible"
+    ),
+    "estimate": Command(
+        ".recordings.estimate", "angles, quaternions and their standard deviations of a recording, as a file"
+    ),
+    "evaluate": Command(".recordings.evaluate", "measure estimators on recorded trajectories"),
     "calibrate": Command(".calibrate", "scale, offset and axes of raw sensors, from rate-table and tumbling runs"),
     "array": Command(".array", "what an array of accelerometers can tell: rank and noise gains"),
     "benchmark": Command(".benchmark", "compare all estimators on simulated motion and on recordings"),

@@ -39,31 +39,35 @@ def parts(table: pandas.DataFrame) -> Iterator[tuple[str, str, pandas.DataFrame]
     """Title, metric and rows of each metric in deg; of each quantity apart where several have the metric.
 
     Estimators that give no angle (the angular rate alone) come after these, with the quantities that they give.
+    Distances between estimators are not errors: see :func:`agreement_tables`.
     """
-    angles = table[table["unit"] == "deg"]
+    import pandas
+
+    angles = table[(table["unit"] == "deg") & ~table["metric"].str.contains(" to ")]
+    valid = table[table["metric"] == "valid"]
     for metric in angles["metric"].unique():
         title = TITLES.get(metric, f"RMS {metric}, deg")
-        if " to " in metric:
-            title += " (agreement, not error: these recordings have no truth)"
         of_metric = angles[angles["metric"] == metric]
         quantities = of_metric["quantity"].unique()
         for quantity in quantities:
             name = f"{quantity}: {title}" if len(quantities) > 1 else title
-            yield name, metric, of_metric[of_metric["quantity"] == quantity]
-    others = table[~table["estimator"].isin(angles["estimator"]) & (table["metric"] != "valid")]
+            part = of_metric[of_metric["quantity"] == quantity]
+            yield name, metric, pandas.concat([part, valid[valid["quantity"] == quantity]])
+    shown = angles["estimator"]
+    others = table[~table["estimator"].isin(shown) & ~table["metric"].str.contains("^valid$| to |^nis$")]
     for (quantity, metric, unit), part in others.groupby(["quantity", "metric", "unit"], sort=False):
         yield f"{quantity}: RMS {metric}, {unit}", metric, part
 
 
 def wide_tables(table: pandas.DataFrame, groups: Mapping[str, str] | None = None) -> dict[str, list[dict[str, Any]]]:
     """Title → rows (an estimator each, a column a group, then the mean over trajectories), for every metric in deg."""
-    from ..baselines.evaluation import summary
+    from ..baselines.error_table import summary
 
     kinds = kinds_of(table["estimator"].unique())
     tables = {}
     for title, metric, part in parts(table):
         wide = summary(part, metric, groups)
-        if len(wide.columns) == 2:  # of a single group the mean says it all again
+        if len(wide.columns.drop(["valid"], errors="ignore")) == 2:  # of a single group the mean says it all again
             wide = wide.drop(columns="mean")
         tables[title] = [
             {"estimator": name, "kind": kinds.get(str(name), "–"), **{str(key): value for key, value in row.items()}}
@@ -72,23 +76,53 @@ def wide_tables(table: pandas.DataFrame, groups: Mapping[str, str] | None = None
     return tables
 
 
+def agreement_tables(table: pandas.DataFrame) -> dict[str, list[dict[str, Any]]]:
+    """Title → rows of recordings without truth: how far each estimator is from each other, and its consistency."""
+    from ..baselines.error_table import agreement
+    from ..baselines.scoring import family
+
+    references = set(table.attrs.get("references", {}).values())
+    tables = {}
+    for metric in TITLES:
+        wide = agreement(table, metric)
+        if wide.empty:
+            continue
+        rows = []
+        for name, row in wide.iterrows():
+            related = any(family(str(name)) == family(one) and name != one for one in references)
+            label = f"{name} (family of the reference)" if related else str(name)
+            rows.append({"estimator": label, **{f"to {other}": value for other, value in row.items()}})
+        told = f"; reference {', '.join(sorted(references))}" if references else ""
+        tables[f"Agreement, {metric}, RMS, deg (no truth: neither error nor ranking{told})"] = rows
+    if tables:
+        nis = table[table["metric"] == "nis"].groupby("estimator", sort=False)["value"].mean()
+        rows = [{"estimator": name, "NIS": value} for name, value in nis.items()]
+        if rows:
+            tables["Innovations: NIS a degree of freedom (1 if the noise is as assumed)"] = rows
+    return tables
+
+
 def narrow(row: Mapping[str, Any]) -> dict[str, Any]:
     """A row that fits a terminal: with many groups only their mean, median and largest."""
-    numbers = [value for value in row.values() if isinstance(value, float)]
-    if len(numbers) <= MOST_COLUMNS:
+    numbers = {name: value for name, value in row.items() if isinstance(value, float)}
+    groups = [value for name, value in numbers.items() if name not in ("mean", "valid")]
+    if len(numbers) <= MOST_COLUMNS or "mean" not in numbers:
         return dict(row)
-    *groups, mean = numbers
     texts = {name: value for name, value in row.items() if not isinstance(value, float)}
     finite = [value for value in groups if value == value]
-    return {**texts, "mean": mean, "median": statistics.median(finite), "largest": max(finite)}
+    middle = {"mean": numbers["mean"], "median": statistics.median(finite), "largest": max(finite)} if finite else {}
+    return {**texts, **middle, **({"valid": numbers["valid"]} if "valid" in numbers else {})}
 
 
 def skipped_text(table: pandas.DataFrame) -> str:
-    """What could not be run and why, a line an estimator."""
-    reasons: dict[str, set[str]] = {}
-    for estimator, _, reason in table.attrs.get("skipped", []):
-        reasons.setdefault(estimator, set()).add(reason)
-    return "\n".join(f"- {name}: {'; '.join(sorted(why))}" for name, why in reasons.items())
+    """What could not be run and why, a line an estimator and reason."""
+    where: dict[tuple[str, str], list[str]] = {}
+    for estimator, trajectory, reason in table.attrs.get("skipped", []):
+        where.setdefault((estimator, reason), []).append(trajectory)
+    return "\n".join(
+        f"- {name}: {reason} ({names[0] if len(names) == 1 else f'{len(names)} recordings'})"
+        for (name, reason), names in where.items()
+    )
 
 
 def print_comparison(
@@ -114,6 +148,14 @@ def print_comparison(
         heading = f"{name}: {title}" if name else title
         out.show([narrow(row) for row in rows], heading)
         sections[heading] = markdown_table(rows)
+    for title, rows in agreement_tables(table).items():
+        heading = f"{name}: {title}" if name else title
+        out.show(rows, heading)
+        sections[heading] = markdown_table(rows)
+    if table.attrs.get("reference_clock") and table["metric"].isin(list(TITLES)).any():
+        words = {"recorded": "as recorded", "corrected": "corrected by the measured offset"}
+        sections[f"{name}: reference clock".lstrip(": ")] = f"{words[table.attrs['reference_clock']]}."
+        out.say(f"clock of the reference: {words[table.attrs['reference_clock']]}")
     found = list(parts(table))
     for _, metric, part in found:
         several = sum(metric == other for _, other, _ in found) > 1
@@ -143,24 +185,24 @@ def draw_example(
     Returns:
         Heading → Markdown; empty if no trajectory has a truth, or no estimator an inclination.
     """
-    from ..baselines.evaluation import fitted, has_truth, summary
+    from ..baselines.error_table import summary
     from ..baselines.plots import error_curves, save
-    from ..filters.core.estimator import run as run_estimator
+    from ..baselines.run import run as run_estimator
+    from ..baselines.scoring import has_truth
 
-    known = [trajectory for trajectory in trajectories if has_truth(trajectory)]
+    scored = set(table.loc[table["metric"] == "inclination", "trajectory"])
+    known = [trajectory for trajectory in trajectories if has_truth(trajectory) and trajectory.name in scored]
     if not known:
         return {}
     trajectory = known[-1]
+    table = table[table["trajectory"] == trajectory.name]
     kinds = kinds_of(contenders)
     best: dict[str, str] = {}
     for label in summary(table).index:
         best.setdefault(kinds.get(str(label), ""), str(label))
     if not best:
         return {}
-    estimates = {
-        label: run_estimator(fitted(contenders[label], trajectory), trajectory.measurements)
-        for label in list(best.values())[:most]
-    }
+    estimates = {label: run_estimator(contenders[label], trajectory) for label in list(best.values())[:most]}
     figure = error_curves(trajectory, estimates, kinds, f"{name}: {trajectory.name}, best estimator of each kind")
     path = save(figure, run.figures / f"{name}-over-time.png")
     return {f"Figure: {name} over time": f"![{name} over time]({path.relative_to(run.folder)})"}

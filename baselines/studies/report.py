@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..evaluation import COLUMNS
 from ..plots import save
+from ..scoring import COLUMNS
 from .claims import Claim
 
 if TYPE_CHECKING:

@@ -10,6 +10,7 @@ EXTRAS: dict[str, frozenset[str]] = {
     "learn": frozenset({"torch", "tensorboard"}),
     "rl": frozenset({"stable_baselines3", "torch", "tensorboard"}),
     "compare": frozenset({"ahrs", "imufusion", "vqf"}),
+    "parquet": frozenset({"pyarrow"}),
 }
 """Extra → the modules that it brings."""
 

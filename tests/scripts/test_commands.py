@@ -6,7 +6,7 @@ import re
 import pandas
 import pytest
 
-from poise.baselines.evaluation import COLUMNS
+from poise.baselines.scoring import COLUMNS
 from poise.envs.data.trajectory import load_trajectory
 from poise.filters.support.seeds import child_seed
 from poise.scripts.main import main

@@ -6,7 +6,7 @@ import numpy as np
 import pandas
 import pytest
 
-from poise.baselines.evaluation import COLUMNS
+from poise.baselines.scoring import COLUMNS
 from poise.baselines.studies.rides.reports import REPORTED, comparison
 from poise.baselines.studies.rides.statistics import RideStatistics, ride, trunk_lean
 from poise.envs.bicycle.course.scenarios import list_scenarios

@@ -290,8 +290,8 @@ def recordings(study: Study, report: Report) -> None:
 def recorded_errors(path: Path) -> dict[str, Any]:
     """Errors of the modes on one recording; empty if it knows no orientation."""
     from ....envs.data.formats.load import load_recording
-    from ...evaluation import has_truth
     from ...registry import make_estimator
+    from ...scoring import has_truth
 
     trial = load_recording(path)
     if not has_truth(trial) or not {"imu/gyr", "imu/acc"} <= set(trial.measurements):

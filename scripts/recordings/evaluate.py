@@ -1,14 +1,15 @@
-"""Measure estimators on recordings: BROAD trials, Movella/Xsens DOT exports, or trajectories of this package."""
+"""Measure estimators on recordings: those with a reference against it, others against each other."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 import tyro
 
-from .main import run_command
-from .output import Output
+from ..main import run_command
+from ..output import Output
 
 
 @dataclass
@@ -19,10 +20,13 @@ class Args:
     """files, or folders that are searched for recordings"""
     estimators: tuple[str, ...] = ("bounded-motion", "external-acceleration", "mekf", "mahony", "gru")
     """names of estimators; `poise evaluate --estimators all .` takes every one that is installed"""
-    reference: str = "mekf-9"
-    """estimator that stands in for the truth of recordings without one (agreement, not error)"""
+    reference: str = "auto"
+    """what stands in for the truth of recordings without one (agreement, not error): an estimator, `onboard` for the
+    orientation that the device computed, or `auto`: mekf-9, or bounded-motion where there is no magnetometer"""
+    reference_clock: Literal["recorded", "corrected"] = "recorded"
+    """take the truth as recorded, or corrected by the measured offset between its clock and that of the gyroscope"""
     place: str | None = None
-    """in recorded rides of a bicycle, the IMU to look at: bicycle_imu or trunk_imu"""
+    """in recordings of several sensors, the one to look at, such as bicycle_imu or trunk_imu of a ride"""
     calibration: Path | None = None
     """record of `poise calibrate` that turns raw readings of the recordings into SI units"""
     seed: int = 0
@@ -35,28 +39,26 @@ class Args:
 
 def run(args: Args) -> int:
     """Evaluate, print the table, and leave a run folder with a report."""
-    from ..baselines.benchmark import groups_of
-    from ..baselines.evaluation import evaluate
-    from ..baselines.registry import list_estimators
-    from ..envs.data.formats.load import load_recording, recording_files
-    from .experiment import start_run
-    from .report import draw_example, print_comparison, provenance
+    from ...baselines.benchmark import groups_of
+    from ...baselines.evaluation import evaluate
+    from ...baselines.registry import list_estimators
+    from ..experiment import start_run
+    from ..report import draw_example, print_comparison, provenance
+    from .load import load_all, passed_over_text, plain_warnings
 
-    paths = recording_files(args.recordings)
-    if not paths:
-        raise ValueError(f"no recording in {', '.join(map(str, args.recordings))}")
-    trajectories = [load_recording(path, args.calibration) for path in paths]
-    if args.place is not None:
-        from ..envs.bicycle.sensors.single_imu import imu_of
-
-        trajectories = [imu_of(trajectory, args.place) for trajectory in trajectories]
     names = tuple(list_estimators()) if args.estimators == ("all",) else args.estimators
-    table = evaluate(list(names), trajectories, reference=args.reference, progress=True)
+    with plain_warnings():
+        trajectories, passed_over = load_all(args.recordings, args.calibration, args.place)
+        options = {"reference": args.reference, "reference_clock": args.reference_clock}
+        table = evaluate(list(names), trajectories, **options, progress=True)
     folder = start_run("evaluate", args, args.seed, args.runs)
     folder.write_results(table)
     with Output("evaluate", args) as out:
         sections = print_comparison(table, folder, out, groups=groups_of(trajectories))
         sections |= draw_example(table, trajectories, {name: name for name in names}, folder, "recordings")
+        if passed_over:
+            sections["Passed over"] = passed_over_text(passed_over, most=1000)
+            out.say(f"passed over:\n{passed_over_text(passed_over)}")
         sections["Provenance"] = provenance(folder)
         out.report(folder.write_report("poise evaluate", sections))
     return 0

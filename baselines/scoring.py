@@ -1,0 +1,132 @@
+"""Errors of one run: against the truth, or against another estimator where no truth is known."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from ..envs.data.trajectory import Trajectory
+from ..filters.core import rotation
+from ..filters.core.consistency import consistency
+from ..filters.core.estimator import Estimator
+from ..filters.core.metrics import score
+from ..filters.core.model import Equations, equations_of
+from ..filters.core.quantity import ORIENTATION, RELATIVE_ORIENTATION, UP, Estimate, Quantity
+from .run import fitted, run_on
+
+COLUMNS = ("estimator", "trajectory", "quantity", "metric", "value", "unit")
+"""Columns of a table of errors, one number a row."""
+ONBOARD = "onboard"
+"""Reference: the orientation that the device itself computed."""
+AUTOMATIC = ("mekf-9", "bounded-motion")
+"""References for recordings without truth, the first that the channels suffice for."""
+
+StandIn = tuple[str, dict[str, np.ndarray]]
+"""Label and pose of what stands in for the truth."""
+Row = tuple[str, str, float, str]
+"""Quantity, metric, value, unit."""
+
+
+def has_truth(trajectory: Trajectory) -> bool:
+    """Whether the trajectory knows where up is."""
+    return UP.name in trajectory.quantities
+
+
+def without_truth(trajectory: Trajectory) -> bool:
+    """Whether nothing is known that an estimate of the pose could be compared with."""
+    return not set(trajectory.truth) - {"position", "velocity"}
+
+
+def automatic_reference(trajectory: Trajectory) -> str | None:
+    """The reference that a recording can feed: with the heading of a magnetometer that works, or six axes."""
+    from .registry import list_estimators
+
+    alive = {
+        name
+        for name, values in trajectory.measurements.items()
+        if np.isfinite(values).any() and np.nanmax(np.abs(values)) > 0.0
+    }
+    known = list_estimators()
+    return next((name for name in AUTOMATIC if set(known[name].channels) <= alive), None)
+
+
+def onboard_orientation(trajectory: Trajectory) -> np.ndarray:
+    """The orientation ``(T, 4)`` that the device itself computed.
+
+    Raises:
+        ValueError: the recording has none.
+    """
+    names = [name for name in trajectory.measurements if name.endswith("onboard_orientation")]
+    if not names:
+        raise ValueError(f"{trajectory.name!r} holds no orientation of the device's own (…/onboard_orientation)")
+    return trajectory.measurements["imu/onboard_orientation" if "imu/onboard_orientation" in names else names[0]]
+
+
+def reference_pose(reference: str | Estimator[Any], label: str, trajectory: Trajectory) -> StandIn:
+    """What stands in for the truth of a trajectory on its grid.
+
+    Raises:
+        ValueError: the trajectory lacks a channel that the reference needs.
+    """
+    if reference == ONBOARD:
+        orientation = onboard_orientation(trajectory)
+        return ONBOARD, {"orientation": orientation, "up": rotation.up_in_body(orientation)}
+    estimator = fitted(reference, trajectory)
+    lacking = [channel.name for channel in estimator.channels if channel.name not in trajectory.measurements]
+    if lacking:
+        raise ValueError(f"the reference {label!r} needs {', '.join(lacking)}, which {trajectory.name!r} lacks")
+    return label, with_up(run_on(estimator, trajectory).pose)
+
+
+def with_up(pose: Mapping[str, Any]) -> dict[str, Any]:
+    """The pose with ``up``, which every orientation contains."""
+    for name in (ORIENTATION.name, RELATIVE_ORIENTATION.name):
+        if UP.name not in pose and name in pose:
+            return {**pose, UP.name: rotation.up_in_body(pose[name])}
+    return dict(pose)
+
+
+def errors(estimator: Estimator[Any], estimate: Estimate, trajectory: Trajectory, others: list[StandIn]) -> list[Row]:
+    """Rows of one run: errors against the truth, distances to others where it is unknown, shares, consistency."""
+    pose = with_up(estimate.pose)
+    equations = equations_of(estimator)
+    derived = equations.truth(trajectory.truth) if isinstance(equations, Equations) else {}
+    if derived:
+        trajectory = trajectory.replace(truth={**derived, **trajectory.truth})
+    outputs = {quantity.name: quantity for quantity in (UP, *estimator.outputs)}
+    rows: list[Row] = []
+    for name, quantity in outputs.items():
+        # The inclination of an orientation is scored once, as that of its upward vertical.
+        if name not in pose or name == RELATIVE_ORIENTATION.name:
+            continue
+        if name in trajectory.quantities:
+            rows += scored_rows(quantity, pose[name], trajectory.truth_of(name), trajectory.mask)
+        elif quantity.kind in ("direction", "rotation"):
+            compared = [(label, other[name]) for label, other in others if name in other]
+            for label, other in compared:
+                rows += scored_rows(quantity, pose[name], other, trajectory.mask, f" to {label}")
+            if compared and quantity.kind == "direction":
+                rows += [
+                    row for row in scored_rows(quantity, pose[name], pose[name], trajectory.mask) if row[1] == "valid"
+                ]
+    if estimate.nis is not None and estimate.innovation is not None:
+        degrees = (np.asarray(estimate.innovation) != 0.0).sum(axis=-1)
+        rows.append(("innovation", "nis", consistency(estimate.nis, degrees, trajectory.mask).ratio, "1"))
+    return rows
+
+
+def scored_rows(quantity: Quantity, estimate: Any, truth: Any, mask: np.ndarray, suffix: str = "") -> list[Row]:
+    """Metrics of one quantity; a share of samples only of a truth."""
+    return [
+        (quantity.name, metric + suffix, value, unit)
+        for metric, (value, unit) in score(quantity, estimate, truth, mask).items()
+        if (metric != "valid" or not suffix) and (quantity.kind != "rotation" or metric not in ("inclination", "valid"))
+    ]
+
+
+def family(label: str) -> str:
+    """What estimators that share their equations have in common: the name without axes, policy or variant."""
+    return re.sub(r"-9\b|\+policy$", "", label.split(" (")[0])

@@ -1,0 +1,1 @@
+"""Commands on recordings: look at them, estimate, compare estimators, choose one."""

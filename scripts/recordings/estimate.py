@@ -1,0 +1,89 @@
+"""Take estimates away: run an estimator over recordings and write angles, quaternions, standard deviations, biases."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import tyro
+
+from ..main import run_command
+from ..output import Output
+
+if TYPE_CHECKING:
+    from ...filters.core.quantity import Estimate
+
+
+@dataclass
+class Args:
+    """Arguments of ``poise estimate``."""
+
+    recordings: tyro.conf.Positional[tuple[Path, ...]]
+    """files, or folders that are searched for recordings; several sensors are written together"""
+    estimator: str = "bounded-motion"
+    """name of the estimator, see `poise list estimators`"""
+    output: Path | None = None
+    """file to write, .csv, .parquet, .h5, .npz, or .sto for OpenSim"""
+    plot: Path | None = None
+    """picture of the angles over time, .png, .pdf or .svg"""
+    place: str | None = None
+    """in recordings of several sensors, the only one to look at"""
+    calibration: Path | None = None
+    """record of `poise calibrate` that turns raw readings of the recordings into SI units"""
+    json: bool = False
+    """print one JSON document instead of tables"""
+
+
+def run(args: Args) -> int:
+    """Estimate, write, print a summary."""
+    import warnings
+
+    from ...baselines.export import WRITERS, write_estimates
+    from ...baselines.run import run as run_estimator
+    from ...envs.data.plausibility import check_recording
+    from .load import load_all, passed_over_text, plain_warnings, sensors_of
+
+    if args.output is not None and args.output.suffix.lower() not in WRITERS:
+        raise ValueError(f"output must end in one of {', '.join(WRITERS)}, got {args.output.name!r}")
+    with plain_warnings(), Output("estimate", args) as out:
+        loaded, passed_over = load_all(args.recordings, args.calibration, args.place)
+        sensors = {sensor.name: sensor for one in loaded for sensor in sensors_of(one)}
+        estimates: dict[str, Estimate] = {}
+        for name, sensor in sensors.items():
+            for finding in check_recording(sensor):
+                if finding.severity == "warning":
+                    warnings.warn(f"{name}: {finding}", stacklevel=1)
+            estimates[name] = run_estimator(args.estimator, sensor)
+        rows = [summary_row(name, estimate) for name, estimate in estimates.items()]
+        out.table(rows, f"Angles by {args.estimator}, deg (±: standard deviation at the end)")
+        if passed_over:
+            out.say(f"passed over:\n{passed_over_text(passed_over)}")
+        if args.output is not None:
+            out.say(f"estimates: {write_estimates(estimates, args.output)}")
+        if args.plot is not None:
+            from ...baselines.plots import angle_curves, save
+
+            out.say(f"figure: {save(angle_curves(sensors, estimates), args.plot)}")
+    return 0
+
+
+def summary_row(name: str, estimate: Estimate) -> dict[str, Any]:
+    """What an estimate was, in one row: samples, rate, ranges of the angles, final standard deviations."""
+    import numpy as np
+
+    frame = estimate.to_frame()
+    time = frame["time"].to_numpy()
+    rate = 1.0 / float(np.median(np.diff(time))) if len(time) > 1 else float("nan")
+    row: dict[str, Any] = {"sensor": name, "samples": len(frame), "Hz": rate}
+    for angle in ("roll", "pitch", "yaw"):
+        if angle in frame:
+            known = frame[angle].dropna()
+            row[angle] = f"{known.min():.1f} to {known.max():.1f}" if len(known) else "–"
+        if f"std_{angle}" in frame:
+            row[f"± {angle}"] = float(frame[f"std_{angle}"].iloc[-1])
+    return row
+
+
+if __name__ == "__main__":
+    run_command("estimate")

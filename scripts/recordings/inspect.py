@@ -1,0 +1,57 @@
+"""Look at recordings before believing them: what was recognised, rate, gaps, rest, units, signs, reference."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import tyro
+
+from ..main import run_command
+from ..output import Output
+
+
+@dataclass
+class Args:
+    """Arguments of ``poise inspect``."""
+
+    recordings: tyro.conf.Positional[tuple[Path, ...]]
+    """files, or folders that are searched for recordings"""
+    plot: Path | None = None
+    """picture of rates, specific force and field over time, of the first recording"""
+    calibration: Path | None = None
+    """record of `poise calibrate` that turns raw readings of the recordings into SI units"""
+    json: bool = False
+    """print one JSON document instead of tables"""
+
+
+def run(args: Args) -> int:
+    """Describe, judge, draw."""
+    from ...envs.data.inspection import inspect_recording
+    from ...envs.data.plausibility import check_recording
+    from .load import load_all, passed_over_text, plain_warnings
+
+    with plain_warnings(), Output("inspect", args) as out:
+        loaded, passed_over = load_all(args.recordings, args.calibration)
+        for trajectory in loaded:
+            found, findings = inspect_recording(trajectory), check_recording(trajectory)
+            rows = [{"property": name, "value": text} for name, text in found.clock.items()]
+            out.table(rows, f"{trajectory.name}: recording")
+            out.table(found.channels, f"{trajectory.name}: channels")
+            out.table(found.sensors, f"{trajectory.name}: sensors")
+            out.rows([vars(finding) for finding in findings], f"{trajectory.name}: findings")
+            for finding in findings:
+                out.say(f"{finding.severity}: {finding}")
+            if not findings:
+                out.say(f"{trajectory.name}: units, signs, axes and clock are plausible")
+        if passed_over:
+            out.say(f"passed over:\n{passed_over_text(passed_over)}")
+        if args.plot is not None:
+            from ...baselines.plots import save, signals
+
+            out.say(f"figure: {save(signals(loaded[0], inspect_recording(loaded[0]).rest), args.plot)}")
+    return 0
+
+
+if __name__ == "__main__":
+    run_command("inspect")

@@ -1,0 +1,124 @@
+"""Recordings that a command is given: files and folders → trajectories of distinct names, and what was passed over."""
+
+from __future__ import annotations
+
+import sys
+import warnings
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from ...envs.data.trajectory import Trajectory
+
+
+def load_all(
+    paths: Sequence[Path], calibration: Path | None = None, place: str | None = None
+) -> tuple[list[Trajectory], list[tuple[Path, str]]]:
+    """Load files, and folders as the recordings below them.
+
+    Args:
+        paths: files or folders.
+        calibration: record of ``poise calibrate``.
+        place: in recordings of several sensors, the one to look at.
+
+    Returns:
+        Trajectories of distinct names; files of folders that were passed over, with the reason.
+
+    Raises:
+        ValueError: there is no recording, or a file that was named itself cannot be read.
+        FileNotFoundError: a path leads nowhere.
+    """
+    from ...baselines.evaluation import distinct
+    from ...envs.data.formats.load import find_recordings, load_recording
+
+    found: list[Trajectory] = []
+    sources: list[Path | None] = []
+    passed_over: list[tuple[Path, str]] = []
+    for path in paths:
+        files = find_recordings(path) if path.is_dir() else [path]
+        for file in files:
+            try:
+                trajectory = load_recording(file, calibration)
+                found.append(trajectory if place is None else at_place(trajectory, place))
+                sources.append(file)
+            except ValueError as reason:
+                if not path.is_dir():
+                    raise
+                passed_over.append((file, str(reason)))
+        if path.is_dir():
+            others = (file for file in path.rglob("*") if file.is_file() and not file.name.startswith("."))
+            # A folder may be a recording itself.
+            unread = [file for file in sorted(others) if not set(files) & {file, *file.parents}]
+            passed_over += [(file, "no known format") for file in unread]
+    if not found:
+        reasons = "; ".join(f"{file.name}: {reason}" for file, reason in passed_over[:5])
+        raise ValueError(f"no recording in {', '.join(map(str, paths))}{f' ({reasons})' if reasons else ''}")
+    return distinct(found, sources), passed_over
+
+
+def at_place(trajectory: Trajectory, place: str) -> Trajectory:
+    """One sensor of a recording, as ``imu``; of a ride with the truth of that sensor.
+
+    Raises:
+        ValueError: there is no such sensor.
+    """
+    from ...envs.bicycle.sensors.single_imu import PLACES, imu_of
+
+    if place in PLACES and f"{place}/gyr" in trajectory.measurements:
+        return imu_of(trajectory, place)
+    channels = place_channels(trajectory, place)
+    if not channels:
+        from ...envs.data.plausibility import places
+
+        raise ValueError(f"{trajectory.name!r} has no sensor {place!r}; there are {', '.join(places(trajectory))}")
+    truth = {
+        name.rpartition("/")[2]: values for name, values in trajectory.truth.items() if name.startswith(f"{place}/")
+    }
+    return trajectory.replace(
+        measurements=channels, truth=truth, metadata={**trajectory.metadata, "name": f"{trajectory.name}/{place}"}
+    )
+
+
+def place_channels(trajectory: Trajectory, place: str) -> dict[str, Any]:
+    """Channels of one sensor, as those of ``imu``."""
+    return {
+        f"imu/{name.rpartition('/')[2]}": values
+        for name, values in trajectory.measurements.items()
+        if name.rpartition("/")[0] == place
+    }
+
+
+def sensors_of(trajectory: Trajectory) -> list[Trajectory]:
+    """The sensors of a recording, each as ``imu``; the recording itself if it has one."""
+    from ...envs.data.plausibility import places
+
+    if "imu/gyr" in trajectory.measurements:
+        return [trajectory]
+    found = [place for place in places(trajectory) if f"{place}/gyr" in trajectory.measurements]
+    return [at_place(trajectory, place) for place in found] or [trajectory]
+
+
+@contextmanager
+def plain_warnings() -> Iterator[None]:
+    """Print warnings of the package in one line each on standard error, every text once."""
+    told: set[str] = set()
+
+    def show(message: Any, category: type[Warning], filename: str, lineno: int, *rest: Any) -> None:
+        text = " ".join(str(message).split())
+        if text not in told:
+            told.add(text)
+            print(f"poise: warning: {text}", file=sys.stderr, flush=True)
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("always", UserWarning)
+        warnings.showwarning = show  # type: ignore[assignment]
+        yield
+
+
+def passed_over_text(passed_over: Sequence[tuple[Path, str]], most: int = 10) -> str:
+    """What was passed over and why, a line a file."""
+    lines = [f"- {file}: {' '.join(reason.split())}" for file, reason in passed_over[:most]]
+    more = len(passed_over) - len(lines)
+    return "\n".join([*lines, *([f"- … and {more} more"] if more > 0 else [])])

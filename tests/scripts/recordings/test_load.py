@@ -1,0 +1,75 @@
+"""``poise inspect``, ``estimate``, ``evaluate`` on files as users have them."""
+
+import json
+
+import numpy as np
+import pandas
+import pytest
+
+from poise.envs.hand.sensing import simulate_hand
+from poise.scripts.main import main
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("recordings")
+    for number, session in enumerate(("first", "second")):
+        (folder / session).mkdir()
+        motion = simulate_hand("slow", seed=number, duration=4.0)
+        six = {name: values for name, values in motion.measurements.items() if name != "imu/mag"}
+        motion.replace(measurements=six, truth={}, metadata={"name": "chest"}).save(folder / session / "chest.h5")
+    (folder / "second" / "notes.txt").write_text("the sensor fell off at 12:30\n")
+    return folder
+
+
+def test_six_axes_without_truth_work_out_of_the_box(folder, tmp_path, capsys):
+    assert main(["evaluate", str(folder), "--runs", str(tmp_path), "--estimators", "mekf", "tilt", "mekf-9"]) == 0
+    captured = capsys.readouterr()
+    assert "no truth" in captured.out
+    assert "reference bounded-motion" in captured.out
+    assert "mekf-9: no channel imu/mag (2 recordings)" in captured.out
+    assert "notes.txt: no known format" in captured.out
+    assert "poise: warning: mekf-9 was not run on first/chest" in captured.err
+    (run,) = (tmp_path / "evaluate").iterdir()
+    table = pandas.read_csv(run / "results.csv")
+    assert set(table.trajectory) == {"first/chest", "second/chest"}
+
+
+def test_estimates_are_written_for_several_sensors_at_once(folder, tmp_path, capsys):
+    output, plot = tmp_path / "angles.csv", tmp_path / "angles.png"
+    assert main(["estimate", str(folder), "--output", str(output), "--plot", str(plot)]) == 0
+    table = pandas.read_csv(output)
+    assert set(table.sensor) == {"first/chest", "second/chest"}
+    assert {"time", "roll", "pitch", "yaw", "qw", "std_roll", "gyroscope_bias_x"} <= set(table.columns)
+    assert plot.stat().st_size > 10_000
+    assert "first/chest" in capsys.readouterr().out
+    assert main(["estimate", str(folder), "--output", str(tmp_path / "angles.docx")]) == 2
+    assert "must end in" in capsys.readouterr().err
+    assert main(["estimate", str(folder), "--estimator", "mekff"]) == 2
+    assert "did you mean 'mekf'" in capsys.readouterr().err
+
+
+def test_inspect_tells_what_is_there_and_what_is_odd(folder, tmp_path, capsys):
+    plot = tmp_path / "signals.png"
+    assert main(["inspect", str(folder / "first" / "chest.h5"), "--plot", str(plot)]) == 0
+    text = capsys.readouterr().out
+    assert "100 Hz" in text
+    assert "plausible" in text
+    assert plot.stat().st_size > 10_000
+    motion = simulate_hand("slow", seed=0, duration=4.0)
+    wrong = {**motion.measurements, "imu/gyr": np.degrees(motion.measurements["imu/gyr"])}
+    path = motion.replace(measurements=wrong, metadata={"name": "wrong"}).save(tmp_path / "wrong.h5")
+    assert main(["inspect", str(path), "--json"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    findings = [row for row in document["rows"] if row["table"] == "wrong: findings"]
+    assert [row["cause"] for row in findings] == ["rates in deg/s"]
+    sensor = next(row for row in document["rows"] if row["table"] == "wrong: sensors")
+    assert sensor["dip °"] == pytest.approx(60.0, abs=25.0)
+
+
+def test_users_are_warned_where_they_estimate(tmp_path, capsys):
+    motion = simulate_hand("fast", seed=0, duration=4.0)
+    wrong = {**motion.measurements, "imu/acc": motion.measurements["imu/acc"] / 9.80665}
+    path = motion.replace(measurements=wrong, metadata={"name": "wrong"}).save(tmp_path / "wrong.h5")
+    assert main(["estimate", str(path)]) == 0
+    assert "readings in g. Multiply by 9.80665" in capsys.readouterr().err
