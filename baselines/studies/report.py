@@ -1,4 +1,4 @@
-"""What a study tells: texts, tables, figures and numbers, in the order in which they were found."""
+"""What a study reports: texts, tables, claims, figures and numbers, in the order in which they were found."""
 
 from __future__ import annotations
 
@@ -101,11 +101,11 @@ class Report:
         self.results.extend(dict(row) for row in rows)
 
     def compare(self, title: str, rows: Sequence[Mapping[str, Any]], note: str = "", *, interval: str = RANGE) -> None:
-        """Add a table of printed values beside ours.
+        """Add a table of published values beside ours.
 
         Args:
             title: heading.
-            rows: each with ``quantity``, ``printed`` (text or number; None where the paper has none), ``unit``, and
+            rows: each with ``quantity``, ``published`` (text or number; None where the paper has none), ``unit``, and
                 ours: either ``values`` (one a ride; NaN are left out), or ``ours`` and ``interval`` ``(low, high)``
                 (for :data:`DEVIATION` the deviation). Further keys are columns before the quantity (``filter``, …).
             note: Markdown beneath.
@@ -117,10 +117,10 @@ class Report:
         """
         shown = []
         for row in rows:
-            missing = {"quantity", "printed", "unit"} - set(row)
+            missing = {"quantity", "published", "unit"} - set(row)
             if missing or not ("values" in row or {"ours", "interval"} <= set(row)):
                 raise ValueError(
-                    f"a comparison needs quantity, printed, unit, and values or ours and interval; got {sorted(row)}"
+                    f"a comparison needs quantity, published, unit, and values or ours and interval; got {sorted(row)}"
                 )
             ours, spread = row.get("ours"), row.get("interval")
             if "values" in row:
@@ -128,7 +128,7 @@ class Report:
             others = {name: value for name, value in row.items() if name not in OWN}
             shown.append(
                 others
-                | {"quantity": row["quantity"], "printed": row["printed"], "ours": ours}
+                | {"quantity": row["quantity"], "published": row["published"], "ours": ours}
                 | {"interval": interval_text(spread), "unit": row["unit"]}
             )
         self.table(title, shown, f"Ours: {interval}. {note}".strip())
@@ -157,7 +157,7 @@ class Report:
         self.publish(entry)
 
 
-OWN = ("quantity", "printed", "ours", "interval", "unit", "values")
+OWN = ("quantity", "published", "ours", "interval", "unit", "values")
 """Keys of a comparison that have a meaning."""
 
 

@@ -205,7 +205,7 @@ class RideStudy:
             for angle in self.angles:
                 values = [each["rms"][name]["settled"].get(angle, float("nan")) for each in results]
                 if np.isfinite(values).any():
-                    row = {"filter": name, "quantity": angle, "printed": printed.get(angle)}
+                    row = {"filter": name, "quantity": angle, "published": printed.get(angle)}
                     rows.append(row | {"values": values, "unit": "deg"})
         if rows:
             report.compare(f"{self.table}, {course}", rows, f"RMS from {SETTLED:g} s on.", interval=DEVIATION)

@@ -26,7 +26,7 @@ def reproduce(study, report):
     values = study.map("squares", square, [(number,) for number in range(study.seeds)])
     report.text("What was done.")
     report.table("Squares", [{"number": number, "square": value} for number, value in enumerate(values)])
-    report.compare("Lengths", [{"quantity": "ticks", "printed": 100, "values": [len(r) for r in rides], "unit": "1"}])
+    report.compare("Lengths", [{"quantity": "ticks", "published": 100, "values": [len(r) for r in rides], "unit": "1"}])
     report.figure("empty", new_figure(2.0, 1.0)[0], "An empty figure")
     row = {"estimator": "none", "trajectory": "push", "quantity": "ticks", "metric": "mean", "value": 101.0}
     report.numbers([{**row, "unit": "1"}])

@@ -99,7 +99,7 @@ def calibration(study: Study, report: Report) -> None:
     report.compare(
         "Chapter 4: calibration of simulated devices",
         [
-            {"quantity": quantity, "printed": printed, "values": (factor * largest(key)).tolist(), "unit": unit}
+            {"quantity": quantity, "published": printed, "values": (factor * largest(key)).tolist(), "unit": unit}
             for quantity, printed, key, factor, unit in ROWS
         ],
         f"{seeds} devices, the largest error of each over its axes. Printed are residuals of the thesis' own fits; its "

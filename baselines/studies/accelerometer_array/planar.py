@@ -210,7 +210,7 @@ def planar(study: Study, report: Report) -> None:
     report.compare(
         "Figures 3.5 to 3.12: errors of the angle in the plane",
         [
-            {"motion": motion, "method": method, "quantity": "largest error", "printed": printed, "unit": "deg"}
+            {"motion": motion, "method": method, "quantity": "largest error", "published": printed, "unit": "deg"}
             | {"values": values_of(rows, "largest", motion=motion, method=method)}
             for motion, method, printed in PUBLISHED
         ],

@@ -172,7 +172,7 @@ def angular_rates(study: Study, report: Report) -> None:
         "Table 2.1: angular rate of a shaken OCTA",
         [
             {"method": method, "quantity": "rms of |ω̂ − ω|", "unit": "rad/s"}
-            | {"printed": mean_and_range(PUBLISHED[row]) if row else None}
+            | {"published": mean_and_range(PUBLISHED[row]) if row else None}
             | {"values": values_of(rows, "rms", method=method, errors=CALIBRATED)}
             for method, row in ROWS_OF_TABLE_2_1.items()
         ],

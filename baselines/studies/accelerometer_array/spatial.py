@@ -301,7 +301,7 @@ def spatial(study: Study, report: Report) -> None:
     report.compare(
         "Figures 5.6 to 5.10 and Table 5.1, simulation: the proposed method",
         [
-            {"device": device, "method": method, "quantity": f"{angle}, {label}", "printed": says, "unit": "deg"}
+            {"device": device, "method": method, "quantity": f"{angle}, {label}", "published": says, "unit": "deg"}
             | {"values": values_of(rows, key, device=device, method=method)}
             for (device, method), printed in PUBLISHED.items()
             for angle in ("pitch", "azimuth")

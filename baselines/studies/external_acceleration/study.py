@@ -110,7 +110,7 @@ def sweep(trial: Trial) -> dict[str, dict[str, np.ndarray]]:
 def levels(report: Report, tests: dict[str, Any]) -> None:
     """Mean and peak of the acceleration."""
     rows = [
-        {"test": test, "quantity": f"{what} ‖a‖, {kind}", "printed": LEVELS[test][index], "unit": "m/s²"}
+        {"test": test, "quantity": f"{what} ‖a‖, {kind}", "published": LEVELS[test][index], "unit": "m/s²"}
         | {"values": tests[test]["level"][kind][index]}
         for test in tests
         for kind in ("true", "apparent")
@@ -130,7 +130,7 @@ def table_i(report: Report, tests: dict[str, Any]) -> None:
         found, exact = (tests[test]["modes"][f"{mode} {rotated}"] for rotated in ("printed", "exact"))
         for quantity, value in zip(QUANTITIES, printed, strict=True):
             rows.append(
-                {"test": test, "mode": mode, "quantity": quantity, "printed": value, "values": found[quantity]}
+                {"test": test, "mode": mode, "quantity": quantity, "published": value, "values": found[quantity]}
                 | {"unit": "deg" if quantity in ("roll", "pitch") else "m/s²"}
             )
         report.numbers(
@@ -173,7 +173,7 @@ def table_i(report: Report, tests: dict[str, Any]) -> None:
 def table_ii(report: Report, tests: dict[str, Any], still: dict[str, Any]) -> None:
     """Errors of mode 1 against c_a."""
     rows = [
-        {"test": test, "c_a": c_a, "quantity": quantity, "printed": printed[index][which], "unit": "deg"}
+        {"test": test, "c_a": c_a, "quantity": quantity, "published": printed[index][which], "unit": "deg"}
         | {"values": tests[test]["c_a"][f"{c_a:g}"][quantity]}
         for index, test in enumerate(TESTS)
         for c_a, printed in TABLE_II.items()
@@ -181,7 +181,7 @@ def table_ii(report: Report, tests: dict[str, Any], still: dict[str, Any]) -> No
     ]
     report.compare("Table II: mode 1 against c_a", rows, interval=TRIALS)
     rows = [
-        {"c_a": c_a, "quantity": quantity, "printed": printed[0][which], "unit": "deg"}
+        {"c_a": c_a, "quantity": quantity, "published": printed[0][which], "unit": "deg"}
         | {"values": still["c_a"][f"{c_a:g}"][quantity]}
         for c_a, printed in TABLE_II.items()
         for which, quantity in enumerate(("roll", "pitch"))
@@ -193,7 +193,7 @@ def table_ii(report: Report, tests: dict[str, Any], still: dict[str, Any]) -> No
 def table_iii(report: Report, tests: dict[str, Any]) -> None:
     """Errors of mode 3 against its threshold."""
     rows = [
-        {"test": test, "ε_A, n": f"{threshold:g}, {n}", "quantity": quantity, "printed": printed[index][which]}
+        {"test": test, "ε_A, n": f"{threshold:g}, {n}", "quantity": quantity, "published": printed[index][which]}
         | {"values": tests[test]["threshold"][f"{threshold:g}, {n}"][quantity], "unit": "deg"}
         for index, test in enumerate(TESTS)
         for (threshold, n), printed in TABLE_III.items()

@@ -41,12 +41,12 @@ def test_printed_values_stand_beside_ours_with_what_the_interval_means(tmp_path)
         {
             "filter": "x",
             "quantity": "roll",
-            "printed": "2.1 ± 0.4",
+            "published": "2.1 ± 0.4",
             "values": [1.0, 2.0, 6.0, float("nan")],
             "unit": "deg",
         },
-        {"filter": "y", "quantity": "roll", "printed": None, "ours": 5.0, "interval": (4.0, 6.5), "unit": "deg"},
-        {"filter": "z", "quantity": "roll", "printed": None, "values": [float("nan")], "unit": "deg"},
+        {"filter": "y", "quantity": "roll", "published": None, "ours": 5.0, "interval": (4.0, 6.5), "unit": "deg"},
+        {"filter": "z", "quantity": "roll", "published": None, "values": [float("nan")], "unit": "deg"},
     ]
     report.compare("Table", rows, "Why.")
     report.compare("Table with deviations", rows[:1], interval=DEVIATION)
@@ -54,7 +54,7 @@ def test_printed_values_stand_beside_ours_with_what_the_interval_means(tmp_path)
     assert first == {
         "filter": "x",
         "quantity": "roll",
-        "printed": "2.1 ± 0.4",
+        "published": "2.1 ± 0.4",
         "ours": 3.0,
         "interval": "1 … 6",
         "unit": "deg",
@@ -66,7 +66,7 @@ def test_printed_values_stand_beside_ours_with_what_the_interval_means(tmp_path)
     assert report.entries[0].text.startswith("Ours: mean, smallest")
     assert report.entries[0].text.endswith("Why.")
     with pytest.raises(ValueError, match="values or ours and interval"):
-        report.compare("Wrong", [{"quantity": "roll", "printed": 1.0, "unit": "deg", "ours": 1.0}])
+        report.compare("Wrong", [{"quantity": "roll", "published": 1.0, "unit": "deg", "ours": 1.0}])
 
 
 def test_numbers_have_the_columns_of_results(tmp_path):

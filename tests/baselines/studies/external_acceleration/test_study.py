@@ -75,7 +75,7 @@ def test_the_study_runs_and_says_what_it_must(tmp_path):
     assert len(tables["Table II: mode 1 against c_a"]) == 3 * 8 * 2
     assert len(tables["Table III: mode 3 against threshold and window"]) == 3 * 5 * 2
     levels = tables["Levels of the tests (section III-B)"]
-    assert all(row["ours"] == pytest.approx(row["printed"], rel=0.05) for row in levels if "true" in row["quantity"])
+    assert all(row["ours"] == pytest.approx(row["published"], rel=0.05) for row in levels if "true" in row["quantity"])
     recorded = tables["Recordings: inclination error, deg"]
     assert [row["trial"] for row in recorded] == [hand.name, "mean"]
     assert recorded[0]["bounded-motion"] < recorded[0]["mode 2"]
