@@ -121,12 +121,12 @@ class GainTuningEnv(DrawnEnv):
             ValueError: the action has a wrong shape or is not finite.
             RuntimeError: :meth:`reset` was not called, or the episode is over.
         """
-        if self.trajectory is None or self._tick + self.tuned.ticks > len(self.trajectory):
+        if self.trajectory is None or self._tick + self.tuned.interval_samples > len(self.trajectory):
             raise RuntimeError("call reset first: there is no episode, or it is over")
         chosen = np.asarray(action, dtype=float)
         if chosen.shape != self.action_space.shape or not np.isfinite(chosen).all():
             raise ValueError(f"action must hold {self.tuned.actions} finite numbers, got {action!r}")
-        ticks = slice(self._tick, self._tick + self.tuned.ticks)
+        ticks = slice(self._tick, self._tick + self.tuned.interval_samples)
         chunk = {name: values[ticks] for name, values in self._measurements.items()}
         estimate, self._state = self.tuned.advance(self.tuned.decide(self._state, chosen), chunk)
         self._tick = ticks.stop
@@ -139,9 +139,9 @@ class GainTuningEnv(DrawnEnv):
             reward += reference if math.isfinite(reference) else 0.0
         if self.consistency:
             reward -= self.consistency * inconsistency(estimate, self.tuned.kalman.model.residual_size)
-        truncated = self._tick + self.tuned.ticks > len(self.trajectory)
+        truncated = self._tick + self.tuned.interval_samples > len(self.trajectory)
         self._estimates = {name: np.array(estimate.pose[name][-1]) for name in self._estimates}
-        self._show(self._tick // self.tuned.ticks)
+        self._show(self._tick // self.tuned.interval_samples)
         return self.tuned.observe(self._state), reward, False, truncated, self._info(mean_error)
 
     def make_scene(self, gui: bool) -> Scene:
@@ -261,7 +261,7 @@ class HandMotionGainEnv(GainTuningEnv):
             mounting=mounting,
             drive=drive,
         )
-        longest = max(1.0 / rate * self.tuned.features.ticks(1.0 / rate) for rate in self.motions.rates)
+        longest = max(1.0 / rate * self.tuned.features.interval_samples(1.0 / rate) for rate in self.motions.rates)
         if duration < longest:
             raise ValueError(f"duration must be one interval at least ({longest:g} s), got {duration}")
 
@@ -309,7 +309,7 @@ class ReplayGainEnv(GainTuningEnv):
         self.trajectories = tuple(item.on_grid() for item in loaded)
         for item in self.trajectories:
             true_values(item, self.quantity, self.tuned.kalman)
-            shortest = self.tuned.features.ticks(item.dt)
+            shortest = self.tuned.features.interval_samples(item.dt)
             length = len(item) if duration is None else math.floor(duration / item.dt + 1e-6)
             if min(length, len(item)) < shortest:
                 raise ValueError(f"an episode of {item.name!r} must last one interval at least ({shortest} ticks)")

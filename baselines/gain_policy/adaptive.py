@@ -117,7 +117,7 @@ class AdaptiveEstimator:
             state = self.init({name: array[0] for name, array in arrays.items()})
         parts, actions, start = [], [], 0
         while start < length:
-            stop = min(length, start + self.tuned.ticks - int(state.memory.tick))
+            stop = min(length, start + self.tuned.interval_samples - int(state.memory.samples))
             estimate, state = self._advance(state, {name: array[start:stop] for name, array in arrays.items()})
             parts.append(estimate)
             actions.append(np.broadcast_to(state.action, (stop - start, *state.action.shape)))
@@ -125,7 +125,7 @@ class AdaptiveEstimator:
         return joined(parts), state, np.concatenate(actions)
 
     def _advance(self, state: TunedState, ticks: Mapping[str, np.ndarray]) -> tuple[Estimate, TunedState]:
-        if int(state.memory.tick) == 0:
+        if int(state.memory.samples) == 0:
             state = self.tuned.decide(state, self.policy(self.tuned.observe(state)))
         return self.tuned.advance(state, ticks)
 

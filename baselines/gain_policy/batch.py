@@ -67,7 +67,7 @@ class RateGroup:
 
         The gyroscope's bias, and over each of :data:`AHEAD` the mean cost of the reference and the mean acceleration.
         """
-        ticks, length = self.tuned.ticks, len(self.reference)
+        ticks, length = self.tuned.interval_samples, len(self.reference)
         absent = np.zeros((length, 3))
         bias, force = (
             np.stack([np.linalg.norm(t.truth.get(name, absent)[:length], axis=-1) for t in self.stack.trajectories])
@@ -110,7 +110,8 @@ class RateGroup:
             episodes are over ``(rows,)``; :meth:`restart` begins these anew.
         """
         stack, quantity = self.stack, self.stack.quantity
-        now = self.decision * self.tuned.ticks + np.arange(self.tuned.ticks)[:, None], self.trajectory
+        length = self.tuned.interval_samples
+        now = self.decision * length + np.arange(length)[:, None], self.trajectory
         chunk = {name: values[now] for name, values in stack.channels.items()}
         estimate, self.state = self.tuned.advance(self.tuned.decide(self.state, actions), chunk)
         errors = error(quantity, estimate.pose[quantity.name], stack.truth[now])

@@ -48,7 +48,7 @@ def costs_to_go(
     for action in actions:
         errors = stack.errors(action)
         errors = np.where(stack.mask & np.isfinite(errors), errors, 0.0)
-        tables.append(errors.reshape(stack.decisions, stack.tuned.ticks, -1).mean(axis=1))
+        tables.append(errors.reshape(stack.decisions, stack.tuned.interval_samples, -1).mean(axis=1))
     table = np.stack(tables, axis=-1)
     table = table / (table[..., :1].mean(axis=0) + small)
     ahead = np.zeros_like(table)
@@ -68,7 +68,7 @@ def observations(stack: TrajectoryStack, policy: GainPolicy) -> np.ndarray:
     for decision in range(stack.decisions):
         seen.append(tuned.observe(state))
         state = tuned.decide(state, policy(seen[-1]))
-        interval = slice(decision * tuned.ticks, (decision + 1) * tuned.ticks)
+        interval = slice(decision * tuned.interval_samples, (decision + 1) * tuned.interval_samples)
         _, state = tuned.advance(state, {name: values[interval] for name, values in stack.channels.items()})
     return np.stack(seen)
 

@@ -42,8 +42,8 @@ class TrajectoryStack:
         """Stack trajectories of one rate; ``quantity`` None scores ``up``."""
         tuned = tuned.with_dt(trajectories[0].dt)
         output = scored_quantity(tuned.kalman, quantity)
-        decisions = min(len(trajectory) for trajectory in trajectories) // tuned.ticks
-        length = decisions * tuned.ticks
+        decisions = min(len(trajectory) for trajectory in trajectories) // tuned.interval_samples
+        length = decisions * tuned.interval_samples
         channels = {
             channel.name: np.stack([trajectory.measurements[channel.name][:length] for trajectory in trajectories], 1)
             for channel in tuned.kalman.channels

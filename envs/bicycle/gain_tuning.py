@@ -155,7 +155,7 @@ class RiderBicycleGainEnv(GainTuningEnv):
             )
             for each in scenarios
         )
-        longest = self.tuned.features.ticks(1.0 / rate) / rate
+        longest = self.tuned.features.interval_samples(1.0 / rate) / rate
         if duration < longest:
             raise ValueError(f"duration must be one interval at least ({longest:g} s), got {duration}")
 

@@ -60,14 +60,14 @@ class FeatureMemory(NamedTuple):
         averages: ``(*batch, scales, moments)`` running means.
         sums: ``(*batch, moments)`` over the samples of the interval that is not over.
         previous: ``(*batch, streams, width)`` last sample of every stream; NaN if there was none.
-        tick: ``()`` int, samples of the interval that is not over; 0 asks for a decision.
+        samples: ``()`` int, samples of the interval that is not over; 0 asks for a decision.
         decisions: ``(*batch,)`` int, intervals that are over.
     """
 
     averages: np.ndarray
     sums: np.ndarray
     previous: np.ndarray
-    tick: np.ndarray
+    samples: np.ndarray
     decisions: np.ndarray
 
 
@@ -103,7 +103,7 @@ class InnovationFeatures:
         """Length of :meth:`observe` for that many actions."""
         return len(self.scales) * (len(STREAMS) * len(STATISTICS) + 2) + 1 + actions
 
-    def ticks(self, dt: float) -> int:
+    def interval_samples(self, dt: float) -> int:
         """Samples of an interval at a sampling interval of ``dt`` seconds."""
         return max(1, round(self.interval / dt))
 
@@ -139,14 +139,15 @@ class InnovationFeatures:
             ValueError: the samples reach beyond the end of the interval.
         """
         moments, previous = self._moments(memory, kalman, measurements, estimate)
-        tick = int(memory.tick) + len(moments)
-        whole = self.ticks(kalman.dt)
-        if tick > whole:
-            raise ValueError(f"{len(moments)} samples after {memory.tick} reach beyond the interval of {whole} samples")
+        taken = int(memory.samples) + len(moments)
+        whole = self.interval_samples(kalman.dt)
+        if taken > whole:
+            beyond = f"{len(moments)} samples after {memory.samples}"
+            raise ValueError(f"{beyond} reach beyond the interval of {whole} samples")
         # The first axis is added up row by row, so samples one by one and together give the same sums.
         sums = np.concatenate([memory.sums[None], moments]).sum(axis=0)
-        if tick < whole:
-            return memory._replace(sums=sums, previous=previous, tick=np.array(tick))
+        if taken < whole:
+            return memory._replace(sums=sums, previous=previous, samples=np.array(taken))
         duration = whole * kalman.dt
         rate = np.array([1.0 if scale == 0.0 else -math.expm1(-duration / scale) for scale in self.scales])
         averages = memory.averages + rate[:, None] * ((sums / whole)[..., None, :] - memory.averages)
@@ -174,7 +175,7 @@ class InnovationFeatures:
         excess = np.where(np.isfinite(excess), excess, 0.0)
         excess_rms = 0.5 * np.log10(np.fmax(excess[..., 1:], FLOOR**2)) + 0.5
         features = np.concatenate([logarithms.reshape(*batch, scales, -1), excess[..., :1], excess_rms], axis=-1)
-        age = memory.decisions * (self.ticks(kalman.dt) * kalman.dt / START_TIME)
+        age = memory.decisions * (self.interval_samples(kalman.dt) * kalman.dt / START_TIME)
         squashed = np.tanh(np.concatenate([features.reshape(*batch, -1), age[..., None]], axis=-1))
         return np.concatenate([squashed, action], axis=-1).astype(np.float32)
 
@@ -229,7 +230,7 @@ def before(values: np.ndarray, held: np.ndarray) -> tuple[np.ndarray, np.ndarray
     row = np.concatenate([held[None], values])
     known = np.isfinite(row).all(axis=-1)
     if not known[1:].all():
-        ticks = np.arange(len(row)).reshape(-1, *(1,) * (known.ndim - 1))
-        latest = np.maximum.accumulate(np.where(known, ticks, 0), axis=0)
+        indices = np.arange(len(row)).reshape(-1, *(1,) * (known.ndim - 1))
+        latest = np.maximum.accumulate(np.where(known, indices, 0), axis=0)
         row = np.take_along_axis(row, latest[..., None], axis=0)
     return row[:-1], row[-1]

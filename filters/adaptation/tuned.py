@@ -65,9 +65,9 @@ class TunedFilter:
         return self.features.size(self.actions)
 
     @property
-    def ticks(self) -> int:
+    def interval_samples(self) -> int:
         """Samples from decision to decision."""
-        return self.features.ticks(self.kalman.dt)
+        return self.features.interval_samples(self.kalman.dt)
 
     def with_dt(self, dt: float) -> TunedFilter:
         """The same for another sampling interval; decisions stay as many seconds apart, to a sample."""

@@ -73,11 +73,11 @@ class Marins(Model):
     """``samples``: at rest, from the first samples; ``given``: :attr:`start_orientation`"""
     field: Literal["start", "given"] = "start"
     """``start``: the dip is that of the first samples; ``given``: :attr:`dip`"""
-    quaternion_deviation: float = 0.5
+    quaternion_std: float = 0.5
     """σ_q of each element of the first step's quaternion; 0.01 follows the first step, 0.5 is what 5 m/s² do to it"""
-    gyroscope_deviation: float = 0.1
+    gyroscope_std: float = 0.1
     """σ_ω, rad/s per sample (section 5.3.2)"""
-    rate_deviation: float = 3.0
+    rate_std: float = 3.0
     """σ_Ω, rad/s: of the angular rate of the motion"""
     rate_time: float = 0.5
     """τ, s; the thesis gives none"""
@@ -96,15 +96,15 @@ class Marins(Model):
     error_size: ClassVar[int] = 7
     residual_size: ClassVar[int] = 7
     gains: ClassVar[dict[str, Gain]] = {
-        "process": Gain("rate_deviation", description="process variance σ_Ω² of the angular rate"),
-        "measurement": Gain("quaternion_deviation", description="variance σ_q² of the first step"),
+        "process": Gain("rate_std", description="process variance σ_Ω² of the angular rate"),
+        "measurement": Gain("quaternion_std", description="variance σ_q² of the first step"),
     }
 
     def __post_init__(self) -> None:
         """Refuse what is no start, and what must be positive and is not."""
         super().__post_init__()
         object.__setattr__(self, "start_orientation", checked_quaternion("start_orientation", self.start_orientation))
-        for name in ("quaternion_deviation", "gyroscope_deviation", "rate_deviation", "rate_time"):
+        for name in ("quaternion_std", "gyroscope_std", "rate_std", "rate_time"):
             if getattr(self, name) <= 0.0:
                 raise ValueError(f"{name} must be positive, got {getattr(self, name)}")
 
@@ -118,7 +118,7 @@ class Marins(Model):
         if self.field == "given":
             world = field_direction(self.declination, self.dip, q)
         x = xp.concat([rate, q, world], axis=-1)
-        deviations = [self.gyroscope_deviation] * 3 + [self.orientation_prior] * 4
+        deviations = [self.gyroscope_std] * 3 + [self.orientation_prior] * 4
         return x, covariance_of(deviations, 0.0 * x[..., :1])
 
     def predict(self, x: Array, z: Measurement, previous: Measurement) -> tuple[Array, Array, Array]:
@@ -136,7 +136,7 @@ class Marins(Model):
         right = _columns([multiply(_basis(index, q), exp(turn)) for index in range(4)])
         three, none = identity(3, x), 0.0 * lever
         F = block_matrix([[decay[..., None] * three, none.mT], [lever, right]])
-        power = expand(self.rate_deviation**2, 1) * (1.0 - decay * decay)
+        power = expand(self.rate_std**2, 1) * (1.0 - decay * decay)
         Q = block_diagonal([power[..., None] * three, 0.0 * right])
         return xp.concat([decay * rate, turned, x[..., 7:]], axis=-1), F, Q
 
@@ -151,7 +151,7 @@ class Marins(Model):
         field = normalize(xp.where(complete, field, rotate_back(normalize(q), world)))
         found = solve_orientation(normalize(q), (up, world), (force, field))
         r = xp.concat([z["imu/gyr"] - x[..., :3], xp.where(complete, found - q, xp.nan + 0.0 * q)], axis=-1)
-        deviations = [self.gyroscope_deviation] * 3 + [self.quaternion_deviation] * 4
+        deviations = [self.gyroscope_std] * 3 + [self.quaternion_std] * 4
         return r, identity(7, x), covariance_of(deviations, 0.0 * x[..., :1])
 
     def retract(self, x: Array, dx: Array) -> Array:

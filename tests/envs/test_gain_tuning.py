@@ -53,12 +53,12 @@ def test_zero_action_is_the_published_tuning_bit_by_bit(name, trajectory):
     env = ReplayGainEnv(trajectory, name)
     _, infos = play(env, lambda observation: env.neutral_action)
     plain = tunable_filter(name).with_dt(trajectory.dt).run(trajectory.measurements)
-    ticks = env.tuned.ticks * np.arange(1, len(infos)) - 1
+    ticks = env.tuned.interval_samples * np.arange(1, len(infos)) - 1
     for output in env.tuned.kalman.outputs:
         said = np.stack([info["estimate"][output.name] for info in infos[1:]])
         np.testing.assert_array_equal(said, plain.pose[output.name][ticks])
     errors = direction_error(plain.pose["up"], trajectory.truth_of("up"))
-    means = errors[: len(ticks) * env.tuned.ticks].reshape(len(ticks), -1).mean(axis=1)
+    means = errors[: len(ticks) * env.tuned.interval_samples].reshape(len(ticks), -1).mean(axis=1)
     np.testing.assert_allclose([info["error_deg"] for info in infos[1:]], np.degrees(means), rtol=1e-12)
 
 
@@ -110,9 +110,9 @@ def test_the_interval_is_kept_at_any_rate():
     for rate, ticks in ((50.0, 5), (100.0, 10), (286.0, 29)):
         env = HandMotionGainEnv(rate=rate, duration=2.0)
         _, infos = play(env, lambda observation: np.zeros(3))
-        assert env.tuned.ticks == ticks
+        assert env.tuned.interval_samples == ticks
         assert np.allclose(np.diff([info["time"] for info in infos[1:]]), ticks / rate)
-    assert TunedFilter.of(tunable_filter("bounded-motion"), None, InnovationFeatures(1e-3)).ticks == 1
+    assert TunedFilter.of(tunable_filter("bounded-motion"), None, InnovationFeatures(1e-3)).interval_samples == 1
 
 
 def test_motion_and_setting_follow_the_seed():

@@ -56,12 +56,12 @@ def contenders(array: str, noise: Mapping[str, Any]) -> dict[str, Any]:
     """
     model = ArrayOrientation(array=array, **noise)
     printed = ArrayOrientation(array=array, exact_rotation=False, orthonormalise=False, **noise)
-    gyroscope: dict[str, Any] = {name: value for name, value in noise.items() if name == "gyroscope_deviation"}
+    gyroscope: dict[str, Any] = {name: value for name, value in noise.items() if name == "gyroscope_std"}
     found: dict[str, Any] = {
         "array-orientation": KalmanFilter(model, keep_covariance=False),
         "array-orientation, first order": KalmanFilter(printed, keep_covariance=False),
         "marins, σ_q = 0.5": KalmanFilter(Marins(**gyroscope), keep_covariance=False),
-        "marins, σ_q = 0.01": KalmanFilter(Marins(quaternion_deviation=0.01, **gyroscope), keep_covariance=False),
+        "marins, σ_q = 0.01": KalmanFilter(Marins(quaternion_std=0.01, **gyroscope), keep_covariance=False),
     }
     return found | {name: name for name in ESTIMATORS}
 
@@ -71,9 +71,9 @@ def noise_of(sensors: str) -> dict[str, float]:
     preset, root = array_preset(sensors), math.sqrt(RATE)
     assert preset.magnetometer is not None
     return {
-        "array_deviation": float(preset.accelerometer.white_noise) * root,
-        "gyroscope_deviation": float(preset.gyroscope.white_noise) * root,
-        "magnetometer_deviation": float(preset.magnetometer.white_noise) * root / 50.0,
+        "array_std": float(preset.accelerometer.white_noise) * root,
+        "gyroscope_std": float(preset.gyroscope.white_noise) * root,
+        "magnetometer_std": float(preset.magnetometer.white_noise) * root / 50.0,
     }
 
 

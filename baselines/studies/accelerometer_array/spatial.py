@@ -58,8 +58,8 @@ METHODS: dict[str, dict[str, dict[str, Any]]] = {
         "proposed, gravity as printed": {"gravity_sign": -1.0},
         "tilt sensor": {"method": "tilt"},
         "integration": {"method": "integration"},
-        "Marins, σ_q = 0.01": {"quaternion_deviation": 0.01},
-        "Marins, σ_q = 0.5": {"quaternion_deviation": 0.5},
+        "Marins, σ_q = 0.01": {"quaternion_std": 0.01},
+        "Marins, σ_q = 0.5": {"quaternion_std": 0.5},
     },
     "octa": {
         WITH_GYROSCOPE: {},
@@ -69,8 +69,8 @@ METHODS: dict[str, dict[str, dict[str, Any]]] = {
         "proposed, F as printed, no gyroscope": AS_PRINTED | NO_GYROSCOPE | WRONG_SIGN,
         "tilt sensor": {"method": "tilt"},
         "integration of the array's rate": {"method": "integration"},
-        "Marins, σ_q = 0.01, array's rate": {"quaternion_deviation": 0.01},
-        "Marins, σ_q = 0.3, array's rate": {"quaternion_deviation": 0.3},
+        "Marins, σ_q = 0.01, array's rate": {"quaternion_std": 0.01},
+        "Marins, σ_q = 0.3, array's rate": {"quaternion_std": 0.3},
     },
 }
 """Device → name in tables → parameters of :class:`.Marins` (names that begin so) or :class:`.ArrayOrientation`. OCTA is

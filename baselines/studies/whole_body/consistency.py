@@ -74,8 +74,8 @@ def simulate(
         name: np.stack([ride.measurements[name] for ride in rides], axis=1) for name in rides[0].measurements
     }
     processes = {
-        1: (model.yaw_acceleration_deviation, model.yaw_acceleration_time),
-        3: (model.relative_acceleration_deviation, model.relative_acceleration_time),
+        1: (model.yaw_acceleration_std, model.yaw_acceleration_time),
+        3: (model.relative_acceleration_std, model.relative_acceleration_time),
     }
     names = ["bicycle/roll", None, "trunk/angles", None]
     names += [f"{joint}_{side}/angles" for side in ("right", "left") for joint in ("shoulder", "hip")]

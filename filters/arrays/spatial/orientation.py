@@ -101,17 +101,17 @@ class ArrayOrientation(ArrayEquations, Model):
     """``samples``: at rest, from the first readings and field; ``given``: :attr:`start_orientation`"""
     field: Literal["start", "given"] = "start"
     """``start``: the dip is that of the first samples; ``given``: :attr:`dip`"""
-    jerk_deviation: float = 30.0
+    jerk_std: float = 30.0
     """σ_γ, rad/s³ per sample; the thesis gives none, 10 to 1000 makes no difference"""
-    acceleration_deviation: float = 5.0
+    acceleration_std: float = 5.0
     """σ_b, m/s²: acceleration of the hand, each axis; the thesis gives none, less than 2 doubles the error"""
-    array_deviation: float = 0.981
+    array_std: float = 0.981
     """σ_a, m/s² per sample (section 5.3.2: 0.1 g)"""
-    gyroscope_deviation: float = 0.1
+    gyroscope_std: float = 0.1
     """σ_ω, rad/s per sample (section 5.3.2)"""
-    magnetometer_deviation: float = 0.01
+    magnetometer_std: float = 0.01
     """σ_m per sample, of a field of length one (section 5.3.2: 1 %)"""
-    orthogonality_deviation: float = 0.01
+    orthogonality_std: float = 0.01
     """σ_s; the thesis gives none, 10⁻³ over-constrains"""
     orientation_prior: float = 0.01
     """standard deviation of every element of Q at the start; 1 opens it after a start that is only guessed"""
@@ -143,9 +143,9 @@ class ArrayOrientation(ArrayEquations, Model):
     state_size: ClassVar[int] = 27
     error_size: ClassVar[int] = 15
     gains: ClassVar[dict[str, Gain]] = {
-        "process": Gain("jerk_deviation", description="process variance σ_γ²"),
-        "measurement": Gain("acceleration_deviation", description="variance σ_b² of the acceleration of the hand"),
-        "heading": Gain("magnetometer_deviation", description="measurement variance σ_m²"),
+        "process": Gain("jerk_std", description="process variance σ_γ²"),
+        "measurement": Gain("acceleration_std", description="variance σ_b² of the acceleration of the hand"),
+        "heading": Gain("magnetometer_std", description="measurement variance σ_m²"),
     }
 
     def __post_init__(self) -> None:
@@ -233,7 +233,7 @@ class ArrayOrientation(ArrayEquations, Model):
             + [[none, none, none, unit, none], [none, none, none, dt2 * unit, unit]],
         )
         # V = J σ_γ² Jᵀ with J = [0 0 0 Δt ½Δt²]ᵀ: white jerk γ drives α and ω
-        power = expand(self.jerk_deviation**2, 2) * unit
+        power = expand(self.jerk_std**2, 2) * unit
         jerk = [none, none, none, expand(self.dt, 2) * unit, expand(0.5 * self.dt**2, 2) * unit]
         V = block_matrix([[a @ power @ b for b in jerk] for a in jerk])
         rows = [turned[..., index, :] for index in range(3)]
@@ -254,13 +254,13 @@ class ArrayOrientation(ArrayEquations, Model):
             r.append(z[self.readings.name] - expected[..., 0])
             nothing = (P @ none) + 0.0
             H.append([nothing, nothing, gravity * (P @ unit), T @ unit, C @ product_jacobian(rate)])
-            shared = 0.0 if self.method == "tilt" else expand(self.acceleration_deviation**2, 2)
-            R.append(shared * (P @ P.mT) + expand(self.array_deviation**2, 2) * identity(self.geometry.size, x))
+            shared = 0.0 if self.method == "tilt" else expand(self.acceleration_std**2, 2)
+            R.append(shared * (P @ P.mT) + expand(self.array_std**2, 2) * identity(self.geometry.size, x))
         if self.has_rate_rows:
             # gyroscope: ω
             r.append(z["imu/gyr"] - x[..., 12:15])
             H.append([none, none, none, none, unit])
-            R.append(expand(self.gyroscope_deviation**2, 2) * unit)
+            R.append(expand(self.gyroscope_std**2, 2) * unit)
         if self.method != "integration":
             # magnetometer (5.23): R_BOᵀ Qᵀ m, linear in each row of Q
             field, there = known(z["imu/mag"])
@@ -269,12 +269,12 @@ class ArrayOrientation(ArrayEquations, Model):
             expected = to_sensor @ (self._matrix(x).mT @ world[..., None])
             r.append(xp.where(there, normalize(field), xp.nan + zero3) - expected[..., 0])
             H.append([*(world[..., i, None, None] * to_sensor for i in range(3)), none, none])
-            R.append(expand(self.magnetometer_deviation**2, 2) * unit)
+            R.append(expand(self.magnetometer_std**2, 2) * unit)
         # orthogonality (5.31), (5.32): six zeros
         zeros, jacobian = _orthogonality(xp, x)
         r.append(-zeros)
         H.append([jacobian, 0.0 * jacobian[..., :6]])
-        R.append(expand(self.orthogonality_deviation**2, 2) * identity(6, x))
+        R.append(expand(self.orthogonality_std**2, 2) * identity(6, x))
         return xp.concat(r, axis=-1), block_matrix(H), block_diagonal(R)
 
     def retract(self, x: Array, dx: Array) -> Array:

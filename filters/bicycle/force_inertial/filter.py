@@ -107,7 +107,7 @@ class ForceInertial(ForceInertialParameters, Model):
     residual_size: ClassVar[int] = 4
     gains: ClassVar[dict[str, Gain]] = {
         "process": Gain("gyroscope_noise", description="process variance of the angles, from the gyroscopes"),
-        "bias": Gain("bias_deviation", description="process variance of the gyroscope bias"),
+        "bias": Gain("bias_std", description="process variance of the gyroscope bias"),
         "torque": Gain("torque_noise", description="measurement variance of the two torques"),
         "roll": Gain("roll_noise", description="measurement variance of the roll from the seat's force"),
         "shoulder": Gain("shoulder_noise", description="variance of the shoulders' tilt"),
@@ -162,7 +162,7 @@ class ForceInertial(ForceInertialParameters, Model):
         # Q: ΔT² G Σ_ω Gᵀ of the angles, 2σ² ΔT/τ of the bias
         scale = (dt * self.gyroscope_noise) * (dt * self.gyroscope_noise)
         spread = G @ G.mT
-        drift = 2.0 * self.bias_deviation * self.bias_deviation * dt / self.bias_time if self.bias_model else 0.0
+        drift = 2.0 * self.bias_std * self.bias_std * dt / self.bias_time if self.bias_model else 0.0
         Q = rows(
             [
                 [

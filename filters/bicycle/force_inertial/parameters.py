@@ -117,7 +117,7 @@ class ForceInertialParameters(RiderEquations):
     sine of tangential force over its mean vertical part"""
     bias_time: float = 1800.0
     """τ, s (table I)"""
-    bias_deviation: float = 0.15 * DEG
+    bias_std: float = 0.15 * DEG
     """σ of (15), rad/s; not published"""
     gyroscope_noise: float = 1.0 * DEG
     """standard deviation a sample, rad/s: stands for scale and alignment and for the Euler step too; not published"""

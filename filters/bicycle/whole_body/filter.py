@@ -108,11 +108,11 @@ class WholeBody(RiderLinkage, Model):
     """rad/s/√Hz (0.4 °/s/√Hz)"""
     limb_gyroscope_noise: float = 7.0e-3
     """rad/s/√Hz (0.4 °/s/√Hz)"""
-    yaw_acceleration_deviation: float = 0.5
+    yaw_acceleration_std: float = 0.5
     """rad/s², stationary"""
     yaw_acceleration_time: float = 1.0
     """s (table II)"""
-    relative_acceleration_deviation: float = 0.8
+    relative_acceleration_std: float = 0.8
     """m/s², stationary, of a_ts"""
     relative_acceleration_time: float = 1.0
     """s (table II)"""
@@ -191,8 +191,8 @@ class WholeBody(RiderLinkage, Model):
         rate = self.bicycle_axes(z["bicycle_imu/gyr"])
         force = self._seat_force(z, rate, 0.0 * rate)
         x = xp.concat([x, rate, 0.0 * rate, force, speed, zero], axis=-1)
-        deviations = [self.roll_prior, self.yaw_acceleration_deviation, *[self.trunk_prior] * 3]
-        deviations += [*[self.relative_acceleration_deviation] * 3, *[self.limb_prior] * 12]
+        deviations = [self.roll_prior, self.yaw_acceleration_std, *[self.trunk_prior] * 3]
+        deviations += [*[self.relative_acceleration_std] * 3, *[self.limb_prior] * 12]
         variances = xp.concat([1.0 + zero * 0.0 + expand(value**2 - 1.0, 1) for value in deviations], axis=-1)
         return x, diagonal_matrix(variances)
 
@@ -217,8 +217,8 @@ class WholeBody(RiderLinkage, Model):
         Q: dict[tuple[int, int], Array] = {(0, 0): one[..., None] * expand(dt * self.bicycle_gyroscope_noise**2, 2)}
         # Gauss–Markov processes (4)*, (7): ϑ̈ (block 1) and a_ts (block 3)
         memories = (
-            (1, YAW_ACCELERATION, self.yaw_acceleration_time, self.yaw_acceleration_deviation),
-            (3, RELATIVE_ACCELERATION, self.relative_acceleration_time, self.relative_acceleration_deviation),
+            (1, YAW_ACCELERATION, self.yaw_acceleration_time, self.yaw_acceleration_std),
+            (3, RELATIVE_ACCELERATION, self.relative_acceleration_time, self.relative_acceleration_std),
         )
         for index, part, time, deviation in memories:
             keep = xp.exp(-(dt / time) * one)

@@ -108,16 +108,16 @@ def test_environment_and_estimator_are_the_same_thing(name):
     while not over:
         observation, _, _, over, info = env.step(estimator.policy(observation))
         said.append(info["estimate"]["up"])
-    ticks = env.tuned.ticks * np.arange(1, len(said) + 1) - 1
+    ticks = env.tuned.interval_samples * np.arange(1, len(said) + 1) - 1
     run = estimator.with_dt(trajectory.dt).run(trajectory.measurements)
     np.testing.assert_allclose(said, run.pose["up"][ticks], atol=1e-12)
 
 
 def test_another_rate_keeps_the_seconds():
     estimator = adaptive("bounded-motion")
-    assert (estimator.dt, estimator.tuned.ticks) == (0.01, 10)
-    assert estimator.with_dt(1 / 286).tuned.ticks == 29
-    assert estimator.with_dt(0.5).tuned.ticks == 1
+    assert (estimator.dt, estimator.tuned.interval_samples) == (0.01, 10)
+    assert estimator.with_dt(1 / 286).tuned.interval_samples == 29
+    assert estimator.with_dt(0.5).tuned.interval_samples == 1
 
 
 def test_what_does_not_fit_is_refused():

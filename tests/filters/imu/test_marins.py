@@ -119,14 +119,14 @@ def test_the_second_step_equals_filterpy() -> None:
 def test_a_hand_at_constant_speed_is_followed() -> None:
     data, orientation = swaying(1000, 5)
     assert rms(total(Marins(), data, orientation)[100:]) < 2.5
-    assert rms(total(Marins(quaternion_deviation=0.05), data, orientation)[100:]) < 2.0
+    assert rms(total(Marins(quaternion_std=0.05), data, orientation)[100:]) < 2.0
 
 
 def test_acceleration_needs_a_large_deviation_and_a_steep_field_leaves_a_bias() -> None:
     """At 0.01 the first step is believed, at 0.5 the gyroscope; equal weights split what two vectors disagree about."""
     data, orientation = swaying(1000, 6, acceleration=5.0)
     model = Marins(field="given", start="given", start_orientation=tuple(orientation[0]))
-    believed = rms(total(replace(model, quaternion_deviation=0.01), data, orientation))
+    believed = rms(total(replace(model, quaternion_std=0.01), data, orientation))
     weighted = rms(total(model, data, orientation))
     assert believed > 8.0
     assert weighted < 0.5 * believed

@@ -112,8 +112,8 @@ def test_the_array_of_a_controller_stands_in_for_an_imu():
     left = trajectory.measurements["array/acc"] - CONTROLLER.readings(
         force, truth["angular_acceleration"], truth["angular_rate"]
     )
-    assert noise["array_deviation"] == pytest.approx(float(np.nanstd(left)), rel=0.1)
-    assert noise["gyroscope_deviation"] == pytest.approx(0.0052, rel=0.1)
+    assert noise["array_std"] == pytest.approx(float(np.nanstd(left)), rel=0.1)
+    assert noise["gyroscope_std"] == pytest.approx(0.0052, rel=0.1)
 
 
 def test_scores_join_what_an_estimator_tells(monkeypatch):

@@ -110,7 +110,7 @@ def accuracy():
         raw = undo_calibration(ideal, truth)
         runs += [apply_calibration(raw, nominal_calibration(CONTROLLER)), apply_calibration(raw, found), ideal]
         attitudes += [motion.truth["orientation"]] * 3
-    model = ArrayOrientation(array=CONTROLLER, dt=0.01, array_deviation=0.1, gyroscope_deviation=0.01)
+    model = ArrayOrientation(array=CONTROLLER, dt=0.01, array_std=0.1, gyroscope_std=0.01)
     channels = {name: np.stack([run.measurements[name] for run in runs], axis=1) for name in runs[0].measurements}
     estimate = KalmanFilter(model, compiled=False).run(channels)
     error = metrics.error(ORIENTATION, estimate.pose["orientation"], np.stack(attitudes, axis=1))
