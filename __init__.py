@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from .baselines.registry import EstimatorInfo, list_estimators, make_estimator
     from .baselines.run import run
     from .envs.data.calibration.records import apply_calibration, load_calibration
-    from .envs.data.formats.load import load_recording
+    from .envs.data.formats.load import load_recording, load_recordings
     from .envs.data.plausibility import Finding, check_recording
     from .envs.data.trajectory import Trajectory
     from .envs.record import record
@@ -48,6 +48,7 @@ __all__ = [
     "list_estimators",
     "load_calibration",
     "load_recording",
+    "load_recordings",
     "make_estimator",
     "record",
     "run",
@@ -65,6 +66,7 @@ _HOMES = {
     "list_estimators": ".baselines.registry",
     "load_calibration": ".envs.data.calibration.records",
     "load_recording": ".envs.data.formats.load",
+    "load_recordings": ".envs.data.formats.load",
     "make_estimator": ".baselines.registry",
     "record": ".envs.record",
     "run": ".baselines.run",

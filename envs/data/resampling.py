@@ -95,6 +95,18 @@ def between(name: str, a: np.ndarray, b: np.ndarray, weight: np.ndarray) -> np.n
     return rotation.normalize(value) if name == "up" else value
 
 
+def shifted(truth: Mapping[str, np.ndarray], time: np.ndarray, offset: float) -> dict[str, np.ndarray]:
+    """Truth recorded at ``time`` as it is at ``time - offset``, s; NaN outside and beside unknown truth."""
+    wanted = time - offset
+    left, right, weight = neighbours(time, wanted)
+    outside = ((wanted < time[0]) | (wanted > time[-1]))[:, None]
+    with np.errstate(invalid="ignore"):
+        return {
+            name: np.where(outside, np.nan, between(name, values[left], values[right], weight))
+            for name, values in truth.items()
+        }
+
+
 def own_interval(times: np.ndarray, dt: float) -> float:
     """Usual distance of a sensor's samples, s; ``dt`` if it has fewer than two."""
     return float(np.median(np.diff(times))) if len(times) > 1 else dt

@@ -6,7 +6,6 @@ Simulated episodes and recordings are the same thing here, so that everything th
 from __future__ import annotations
 
 import dataclasses
-import json
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -17,15 +16,15 @@ from typing import Any, Literal
 import numpy as np
 
 from ...filters.core import rotation
+from .checks import check_metadata, columns, first, real_array, unit_or_unknown
 from .clock import Clock, check_interval, fit_clock
-from .resampling import resampled_fields
+from .resampling import resampled_fields, shifted
 from .storage import read_trajectory_file, write_trajectory_file
 
 DERIVED_FROM_ORIENTATION = {"up": rotation.up_in_body, "relative_orientation": lambda orientation: orientation}
 """Truth that an orientation contains: quantity name → function of the quaternions ``(T, 4)``."""
-UNIT_QUANTITIES = {"orientation": 4, "up": 3}
-"""Truth of unit length, by the last part of its name, and its size."""
-UNIT_TOLERANCE = 0.02
+REFERENCE_CLOCK = "reference_clock_offset"
+"""Key of the metadata: s by which the truth runs ahead of the gyroscope."""
 INERTIAL = ("gyr", "acc", "mag")
 """Kinds of channels whose sampling interval must be that of an inertial sensor."""
 
@@ -188,6 +187,13 @@ class Trajectory:
         return self._rows(np.flatnonzero(~repeated)) if repeated.any() else self
 
     @property
+    def onboard_orientation(self) -> np.ndarray | None:
+        """The device's own estimate of its orientation ``(T, 4)``, which is no truth; None if it gave none."""
+        return next(
+            (values for name, values in self.measurements.items() if name.endswith("onboard_orientation")), None
+        )
+
+    @property
     def quantities(self) -> tuple[str, ...]:
         """Names that :meth:`truth_of` answers."""
         derived = [name for name in DERIVED_FROM_ORIENTATION if "orientation" in self.truth and name not in self.truth]
@@ -256,6 +262,25 @@ class Trajectory:
         old_rate = 1.0 / float(np.median(np.diff(self.time))) if len(self) > 1 else 1.0 / self.dt
         return self.replace(**fields, metadata=self.metadata | {"rate": float(rate), "resampled_from": old_rate})
 
+    def reference_clock_corrected(self) -> Trajectory:
+        """The trajectory with its truth on the clock of its gyroscope.
+
+        Loaders measure by how much the reference runs ahead (``metadata["reference_clock_offset"]``, s). The truth at t
+        is the recorded one at t − offset. Where that lies beside unknown truth, the orientation is turned back by the
+        gyroscope instead, over no more than 10 ms. Without a measured offset nothing changes.
+        """
+        offset = self.metadata.get(REFERENCE_CLOCK)
+        if not offset or not self.truth:
+            return self
+        truth = shifted(self.truth, self.time, offset)
+        gyr = self.measurements.get("imu/gyr")
+        if "orientation" in truth and gyr is not None and abs(offset) <= 0.01:
+            turned = rotation.multiply(self.truth["orientation"], rotation.exp(-offset * gyr))
+            lost = ~np.isfinite(truth["orientation"]).all(axis=1, keepdims=True)
+            truth["orientation"] = np.where(lost, turned, truth["orientation"])
+        details = {name: value for name, value in self.metadata.items() if name != REFERENCE_CLOCK}
+        return self.replace(truth=truth, metadata=details | {"reference_clock_corrected": offset})
+
     def save(self, path: str | Path) -> Path:
         """Write the trajectory to an HDF5 file, see :mod:`poise.envs.data.storage`.
 
@@ -288,86 +313,3 @@ def load_trajectory(path: str | Path) -> Trajectory:
         return Trajectory(**fields)
     except ValueError as reason:
         raise ValueError(f"{path}: {reason}") from None
-
-
-def unit_or_unknown(truth: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Truth that must have unit length, with NaN in rows that have not."""
-    for name, values in truth.items():
-        if UNIT_QUANTITIES.get(name.rsplit("/", 1)[-1].removeprefix("relative_")) != values.shape[1]:
-            continue
-        wrong = np.abs(np.linalg.norm(values, axis=1) - 1.0) > UNIT_TOLERANCE
-        if wrong.any():
-            warnings.warn(
-                f"truth[{name!r}] must have unit length or be NaN; {wrong.sum()} of {len(wrong)} rows have not (the "
-                f"first at tick {first(wrong)}: {values[first(wrong)].tolist()}) and count as unknown",
-                stacklevel=4,
-            )
-            truth[name] = np.where(wrong[:, None], np.nan, values)
-            truth[name].flags.writeable = False
-    return truth
-
-
-def first(flags: np.ndarray) -> int:
-    """Index of the first True."""
-    return int(np.flatnonzero(flags)[0])
-
-
-def real_array(name: str, values: Any) -> np.ndarray:
-    """``values`` as a read-only float64 array of our own; masked entries are NaN.
-
-    Raises:
-        ValueError: names the values if they are not real numbers.
-    """
-    try:
-        array = np.asanyarray(values)
-    except ValueError as reason:
-        raise ValueError(f"{name} must be an array of real numbers: {reason}") from None
-    if array.dtype.kind not in "fiub":
-        raise ValueError(f"{name} must be an array of real numbers, got dtype {array.dtype}")
-    if not constant(array):
-        array = np.array(np.ma.filled(array.astype(float), np.nan), dtype=float, subok=False)
-        array.flags.writeable = False
-    return array
-
-
-def constant(array: np.ndarray) -> bool:
-    """Whether nobody can change a float64 array, so that it need not be copied: all its owners are read-only."""
-    owner: Any = array
-    while isinstance(owner, np.ndarray):
-        if owner.flags.writeable or type(owner) is not np.ndarray:
-            return False
-        if owner.base is None:
-            return array.dtype == float
-        owner = owner.base
-    return False
-
-
-def columns(argument: str, arrays: Mapping[str, Any], length: int) -> dict[str, np.ndarray]:
-    """Check a mapping name → ``(length, size)``."""
-    if not isinstance(arrays, Mapping):
-        raise ValueError(f"{argument} must be a mapping from name to array, got {type(arrays).__name__}")
-    checked = {}
-    for name, values in arrays.items():
-        if not isinstance(name, str) or not name.strip("/"):
-            raise ValueError(f"{argument} must have names as keys, got {name!r}")
-        array = real_array(f"{argument}[{name!r}]", values)
-        if array.ndim != 2 or array.shape[0] != length or array.shape[1] == 0:
-            raise ValueError(f"{argument}[{name!r}] must have shape ({length}, size), got {array.shape}")
-        if np.isinf(array).any():
-            tick = first(np.isinf(array).any(axis=1))
-            raise ValueError(
-                f"{argument}[{name!r}] must be finite, or NaN where unknown; it is infinite at tick {tick}"
-            )
-        checked[name] = array
-    return checked
-
-
-def check_metadata(metadata: Mapping[str, Any]) -> dict[str, Any]:
-    """Metadata as JSON would give them back, so that a saved trajectory equals itself."""
-    try:
-        plain = json.loads(json.dumps(metadata))
-    except (TypeError, ValueError) as reason:
-        raise ValueError(f"metadata must be JSON-able: {reason}") from None
-    if not isinstance(plain, dict):
-        raise ValueError(f"metadata must be a mapping, got {type(metadata).__name__}")
-    return plain

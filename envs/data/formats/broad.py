@@ -15,8 +15,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ....filters.core import rotation
+from .. import reference_clock
 from ..storage import HDF5_SIGNATURE, read_hdf5
 from ..trajectory import Trajectory
+from .head import Head
 
 if TYPE_CHECKING:
     import h5py
@@ -29,15 +31,16 @@ LICENCE = "CC BY 4.0"
 SOURCE = "BROAD, Laidig et al. 2021, https://doi.org/10.3390/data6070072"
 
 
-def is_broad(head: bytes, path: Path) -> bool:
+def is_broad(head: Head) -> bool:
     """Whether a file is a BROAD trial: MATLAB or HDF5 with one of its fields."""
-    if not head.startswith((MATLAB_5, MATLAB_7, HDF5_SIGNATURE)):
+    path = head.path
+    if not head.content.startswith((MATLAB_5, MATLAB_7, HDF5_SIGNATURE)):
         return False
     import h5py
     import scipy.io
 
     try:
-        if head.startswith(MATLAB_5):
+        if head.content.startswith(MATLAB_5):
             return any(name in WIDTHS for name, _, _ in scipy.io.whosmat(str(path)))
         with h5py.File(path, "r") as file:
             return any(name in WIDTHS for name in file)
@@ -46,7 +49,7 @@ def is_broad(head: bytes, path: Path) -> bool:
         return True
 
 
-def load_broad(path: Path) -> Trajectory:
+def load_broad(path: Path) -> list[Trajectory]:
     """Read a BROAD trial.
 
     Returns:
@@ -59,17 +62,15 @@ def load_broad(path: Path) -> Trajectory:
     """
     with path.open("rb") as file:
         if file.read(len(MATLAB_5)) != MATLAB_5:
-            return read_hdf5(path, lambda file, path: to_trajectory(hdf5_fields(file), path))
+            trial = read_hdf5(path, lambda file, path: to_trajectory(hdf5_fields(file), path))
+            return [reference_clock.measured(trial)]
     import scipy.io
 
     try:
         fields = scipy.io.loadmat(str(path), variable_names=[*WIDTHS, "sampling_rate"])
     except Exception as reason:  # scipy raises many kinds for damaged files
-        raise ValueError(f"{path} is not a readable MATLAB file; it may be truncated or damaged: {reason}") from reason
-    try:
-        return to_trajectory(fields, path)
-    except ValueError as reason:
-        raise ValueError(f"{path}: {reason}") from reason
+        raise ValueError(f"it is not a readable MATLAB file; it may be truncated or damaged: {reason}") from reason
+    return [reference_clock.measured(to_trajectory(fields, path))]
 
 
 def hdf5_fields(file: h5py.File) -> dict[str, np.ndarray]:

@@ -1,4 +1,4 @@
-"""CSV exports of Movella DOT (formerly Xsens DOT) sensors.
+"""Exports of Movella DOT (formerly Xsens DOT) sensors, with any delimiter, decimal mark and line end.
 
 Xsens DOT User Manual, document XD0502P, sections 4.2.1–4.2.5: ``SampleTimeFine`` counts microseconds and
 wraps at 2³²; ``Acc_*`` m/s², ``Gyr_*`` deg/s, ``Mag_*`` in units of the field at calibration (about 40 µT), ``dq_*``
@@ -8,50 +8,43 @@ and ``dv[*]`` are increments of one sampling interval, all in sensor axes.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ....filters.core import rotation
 from ..trajectory import Trajectory
+from .arrays import read_table
+from .described import with_checked_orientation
+from .head import Head
+from .mapping import trajectory_of
+from .stamps import as_seconds
+from .table import Table
 
-if TYPE_CHECKING:
-    import pandas
-
-CLOCK_PERIOD = 2**32
-"""µs after which the clock of the sensor starts again."""
-LONGEST_GAP = 60_000_000
-"""µs; more between two rows is no drop-out but a sensor that was started again."""
-HEADER_LINES = 40
-"""The table of an export starts within so many lines."""
-DEVICE_KEYS = ("DeviceTag", "DeviceId", "OutputRate", "FilterProfile", "Measurement Mode", "SyncStatus")
-
-
-def axes(*stems: str, names: str = "XYZ") -> tuple[str, ...]:
-    """Column names of vectors or quaternions: ``stem_X`` and so on."""
-    return tuple(f"{stem}_{axis}" for stem in stems for axis in names)
+DEVICE_KEYS = ("DeviceTag", "DeviceId", "OutputRate", "FilterProfile", "Measurement Mode", "SyncStatus", "Measurement")
+UNITS = {"gyr": "rad/s", "acc": "m/s²", "mag": "calibration field", "onboard_orientation": "1"}
+LONGEST_GAP = 60.0
+"""s; more between two rows is no drop-out but a sensor that was started again."""
 
 
-VELOCITY_INCREMENT = ("dv[1]", "dv[2]", "dv[3]")
+def axes(stem: str, names: str = "XYZ") -> list[str]:
+    """Column names of a vector or quaternion: ``stem_X`` and so on."""
+    return [f"{stem}_{axis}" for axis in names]
 
 
-def is_dot(head: bytes, path: Path) -> bool:
+def is_dot(head: Head) -> bool:
     """Whether a file is a DOT export: text, a key of the device's header, and the column of its clock.
 
-    The header matters: the older MTw exports have the same columns in other units.
+    The header matters: MT Manager exports have the same columns in other units.
     """
-    text = head.decode("utf-8", errors="replace")
-    return "SampleTimeFine" in text and any(line.startswith(DEVICE_KEYS) for line in text.splitlines())
+    lines = [line.lstrip('"') for line in head.text.splitlines()]
+    return "sampletimefine" in head.text.lower() and any(line.startswith(DEVICE_KEYS) for line in lines)
 
 
-def load_dot(path: Path, place: str = "imu") -> Trajectory:
+def load_dot(path: Path) -> list[Trajectory]:
     """Read an export of one DOT sensor.
 
-    The ticks lie on the sensor's uniform grid; packets that were lost are ticks of NaN.
-
-    Args:
-        path: the file.
-        place: name of the sensor, the first part of its channels' names.
+    The ticks lie on the sensor's uniform grid, that of ``OutputRate`` where rows are lost or their stamps are
+    irregular; packets that were lost are ticks of NaN.
 
     Returns:
         The channels ``gyr`` rad/s, ``acc`` m/s² and, if it was exported, ``mag`` (arbitrary unit); ``gyr`` and ``acc``
@@ -60,159 +53,88 @@ def load_dot(path: Path, place: str = "imu") -> Trajectory:
         synchronised sensors apart.
 
     Raises:
-        ValueError: no samples, a truncated or unreadable row, missing columns, or a clock that runs
-            backwards, stands still or jumps.
+        ValueError: no samples, an unreadable cell, missing columns, or a clock that runs backwards, stands still or
+            was started again.
     """
-    header, first_row = read_header(path)
-    table = read_table(path, first_row)
-    clock = table["SampleTimeFine"].to_numpy(dtype=float)
-    try:
-        ticks, interval = grid(clock)
-        nominal = output_rate(header)
-        if nominal is not None and len(ticks) > 1 and abs(interval * 1e-6 * nominal - 1.0) > 0.05:
-            raise ValueError(f"rows are {interval:.0f} µs apart, but the header says OutputRate {nominal:g} Hz")
-    except ValueError as reason:
-        raise ValueError(f"{path}: {reason}") from None
-    if len(ticks) == 1:
-        if nominal is None:
-            raise ValueError(f"{path}: a single row and no OutputRate; at least two rows are needed")
-        interval = 1e6 / nominal
-    measurements, units = channels(table, interval * 1e-6, path)
-    spread = {
-        f"{place}/{kind}": np.full((ticks[-1] + 1, values.shape[1]), np.nan) for kind, values in measurements.items()
+    table = read_table(path)
+    table = Table(
+        {spelled(name): values for name, values in table.arrays.items()},
+        preamble=table.preamble,
+        kind=table.kind,
+        unreadable={spelled(name): cell for name, cell in table.unreadable.items()},
+    )
+    header = {
+        key: table.value_of(key)
+        for key in (*DEVICE_KEYS, "FirmwareVersion", "AppVersion", "StartTime")
+        if table.value_of(key) is not None
     }
-    for kind, values in measurements.items():
-        spread[f"{place}/{kind}"][ticks] = values
-    return Trajectory(
-        time=np.arange(ticks[-1] + 1) * (interval * 1e-6),
-        measurements=spread,
-        metadata={
-            "name": path.stem,
-            "rate": 1e6 / interval,
-            "units": {f"{place}/{kind}": unit for kind, unit in units.items()},
-            "clock_start": int(clock[0]),
-            "missing_ticks": int(ticks[-1] + 1 - len(ticks)),
-            "device": header,
-            "format": "Movella DOT",
-            "source": "Movella/Xsens DOT export",
-        },
-    )
-
-
-def read_header(path: Path) -> tuple[dict[str, str], int]:
-    """Key-value lines before the table, and the number of the line with the column names."""
-    header: dict[str, str] = {}
-    with path.open(encoding="utf-8", errors="replace") as file:
-        for number, line in zip(range(HEADER_LINES), file, strict=False):
-            if "SampleTimeFine" in line:
-                return header, number
-            key, comma, value = line.strip().partition(",")
-            if comma and key.endswith(":"):
-                header[key.rstrip(":")] = value.strip().rstrip(",")
-    raise ValueError(f"{path}: no line with the column SampleTimeFine among the first {HEADER_LINES}")
-
-
-def read_table(path: Path, first_row: int) -> pandas.DataFrame:
-    """The table, every column a number; a ValueError names the row that is not."""
-    import pandas
-
-    try:
-        table = pandas.read_csv(
-            path, skiprows=first_row, index_col=False, skipinitialspace=True, encoding_errors="replace"
-        )
-    except (pandas.errors.ParserError, pandas.errors.EmptyDataError) as reason:
-        raise ValueError(f"{path} is not a readable DOT export: {reason}") from reason
-    table.columns = [str(name).strip() for name in table.columns]
-    # Rows that end in a comma make a last column without name or content.
-    table = table[[name for name in table.columns if not name.startswith("Unnamed")]]
-    if len(table) == 0:
-        raise ValueError(f"{path}: the recording has no samples")
-    table = table.apply(pandas.to_numeric, errors="coerce")
-    for name in wanted_columns(table):
-        unreadable = ~np.isfinite(table[name].to_numpy(dtype=float))
-        if unreadable.any():
-            row = int(np.flatnonzero(unreadable)[0])
-            where = "the last row; the file seems truncated" if row == len(table) - 1 else f"row {row} of the table"
-            raise ValueError(f"{path}: column {name} holds no finite number in {where}")
-    return table
-
-
-def wanted_columns(table: pandas.DataFrame) -> list[str]:
-    """Columns that are read, of those that are there."""
-    known = (
-        "SampleTimeFine",
-        *axes("Acc", "Gyr", "Mag", "Euler"),
-        *axes("Quat", "dq", names="WXYZ"),
-        *VELOCITY_INCREMENT,
-    )
-    return [name for name in table.columns if name in known]
-
-
-def output_rate(header: dict[str, str]) -> float | None:
-    """Sampling rate in Hz as the header has it (``60Hz``), or None."""
-    text = header.get("OutputRate", "").lower().replace("hz", "").strip()
-    try:
-        return float(text)
-    except ValueError:
-        return None
-
-
-def grid(clock: np.ndarray) -> tuple[np.ndarray, float]:
-    """Place rows on a uniform grid.
-
-    Args:
-        clock: ``(N,)`` µs, wrapping at 2³².
-
-    Returns:
-        Tick ``(N,)`` of every row, the first is 0, and the interval in µs (NaN for a single row).
-
-    Raises:
-        ValueError: the clock stands still, runs backwards, jumps, or is so irregular that two rows share a tick.
-    """
-    steps = np.mod(np.diff(clock), CLOCK_PERIOD)
-    if len(steps) == 0:
-        return np.zeros(1, dtype=int), float("nan")
-    bad = (steps == 0) | (steps > LONGEST_GAP)
-    if bad.any():
-        row = int(np.flatnonzero(bad)[0]) + 1
+    nominal = table.rate_in_header("OutputRate")
+    if "SampleTimeFine" not in table.arrays:
+        raise ValueError(f"there is no column SampleTimeFine; {table.seen()}")
+    stamps = as_seconds(table.column("SampleTimeFine"), "us", "SampleTimeFine")
+    if len(table) == 1 and nominal is None:
+        raise ValueError("a single row and no OutputRate; at least two rows are needed")
+    steps = np.diff(stamps.elapsed)
+    if len(steps) and (steps.max() > LONGEST_GAP or steps.max() <= 0.0):
+        row = int(np.argmax(steps)) + 1
         raise ValueError(
-            f"SampleTimeFine must increase by less than {LONGEST_GAP} µs from row to row (and may wrap at 2³²), "
-            f"got {clock[row]:.0f} in row {row} after {clock[row - 1]:.0f}"
+            f"SampleTimeFine must increase by less than {LONGEST_GAP:g} s from row to row (and may wrap at 2³²), got "
+            f"{table.arrays['SampleTimeFine'][row]} in row {row} after {table.arrays['SampleTimeFine'][row - 1]}"
         )
-    # Counted from row to row: over the whole recording the rounding of the interval to 1 µs would add up.
-    increments = np.rint(steps / np.median(steps)).astype(int)
-    if (increments == 0).any():
-        row = int(np.flatnonzero(increments == 0)[0]) + 1
-        raise ValueError(f"SampleTimeFine is irregular: row {row} follows after {steps[row - 1]:.0f} µs")
-    return np.concatenate([[0], np.cumsum(increments)]), float(steps.sum() / increments.sum())
+    details = {
+        "name": path.stem,
+        "clock_start": int(stamps.first),
+        "device": header,
+        "format": "Movella DOT",
+        "source": "Movella/Xsens DOT export",
+    }
+    if nominal is not None:
+        details["nominal_rate"] = nominal
+    # Increments need the interval, which the stamps tell before their rows lie on the grid.
+    interval = Trajectory(stamps.elapsed, {"x": np.zeros((len(table), 1))}, metadata=details).dt
+    measurements = {f"imu/{kind}": values for kind, values in channels(table, interval).items()}
+    details["units"] = {name: UNITS[name.removeprefix("imu/")] for name in measurements}
+    recorded = with_checked_orientation(trajectory_of(stamps.elapsed, measurements, {}, details))
+    grid = recorded.on_grid()
+    return [
+        grid.replace(
+            time=grid.time - grid.time[0],
+            metadata=grid.metadata | {"rate": 1.0 / interval, "missing_ticks": len(grid) - len(recorded)},
+        )
+    ]
 
 
-def channels(table: pandas.DataFrame, dt: float, path: Path) -> tuple[dict[str, np.ndarray], dict[str, str]]:
-    """Arrays ``(N, size)`` and units by kind, in SI."""
+def spelled(name: str) -> str:
+    """A column's name as the manual spells it, whatever its case."""
+    known = ["PacketCounter", "SampleTimeFine", *axes("Acc"), *axes("Gyr"), *axes("Mag"), *axes("Euler")]
+    known += [*axes("Quat", "WXYZ"), *axes("dq", "WXYZ"), "dv[1]", "dv[2]", "dv[3]"]
+    return {each.lower(): each for each in known}.get(name.lower().replace(" ", ""), name)
 
-    def values(names: tuple[str, ...]) -> Any:
-        return table[list(names)].to_numpy(dtype=float) if set(names) <= set(table.columns) else None
 
-    found = {"gyr": values(axes("Gyr")), "acc": values(axes("Acc")), "mag": values(axes("Mag"))}
-    turn, velocity = values(axes("dq", names="WXYZ")), values(VELOCITY_INCREMENT)
-    if found["gyr"] is not None:
-        found["gyr"] = np.radians(found["gyr"])
-    elif turn is not None:
+def channels(table: Table, dt: float) -> dict[str, np.ndarray]:
+    """Arrays ``(N, size)`` by kind, in SI units."""
+
+    def values(names: list[str]) -> np.ndarray | None:
+        return table.matrix(names) if names in table else None
+
+    gyr, acc, mag = values(axes("Gyr")), values(axes("Acc")), values(axes("Mag"))
+    turn, velocity = values(axes("dq", "WXYZ")), values(["dv[1]", "dv[2]", "dv[3]"])
+    found: dict[str, np.ndarray | None] = {
+        "gyr": np.radians(gyr) if gyr is not None else None,
+        "acc": acc if acc is not None else velocity / dt if velocity is not None else None,
+        "mag": mag,
+    }
+    if gyr is None and turn is not None:
         found["gyr"] = rotation.log(rotation.normalize(turn)) / dt
-    if found["acc"] is None and velocity is not None:
-        found["acc"] = velocity / dt
-    missing = [kind for kind in ("gyr", "acc") if found[kind] is None]
-    if missing:
+    if found["gyr"] is None or found["acc"] is None:
         raise ValueError(
-            f"{path}: a gyroscope (Gyr_X … or dq_W …) and an accelerometer (Acc_X … or dv[1] …) are needed, without "
-            f"gravity removed; the columns are {list(table.columns)}"
+            "a gyroscope (Gyr_X … or dq_W …) and an accelerometer (Acc_X … or dv[1] …) are needed, without gravity "
+            f"removed; the columns are {list(table.arrays)}"
         )
-    quaternion, euler = values(axes("Quat", names="WXYZ")), values(axes("Euler"))
+    quaternion, euler = values(axes("Quat", "WXYZ")), values(axes("Euler"))
     if quaternion is not None:
         found["onboard_orientation"] = rotation.normalize(quaternion)
     elif euler is not None:
         roll, pitch, yaw = np.radians(euler).T
         found["onboard_orientation"] = rotation.from_euler_zyx(yaw, pitch, roll)
-    units = {"gyr": "rad/s", "acc": "m/s²", "mag": "calibration field", "onboard_orientation": "1"}
-    present = {kind: array for kind, array in found.items() if array is not None}
-    return present, {kind: units[kind] for kind in present}
+    return {kind: array for kind, array in found.items() if array is not None}

@@ -2,89 +2,272 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+import warnings
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
+from ....filters.support.names import unknown
 from ..calibration.records import CalibrationRecord, apply_calibration
+from ..reference_clock import measured
 from ..storage import FORMAT, is_trajectory_file
 from ..trajectory import Trajectory, load_trajectory
+from .arrays import read_table
+from .benchmarks import (
+    is_archive,
+    is_euroc,
+    is_repoimu,
+    load_archive,
+    load_euroc,
+    load_phone,
+    load_repoimu,
+)
 from .broad import is_broad, load_broad
+from .described import complete, load_described, mapping_of, with_checked_orientation
 from .dot import is_dot, load_dot
-
-HEAD_LENGTH = 4096
-"""Bytes of a file that the recognisers see."""
+from .draft import explanation
+from .folders import is_folder_of_streams, is_member, load_member
+from .head import Head
+from .mapping import RecordingMap, apply_map, make_map, read_map
+from .text import table_of
+from .xsens import is_xsens, load_xsens
 
 
 @dataclass(frozen=True)
 class RecordingFormat:
-    """A file format that can be read.
+    """A format that can be read.
 
     Attributes:
         name: for messages.
-        recognises: whether a file, given by its first bytes and its path, is of this format; must not raise.
-        load: path → trajectory.
+        recognises: whether a file or a folder is of this format; must not raise.
+        load: path → trajectories, one a sensor.
     """
 
     name: str
-    recognises: Callable[[bytes, Path], bool]
-    load: Callable[[Path], Trajectory]
+    recognises: Callable[[Head], bool]
+    load: Callable[[Path], list[Trajectory]]
+
+
+def is_own(head: Head) -> bool:
+    """Whether this package wrote a file."""
+    return is_trajectory_file(head.content, head.path)
+
+
+def load_own(path: Path) -> list[Trajectory]:
+    """What this package wrote."""
+    return [load_trajectory(path)]
+
+
+def is_map(head: Head) -> bool:
+    """Whether a file is a mapping in TOML."""
+    return head.path.suffix.lower() == ".toml" and "[columns]" in head.text
+
+
+def load_map(path: Path) -> list[Trajectory]:
+    """The data of a mapping."""
+    data, mapping = read_map(path)
+    return mapped(data, mapping)
+
+
+def is_described(head: Head) -> bool:
+    """Whether a text table names its columns and their units."""
+    if not head.text:
+        return False
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            table = table_of(head.text, head.path.name)
+            return complete(table, mapping_of(table))
+    except ValueError:
+        return False
+
+
+def load_any_described(path: Path) -> list[Trajectory]:
+    """A table that names its columns and their units."""
+    table = read_table(path)
+    header = " ".join((*table.preamble, *list(table.arrays)[:3]))
+    makers = {"Test Name": "APDM Moveo", "Shimmer": "Shimmer Consensys", "Accelerometer X": "x-io"}
+    name = next((maker for word, maker in makers.items() if word in header), "table with units")
+    return load_described(path, table, name)
 
 
 FORMATS: tuple[RecordingFormat, ...] = (
-    RecordingFormat(f"{FORMAT} (HDF5)", is_trajectory_file, load_trajectory),
+    RecordingFormat(f"{FORMAT} (HDF5)", is_own, load_own),
     RecordingFormat("BROAD (MATLAB or HDF5)", is_broad, load_broad),
     RecordingFormat("Movella/Xsens DOT export (CSV)", is_dot, load_dot),
+    RecordingFormat("Xsens MT Manager export (text)", is_xsens, load_xsens),
+    RecordingFormat("RepoIMU (CSV)", is_repoimu, load_repoimu),
+    RecordingFormat("EuRoC (folder)", is_euroc, load_euroc),
+    RecordingFormat("x-io x-IMU3, NGIMU (folder)", is_member, load_member),
+    RecordingFormat("phone: phyphox, Sensor Logger, SensLogs (folder)", is_folder_of_streams, load_phone),
+    RecordingFormat("NumPy archive of t, gyr, acc (npz)", is_archive, load_archive),
+    RecordingFormat("mapping (TOML)", is_map, load_map),
+    RecordingFormat(
+        "table with units in its header: x-io Fusion, APDM Moveo, Shimmer Consensys, …",
+        is_described,
+        load_any_described,
+    ),
 )
 
 
-def load_recording(path: str | Path, calibration: CalibrationRecord | str | Path | None = None) -> Trajectory:
-    """Read a recording.
+def load_recording(
+    path: str | Path,
+    calibration: CalibrationRecord | str | Path | None = None,
+    *,
+    sensor: str | None = None,
+    columns: Mapping[str, str | Sequence[str | int]] | None = None,
+    units: Mapping[str, str] | None = None,
+    signs: Mapping[str, float | Sequence[float]] | None = None,
+    rate: float | None = None,
+    time: str | int | None = None,
+    reference: Mapping[str, Any] | Sequence[Mapping[str, Any]] | None = None,
+) -> Trajectory:
+    """Read a recording of one sensor.
 
-    Accepted are trajectories saved by this package, trials of BROAD (MATLAB 5, MATLAB 7.3 and HDF5 files), and CSV
-    exports of Movella/Xsens DOT sensors.
+    The format is recognised by the content: see ``docs/recordings.md`` for the list. With ``columns`` any table is read
+    (text, NumPy ``.npy`` and ``.npz``, MATLAB, HDF5, Parquet); a TOML file beside the data says the same.
 
     Args:
-        path: the file; its extension does not matter.
+        path: the file, or the folder of a device that writes a file a stream.
         calibration: record (or its file) that turns raw readings into SI units, see ``poise calibrate``; None where
             the readings are calibrated.
+        sensor: which one, of a file with several; by default the first, with a warning.
+        columns: channel (``gyr``, ``acc``, ``mag``; ``chest/gyr`` where there are several sensors) → three names or
+            numbers of columns, or the name of an array.
+        units: channel → unit (``deg/s``, ``g``, …), and ``time`` → ``s``, ``ms``, ``us`` or ``ns``. By default what the
+            header says, else SI.
+        signs: channel → −1, or a sign for each axis.
+        rate: nominal sampling rate in Hz; needed where there is no time.
+        time: column of the time.
+        reference: orientation in the file: ``columns`` (quaternion, matrix or roll, pitch, yaw) and, where they differ
+            from the default, ``order`` (``wxyz``), ``conjugate`` (False), ``frame`` (``enu``), ``role`` (``truth``, or
+            ``onboard`` for the device's own estimate), ``sensor``, ``position``.
 
     Returns:
-        The recording in SI units, with the truth ``orientation`` and ``position`` if it brings an optical reference.
+        The recording in SI units, with the channels ``imu/gyr``, ``imu/acc`` and so on; the truth ``orientation`` and
+        ``position`` if it brings a reference, and the channel ``imu/onboard_orientation`` if the device estimated one.
+        ``metadata["reference_clock_offset"]`` is how far the reference runs ahead of the gyroscope, s.
 
     Raises:
         FileNotFoundError: there is no such file.
         ValueError: the file is empty, truncated, of another format, or has contents that contradict its format; the
-            message names the file and what is accepted. Or the calibration does not fit its channels.
+            message names the file and what is accepted. Or an argument is none of those above.
+    """
+    given = {"columns": columns, "units": units, "signs": signs, "rate": rate, "time": time, "reference": reference}
+    trajectories = load_recordings(
+        path, calibration, **{name: value for name, value in given.items() if value is not None}
+    )
+    named = {str(one.metadata.get("sensor", "imu")): one for one in trajectories}
+    if sensor is not None:
+        chosen = [one for name, one in named.items() if name.lower() == sensor.lower()]
+        if not chosen:
+            raise ValueError(f"{path}: {unknown('sensor', sensor, named)}")
+        return chosen[0]
+    if len(trajectories) > 1:
+        warnings.warn(
+            f"{path} holds several sensors ({', '.join(named)}); this is the first: name another with sensor=…, or "
+            "read all with poise.load_recordings",
+            stacklevel=2,
+        )
+    return trajectories[0]
+
+
+def load_recordings(
+    path: str | Path, calibration: CalibrationRecord | str | Path | None = None, **mapping: Any
+) -> list[Trajectory]:
+    """Read all sensors of a file, or all recordings of a folder.
+
+    Args:
+        path: a file or folder.
+        calibration: see :func:`load_recording`.
+        mapping: ``columns`` and so on, see :func:`load_recording`.
+
+    Returns:
+        A trajectory for every sensor; of a folder that is no recording itself, those of all recordings in it.
+
+    Raises:
+        FileNotFoundError: there is no such path.
+        ValueError: see :func:`load_recording`.
     """
     path = Path(path)
-    if not path.is_file():
-        raise FileNotFoundError(
-            f"no recording at {path}: {'it is a folder' if path.is_dir() else 'there is no such file'}"
-        )
-    recording_format = recognise(path)
-    if recording_format is None:
-        accepted = ", ".join(known.name for known in FORMATS)
-        state = "is empty" if path.stat().st_size == 0 else "is of no known format, or truncated"
-        raise ValueError(f"{path} {state}; accepted are {accepted}")
-    trajectory = recording_format.load(path)
-    return trajectory if calibration is None else apply_calibration(trajectory, calibration)
+    if not path.exists():
+        raise FileNotFoundError(f"no recording at {path}: there is no such file")
+    if mapping:
+        trajectories = with_path(path, lambda: mapped(path, chosen_map(path, mapping)))
+    else:
+        known = recognise(path)
+        if known is None and path.is_dir():
+            files = find_recordings(path)
+            if not files:
+                raise FileNotFoundError(f"no recording at {path}: it is a folder without recordings")
+            return [one for file in files for one in load_recordings(file, calibration)]
+        if known is None:
+            raise ValueError(unknown_file(path))
+        trajectories = with_path(path, lambda: known.load(path))
+    if calibration is not None:
+        return [apply_calibration(one, calibration) for one in trajectories]
+    return trajectories
+
+
+def chosen_map(path: Path, given: Mapping[str, Any]) -> RecordingMap:
+    """The mapping of arguments; without columns those that the names of the table tell."""
+    arguments = dict(given)
+    if "columns" not in arguments:
+        told = mapping_of(read_table(path))
+        if not told.columns:
+            raise ValueError(explanation(path))
+        arguments["columns"] = {name.removeprefix("imu/"): list(names) for name, names in told.columns.items()}
+        arguments.setdefault("time", told.time)
+        made = make_map(**arguments)
+        units = {name.removeprefix("imu/"): unit for name, unit in told.units.items()} | dict(made.units)
+        return replace(made, units=units, reference=made.reference or told.reference)
+    return make_map(**arguments)
+
+
+def mapped(path: Path, mapping: RecordingMap) -> list[Trajectory]:
+    """Trajectories of a mapping, with checked onboard orientations and measured reference clocks."""
+    if path.is_dir():
+        raise ValueError("it is a folder; a mapping describes one file")
+    if not any(name.rpartition("/")[2] in ("gyr", "acc") for name in mapping.columns):
+        raise ValueError(f"columns must name 'gyr' or 'acc', got {list(mapping.columns)}")
+    return [measured(with_checked_orientation(one)) for one in apply_map(read_table(path), mapping, path)]
+
+
+def with_path(path: Path, load: Callable[[], list[Trajectory]]) -> list[Trajectory]:
+    """What ``load`` returns; its errors name the path."""
+    try:
+        return load()
+    except ValueError as reason:
+        text = str(reason)
+        raise ValueError(text if text.startswith(str(path)) else f"{path}: {text}") from reason
+
+
+def unknown_file(path: Path) -> str:
+    """What is said about a file of no known format."""
+    if is_folder_of_streams(Head(path.parent)):
+        return f"{path} is one stream of a device that writes a file a sensor: load its folder, {path.parent}"
+    accepted = ", ".join(known.name for known in FORMATS)
+    state = "is empty" if path.stat().st_size == 0 else "is of no known format, or truncated"
+    return f"{path} {state}; accepted are {accepted}. Seen: {explanation(path)}"
 
 
 def recognise(path: Path) -> RecordingFormat | None:
-    """The format of a file, or None."""
-    with path.open("rb") as file:
-        head = file.read(HEAD_LENGTH)
-    return next((known for known in FORMATS if known.recognises(head, path)), None)
+    """The format of a file or folder, or None."""
+    head = Head(path)
+    return next((known for known in FORMATS if known.recognises(head)), None)
 
 
 def recording_files(paths: Iterable[Path]) -> list[Path]:
-    """Files as they are, folders as the recordings below them; see :func:`find_recordings`."""
+    """Files as they are, folders as the recordings in them; see :func:`find_recordings`."""
     return [file for path in paths for file in (find_recordings(path) if path.is_dir() else [path])]
 
 
 def find_recordings(folder: str | Path) -> list[Path]:
-    """Files below ``folder``, at any depth, whose format :func:`load_recording` recognises, sorted.
+    """Recordings in ``folder``, at any depth: files and folders that :func:`load_recording` recognises, sorted.
+
+    A folder that is a recording is one path, its files are none. A file that a mapping beside it names is read through
+    the mapping.
 
     Raises:
         FileNotFoundError: there is no such folder.
@@ -92,5 +275,26 @@ def find_recordings(folder: str | Path) -> list[Path]:
     folder = Path(folder)
     if not folder.is_dir():
         raise FileNotFoundError(f"no folder of recordings at {folder}")
-    files = (path for path in folder.rglob("*") if path.is_file() and not path.name.startswith("."))
-    return sorted(path for path in files if recognise(path) is not None)
+    known = recognise(folder)
+    if known is not None:
+        return [folder]
+    found: list[Path] = []
+    mapped_files: set[Path] = set()
+    for path in sorted(folder.iterdir()):
+        if path.name.startswith("."):
+            continue
+        if path.is_dir():
+            found += find_recordings(path)
+        elif recognise(path) is not None:
+            found.append(path)
+            if is_map(Head(path)):
+                mapped_files |= data_of(path)
+    return sorted(path for path in found if path not in mapped_files)
+
+
+def data_of(path: Path) -> set[Path]:
+    """The file that a mapping names, if it names one."""
+    try:
+        return {read_map(path)[0]}
+    except ValueError:
+        return set()

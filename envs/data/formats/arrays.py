@@ -1,0 +1,160 @@
+"""Tables out of array files: NumPy (without pickles), MATLAB, HDF5 of others, and Parquet."""
+
+from __future__ import annotations
+
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..storage import HDF5_SIGNATURE, LARGEST, LARGEST_RATIO, objects, read_hdf5
+from .table import Table, split_unit
+from .text import is_text, read_text
+
+NPY, ZIP, PARQUET, MATLAB = b"\x93NUMPY", b"PK\x03\x04", b"PAR1", b"MATLAB"
+
+
+def read_table(path: Path) -> Table:
+    """Read the table of a file, whose kind is told by its content.
+
+    Raises:
+        ValueError: it holds no table, is damaged, or declares more than it can hold.
+        ImportError: a Parquet file, and neither pyarrow nor fastparquet is installed.
+    """
+    with path.open("rb") as file:
+        head = file.read(4096)
+    if head.startswith(NPY):
+        return as_table({"array": load_npy(path)}, "NumPy array")
+    if head.startswith(ZIP):
+        return as_table(load_npz(path), "NumPy archive")
+    if head.startswith(PARQUET):
+        return read_parquet(path)
+    if head.startswith(HDF5_SIGNATURE) or b"MATLAB 7.3" in head[:128]:
+        return as_table(read_hdf5(path, hdf5_arrays), "HDF5 file")
+    if head.startswith(MATLAB):
+        return as_table(load_mat(path), "MATLAB file")
+    if is_text(head):
+        return read_text(path)
+    raise ValueError("it is empty" if not head else "it is neither a text nor a NumPy, MATLAB, HDF5 or Parquet file")
+
+
+def as_table(arrays: dict[str, Any], kind: str) -> Table:
+    """Numeric arrays of one or two dimensions and at least two rows, time along the first."""
+    found: dict[str, np.ndarray] = {}
+    for name, values in arrays.items():
+        array = np.ma.filled(np.ma.asarray(values).astype(float), np.nan) if np.ma.isMaskedArray(values) else values
+        array = np.asarray(array)
+        if array.dtype.names:
+            found |= {f"{field}": np.ravel(array[field]) for field in array.dtype.names}
+            continue
+        array = array.reshape(-1) if array.ndim == 2 and 1 in array.shape else array
+        if array.dtype.kind not in "fiub" or array.ndim not in (1, 2) or array.size == 0:
+            continue
+        # Some programs write time along the second axis.
+        found[name] = array.T if array.ndim == 2 and array.shape[0] <= 9 < array.shape[1] else array
+    if len(found) == 1 and next(iter(found.values())).ndim == 2:
+        # A single array of all columns: they go by their numbers.
+        matrix = next(iter(found.values()))
+        return Table({str(column): matrix[:, column] for column in range(matrix.shape[1])}, kind=kind, named=False)
+    if not found:
+        raise ValueError(f"the {kind} holds no numeric array")
+    units = {name: split_unit(name)[1] for name in found if split_unit(name)[1]}
+    return Table(found, units={split_unit(name)[0]: unit for name, unit in units.items()}, kind=kind)
+
+
+def load_npy(path: Path) -> np.ndarray:
+    """One array, not pickled."""
+    try:
+        array = np.load(path, allow_pickle=False, mmap_mode="r")
+    except (ValueError, EOFError, OSError) as reason:
+        raise ValueError(f"it is not a readable NumPy array (pickled objects are not loaded): {reason}") from None
+    return np.array(array)
+
+
+def load_npz(path: Path) -> dict[str, np.ndarray]:
+    """The arrays of an archive; what declares more than its file can hold is refused before it is unpacked."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            total = sum(entry.file_size for entry in archive.infolist())
+            if not any(entry.filename.endswith(".npy") for entry in archive.infolist()):
+                raise ValueError("it is a ZIP archive without NumPy arrays; unpack it first")
+            if total > min(LARGEST, LARGEST_RATIO * path.stat().st_size + 2**20):
+                raise ValueError(f"it declares {total / 2**20:.0f} MiB, more than a file of its size can hold")
+            for entry in archive.infolist():
+                with archive.open(entry) as file:
+                    check_declared(file, entry)
+        with np.load(path, allow_pickle=False) as archive:
+            return {name: archive[name] for name in archive.files if archive[name].dtype.kind in "fiubU"}
+    except (zipfile.BadZipFile, EOFError, OSError, KeyError) as reason:
+        raise ValueError(f"it is not a readable NumPy archive; it may be truncated: {reason}") from None
+
+
+def check_declared(file: Any, entry: zipfile.ZipInfo) -> None:
+    """Refuse an array whose header declares more than its entry holds, or pickled objects."""
+    if not entry.filename.endswith(".npy"):
+        return
+    version = np.lib.format.read_magic(file)
+    read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
+    shape, _, dtype = read(file)
+    if dtype.hasobject:
+        raise ValueError(f"{entry.filename} holds pickled objects, which are not loaded")
+    size = int(np.prod(shape, dtype=object)) * dtype.itemsize if shape else dtype.itemsize
+    if size > entry.file_size:
+        raise ValueError(f"{entry.filename} declares the shape {shape}, more than it holds")
+
+
+def load_mat(path: Path) -> dict[str, Any]:
+    """Arrays of a MATLAB 5 file; fields of structures by ``structure/field``."""
+    import scipy.io
+
+    try:
+        fields = scipy.io.loadmat(str(path), simplify_cells=True)
+    except Exception as reason:  # scipy raises many kinds for damaged files
+        raise ValueError(f"it is not a readable MATLAB file; it may be truncated or damaged: {reason}") from None
+    flat: dict[str, Any] = {}
+
+    def visit(prefix: str, value: Any) -> None:
+        if isinstance(value, dict):
+            for name, inner in value.items():
+                if not str(name).startswith("__"):
+                    visit(f"{prefix}/{name}" if prefix else str(name), inner)
+        elif isinstance(value, np.ndarray):
+            flat[prefix] = value
+
+    visit("", fields)
+    return flat
+
+
+def hdf5_arrays(file: Any, path: Path) -> dict[str, np.ndarray]:
+    """All numeric datasets by their paths; those of MATLAB 7.3 transposed."""
+    found = {}
+    for name, item in objects(file):
+        if hasattr(item, "dtype") and item.dtype.kind in "fiub" and not name.startswith("#refs#"):
+            found[name] = item[()].T if "MATLAB_class" in item.attrs else item[()]
+    return found
+
+
+def read_parquet(path: Path) -> Table:
+    """A Parquet table; texts are left out, dates become ns."""
+    import pandas
+
+    try:
+        frame = pandas.read_parquet(path)
+    except ImportError:
+        raise ImportError(f"{path} is a Parquet file: pip install pyarrow to read it") from None
+    except Exception as reason:  # pyarrow raises many kinds for damaged files
+        raise ValueError(f"it is not a readable Parquet file: {reason}") from None
+    if frame.index.name:
+        frame = frame.reset_index()
+    arrays = {}
+    for name, column in frame.items():
+        if column.dtype.kind in "iufb":
+            arrays[str(name)] = column.to_numpy()
+        elif column.dtype.kind == "M":
+            arrays[str(name)] = pandas.to_datetime(column, utc=True).to_numpy("datetime64[ns]").astype(np.int64)
+    return Table(
+        {split_unit(name)[0]: values for name, values in arrays.items()},
+        units={split_unit(name)[0]: split_unit(name)[1] for name in arrays if split_unit(name)[1]},
+        kind="Parquet table",
+    )

@@ -1,0 +1,142 @@
+"""Tables that describe themselves: columns whose names say sensor, kind and axis, and whose header says the units.
+
+This is how x-io's Fusion examples, APDM Moveo and Shimmer Consensys export, and many scripts of users. Of other tables
+the same names give a draft of a mapping.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from ....filters.core import rotation
+from ..trajectory import Trajectory
+from .mapping import RecordingMap, Reference, apply_map, as_columns
+from .names import Group, counter_column, groups, time_column
+from .table import UNITS, Table, factor, plain
+
+LONG_AXIS = {"gyr": "angular rate", "acc": "specific force", "mag": "magnetic field"}
+SATURATED = 0.002
+"""Part of samples at the largest magnitude of an axis beyond which an accelerometer is saturated."""
+FITS = 12.0
+"""deg; an onboard orientation whose vertical is typically this near to gravity is one of the sensor."""
+
+
+def mapping_of(table: Table, details: dict[str, object] | None = None) -> RecordingMap:
+    """The mapping that the names and the units of a table tell, as far as they do."""
+    found = groups(table)
+    sensors = list(dict.fromkeys(group.sensor for group in found if group.kind in ("gyr", "acc")))
+    columns: dict[str, list[str]] = {}
+    units: dict[str, str] = {}
+    references = []
+    for sensor in sensors:
+        label = "imu" if len(sensors) == 1 else sensor
+        for kind in ("gyr", "acc", "mag"):
+            candidates = [group for group in found if group.sensor == sensor and group.kind == kind]
+            if candidates:
+                chosen = best_range(table, candidates)
+                columns[f"{label}/{kind}"] = chosen.columns
+                if chosen.unit:
+                    units[f"{label}/{kind}"] = chosen.unit
+        onboard = [group for group in found if group.kind in ("quaternion", "matrix") and group.sensor == sensor]
+        if onboard:
+            references.append(Reference(tuple(onboard[0].columns), role="onboard", sensor=label))
+    time = time_column(table)
+    rate = table.rate_in_header("Update Rate", "Sample Rate", "Sampling Rate", "OutputRate", "Rate", "Frequency")
+    return RecordingMap(
+        columns,
+        units,
+        time=time,
+        rate=rate,
+        reference=tuple(references),
+        counter=None if time else counter_column(table),
+        details=details or {},
+    )
+
+
+def best_range(table: Table, candidates: list[Group]) -> Group:
+    """Of several sensors of one kind the first (the one of low noise) that does not saturate."""
+    for group in candidates:
+        values = np.abs(table.matrix(group.columns))
+        largest = np.nanmax(values, axis=0)
+        if np.all(np.nanmean(values >= largest - 1e-9 * largest, axis=0) < SATURATED) or len(candidates) == 1:
+            return group
+    return candidates[-1]
+
+
+def complete(table: Table, mapping: RecordingMap) -> bool:
+    """Whether the mapping has a gyroscope and an accelerometer with units that are known, and a time."""
+    kinds = {channel.rpartition("/")[2] for channel in mapping.columns}
+    if not {"gyr", "acc"} <= kinds or (mapping.time is None and mapping.rate is None):
+        return False
+    for channel in mapping.columns:
+        kind = channel.rpartition("/")[2]
+        if kind in ("gyr", "acc") and plain(mapping.units.get(channel, "")) not in UNITS[kind]:
+            return False
+    return True
+
+
+def load_described(path: Path, table: Table, name: str) -> list[Trajectory]:
+    """Trajectories of a table that describes itself.
+
+    Raises:
+        ValueError: a column that is needed holds no numbers, or the time runs backwards.
+    """
+    mapping = mapping_of(table, {"format": name})
+    return [with_checked_orientation(one) for one in apply_map(table, mapping, path)]
+
+
+def with_checked_orientation(trajectory: Trajectory) -> Trajectory:
+    """The trajectory with its onboard orientation as one of the sensor in a world whose z axis is up.
+
+    Devices differ in what their quaternion turns into what. The accelerometer tells: of the quaternion, its conjugate
+    and both in a world whose z axis points down, the one whose vertical is nearest to the specific force is taken, if
+    the one as written does not fit. ``metadata["onboard_orientation"]`` says which.
+    """
+    key = "imu/onboard_orientation"
+    if key not in trajectory.measurements or "imu/acc" not in trajectory.measurements:
+        return trajectory
+    q, acc = trajectory.measurements[key], trajectory.measurements["imu/acc"]
+    flip = np.array([0.0, 1.0, 0.0, 0.0])
+    variants = {
+        "as written": q,
+        "conjugate": rotation.conjugate(q),
+        "as written, z down": rotation.multiply(flip, q),
+        "conjugate, z down": rotation.multiply(flip, rotation.conjugate(q)),
+    }
+    angles = {name: typical_angle(rotation.up_in_body(values), acc) for name, values in variants.items()}
+    best = min(angles, key=lambda name: angles[name])
+    # Where several fit alike, as with a sensor that lies level, what is written stands.
+    chosen = best if angles["as written"] > max(FITS, 2.0 * angles[best]) else "as written"
+    return trajectory.replace(
+        measurements=trajectory.measurements | {key: variants[chosen]},
+        metadata=trajectory.metadata
+        | {"onboard_orientation": {"read": chosen, "angle_to_specific_force_deg": round(angles[chosen], 2)}},
+    )
+
+
+def typical_angle(up: np.ndarray, acc: np.ndarray) -> float:
+    """Median angle in deg between verticals ``(T, 3)`` and specific force; infinite where there is none."""
+    with np.errstate(invalid="ignore", divide="ignore"):
+        cosine = (up * acc).sum(axis=1) / np.linalg.norm(acc, axis=1)
+    known = np.isfinite(cosine)
+    return float(np.degrees(np.median(np.arccos(np.clip(cosine[known], -1.0, 1.0))))) if known.any() else float("inf")
+
+
+def plausible_units(table: Table, mapping: RecordingMap) -> dict[str, str]:
+    """Likely units of channels without any, from their magnitudes, for a draft."""
+    likely = {}
+    for channel, names in mapping.columns.items():
+        kind = channel.rpartition("/")[2]
+        if channel in mapping.units or kind not in ("gyr", "acc"):
+            continue
+        with np.errstate(invalid="ignore"):
+            size = np.linalg.norm(table.matrix(as_columns(names)), axis=1)
+        typical = float(np.nanmedian(size)) if np.isfinite(size).any() else 0.0
+        if kind == "acc":
+            choices = {unit: abs(typical * factor("acc", unit) / 9.81 - 1.0) for unit in ("m/s^2", "g", "mg")}
+            likely[channel] = min(choices, key=lambda unit: choices[unit])
+        else:
+            likely[channel] = "deg/s" if float(np.nanmax(size)) > 40.0 else "rad/s"
+    return likely

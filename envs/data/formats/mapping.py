@@ -1,0 +1,278 @@
+"""The general reader: from the columns of a table to trajectories, as a mapping says.
+
+The same mapping comes from arguments of :func:`poise.load_recording`, from a TOML file beside the data, and from the
+readers of formats whose columns have fixed names.
+"""
+
+from __future__ import annotations
+
+import tomllib
+import warnings
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ....filters.core import rotation
+from ....filters.support.names import unknown
+from ..trajectory import Trajectory
+from .stamps import as_seconds
+from .table import UNITS, Table, factor
+
+Columns = str | Sequence[str | int]
+SIZES = {"gyr": 3, "acc": 3, "mag": 3}
+SI = {"gyr": "rad/s", "acc": "m/s²", "mag": "µT", "onboard_orientation": "1"}
+REFERENCE_KEYS = ("columns", "order", "conjugate", "frame", "role", "position", "sensor", "unit")
+FRAMES = {
+    "enu": (1.0, 0.0, 0.0, 0.0),
+    "nwu": (np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)),
+    "ned": (0.0, np.sqrt(0.5), np.sqrt(0.5), 0.0),
+    "y-up": (np.sqrt(0.5), np.sqrt(0.5), 0.0, 0.0),
+}
+"""World axes of a reference → quaternion to east, north, up."""
+
+
+@dataclass(frozen=True)
+class Reference:
+    """An orientation in the file, the truth or the estimate of the device.
+
+    Raises:
+        ValueError: an unknown order, frame or role.
+    """
+
+    columns: Columns
+    """four (quaternion), nine (matrix, row by row) or three columns (roll, pitch, yaw)"""
+    order: str = "wxyz"
+    """of the quaternion's columns, ``wxyz`` or ``xyzw``"""
+    conjugate: bool = False
+    """whether it turns the world into the sensor"""
+    frame: str = "enu"
+    """axes of its world: one of FRAMES"""
+    role: str = "truth"
+    """``truth`` or ``onboard``"""
+    position: Columns | None = None
+    """three columns in m"""
+    sensor: str | None = None
+    """whose it is; None: that of the only sensor"""
+    unit: str = "deg"
+    """of angles"""
+
+    def __post_init__(self) -> None:
+        choices = {"order": ("wxyz", "xyzw"), "frame": FRAMES, "role": ("truth", "onboard")}
+        for name, known in choices.items():
+            if getattr(self, name) not in known:
+                raise ValueError(f"reference: {unknown(name, getattr(self, name), known)}")
+
+    def orientation(self, table: Table) -> np.ndarray:
+        """Quaternions ``(N, 4)`` w, x, y, z, sensor to east, north, up; NaN where they are of no length."""
+        values = table.matrix(as_columns(self.columns))
+        if values.shape[1] == 4:
+            q = rotation.from_xyzw(values) if self.order == "xyzw" else values
+        elif values.shape[1] == 9:
+            q = rotation.from_matrix(values.reshape(-1, 3, 3))
+        elif values.shape[1] == 3:
+            roll, pitch, yaw = (values * factor("angle", self.unit)).T
+            q = rotation.from_euler_zyx(yaw, pitch, roll)
+        else:
+            raise ValueError(f"reference columns must be four, nine or three, got {values.shape[1]}")
+        length = rotation.norm(q)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            q = np.where(np.abs(length - 1.0) < 0.1, q / length, np.nan)
+        q = rotation.conjugate(q) if self.conjugate else q
+        return rotation.multiply(np.array(FRAMES[self.frame]), q) if self.frame != "enu" else q
+
+
+@dataclass(frozen=True)
+class RecordingMap:
+    """What the columns of a table mean.
+
+    Raises:
+        ValueError: a key, unit, sign or column that cannot be.
+    """
+
+    columns: Mapping[str, Columns]
+    """channel (``gyr``, ``acc``, ``mag`` or anything else; with several sensors ``chest/gyr``) → its columns"""
+    units: Mapping[str, str] = field(default_factory=dict)
+    """kind, channel or ``time`` → unit; those that the header names by default, else SI"""
+    signs: Mapping[str, float | Sequence[float]] = field(default_factory=dict)
+    """kind or channel → −1 or a sign for each axis"""
+    time: str | int | None = None
+    """column of the time; None: rows at ``rate``"""
+    rate: float | None = None
+    """nominal rate, Hz"""
+    reference: tuple[Reference, ...] = ()
+    counter: str | None = None
+    """column that counts samples (it may wrap): the grid of rows without a usable time"""
+    details: Mapping[str, Any] = field(default_factory=dict)
+    """metadata to add"""
+
+    def sensors(self) -> dict[str, dict[str, Columns]]:
+        """Sensor → kind → columns."""
+        found: dict[str, dict[str, Columns]] = {}
+        for channel, names in self.columns.items():
+            sensor, _, kind = channel.rpartition("/")
+            found.setdefault(sensor or "imu", {})[kind] = names
+        return found
+
+
+def as_columns(names: Columns) -> str | list[str]:
+    """Names of columns; numbers count columns from 0."""
+    if isinstance(names, str):
+        return names
+    if isinstance(names, int):
+        return str(names)
+    return [str(name) for name in names]
+
+
+def make_map(
+    columns: Mapping[str, Columns],
+    units: Mapping[str, str] | None = None,
+    signs: Mapping[str, Any] | None = None,
+    time: str | int | None = None,
+    rate: float | None = None,
+    reference: Any = None,
+) -> RecordingMap:
+    """A mapping of plain arguments, checked.
+
+    Raises:
+        ValueError: names the argument, its value and what is accepted.
+    """
+    if not isinstance(columns, Mapping) or not columns:
+        raise ValueError(f"columns must map channels to columns, such as gyr to [gx, gy, gz]; got {columns!r}")
+    if rate is not None and (isinstance(rate, bool) or not isinstance(rate, int | float) or not 0.0 < rate < np.inf):
+        raise ValueError(f"rate must be a positive number of Hz, got {rate!r}")
+    kinds = {channel.rpartition("/")[2] for channel in columns}
+    for name, given in (("units", units), ("signs", signs)):
+        for key in given or {}:
+            if key not in columns and key not in kinds and key != "time":
+                raise ValueError(f"{name}: {unknown('channel', key, [*columns, 'time'])}")
+    references = [] if reference is None else reference if isinstance(reference, list | tuple) else [reference]
+    return RecordingMap(
+        dict(columns), dict(units or {}), dict(signs or {}), time, rate, tuple(as_reference(one) for one in references)
+    )
+
+
+def as_reference(given: Any) -> Reference:
+    """A reference of a mapping with REFERENCE_KEYS."""
+    if isinstance(given, Reference):
+        return given
+    if not isinstance(given, Mapping) or "columns" not in given:
+        raise ValueError(f"reference must be a mapping with 'columns' (and {REFERENCE_KEYS[1:]}), got {given!r}")
+    for key in given:
+        if key not in REFERENCE_KEYS:
+            raise ValueError(f"reference: {unknown('key', key, REFERENCE_KEYS)}")
+    return Reference(**given)
+
+
+def read_map(path: Path) -> tuple[Path, RecordingMap]:
+    """The data file that a TOML file names (beside it), and its mapping.
+
+    Raises:
+        ValueError: it is no TOML, names no file, or has unknown keys.
+    """
+    try:
+        content = tomllib.loads(path.read_text(encoding="utf-8-sig"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as reason:
+        raise ValueError(f"it is no TOML: {reason}") from None
+    known = ("file", "columns", "units", "signs", "time", "rate", "reference", "name")
+    for key in content:
+        if key not in known:
+            raise ValueError(unknown("key", key, known))
+    if not isinstance(content.get("file"), str) or "columns" not in content:
+        raise ValueError("a mapping names the data by 'file' and its 'columns'")
+    data = path.parent / content["file"]
+    if not data.exists():
+        raise ValueError(f"there is no {data}")
+    arguments = {key: content[key] for key in known if key in content and key not in ("file", "name")}
+    made = make_map(**arguments)
+    return data, RecordingMap(**{**made.__dict__, "details": {"name": content["name"]} if "name" in content else {}})
+
+
+def apply_map(table: Table, mapping: RecordingMap, path: Path) -> list[Trajectory]:
+    """Trajectories of a table, one a sensor, each with the channels ``imu/<kind>``.
+
+    Raises:
+        ValueError: a column is missing or unreadable, or the time is.
+    """
+    seconds, clock = recording_time(table, mapping)
+    sensors = mapping.sensors()
+    trajectories = []
+    for sensor, kinds in sensors.items():
+        measurements, units = {}, {}
+        for kind, names in kinds.items():
+            measurements[f"imu/{kind}"], unit = channel(table, mapping, sensor, kind, names)
+            units[f"imu/{kind}"] = unit
+        truth = {}
+        for reference in mapping.reference:
+            if reference.sensor is not None and reference.sensor.lower() != sensor.lower():
+                continue
+            if reference.role == "onboard":
+                measurements["imu/onboard_orientation"] = reference.orientation(table)
+            else:
+                truth["orientation"] = reference.orientation(table)
+                if reference.position is not None:
+                    truth["position"] = table.matrix(as_columns(reference.position))
+        name = path.stem if len(sensors) == 1 else f"{path.stem}-{sensor}"
+        details = {"name": name, "units": units, **clock, **mapping.details}
+        if len(sensors) > 1 or sensor != "imu":
+            details["sensor"] = sensor
+        trajectories.append(trajectory_of(seconds, measurements, truth, details))
+    return trajectories
+
+
+def trajectory_of(
+    seconds: np.ndarray, measurements: dict[str, np.ndarray], truth: dict[str, np.ndarray], details: dict[str, Any]
+) -> Trajectory:
+    """A trajectory whose mask is where the truth is known, if it is known at all; rows out of order are sorted."""
+    backwards = int((np.diff(seconds) < 0.0).sum())
+    if backwards:
+        order = np.argsort(seconds, kind="stable")
+        warnings.warn(f"{details['name']}: {backwards} rows are out of order in time and were sorted", stacklevel=3)
+        seconds = seconds[order]
+        measurements = {name: values[order] for name, values in measurements.items()}
+        truth = {name: values[order] for name, values in truth.items()}
+    mask = np.ones(len(seconds), bool)
+    if "orientation" in truth:
+        mask = np.isfinite(truth["orientation"]).all(axis=1)
+    return Trajectory(seconds, measurements, truth, mask, details)
+
+
+def channel(table: Table, mapping: RecordingMap, sensor: str, kind: str, names: Columns) -> tuple[np.ndarray, str]:
+    """Values ``(N, size)`` of a channel in SI units, and the unit."""
+    columns = as_columns(names)
+    values = table.matrix(columns)
+    if kind in SIZES and values.shape[1] != SIZES[kind]:
+        raise ValueError(f"columns[{kind!r}] must be {SIZES[kind]} columns, got {values.shape[1]}: {columns}")
+    if np.isinf(values).any():
+        values = np.where(np.isfinite(values), values, np.nan)
+    given = first_of(mapping.units, sensor, kind)
+    unit = given or table.unit(columns)
+    scale = factor(kind, unit) if unit and kind in UNITS else 1.0
+    sign = np.asarray(first_of(mapping.signs, sensor, kind) or 1.0, dtype=float)
+    if not np.isin(sign, (-1.0, 1.0)).all() or sign.ndim > 1 or sign.size not in (1, values.shape[1]):
+        raise ValueError(f"signs[{kind!r}] must be 1 or -1, for all axes or one an axis, got {sign.tolist()}")
+    return values * (scale * sign), SI.get(kind, unit or "?")
+
+
+def first_of(given: Mapping[str, Any], sensor: str, kind: str) -> Any:
+    """What a channel or, failing that, its kind is given."""
+    return given.get(f"{sensor}/{kind}", given.get(kind))
+
+
+def recording_time(table: Table, mapping: RecordingMap) -> tuple[np.ndarray, dict[str, Any]]:
+    """Time ``(N,)`` in s from the first row, and metadata on the clock."""
+    length = len(table)
+    details: dict[str, Any] = {} if mapping.rate is None else {"nominal_rate": float(mapping.rate)}
+    if mapping.time is not None:
+        name = str(mapping.time)
+        unit = mapping.units.get("time") or table.units.get(name, "")
+        stamps = as_seconds(table.column(name), unit, name)
+        return stamps.elapsed, details | {"clock_start": stamps.first}
+    if mapping.rate is None:
+        raise ValueError("name the column of the time (time=…) or the sampling rate in Hz (rate=…)")
+    if mapping.counter is not None:
+        stamps = as_seconds(table.column(mapping.counter), "s", mapping.counter)
+        return stamps.elapsed / mapping.rate, details | {"clock_start": stamps.first}
+    return np.arange(length) / mapping.rate, details

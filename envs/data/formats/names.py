@@ -1,0 +1,141 @@
+"""What columns are called: from names to sensors, kinds of channels and axes."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from .table import UNITS, Table, plain
+
+WORDS = re.compile(r"[A-Z]+(?=[A-Z][a-z])|[A-Z]?[a-z]+|[A-Z]+|\d+|[µ°]")
+FILLERS = {"cal", "calibrated", "raw", "data", "s", "rs", "sensor", "field", "values", "value", "axis", "imu"}
+FILLERS |= {"element", "measured", "rate", "velocity", "vel", "signal", "body", "b", "wideband", "float", "motion"}
+FILLERS |= {"uncalibrated"}
+GRAVITY_FREE = {"free", "linear", "user", "lin", "gravity", "increment", "global", "world"}
+KINDS = {
+    "gyr": {"gyr", "gyro", "gyros", "gyroscope", "gyroscopes", "omega", "angvel", "angrate", "rotationrate", "w", "g"},
+    "acc": {"acc", "accel", "accelerometer", "accelerometers", "acceleration", "accelerations", "a", "specific"},
+    "mag": {"mag", "magn", "magneto", "magnetometer", "magnetometers", "magnetic", "m", "mf"},
+    "quaternion": {"q", "quat", "quats", "quaternion", "orientation", "attitude", "rotation", "ori"},
+    "matrix": {"mat", "matrix", "dcm", "rotmat"},
+}
+"""Kind → words that name it; single letters count only right before an axis."""
+TIME = {"time", "timestamp", "timestamps", "t", "seconds", "sampletimefine", "datetime", "epoch", "clock", "ts"}
+COUNTER = {"packetcounter", "counter", "sample", "samplenumber", "index", "frame", "packet", "samples", "n"}
+AXES = {"x": 0, "y": 1, "z": 2}
+QUATERNION = {"w": 0, "scalar": 0, "x": 1, "y": 2, "z": 3, "0": 0, "1": 1, "2": 2, "3": 3, "4": 4}
+
+
+@dataclass
+class Group:
+    """Columns that belong to one kind of one sensor, in the order of their axes."""
+
+    sensor: str
+    kind: str
+    variant: str
+    columns: list[str] = field(default_factory=list)
+    unit: str = ""
+
+
+def words(name: str) -> list[str]:
+    """Words of a column's name in lower case: ``Shimmer_Accel_LN_X`` → shimmer, accel, ln, x."""
+    return [word.lower() for word in WORDS.findall(name)]
+
+
+def classify(name: str) -> tuple[str, str, str, str] | None:
+    """Sensor, kind, variant and axis that a name says, or None."""
+    parts = words(name)
+    match = re.match(r"^(.*?)mat(?:rix)?\[(\d)\]\[(\d)\]$", name.strip(), re.IGNORECASE)
+    if match:
+        return match[1].strip("_./ "), "matrix", "", f"{match[2]}{match[3]}"
+    if len(parts) == 1 and re.fullmatch(r"(gyr|gyro|acc|accel|mag|quat|[wagmq])[xyzw0-3]", parts[0]):
+        parts = [parts[0][:-1], parts[0][-1]]
+    if len(parts) >= 1 and len(parts[-1]) > 1 and re.fullmatch(r"(gyr|gyro|acc|accel|mag|quat)[xyzw0-3]", parts[-1]):
+        parts = [*parts[:-1], parts[-1][:-1], parts[-1][-1]]
+    where = next((i for i, word in enumerate(parts) if word in QUATERNION and i == len(parts) - 1), None)
+    if where is None:
+        where = next((i for i, word in enumerate(parts) if word in QUATERNION and not word.isdigit()), None)
+    if where is None or len(parts) < 2 or GRAVITY_FREE & set(parts) or "inc" in parts:
+        return None
+    axis, rest = parts[where], parts[:where] + parts[where + 1 :]
+    joined = " ".join(rest)
+    if re.search(r"\b(angular (velocity|rate)|rotation rate)\b", joined):
+        first = next(i for i, word in enumerate(rest) if word in ("angular", "rotation"))
+        return " ".join(word for word in rest[:first] if word not in FILLERS), "gyr", "", axis
+    for kind, known in KINDS.items():
+        at = next((i for i, word in enumerate(rest) if word in known and (len(word) > 1 or len(rest) <= 3)), None)
+        if at is not None:
+            others = [word for word in rest[at + 1 :] if word not in FILLERS and word not in known]
+            if kind != "quaternion" and axis not in AXES and not axis.isdigit():
+                return None
+            return " ".join(word for word in rest[:at] if word not in FILLERS), kind, " ".join(others), axis
+    return None
+
+
+def groups(table: Table) -> list[Group]:
+    """Complete groups of columns that the names of a table tell."""
+    found: dict[tuple[str, str, str], dict[str, str]] = {}
+    ros = any("angular_velocity" in name for name in table.arrays)
+    for name, values in table.arrays.items():
+        if values.ndim == 2 and values.shape[1] in (3, 4, 9):
+            whole = classify(f"{name} x") if values.shape[1] == 3 else classify(f"{name} w")
+            if whole:
+                found[whole[:3]] = {"all": name}
+            continue
+        # ROS calls linear acceleration what others call specific force; elsewhere gravity is taken from it.
+        one = classify(name.replace("linear_acceleration", "acceleration") if ros else name)
+        if one is not None:
+            found.setdefault(one[:3], {}).setdefault(one[3], name)
+    result = []
+    # Where the name of the sensor comes last, ``gyro_x_chest``, it looks like a variant of the gyroscope.
+    sensors = {variant for (sensor, kind, variant) in found if kind == "gyr" and not sensor}
+    for (sensor, kind, variant), by_axis in found.items():
+        columns = ordered(kind, by_axis)
+        if columns is not None:
+            units = {table.units.get(column, "") for column in columns}
+            if not sensor and variant in sensors:
+                sensor, variant = variant, ""
+            result.append(Group(sensor, kind, variant, columns, units.pop() if len(units) == 1 else ""))
+    return result
+
+
+def ordered(kind: str, by_axis: Mapping[str, str]) -> list[str] | None:
+    """Columns by axis: x, y, z; w, x, y, z; rows of a matrix. None if one is missing."""
+    if "all" in by_axis:
+        return [by_axis["all"]]
+    if kind == "matrix":
+        wanted = [f"{row}{column}" for row in (1, 2, 3) for column in (1, 2, 3)]
+        wanted = wanted if "33" in by_axis else [f"{row}{column}" for row in (0, 1, 2) for column in (0, 1, 2)]
+        return [by_axis[axis] for axis in wanted] if set(wanted) <= set(by_axis) else None
+    table: Mapping[str, Any] = QUATERNION if kind == "quaternion" else AXES
+    if kind == "quaternion" and "4" in by_axis and "0" not in by_axis:
+        table = {"1": 0, "2": 1, "3": 2, "4": 3}
+    if kind != "quaternion" and not AXES.keys() & by_axis.keys():
+        table = {"0": 0, "1": 1, "2": 2} if "0" in by_axis else {"1": 0, "2": 1, "3": 2}
+    places = {table[axis]: column for axis, column in by_axis.items() if axis in table}
+    size = 4 if kind == "quaternion" else 3
+    return [places[i] for i in range(size)] if set(places) >= set(range(size)) else None
+
+
+def time_column(table: Table) -> str | None:
+    """The column that holds the time, by its name or its unit; the finest if there are several."""
+
+    def rank(name: str) -> int:
+        flat = "".join(words(name))
+        said = plain(table.units.get(name, "")) in UNITS["time"]
+        if flat in ("sampletimefine", "secondselapsed"):
+            return 4
+        if flat in TIME or (words(name) and words(name)[-1] in ("timestamp", "time")):
+            return 3 + said
+        return 2 if said and {"time", "timestamp"} & set(words(name)) else int(bool(TIME & set(words(name))))
+
+    named = [name for name, values in table.arrays.items() if values.ndim == 1 and len(values) == len(table)]
+    named = [name for name in named if "utc" not in words(name) and rank(name) > 0]
+    return max(named, key=rank, default=None)
+
+
+def counter_column(table: Table) -> str | None:
+    """The column that counts packets or samples, or None."""
+    return next((name for name in table.arrays if "".join(words(name)) in COUNTER), None)

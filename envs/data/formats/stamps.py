@@ -1,0 +1,98 @@
+"""Time stamps of tables in seconds: units, whole numbers beyond float64, counters that wrap, rows out of order."""
+
+from __future__ import annotations
+
+import warnings
+from typing import NamedTuple
+
+import numpy as np
+
+from .table import UNITS, factor
+
+WRAPS = (2**8, 2**16, 2**24, 2**32, 10**6, 60 * 10**6)
+"""Ends of counters after which they start again at 0."""
+FURTHEST_BACK = 2.5
+"""Intervals by which rows may be out of order."""
+PLAUSIBLE = (2e-4, 0.2)
+"""s; an interval in these bounds tells the unit of stamps without one: they are a thousand times apart."""
+
+
+class Stamps(NamedTuple):
+    """Stamps of a column: s from the first one, that one in its own unit, and s per unit."""
+
+    elapsed: np.ndarray
+    first: float | int
+    scale: float
+
+    def since(self, origin: float | int) -> np.ndarray:
+        """Seconds ``(N,)`` from an origin in the unit of the stamps; whole numbers are subtracted as such."""
+        return self.elapsed + (self.first - origin) * self.scale
+
+
+def as_seconds(stamps: np.ndarray, unit: str, name: str = "time") -> Stamps:
+    """Stamps ``(N,)`` in seconds.
+
+    Args:
+        stamps: whole or real numbers; whole ones are subtracted before they are converted, so that nanoseconds since
+            1970 keep their last digits.
+        unit: of the stamps; empty: the one in which the interval is that of an inertial sensor, with a warning if that
+            is not the second.
+        name: of the column, for messages.
+
+    Raises:
+        ValueError: a stamp is missing, the unit is unknown, or time runs backwards.
+    """
+    values = np.asarray(stamps)
+    if values.dtype.kind == "f" and not np.isfinite(values).all():
+        raise ValueError(f"column {name} holds no time in row {int(np.flatnonzero(~np.isfinite(values))[0])}")
+    if values.dtype.kind == "f" and np.all(values == np.rint(values)) and np.abs(values).max(initial=0.0) < 2**53:
+        values = values.astype(np.int64)
+    values = values.astype(np.int64) if values.dtype.kind in "iub" else values.astype(float)
+    if values.dtype.kind == "f":
+        elapsed = values - values[0]
+    else:
+        steps = unwrapped(np.diff(values), values)
+        elapsed = np.concatenate([[0], np.cumsum(steps)]).astype(float)
+    steps = np.diff(elapsed)
+    usual = float(np.median(np.abs(steps))) if len(steps) else 0.0
+    # A few rows that changed places are sorted later; a clock that was set back, or a second recording, is not.
+    if len(steps) and ((steps < 0.0).mean() > 0.05 or steps.min() < -FURTHEST_BACK * usual):
+        row = int(np.argmin(steps)) + 1
+        raise ValueError(
+            f"column {name} must increase, got {stamps[row]} in row {row} after {stamps[row - 1]}: a clock that was "
+            "set back, or several recordings in one file"
+        )
+    scale = factor("time", unit) if unit else likely_unit(elapsed, name)
+    return Stamps(elapsed * scale, values[0].item(), scale)
+
+
+def unwrapped(steps: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Steps of a counter without its restarts at 0."""
+    back = steps < 0
+    if not back.any() or back.sum() > max(2, 0.02 * len(back)) or values.min() < 0:
+        return steps
+    usual = float(np.median(steps[~back])) if (~back).any() else 0.0
+    for end in WRAPS:
+        repaired = np.where(back, steps + end, steps)
+        longest = min(50.0 * usual, 0.1 * end + 5.0 * usual)
+        if values.max() < end and np.all(repaired[back] >= 0) and np.all(repaired[back] <= longest):
+            return repaired
+    return steps
+
+
+def likely_unit(elapsed: np.ndarray, name: str) -> float:
+    """Seconds per unit of stamps whose header names none."""
+    steps = np.diff(elapsed)
+    usual = float(np.median(steps[steps > 0.0])) if (steps > 0.0).any() else 0.0
+    if PLAUSIBLE[0] <= usual < PLAUSIBLE[1] or usual == 0.0:
+        return 1.0
+    for unit in ("ms", "us", "ns"):
+        scale = UNITS["time"][unit]
+        if PLAUSIBLE[0] <= usual * scale < PLAUSIBLE[1] and usual != 1.0:
+            warnings.warn(
+                f"column {name} names no unit; its interval of {usual:g} is taken for {unit} "
+                f"({1 / (usual * scale):.4g} Hz): name units={{'time': …}} if it is another",
+                stacklevel=6,
+            )
+            return scale
+    return 1.0

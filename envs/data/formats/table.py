@@ -1,0 +1,173 @@
+"""A table of numbers, whatever file it comes from, and the units that its header names."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ....filters.support.names import unknown
+
+UNIT = re.compile(r"^(?P<name>.*?)[\s_]*(\((?P<a>(?:[^()]|\([^()]*\))*)\)|\[(?P<b>[^\[\]]*)\])$")
+STANDARD_GRAVITY = 9.80665
+
+
+def _spellings(factors: dict[float, str]) -> dict[str, float]:
+    return {spelling: factor for factor, names in factors.items() for spelling in names.split()}
+
+
+UNITS = {
+    "gyr": _spellings(
+        {
+            1.0: "rad/s rads^-1 rad/sec radians/s radians/sec rads-1 rad*s^-1",
+            np.pi / 180: "deg/s °/s dps degs^-1 degree/s degrees/s deg/sec degs-1 degrees/sec º/s",
+            np.pi / 180e3: "mdps mdeg/s",
+        }
+    ),
+    "acc": _spellings(
+        {
+            1.0: "m/s^2 m/s2 m/s² m/(s^2) ms^-2 ms-2 mps2 m/s/s m/sec^2 m*s^-2 m/s**2 meters/second^2",
+            STANDARD_GRAVITY: "g g0 gs gee G",
+            STANDARD_GRAVITY / 1000.0: "mg milli-g",
+        }
+    ),
+    "mag": _spellings(
+        {
+            1.0: "ut µt μt microt microtesla a.u. au arb.u. local_flux 1 normalized",
+            1000.0: "mt",
+            1e6: "t tesla",
+            0.001: "nt",
+            100.0: "gauss gs g ga",
+            0.1: "mgauss mg mga milligauss",
+        }
+    ),
+    "time": _spellings(
+        {1.0: "s sec secs second seconds", 1e-3: "ms msec millis milliseconds", 1e-6: "us µs μs usec microseconds"}
+        | {1e-9: "ns nsec nanoseconds", 60.0: "min minutes", 3600.0: "h hours", 86400.0: "days"}
+    ),
+    "angle": _spellings({1.0: "rad radians", np.pi / 180: "deg ° degree degrees"}),
+}
+"""Kind of quantity → spelling of a unit without white space, in lower case → factor to rad/s, m/s², µT, s, rad."""
+KNOWN_UNITS = {spelling for spellings in UNITS.values() for spelling in spellings}
+OTHER_UNITS = {"c", "degc", "°c", "kpa", "hpa", "pa", "mv", "v", "%", "m", "mm", "cm", "hz", "counts", "lsb", "n", "nm"}
+
+
+def plain(unit: str) -> str:
+    """A unit as the table of units spells it."""
+    return re.sub(r"[\s·]+", "", unit).lower().replace("−", "-")
+
+
+def factor(kind: str, unit: str) -> float:
+    """What a value of a kind in a unit is multiplied by.
+
+    Raises:
+        ValueError: the unit is none of the kind.
+    """
+    known = UNITS.get(kind)
+    if known is None:
+        return 1.0
+    if plain(unit) not in known:
+        raise ValueError(f"units[{kind!r}]: {unknown('unit', unit, known)}")
+    return known[plain(unit)]
+
+
+def split_unit(name: str) -> tuple[str, str]:
+    """Name and unit of ``name (unit)`` or ``name [unit]``; an index like ``Mat[1]`` is part of the name."""
+    match = UNIT.match(name.strip())
+    if match is None:
+        return name.strip(), ""
+    unit = (match["a"] if match["a"] is not None else match["b"]).strip()
+    known = (plain(unit) in KNOWN_UNITS or plain(unit) in OTHER_UNITS) and not unit.isdigit()
+    return (match["name"].strip(), unit) if unit == "" or known else (name.strip(), "")
+
+
+def units_row(cells: Sequence[str]) -> bool:
+    """Whether the cells of a line are units."""
+    content = [plain(cell) if plain(cell) in KNOWN_UNITS else plain(cell).strip("()[]") for cell in cells if cell]
+    known = sum(cell in KNOWN_UNITS or cell in OTHER_UNITS for cell in content)
+    return bool(content) and known > 0.6 * len(content) and not all(len(cell) == 1 for cell in content)
+
+
+@dataclass(frozen=True)
+class Table:
+    """Columns of numbers, equally long in one file where they are text, of any length in others.
+
+    Attributes:
+        arrays: name → ``(N,)`` or, of array files, ``(N, k)``; whole numbers stay whole.
+        units: name → unit, where the header tells it.
+        preamble: lines before the table.
+        kind: of the file, for messages.
+        named: whether the columns have names of their own.
+        unreadable: name → row and content of the first cell that is no number.
+    """
+
+    arrays: dict[str, np.ndarray]
+    units: dict[str, str] = field(default_factory=dict)
+    preamble: tuple[str, ...] = ()
+    kind: str = "table"
+    named: bool = True
+    unreadable: dict[str, tuple[int, str]] = field(default_factory=dict)
+
+    def __len__(self) -> int:
+        return max((len(values) for values in self.arrays.values()), default=0)
+
+    def __contains__(self, names: str | Iterable[str]) -> bool:
+        return all(name in self.arrays for name in ([names] if isinstance(names, str) else names))
+
+    def column(self, name: str) -> np.ndarray:
+        """One array as it is.
+
+        Raises:
+            ValueError: there is none of that name, or a cell of it is no number.
+        """
+        if name not in self.arrays:
+            raise ValueError(f"{unknown('column', name, self.arrays)}")
+        if name in self.unreadable:
+            row, content = self.unreadable[name]
+            raise ValueError(f"column {name} holds no number in row {row} of the table: {content!r}")
+        return self.arrays[name]
+
+    def matrix(self, names: str | Sequence[str]) -> np.ndarray:
+        """Columns side by side, ``(N, k)`` float64; a single name may be an array of several columns."""
+        wanted = [names] if isinstance(names, str) else list(names)
+        parts = [np.asarray(self.column(name), dtype=float) for name in wanted]
+        parts = [part[:, None] if part.ndim == 1 else part for part in parts]
+        lengths = {len(part) for part in parts}
+        if len(lengths) != 1:
+            raise ValueError(f"columns {wanted} are of different lengths {sorted(lengths)}")
+        return np.concatenate(parts, axis=1)
+
+    def unit(self, names: str | Sequence[str]) -> str:
+        """The unit of columns, empty where the header tells none.
+
+        Raises:
+            ValueError: the columns have different units.
+        """
+        wanted = [names] if isinstance(names, str) else list(names)
+        units = {self.units.get(name, "") for name in wanted}
+        if len(units) > 1:
+            raise ValueError(f"columns {wanted} have different units {sorted(units)}")
+        return units.pop()
+
+    def value_of(self, *keys: str) -> str | None:
+        """What the preamble says after a key (``// Update Rate: 100.0Hz``), case aside; None if it says nothing."""
+        for line in self.preamble:
+            text = re.sub(r'^\s*(#|//|%)\s*|"', "", line)
+            match = re.match(r"([^:=,;\t]+?)\s*[:=,;\t]\s*[:=,;\t]*\s*(.*)", text)
+            if match and re.sub(r"[\s_]+", "", match[1]).lower() in [key.replace(" ", "").lower() for key in keys]:
+                return match[2].strip(" ,;\t")
+        return None
+
+    def rate_in_header(self, *keys: str) -> float | None:
+        """A sampling rate in Hz that the preamble names, or None."""
+        text = self.value_of(*keys)
+        number = None if text is None else re.search(r"\d+(?:[.,]\d+)?", text)
+        return float(number[0].replace(",", ".")) if number and float(number[0].replace(",", ".")) > 0.0 else None
+
+    def seen(self) -> str:
+        """What the file holds, in one sentence."""
+        names = list(self.arrays)
+        listed = ", ".join(names[:24]) + (f", … ({len(names)} in all)" if len(names) > 24 else "")
+        return f"{self.kind}; {len(self)} rows; columns {listed if self.named else f'{len(names)} without names'}"

@@ -1,0 +1,245 @@
+"""Text tables as devices and spreadsheets write them.
+
+What is found out from the content: encoding (with or without byte order mark), line ends (LF, CRLF, CR), delimiter
+(comma, semicolon, tab, bar, white space, or what ``sep=`` says), decimal mark, comments and key-value lines before the
+table, lines of column names, a line of units, trailing delimiters, blank lines, texts for missing values, and dates
+with time zones.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+import warnings
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .table import Table, split_unit, units_row
+
+if TYPE_CHECKING:
+    import pandas
+
+MISSING = ("", "nan", "na", "n/a", "null", "none", "-", "--", "#n/a", "nil", "missing")
+NUMBER = re.compile(r"[-+]?(\d+[.,]?\d*|[.,]\d+)([eE][-+]?\d+)?|[-+]?(inf|infinity)", re.IGNORECASE)
+DATE = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d(:\d\d([.,]\d+)?)?\s*(Z|UTC|[-+]\d\d:?\d\d)?")
+COMMENT = ("#", "//", "%")
+DELIMITERS = (",", ";", "\t", "|", " ")
+SAMPLE = 400
+"""Lines that decide about the delimiter."""
+NAMES = {",": "comma", ";": "semicolon", "\t": "tab", "|": "bar", " ": "white space"}
+
+
+def decode(content: bytes) -> str:
+    """Text of a file with line feeds only."""
+    if content.startswith((b"\xff\xfe", b"\xfe\xff")):
+        text = content.decode("utf-16", errors="replace")
+    else:
+        try:
+            text = content.decode("utf-8-sig")
+        except UnicodeDecodeError:
+            text = content.decode("cp1252", errors="replace")
+    return text.replace("\r\n", "\n").replace("\r", "\n")
+
+
+def is_text(head: bytes) -> bool:
+    """Whether the first bytes of a file are those of a text."""
+    if head.startswith((b"\xff\xfe", b"\xfe\xff")):
+        return True
+    printable = sum(byte >= 32 or byte in (9, 10, 13) for byte in head)
+    return bool(head) and b"\0" not in head and printable > 0.97 * len(head)
+
+
+def fields_of(line: str, delimiter: str) -> list[str]:
+    """Fields of a line, without quotes and white space around them."""
+    if delimiter == " ":
+        return line.split()
+    if '"' in line:
+        return [field.strip() for field in next(csv.reader([line], delimiter=delimiter, skipinitialspace=True), [])]
+    return [field.strip() for field in line.split(delimiter)]
+
+
+def is_number(field: str) -> bool:
+    """Whether a field is a number, with either decimal mark."""
+    return NUMBER.fullmatch(field) is not None
+
+
+def is_value(field: str) -> bool:
+    """Whether a field may stand in a table of numbers."""
+    return is_number(field) or field.lower() in MISSING or DATE.fullmatch(field) is not None
+
+
+def numbers(line: str, delimiter: str) -> int:
+    """How many fields are numbers or dates; 0 if fewer than half of those with content are."""
+    content = [field for field in fields_of(line, delimiter) if field.lower() not in MISSING]
+    found = sum(is_value(field) for field in content)
+    return found if 2 * found >= len(content) else 0
+
+
+def guess_delimiter(lines: list[str]) -> str | None:
+    """The delimiter that makes most numbers of most lines; None if there are no numbers."""
+    step = max(1, len(lines) // SAMPLE)
+    sample = [line for line in lines[::step] if line.strip()] or [""]
+    score = {mark: float(np.mean([numbers(line, mark) for line in sample])) for mark in DELIMITERS}
+    best = max(DELIMITERS, key=lambda mark: score[mark])
+    return best if score[best] > 0.0 else None
+
+
+def read_text(path: Path) -> Table:
+    """Read a text table, see :func:`table_of`."""
+    return table_of(decode(path.read_bytes()), path.name)
+
+
+def table_of(text: str, name: str) -> Table:
+    """The table of a text.
+
+    Args:
+        text: with line feeds only.
+        name: of its file, for warnings.
+
+    Raises:
+        ValueError: there is no table of numbers, or a row has more fields than the others.
+    """
+    lines = text.rstrip("\n\0 ").split("\n")
+    first = next((line for line in lines if line.strip()), "")
+    said = re.fullmatch(r'"?sep=(.)"?[,;\t]*', first.strip())
+    delimiter = said[1] if said and said[1] in DELIMITERS else guess_delimiter(lines)
+    if delimiter is None:
+        raise ValueError(f"no table of numbers is in it; it begins with {first[:60]!r}")
+    begin = next(
+        (
+            number
+            for number, line in enumerate(lines)
+            if numbers(line, delimiter)
+            and not line.lstrip().startswith(COMMENT)
+            and all(numbers(after, delimiter) or not after.strip() for after in lines[number + 1 : number + 3])
+            and numbers(line, delimiter) > 0.3 * numbers(lines[min(number + 5, len(lines) - 1)], delimiter)
+        ),
+        None,
+    )
+    if begin is None:
+        raise ValueError(f"no table of numbers is in it; it begins with {first[:60]!r}")
+    data = [line for line in lines[begin:] if line.strip() and not line.lstrip().startswith(COMMENT)]
+    widths = [len(fields_of(line, delimiter)) for line in data[:SAMPLE]]
+    width = max(set(widths), key=widths.count)
+    last = len(fields_of(data[-1], delimiter))
+    if last < width and len(data) > 1:
+        warnings.warn(f"{name}: the last row is cut off ({last} of {width} fields) and left out", stacklevel=4)
+        del data[-1]
+    frame = parse(data, delimiter, width)
+    above = lines[:begin]
+    heads = header_lines(above, delimiter, width)
+    names, units = names_and_units([head for _, head in heads], width)
+    used = {number for number, _ in heads}
+    arrays, unreadable = {}, {}
+    for column, name in enumerate(names):
+        values, wrong = numeric(frame[column])
+        if values is None or (column >= len(names) - 2 and not name and np.isnan(values.astype(float)).all()):
+            continue
+        arrays[name or str(column)] = values
+        if wrong is not None:
+            unreadable[name or str(column)] = wrong
+    return Table(
+        arrays=arrays,
+        units=units,
+        preamble=tuple(line.strip() for number, line in enumerate(above) if number not in used and line.strip()),
+        kind=f"text, delimited by {NAMES[delimiter]}",
+        named=bool(heads),
+        unreadable=unreadable,
+    )
+
+
+def parse(data: list[str], delimiter: str, width: int) -> pandas.DataFrame:
+    """Rows as a frame, its columns by their numbers."""
+    import pandas
+
+    decimal = "."
+    if delimiter != ",":
+        tokens = [field for line in data[:SAMPLE] for field in fields_of(line, delimiter)]
+        decimal = (
+            ","
+            if sum("," in token and is_number(token) for token in tokens)
+            > 0.5 * sum("." in token and is_number(token) for token in tokens)
+            else "."
+        )
+    try:
+        return pandas.read_csv(
+            io.StringIO("\n".join(data)),
+            header=None,
+            names=range(width),
+            index_col=False,
+            sep=r"\s+" if delimiter == " " else delimiter,
+            decimal=decimal,
+            na_values=[*MISSING, *(text.upper() for text in MISSING), *(text.title() for text in MISSING)],
+            skipinitialspace=True,
+            low_memory=False,
+        )
+    except (pandas.errors.ParserError, pandas.errors.EmptyDataError) as reason:
+        raise ValueError(f"its table is not readable: {reason}") from None
+
+
+def header_lines(above: list[str], delimiter: str, width: int) -> list[tuple[int, list[str]]]:
+    """Lines of names and units right before the data, with their numbers, from top to bottom."""
+    found: list[tuple[int, list[str]]] = []
+    for number in range(len(above) - 1, -1, -1):
+        line = above[number].strip(" ")
+        if not line.strip():
+            if found:
+                break
+            continue
+        fields = fields_of(re.sub(r"^\s*(#|//|%)\s*", "", line), delimiter)
+        content = [field for field in fields if field]
+        same = len(fields) in (width - 1, width, width + 1) and len(content) > 0.25 * width
+        if not same or len(found) == 3 or (any(is_number(field) for field in content) and len(found)):
+            break
+        if content and content[0].endswith(":"):
+            break
+        found.insert(0, (number, fields[:width] + [""] * (width - len(fields))))
+    return found
+
+
+def names_and_units(heads: list[list[str]], width: int) -> tuple[list[str], dict[str, str]]:
+    """Unique column names, and the units by name, of the lines of a header."""
+    rows = [list(head) for head in heads]
+    unit_line: list[str] = rows.pop() if len(rows) > 1 and units_row(rows[-1]) else [""] * width
+    if len(rows) > 1 and any(not cell for cell in rows[0][1:]):
+        # A line of groups over a line of axes: the group's name stands over its first column.
+        group = ""
+        for column in range(width):
+            group = rows[0][column] or group
+            rows[0][column] = group
+    names: list[str] = []
+    units = {}
+    for column in range(width):
+        parts = [row[column] for row in rows if row[column]]
+        name, unit = split_unit("/".join(parts))
+        if name in names:
+            name = f"{name}.{names.count(name)}" if name else ""
+        names.append(name)
+        if unit or unit_line[column]:
+            units[name] = unit or unit_line[column]
+    return names, units
+
+
+def numeric(column: pandas.Series) -> tuple[np.ndarray | None, tuple[int, str] | None]:
+    """Numbers of a column (None for texts), and row and content of the first cell that is none."""
+    import pandas
+
+    if column.dtype.kind in "iufb":
+        return column.to_numpy(), None
+    texts = column.astype("string").str.strip()
+    filled = texts.notna() & ~texts.str.lower().isin(MISSING).fillna(False)
+    values = pandas.to_numeric(texts, errors="coerce")
+    if values[filled].isna().any():
+        values = pandas.to_numeric(texts.str.replace(",", ".", regex=False), errors="coerce")
+    wrong = filled & values.isna()
+    if not filled.any() or wrong.sum() > 0.5 * filled.sum():
+        first = str(texts[filled].iloc[0]) if filled.any() else ""
+        if not DATE.fullmatch(first):
+            return None, None
+        stamps = pandas.to_datetime(texts.str.replace(",", "."), errors="coerce", utc=True, format="ISO8601")
+        return stamps.to_numpy(dtype="datetime64[ns]").astype(np.int64), None
+    row = int(np.flatnonzero(wrong)[0]) if wrong.any() else None
+    return values.to_numpy(dtype=float), None if row is None else (row, str(texts.iloc[row]))
