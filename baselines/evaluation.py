@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from ..envs.data.formats.load import load_recording
 from ..envs.data.plausibility import check_recording
-from ..envs.data.trajectory import Trajectory
+from ..envs.data.reference_clock import measured
+from ..envs.data.trajectory import REFERENCE_CLOCK, Trajectory
 from ..filters.core.estimator import Estimator
 from ..filters.support.parallel import progress_bar
 from .registry import list_estimators, make_estimator
@@ -138,9 +139,8 @@ class Evaluation:
         self.estimates: dict[str, tuple[Estimator[Any], Any]] = {}
         try:
             if clock == "corrected":
-                from ..envs.data.reference_clock import KEY, corrected, measured
-
-                trajectory = corrected(trajectory if KEY in trajectory.metadata else measured(trajectory))
+                known = REFERENCE_CLOCK in trajectory.metadata
+                trajectory = (trajectory if known else measured(trajectory)).reference_clock_corrected()
             trajectory = trajectory.on_grid()
         except ValueError as reason:
             self.skipped = dict.fromkeys(contenders, str(reason))
