@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -67,7 +68,7 @@ def write_csv(estimates: Mapping[str, Estimate], path: Path) -> None:
 def write_parquet(estimates: Mapping[str, Estimate], path: Path) -> None:
     """A Parquet table."""
     with extra("parquet"):
-        import pyarrow  # noqa: F401
+        importlib.import_module("pyarrow")
     frame = stacked(estimates)
     with replacing(path) as temporary:
         frame.to_parquet(temporary, index=False)

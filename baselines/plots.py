@@ -229,14 +229,14 @@ def signals(trajectory: Trajectory, rest: Mapping[str, np.ndarray]) -> Figure:
         rest: sensor → ``(T,)`` bool, from :func:`poise.envs.data.inspection.inspect_recording`.
     """
     labels = {"gyr": "|rate|, rad/s", "acc": "|force|, m/s²", "mag": "|field|"}
-    kinds = [kind for kind in labels if any(f"{place}/{kind}" in trajectory.measurements for place in rest)]
+    kinds = [kind for kind in labels if any(f"{site}/{kind}" in trajectory.measurements for site in rest)]
     figure, axes = new_figure(8.5, 0.8 + 1.5 * max(len(kinds), 1), rows=max(len(kinds), 1))
     for kind, ax in zip(kinds, axes, strict=False):
-        for number, place in enumerate(rest):
-            values = trajectory.measurements.get(f"{place}/{kind}")
+        for number, site in enumerate(rest):
+            values = trajectory.measurements.get(f"{site}/{kind}")
             if values is not None:
                 colour = list(COLOURS.values())[number % len(COLOURS)]
-                ax.plot(trajectory.time, np.linalg.norm(values, axis=1), color=colour, linewidth=0.6, label=place)
+                ax.plot(trajectory.time, np.linalg.norm(values, axis=1), color=colour, linewidth=0.6, label=site)
         ax.set_ylabel(labels[kind])
         ax.set_ylim(bottom=0.0)
     if len(rest) == 1:

@@ -117,6 +117,7 @@ def at_samples(estimate: Estimate, trajectory: Trajectory, on_grid: Trajectory) 
     if len(index) != len(trajectory) or index[-1] >= len(on_grid):
         # rows that repeat their predecessor are not on the grid twice
         index = np.rint((trajectory.time - on_grid.time[0]) / on_grid.dt).astype(int).clip(0, len(on_grid) - 1)
-    rest = (None if part is None else part[index] for part in (estimate.covariance, estimate.innovation, estimate.nis))
+    parts = (estimate.covariance, estimate.innovation, estimate.nis)
+    covariance, innovation, nis = (None if part is None else part[index] for part in parts)
     pose = {name: values[index] for name, values in estimate.pose.items()}
-    return Estimate(pose, *rest, trajectory.time, estimate.layout)
+    return Estimate(pose, covariance, innovation, nis, trajectory.time, estimate.layout)

@@ -46,12 +46,8 @@ COMMANDS: dict[str, Command] = {
     "rides": Command(".rides", "ride every scenario with every rider; numbers beside those of the papers"),
     "train": Command(".train", "train a learned estimator"),
     "tune": Command(".tune", "fit the gains of a filter: constant ones, or a policy that sets them"),
-    "inspect": Command(
-        ".recordings.inspect", "what a recording holds, and whether its units, signs and clock are plausible"
-    ),
-    "estimate": Command(
-        ".recordings.estimate", "angles, quaternions and their standard deviations of a recording, as a file"
-    ),
+    "inspect": Command(".recordings.inspect", "what a recording holds; whether units, signs and clock are plausible"),
+    "estimate": Command(".recordings.estimate", "angles, quaternions, standard deviations of a recording, as a file"),
     "evaluate": Command(".recordings.evaluate", "measure estimators on recorded trajectories"),
     "calibrate": Command(".calibrate", "scale, offset and axes of raw sensors, from rate-table and tumbling runs"),
     "array": Command(".array", "what an array of accelerometers can tell: rank and noise gains"),

@@ -153,9 +153,11 @@ def print_comparison(
         out.show(rows, heading)
         sections[heading] = markdown_table(rows)
     if table.attrs.get("reference_clock") and table["metric"].isin(list(TITLES)).any():
-        words = {"recorded": "as recorded", "corrected": "corrected by the measured offset"}
-        sections[f"{name}: reference clock".lstrip(": ")] = f"{words[table.attrs['reference_clock']]}."
-        out.say(f"clock of the reference: {words[table.attrs['reference_clock']]}")
+        clock = {"recorded": "as recorded", "corrected": "corrected by the measured offset"}[
+            table.attrs["reference_clock"]
+        ]
+        sections[f"{name}: clock of the reference".lstrip(": ")] = f"{clock[0].upper()}{clock[1:]}."
+        out.say(f"clock of the reference: {clock}")
     found = list(parts(table))
     for _, metric, part in found:
         several = sum(metric == other for _, other, _ in found) > 1

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from .plausibility import clipped_share, places, vectors
+from .plausibility import clipped_share, sites, vectors
 from .trajectory import Trajectory
 
 REST_WINDOW = 1.0
@@ -37,9 +37,9 @@ class Inspection:
 
 def inspect_recording(trajectory: Trajectory) -> Inspection:
     """Describe a recording; nothing is judged (see :func:`poise.check_recording`)."""
-    rest = {place: at_rest(trajectory, place) for place in places(trajectory)}
+    rest = {site: at_rest(trajectory, site) for site in sites(trajectory)}
     channels = [channel_row(name, values, trajectory.time) for name, values in trajectory.measurements.items()]
-    sensors = [sensor_row(trajectory, place, rest[place]) for place in rest]
+    sensors = [sensor_row(trajectory, site, rest[site]) for site in rest]
     return Inspection(clock_rows(trajectory), channels, sensors, rest)
 
 
@@ -88,9 +88,9 @@ def channel_row(name: str, values: np.ndarray, time: np.ndarray) -> dict[str, An
     return row
 
 
-def at_rest(trajectory: Trajectory, place: str) -> np.ndarray:
+def at_rest(trajectory: Trajectory, site: str) -> np.ndarray:
     """Samples ``(T,)`` at which a sensor rests, found in windows of a second."""
-    gyr, acc = vectors(trajectory, f"{place}/gyr"), vectors(trajectory, f"{place}/acc")
+    gyr, acc = vectors(trajectory, f"{site}/gyr"), vectors(trajectory, f"{site}/acc")
     resting = np.zeros(len(trajectory), bool)
     if gyr is None and acc is None:
         return resting
@@ -114,10 +114,10 @@ def at_rest(trajectory: Trajectory, place: str) -> np.ndarray:
     return resting
 
 
-def sensor_row(trajectory: Trajectory, place: str, rest: np.ndarray) -> dict[str, Any]:
+def sensor_row(trajectory: Trajectory, site: str, rest: np.ndarray) -> dict[str, Any]:
     """Rest, noise and bias at rest, gravity, magnetic field of one sensor."""
-    gyr, acc, mag = (vectors(trajectory, f"{place}/{kind}") for kind in ("gyr", "acc", "mag"))
-    row: dict[str, Any] = {"sensor": place, "rest %": 100.0 * float(rest.mean())}
+    gyr, acc, mag = (vectors(trajectory, f"{site}/{kind}") for kind in ("gyr", "acc", "mag"))
+    row: dict[str, Any] = {"sensor": site, "rest %": 100.0 * float(rest.mean())}
     if gyr is not None:
         row["turns °/s RMS"] = float(np.degrees(np.sqrt(np.nanmean(np.square(gyr).sum(axis=1)))))
         if rest.any():

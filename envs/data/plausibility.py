@@ -69,23 +69,23 @@ def check_recording(trajectory: Trajectory) -> list[Finding]:
     """Look for wrong units, signs, axes and clocks.
 
     Args:
-        trajectory: any; every ``place/gyr``, ``place/acc`` and ``place/mag`` is looked at.
+        trajectory: any; every ``site/gyr``, ``site/acc`` and ``site/mag`` is looked at.
 
     Returns:
         Findings, warnings first; empty if nothing is odd.
     """
     findings = list(check_clock(trajectory))
     wrong_clock = any(finding.severity == "warning" for finding in findings)
-    for place in places(trajectory):
-        findings += check_place(trajectory, place, wrong_clock)
+    for site in sites(trajectory):
+        findings += check_site(trajectory, site, wrong_clock)
     findings += check_reference(trajectory)
     return sorted(findings, key=lambda finding: finding.severity != "warning")
 
 
-def places(trajectory: Trajectory) -> list[str]:
+def sites(trajectory: Trajectory) -> list[str]:
     """Mounting locations with an inertial sensor, ``imu`` of ``imu/gyr`` …, in order of appearance."""
     found = (name.rpartition("/") for name in trajectory.measurements)
-    return list(dict.fromkeys(place for place, _, kind in found if kind in ("gyr", "acc", "mag") and place))
+    return list(dict.fromkeys(site for site, _, kind in found if kind in ("gyr", "acc", "mag") and site))
 
 
 def vectors(trajectory: Trajectory, channel: str) -> np.ndarray | None:
@@ -124,23 +124,23 @@ def check_clock(trajectory: Trajectory) -> Iterator[Finding]:
             yield Finding("note", "time", f"{100 * lost:.0f} % of the rows are missing", "lost packets", remedy)
 
 
-def check_place(trajectory: Trajectory, place: str, wrong_clock: bool) -> list[Finding]:
+def check_site(trajectory: Trajectory, site: str, wrong_clock: bool) -> list[Finding]:
     """All checks of one sensor."""
-    gyr, acc, mag = (vectors(trajectory, f"{place}/{kind}") for kind in ("gyr", "acc", "mag"))
+    gyr, acc, mag = (vectors(trajectory, f"{site}/{kind}") for kind in ("gyr", "acc", "mag"))
     findings: list[Finding] = []
     for kind, values in (("gyr", gyr), ("acc", acc), ("mag", mag)):
         if values is not None:
-            findings += check_alive(f"{place}/{kind}", values)
+            findings += check_alive(f"{site}/{kind}", values)
     dead = {finding.channel for finding in findings if finding.severity == "warning"}
-    if acc is not None and f"{place}/acc" not in dead:
-        findings += check_force(f"{place}/acc", acc)
-    if gyr is not None and f"{place}/gyr" not in dead:
+    if acc is not None and f"{site}/acc" not in dead:
+        findings += check_force(f"{site}/acc", acc)
+    if gyr is not None and f"{site}/gyr" not in dead:
         if not wrong_clock:
-            findings += check_rates(trajectory, place, gyr, acc, mag if f"{place}/mag" not in dead else None)
-        findings += check_rest(f"{place}/gyr", gyr, any(f.channel == f"{place}/gyr" for f in findings))
-    removed = any(f.channel == f"{place}/acc" and f.severity == "warning" for f in findings)
+            findings += check_rates(trajectory, site, gyr, acc, mag if f"{site}/mag" not in dead else None)
+        findings += check_rest(f"{site}/gyr", gyr, any(f.channel == f"{site}/gyr" for f in findings))
+    removed = any(f.channel == f"{site}/acc" and f.severity == "warning" for f in findings)
     if acc is not None and not removed:
-        findings += check_sign(trajectory, f"{place}/acc", acc, mag if f"{place}/mag" not in dead else None)
+        findings += check_sign(trajectory, f"{site}/acc", acc, mag if f"{site}/mag" not in dead else None)
     return findings
 
 
@@ -201,13 +201,13 @@ def check_force(channel: str, acc: np.ndarray) -> Iterator[Finding]:
 
 
 def check_rates(
-    trajectory: Trajectory, place: str, gyr: np.ndarray, acc: np.ndarray | None, mag: np.ndarray | None
+    trajectory: Trajectory, site: str, gyr: np.ndarray, acc: np.ndarray | None, mag: np.ndarray | None
 ) -> Iterator[Finding]:
     """Unit, signs and axes of the gyroscope, against the motion of gravity, of the field and of the truth."""
-    channel = f"{place}/gyr"
+    channel = f"{site}/gyr"
     fastest = float(np.nanquantile(np.linalg.norm(gyr, axis=1), 0.99))
     against = {"accelerometer": acc, "magnetometer": mag}
-    if place == "imu" and "orientation" in trajectory.truth:
+    if site == "imu" and "orientation" in trajectory.truth:
         against["reference"] = rotation.rotate_back(trajectory.truth["orientation"], np.array([0.6, 0.0, 0.8]))
     found: dict[str, RateConsistency] = {}
     for name, vector in against.items():
@@ -225,10 +225,10 @@ def check_rates(
         what = f"rates up to {fastest:.4g} rad/s, {np.degrees(fastest):.0f} °/s"
         yield Finding("warning", channel, what, "rates in deg/s, or raw counts", "Convert to rad/s.")
         return
-    yield from check_axes(place, decided)
+    yield from check_axes(site, decided)
 
 
-def check_axes(place: str, found: dict[str, RateConsistency]) -> Iterator[Finding]:
+def check_axes(site: str, found: dict[str, RateConsistency]) -> Iterator[Finding]:
     """Name the channel whose axes contradict the others."""
     odd = {name: one.other_axes for name, one in found.items() if one.other_axes is not None}
     if not odd:
@@ -242,11 +242,11 @@ def check_axes(place: str, found: dict[str, RateConsistency]) -> Iterator[Findin
     # A vector's own sign does not show: of the two arrangements that look alike, the one with fewer signs is meant.
     of_vector = f"of the {name} {axes_in_words(min(axes, -axes, key=lambda m: int((m < 0.0).sum())))}"
     if proper and agreeing:
-        channel = {"accelerometer": f"{place}/acc", "magnetometer": f"{place}/mag", "reference": "orientation"}[name]
+        channel = {"accelerometer": f"{site}/acc", "magnetometer": f"{site}/mag", "reference": "orientation"}[name]
         cause = of_vector
     else:
         # No arrangement of a vector's axes looks like a left-handed gyroscope.
-        channel, cause = f"{place}/gyr", f"{of_gyroscope}, or {of_vector}" if proper else of_gyroscope
+        channel, cause = f"{site}/gyr", f"{of_gyroscope}, or {of_vector}" if proper else of_gyroscope
     yield Finding("warning", channel, what, cause, "Check signs and order of the axes.")
 
 

@@ -27,7 +27,7 @@ class Args:
     """file to write, .csv, .parquet, .h5, .npz, or .sto for OpenSim"""
     plot: Path | None = None
     """picture of the angles over time, .png, .pdf or .svg"""
-    place: str | None = None
+    site: str | None = None
     """in recordings of several sensors, the only one to look at"""
     calibration: Path | None = None
     """record of `poise calibrate` that turns raw readings of the recordings into SI units"""
@@ -47,7 +47,7 @@ def run(args: Args) -> int:
     if args.output is not None and args.output.suffix.lower() not in WRITERS:
         raise ValueError(f"output must end in one of {', '.join(WRITERS)}, got {args.output.name!r}")
     with plain_warnings(), Output("estimate", args) as out:
-        loaded, passed_over = load_all(args.recordings, args.calibration, args.place)
+        loaded, passed_over = load_all(args.recordings, args.calibration, args.site)
         sensors = {sensor.name: sensor for one in loaded for sensor in sensors_of(one)}
         estimates: dict[str, Estimate] = {}
         for name, sensor in sensors.items():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
 import tyro
 
@@ -25,7 +25,7 @@ class Args:
     orientation that the device computed, or `auto`: mekf-9, or bounded-motion where there is no magnetometer"""
     reference_clock: Literal["recorded", "corrected"] = "recorded"
     """take the truth as recorded, or corrected by the measured offset between its clock and that of the gyroscope"""
-    place: str | None = None
+    site: Annotated[str | None, tyro.conf.arg(aliases=["--place"])] = None
     """in recordings of several sensors, the one to look at, such as bicycle_imu or trunk_imu of a ride"""
     calibration: Path | None = None
     """record of `poise calibrate` that turns raw readings of the recordings into SI units"""
@@ -48,9 +48,9 @@ def run(args: Args) -> int:
 
     names = tuple(list_estimators()) if args.estimators == ("all",) else args.estimators
     with plain_warnings():
-        trajectories, passed_over = load_all(args.recordings, args.calibration, args.place)
-        options = {"reference": args.reference, "reference_clock": args.reference_clock}
-        table = evaluate(list(names), trajectories, **options, progress=True)
+        trajectories, passed_over = load_all(args.recordings, args.calibration, args.site)
+        clock = args.reference_clock
+        table = evaluate(list(names), trajectories, reference=args.reference, reference_clock=clock, progress=True)
     folder = start_run("evaluate", args, args.seed, args.runs)
     folder.write_results(table)
     with Output("evaluate", args) as out:

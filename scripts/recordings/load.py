@@ -14,14 +14,14 @@ if TYPE_CHECKING:
 
 
 def load_all(
-    paths: Sequence[Path], calibration: Path | None = None, place: str | None = None
+    paths: Sequence[Path], calibration: Path | None = None, site: str | None = None
 ) -> tuple[list[Trajectory], list[tuple[Path, str]]]:
     """Load files, and folders as the recordings below them.
 
     Args:
         paths: files or folders.
         calibration: record of ``poise calibrate``.
-        place: in recordings of several sensors, the one to look at.
+        site: in recordings of several sensors, the one to look at.
 
     Returns:
         Trajectories of distinct names; files of folders that were passed over, with the reason.
@@ -41,7 +41,7 @@ def load_all(
         for file in files:
             try:
                 trajectory = load_recording(file, calibration)
-                found.append(trajectory if place is None else at_place(trajectory, place))
+                found.append(trajectory if site is None else at_site(trajectory, site))
                 sources.append(file)
             except ValueError as reason:
                 if not path.is_dir():
@@ -58,46 +58,46 @@ def load_all(
     return distinct(found, sources), passed_over
 
 
-def at_place(trajectory: Trajectory, place: str) -> Trajectory:
+def at_site(trajectory: Trajectory, site: str) -> Trajectory:
     """One sensor of a recording, as ``imu``; of a ride with the truth of that sensor.
 
     Raises:
         ValueError: there is no such sensor.
     """
-    from ...envs.bicycle.sensors.single_imu import PLACES, imu_of
+    from ...envs.bicycle.sensors.single_imu import SITES, imu_of
 
-    if place in PLACES and f"{place}/gyr" in trajectory.measurements:
-        return imu_of(trajectory, place)
-    channels = place_channels(trajectory, place)
+    if site in SITES and f"{site}/gyr" in trajectory.measurements:
+        return imu_of(trajectory, site)
+    channels = site_channels(trajectory, site)
     if not channels:
-        from ...envs.data.plausibility import places
+        from ...envs.data.plausibility import sites
 
-        raise ValueError(f"{trajectory.name!r} has no sensor {place!r}; there are {', '.join(places(trajectory))}")
+        raise ValueError(f"{trajectory.name!r} has no sensor {site!r}; there are {', '.join(sites(trajectory))}")
     truth = {
-        name.rpartition("/")[2]: values for name, values in trajectory.truth.items() if name.startswith(f"{place}/")
+        name.rpartition("/")[2]: values for name, values in trajectory.truth.items() if name.startswith(f"{site}/")
     }
     return trajectory.replace(
-        measurements=channels, truth=truth, metadata={**trajectory.metadata, "name": f"{trajectory.name}/{place}"}
+        measurements=channels, truth=truth, metadata={**trajectory.metadata, "name": f"{trajectory.name}/{site}"}
     )
 
 
-def place_channels(trajectory: Trajectory, place: str) -> dict[str, Any]:
+def site_channels(trajectory: Trajectory, site: str) -> dict[str, Any]:
     """Channels of one sensor, as those of ``imu``."""
     return {
         f"imu/{name.rpartition('/')[2]}": values
         for name, values in trajectory.measurements.items()
-        if name.rpartition("/")[0] == place
+        if name.rpartition("/")[0] == site
     }
 
 
 def sensors_of(trajectory: Trajectory) -> list[Trajectory]:
     """The sensors of a recording, each as ``imu``; the recording itself if it has one."""
-    from ...envs.data.plausibility import places
+    from ...envs.data.plausibility import sites
 
     if "imu/gyr" in trajectory.measurements:
         return [trajectory]
-    found = [place for place in places(trajectory) if f"{place}/gyr" in trajectory.measurements]
-    return [at_place(trajectory, place) for place in found] or [trajectory]
+    found = [site for site in sites(trajectory) if f"{site}/gyr" in trajectory.measurements]
+    return [at_site(trajectory, site) for site in found] or [trajectory]
 
 
 @contextmanager
