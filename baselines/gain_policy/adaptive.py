@@ -95,7 +95,7 @@ class AdaptiveEstimator:
         ticks = {name: np.asarray(array)[None] for name, array in arrays.items()}
         estimate, state = self._advance(state, ticks)
         pose = {name: value[0] for name, value in estimate.pose.items()}
-        return state, Estimate(pose, *(None if part is None else part[0] for part in estimate[1:]))
+        return state, Estimate(pose, *(None if part is None else part[0] for part in estimate[1:4]))
 
     def run(self, measurements: Mapping[str, Any]) -> Estimate:
         """Estimates of a whole sequence ``(T, *batch, size)``; equal to stepping."""

