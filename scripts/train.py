@@ -63,6 +63,8 @@ class Args:
 def run(args: Args) -> int:
     """Train, test, and write weights with their card."""
     from ..baselines.learned.dataset import LearnedDataset
+    from ..baselines.learned.estimator import LearnedEstimator
+    from ..baselines.learned.gru import GruNetwork
     from ..baselines.learned.training import train
     from ..baselines.weights_io import save_weights
 
@@ -78,7 +80,7 @@ def run(args: Args) -> int:
     with Output("train", args) as out:
         resume = args.resume is not None
         result = train(config, folder.folder, dataset=dataset, validation=validation, resume=resume, say=out.say)
-        estimator = estimator_of(result, config)
+        estimator = LearnedEstimator(GruNetwork.from_arrays(result.arrays), config.frame)
         table = test(estimator, config, args.test_episodes, out)
         folder.write_results(table)
         card = card_of(args, config, result, table)
@@ -86,7 +88,12 @@ def run(args: Args) -> int:
         out.say(f"weights: {path}")
         if args.export is not None:
             out.say(f"weights: {save_weights(args.export, result.arrays, card)}")
-        print_means(means(table), out)
+        columns = means(table)
+        rows = [
+            {"estimator": name, **{group: each[name]["mean_deg"] for group, each in columns.items() if name in each}}
+            for name in table["estimator"].unique()
+        ]
+        out.table(rows, "Inclination error on unseen simulated episodes, mean of RMS, deg")
         out.add(run=str(folder.folder), card=card)
     return 0
 
@@ -102,14 +109,6 @@ def training_config(args: Args) -> TrainingConfig:
         config = replace(config, episodes=96, validation_episodes=16, epochs=4, units=32, batch=16, domain=quick)
     given = {name: getattr(args, name) for name in ("episodes", "epochs", "units")}
     return replace(config, seed=args.seed, **{name: value for name, value in given.items() if value is not None})
-
-
-def estimator_of(result: TrainingResult, config: TrainingConfig) -> LearnedEstimator:
-    """The trained estimator."""
-    from ..baselines.learned.estimator import LearnedEstimator
-    from ..baselines.learned.gru import GruNetwork
-
-    return LearnedEstimator(GruNetwork.from_arrays(result.arrays), config.frame)
 
 
 def test(estimator: LearnedEstimator, config: TrainingConfig, episodes: int, out: Output) -> pandas.DataFrame:
@@ -151,16 +150,6 @@ def means(table: pandas.DataFrame) -> dict[str, dict[str, dict[str, float]]]:
         row = {"mean_deg": round(float(values.mean()), 4), "median_deg": round(float(values.median()), 4)}
         groups.setdefault(str(kind), {})[str(estimator)] = row
     return groups
-
-
-def print_means(groups: dict[str, dict[str, dict[str, float]]], out: Output) -> None:
-    """A table on the terminal: an estimator a row, a group a column."""
-    estimators = list(next(iter(groups.values())))
-    rows = [
-        {"estimator": name, **{group: values[name]["mean_deg"] for group, values in groups.items() if name in values}}
-        for name in estimators
-    ]
-    out.table(rows, "Inclination error on unseen simulated episodes, mean of RMS, deg")
 
 
 def card_of(args: Args, config: TrainingConfig, result: TrainingResult, table: pandas.DataFrame) -> dict[str, Any]:

@@ -86,11 +86,12 @@ def run(args: Args) -> int:
         candidates = {"published": GainPolicy.neutral(tuned), "constant": GainPolicy.constant(tuned, constant.action)}
         if args.method == "ppo":
             candidates["policy"] = train(args, folder, constant.action)
-        rows = compare(tuned, candidates, sets)
-        for trajectories in sets.values():
-            rows += oracle_rows(tuned, trajectories, constant)
-        folder.write_results(rows)
-        summary = means(rows, sets)
+        errors = errors_of(tuned, candidates, sets, constant)
+        folder.write_results(results(errors, sets))
+        summary = {
+            name: {group: round(float(np.mean(found[name])), 4) for group, found in errors.items()}
+            for name in [*candidates, "oracle"]
+        }
         title = f"Inclination error of {args.filter}, mean of RMS over trajectories, deg"
         out.table([{"gains": name, **values} for name, values in summary.items()], title)
         final = candidates["policy" if args.method == "ppo" else "constant"]
@@ -138,56 +139,40 @@ def train(args: Args, folder: Run, start: np.ndarray) -> GainPolicy:
         )
 
 
-def compare(
-    tuned: TunedFilter, candidates: Mapping[str, GainPolicy], sets: Mapping[str, Sequence[Trajectory]]
-) -> list[dict[str, Any]]:
-    """Errors of every candidate on every trajectory, as rows of results."""
-    from ..baselines.gain_policy.constant_gains import policy_errors
+def errors_of(
+    tuned: TunedFilter,
+    candidates: Mapping[str, GainPolicy],
+    sets: Mapping[str, Sequence[Trajectory]],
+    constant: ConstantGains,
+    points: int = 32,
+) -> dict[str, dict[str, np.ndarray]]:
+    """Set of trajectories → gains → error on each trajectory, deg.
 
-    return [
-        row(name, trajectory, value)
-        for trajectories in sets.values()
-        for name, policy in candidates.items()
-        for trajectory, value in zip(trajectories, policy_errors(tuned.kalman, policy, trajectories), strict=True)
-    ]
-
-
-def oracle_rows(
-    tuned: TunedFilter, trajectories: Sequence[Trajectory], constant: ConstantGains, points: int = 32
-) -> list[dict[str, Any]]:
-    """Errors of the best constant gains of each trajectory, chosen with the truth known: a bound, not a method."""
-    from ..baselines.gain_policy.constant_gains import constant_errors
+    The ``oracle`` takes the best of ``points`` constant gains on each trajectory, chosen with the truth known: a bound,
+    not a method.
+    """
+    from ..baselines.gain_policy.constant_gains import constant_errors, policy_errors
 
     # The first that were tried lie evenly in the box; those at the end crowd around the best.
-    actions = [constant.action, *constant.tried[:points]]
-    errors = np.stack([constant_errors(tuned, trajectories, action) for action in actions])
-    return [
-        row("oracle", trajectory, value) for trajectory, value in zip(trajectories, errors.min(axis=0), strict=True)
-    ]
-
-
-def row(name: str, trajectory: Trajectory, error: float) -> dict[str, Any]:
-    """One row of results."""
-    return {
-        "estimator": name,
-        "trajectory": trajectory.name,
-        "quantity": "up",
-        "metric": "inclination",
-        "value": float(np.degrees(error)),
-        "unit": "deg",
-    }
-
-
-def means(rows: list[dict[str, Any]], sets: Mapping[str, Sequence[Trajectory]]) -> dict[str, dict[str, float]]:
-    """Estimator → set of trajectories → mean error, deg."""
-    table: dict[str, dict[str, float]] = {}
+    actions, table = [constant.action, *constant.tried[:points]], {}
     for group, trajectories in sets.items():
-        names = {trajectory.name for trajectory in trajectories}
-        for estimator in dict.fromkeys(entry["estimator"] for entry in rows):
-            values = [e["value"] for e in rows if e["estimator"] == estimator and e["trajectory"] in names]
-            if values:
-                table.setdefault(estimator, {})[group] = round(float(np.mean(values)), 4)
+        found = {name: policy_errors(tuned.kalman, policy, trajectories) for name, policy in candidates.items()}
+        found["oracle"] = np.min([constant_errors(tuned, trajectories, action) for action in actions], axis=0)
+        table[group] = {name: np.degrees(values) for name, values in found.items()}
     return table
+
+
+def results(
+    errors: Mapping[str, Mapping[str, np.ndarray]], sets: Mapping[str, Sequence[Trajectory]]
+) -> list[dict[str, Any]]:
+    """The same as rows of results."""
+    common = {"quantity": "up", "metric": "inclination", "unit": "deg"}
+    return [
+        {"estimator": name, "trajectory": trajectory.name, "value": float(value), **common}
+        for group, found in errors.items()
+        for name, values in found.items()
+        for trajectory, value in zip(sets[group], values, strict=True)
+    ]
 
 
 def card_of(
