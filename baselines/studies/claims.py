@@ -43,7 +43,7 @@ class Claim:
         one, other = (
             f"{name} {digits(number)}" for name, number in zip(names or ("", ""), (value, limit), strict=True)
         )
-        share = "" if factor == 1.0 else f"{factor:g} × "
+        share = "" if factor == 1.0 else f"{factor:.3g} × "
         number = f"{one.strip()} against {share}{other.strip()} {unit}".strip()
         return cls(statement, number, None if math.isnan(value) or math.isnan(limit) else value < factor * limit)
 
