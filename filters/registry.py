@@ -19,6 +19,7 @@ from .core.kalman import KalmanFilter
 from .core.model import Equations, Model, Recurrence
 from .core.observer import Observer
 from .support.names import look_up
+from .support.parameters import check_parameters
 
 Kind = Literal["filter", "adaptive", "learned", "baseline", "external"]
 
@@ -84,6 +85,8 @@ class Entry:
         if unknown and not any(each.kind is each.VAR_KEYWORD for each in signature.values()):
             raise ValueError(f"unknown parameters {unknown} of {name!r}; there are {sorted(own | outer)}")
         given = {key: value for key, value in parameters.items() if key not in outer}
+        for owner in filter(None, (_load(self.describes), self.made_by, self.runner)):
+            check_parameters(owner, parameters)
         if metadata and isinstance(self.made_by, type) and issubclass(self.made_by, Equations):
             found = self.made_by.parameters_from(metadata)
             # a name that fixes the device stands for another one than that of the recording
@@ -97,7 +100,7 @@ class Entry:
 
 
 def _load(place: Any) -> Any:
-    if not isinstance(place, str):
+    if not isinstance(place, str) or not place:
         return place
     module, name = place.split(":")
     return getattr(importlib.import_module(module, __package__), name)

@@ -11,7 +11,7 @@ import pytest
 import poise
 from poise.baselines.benchmark import contenders
 from poise.baselines.evaluation import evaluate
-from poise.baselines.speed.fixtures import example
+from poise.baselines.speed.fixtures import plausible_measurements
 from poise.envs.hand.sensing import simulate_hand
 from poise.filters.core.estimator import run_by_steps
 from poise.filters.core.kalman import KalmanFilter
@@ -87,7 +87,7 @@ def test_it_is_made_with_its_parameters():
 
 def test_it_finds_samples_of_its_channels_and_is_scored():
     filter = make("vertical")
-    data = example(filter, 0)
+    data = plausible_measurements(filter, 0)
     compiled, stepped = filter.run(data), run_by_steps(make("vertical", compiled=False), data)
     np.testing.assert_allclose(compiled.pose["up"], stepped.pose["up"], atol=1e-12)
     table = evaluate(["vertical", "tilt"], simulate_hand("fast", 1, duration=3.0))

@@ -1,0 +1,115 @@
+"""What users give as parameters of an estimator: types and ranges that follow from annotations and names."""
+
+from __future__ import annotations
+
+import functools
+import re
+import types
+import typing
+from collections.abc import Callable, Mapping
+from numbers import Real
+from typing import Any, Literal
+
+import numpy as np
+
+POSITIVE = re.compile(
+    r"(dt|gravity|mass|interval|time|step|window|wheelbase|length|width|wide|forearm|shank|thigh|arm)$|tau_"
+)
+"""Names of numbers that are above zero: masses, times, lengths of things."""
+NOT_NEGATIVE = re.compile(
+    r"(noise|deviation|variance|prior|drift|bound|range|tolerance|threshold|adaptation|rejection|decay|jerk|lag|hold"
+    r"|inflation|filter|gain|scale|share|weight|guard|follow|acceleration)$|(gain|k)_"
+)
+"""Names of numbers that are zero or above: standard deviations, limits, gains."""
+MEASURED = re.compile(r"(accelerometer|magnetometer|array|orientation|distance)_(noise|deviation|variance)$")
+"""Noises of measurements: without any, an innovation has no covariance."""
+LARGEST = 1e100
+"""Magnitude up to which squares and products of parameters stay finite."""
+
+
+def check_parameters(maker: Callable[..., Any], given: Mapping[str, Any]) -> None:
+    """Check values by the annotations of a dataclass or function that they are given to.
+
+    Args:
+        maker: class or function; names that it does not annotate are left to it.
+        given: name → value.
+
+    Raises:
+        ValueError: a value of a wrong type or out of its range; the message names parameter, value and what is
+            accepted.
+    """
+    hints = annotations_of(maker)
+    for name, value in given.items():
+        if name in hints:
+            reason = refused(name, value, hints[name], getattr(maker, name, None))
+            if reason:
+                raise ValueError(f"{name} must be {reason}, got {shown(value)}")
+
+
+@functools.lru_cache
+def annotations_of(maker: Callable[..., Any]) -> dict[str, Any]:
+    """Name → type, as far as it can be resolved."""
+    try:
+        return typing.get_type_hints(maker)
+    except NameError:
+        return {}
+
+
+def refused(name: str, value: Any, kind: Any, default: Any = None) -> str:
+    """What would be accepted instead of the value; empty if the value is."""
+    origin = typing.get_origin(kind)
+    if origin is Literal:
+        choices = typing.get_args(kind)
+        same = any(type(value) is type(choice) and value == choice for choice in choices)
+        return "" if same else f"one of {choices}"
+    if origin in (typing.Union, types.UnionType):
+        reasons = [refused(name, value, each, default) for each in typing.get_args(kind)]
+        return "" if "" in reasons else " or ".join(reasons)
+    if kind is float:
+        return "" if is_array(value) else number_refused(name, value)
+    if kind is int:
+        return "" if isinstance(value, int | np.integer) and not isinstance(value, bool) else "an integer"
+    if kind is bool:
+        return "" if isinstance(value, bool | np.bool_) else "True or False"
+    if kind is type(None):
+        return "" if value is None else "None"
+    if origin is tuple:
+        return tuple_refused(name, value, typing.get_args(kind), default)
+    if isinstance(kind, type):
+        return "" if isinstance(value, kind) else f"of type {kind.__name__}"
+    return ""
+
+
+def number_refused(name: str, value: Any) -> str:
+    """See :func:`refused`, for a number."""
+    if isinstance(value, bool | np.bool_) or not isinstance(value, Real) or not abs(float(value)) <= LARGEST:
+        return f"a finite number (at most {LARGEST:g} in magnitude)"
+    if POSITIVE.search(name) or MEASURED.match(name):
+        return "" if value > 0 else "above 0"
+    return "" if value >= 0 or not NOT_NEGATIVE.search(name) else "0 or above"
+
+
+def tuple_refused(name: str, value: Any, parts: tuple[Any, ...], default: Any) -> str:
+    """See :func:`refused`, for a sequence of numbers, names or sequences of numbers."""
+    if not isinstance(value, tuple | list | np.ndarray):
+        return "a sequence" + (f" like {default}" if isinstance(default, tuple) else "")
+    size = len(default) if isinstance(default, tuple) and parts[-1] is Ellipsis and parts[0] is float else None
+    kinds = parts if parts[-1] is not Ellipsis else parts[:1] * len(value)
+    if len(value) != len(kinds) or size not in (None, len(value)):
+        return f"a sequence of {size or len(kinds)}"
+    reasons = [refused(name, each, kind) for each, kind in zip(value, kinds, strict=True)]
+    return next((f"a sequence, each {reason}" for reason in reasons if reason), "")
+
+
+def is_array(value: Any) -> bool:
+    """Whether a value is an array of numbers, one for each sequence of a batch: finite, and checked no further."""
+    if not hasattr(value, "dtype") or not getattr(value, "ndim", 0):
+        return False
+    kind = np.asarray(value).dtype.kind
+    return kind in "fiu" and bool(np.isfinite(np.asarray(value)).all())
+
+
+def shown(value: Any) -> str:
+    """A value in a message, in short."""
+    text = repr(value)
+    return text if len(text) <= 80 else f"{text[:77]}…"
