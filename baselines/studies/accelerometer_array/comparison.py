@@ -110,16 +110,22 @@ def recording_errors(path: Path, seconds: float | None) -> list[Row]:
 def scores(trajectory: Trajectory, estimators: Mapping[str, Any]) -> list[Row]:
     """Root mean square errors of orientation (of ``up`` where there is none), degrees, a row for each estimator."""
     frame = evaluate(estimators, [trajectory])
-    rows = []
+    reasons, rows = {name: reason for name, _, reason in frame.attrs["skipped"]}, []
     for name in estimators:
         own = frame[(frame["estimator"] == name) & frame["metric"].isin(METRICS)]
         values: dict[str, float] = {}
         for quantity in ("up", "orientation"):
             for row in own[own["quantity"] == quantity].itertuples():
                 values[str(row.metric)] = float(row.value)
-        if values:
-            rows.append({"estimator": name} | {metric: values.get(metric) for metric in METRICS})
+        row = {"estimator": name, "skipped": None if values else reasons.get(name, "no estimate")}
+        rows.append(row | {metric: values.get(metric) for metric in METRICS})
     return rows
+
+
+def skipped(rows: list[Row]) -> str:
+    """A sentence on what could not be run; empty if all could."""
+    found = dict.fromkeys(f"{row['estimator']} ({row['skipped']})" for row in rows if row["skipped"])
+    return f" Not run: {', '.join(found)}." if found else ""
 
 
 def comparison(study: Study, report: Report) -> None:
@@ -140,7 +146,9 @@ def comparison(study: Study, report: Report) -> None:
     for kind in sensors:
         for metric in ("total", "inclination"):
             title = f"Works compared: {metric} error on gestures, {kind}"
-            report.table(title, pivoted([row for row in rows if row["sensors"] == kind], "gesture", metric), note)
+            report.table(
+                title, pivoted([row for row in rows if row["sensors"] == kind], "gesture", metric), note + skipped(rows)
+            )
     # Of the files, those of BROAD have what is needed.
     paths = [path for path in recording_files(study.recordings) if path.suffix in (".mat", ".hdf5")]
     if not paths:
@@ -158,7 +166,9 @@ def comparison(study: Study, report: Report) -> None:
         "disturbances, and it takes a sample of the gyroscope for the rate at that instant."
     )
     for metric in ("total", "inclination"):
-        report.table(f"Works compared: {metric} error on recordings", pivoted(rows, "recording", metric), note)
+        report.table(
+            f"Works compared: {metric} error on recordings", pivoted(rows, "recording", metric), note + skipped(rows)
+        )
 
 
 def pivoted(rows: list[Row], column: str, metric: str) -> list[Row]:

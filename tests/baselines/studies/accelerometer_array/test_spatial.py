@@ -127,9 +127,11 @@ def test_scores_join_what_an_estimator_tells(monkeypatch):
 
 def test_works_are_compared_in_tables(study, monkeypatch, tmp_path):
     def gestures(gesture, sensors, seed, duration):
-        common = {"gesture": gesture, "sensors": sensors, "seed": seed}
+        common = {"gesture": gesture, "sensors": sensors, "seed": seed, "skipped": None}
         both = {"estimator": "b", "total": 2.0, "inclination": 1.0, "heading": 1.0}
-        return [common | both, common | {"estimator": "a", "total": None, "inclination": 0.5, "heading": None}]
+        none = dict.fromkeys(("total", "inclination", "heading"))
+        lost = common | {"estimator": "c", "skipped": "no channel imu/mag"} | none
+        return [common | both, common | {"estimator": "a"} | none | {"inclination": 0.5}, lost]
 
     monkeypatch.setattr(array_comparison, "gesture_errors", gestures)
     report = Report(tmp_path / "run")
@@ -138,6 +140,7 @@ def test_works_are_compared_in_tables(study, monkeypatch, tmp_path):
     assert [row["estimator"] for row in total.rows] == ["b"]
     assert [row["estimator"] for row in inclination.rows] == ["a", "b"]
     assert inclination.rows[0] == {"estimator": "a", "fast": 0.5, "pointing": 0.5, "mean": 0.5}
+    assert total.text.endswith("Not run: c (no channel imu/mag).")
     assert "POISE_DATA" in nothing.text
 
 
