@@ -142,8 +142,8 @@ def rides(study: Study, report: Report) -> None:
             for name in achieved
         ],
         "Posterior Cramér–Rao bound along the indoor rides, with the noises that the filter assumes but a camera "
-        "without alignment error (1° a frame), and the filter on such samples. The bound averages over draws of the "
-        "start and of biases from the filter's prior; few rides with small ones may lie below it.",
+        "without alignment error (1° a frame), and the filter on such samples. Errors of θ are correlated over about "
+        "7 s (twice √(R/q) of camera, gyroscopes): rides hold few independent values, and may lie below by chance.",
     )
     errors = {scenario: mean_rms(found, "Σ2")["φ"] for scenario, found in results.items()}
     statement = "Up to 20° of pitch do not significantly degrade φ (at most twice the error of outdoor rides)"
