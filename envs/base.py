@@ -1,7 +1,7 @@
 """What every environment whose agent estimates a pose shares: spaces, reward, info, seeds, snapshots.
 
-An environment is a source of ticks. Estimates do not act on what is estimated, so a subclass hands over ticks in
-:class:`Block` objects, many at once, and :class:`PoseEnv` deals them out one a step.
+Estimates do not act on what is estimated. A subclass therefore computes many time steps at once, as :class:`Block`
+objects, and :class:`PoseEnv` hands them out one by one.
 """
 
 from __future__ import annotations
@@ -26,14 +26,14 @@ Observation = dict[str, np.ndarray]
 
 
 class Block(NamedTuple):
-    """Consecutive ticks of an episode.
+    """Consecutive time steps of an episode.
 
     Attributes:
         time: ``(n,)`` s.
         measurements: channel → ``(n, size)``; NaN where not sampled.
         pose: quantity → ``(n, size)``: the true pose.
-        truth: name → ``(n, size)``: what else is known.
-        scored: ``(n,)`` bool, whether the reward counts.
+        truth: name → ``(n, size)``: further known quantities.
+        scored: ``(n,)`` bool, the evaluation mask: whether the reward counts.
     """
 
     time: np.ndarray
@@ -48,8 +48,8 @@ class Snapshot:
     """The whole state of an environment between two steps; plain data that can be pickled."""
 
     generator: np.random.Generator
-    tick: int
-    last_tick: int
+    step: int
+    last_step: int
     block: Block
     row: int
     sensors: Any
@@ -58,16 +58,16 @@ class Snapshot:
 
 
 class PoseEnv(DrawnEnv):
-    """An agent reads sensors and says a pose; the reward is minus the error of what it says.
+    """An agent reads sensors and outputs a pose estimate; the reward is minus the error of the estimate.
 
     The action of a step is the estimate for the observation *before* the step. Rotations and directions may have any
     length that is not zero; an action of zeros counts as no rotation (or as straight up).
 
     Attributes:
         suite: the sensors: channels, observation space, observation ↔ measurement.
-        quantity: the pose that the action states.
-        neutral_action: the estimate of an agent that knows nothing: no rotation, or straight up.
-        rate: ticks a second, Hz.
+        quantity: the pose that the action estimates.
+        neutral_action: the estimate of an agent without information: no rotation, or straight up.
+        rate: time steps a second, Hz.
     """
 
     def __init__(self, suite: Sensing, quantity: Quantity, rate: float, render_mode: str | None = None) -> None:
@@ -77,7 +77,7 @@ class PoseEnv(DrawnEnv):
         self.action_space = spaces.Box(-1.0, 1.0, (quantity.size,), np.float32)
         self._block: Block | None = None
         self._estimate = self.neutral_action
-        self._row = self._tick = self._last_tick = 0
+        self._row = self._step = self._last_step = 0
 
     @property
     def neutral_action(self) -> np.ndarray:
@@ -100,11 +100,11 @@ class PoseEnv(DrawnEnv):
         raise NotImplementedError
 
     def next_block(self, most: int) -> Block:
-        """The next ticks of the episode: at least one, at most ``most``; the first block begins with tick 0."""
+        """The next time steps of the episode: at least one, at most ``most``; the first block begins with step 0."""
         raise NotImplementedError
 
     def save_source(self) -> Any:
-        """What :meth:`next_block` remembers, as plain data that later calls do not change."""
+        """The memory of :meth:`next_block`, as plain data that later calls do not change."""
         return None
 
     def restore_source(self, saved: Any) -> None:
@@ -125,30 +125,30 @@ class PoseEnv(DrawnEnv):
         super().reset(seed=seed)
         options = self.checked_options(options)
         motion, sensors = self.np_random.spawn(2)
-        self._last_tick = self.begin(motion, sensors, options)
-        self._block = self.next_block(self._last_tick + 1)
-        self._row = self._tick = 0
+        self._last_step = self.begin(motion, sensors, options)
+        self._block = self.next_block(self._last_step + 1)
+        self._row = self._step = 0
         self._estimate = self.neutral_action
-        self._show(self._tick)
+        self._show(self._step)
         return self._observe(), self._info()
 
     def step(self, action: np.ndarray) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
-        """Judge the estimate ``action`` of the last observation, then advance by one tick.
+        """Score ``action``, the estimate for the last observation, then advance by one time step.
 
         Raises:
             ValueError: the action has another shape than the action space, or is not finite.
             RuntimeError: :meth:`reset` was not called, or the episode is over.
         """
-        if self._block is None or self._tick >= self._last_tick:
+        if self._block is None or self._step >= self._last_step:
             raise RuntimeError("call reset first: there is no episode, or it is over")
         self._estimate = self._checked(action)
         reward = self._reward(self._block)
-        self._tick += 1
+        self._step += 1
         self._row += 1
         if self._row == len(self._block.time):
-            self._block, self._row = self.next_block(self._last_tick + 1 - self._tick), 0
-        self._show(self._tick)
-        return self._observe(), reward, False, self._tick >= self._last_tick, self._info()
+            self._block, self._row = self.next_block(self._last_step + 1 - self._step), 0
+        self._show(self._step)
+        return self._observe(), reward, False, self._step >= self._last_step, self._info()
 
     def _checked(self, action: np.ndarray) -> np.ndarray:
         estimate = np.asarray(action, dtype=float)
@@ -157,7 +157,7 @@ class PoseEnv(DrawnEnv):
         return estimate if estimate.any() else self.neutral_action.astype(float)
 
     def _reward(self, block: Block) -> float:
-        """Minus the error of the estimate at the present tick; 0 where it is not scored or the truth is unknown."""
+        """Minus the error of the estimate at this time step; 0 outside the evaluation mask or without truth."""
         if not block.scored[self._row]:
             return 0.0
         truth = block.pose[self.quantity.name if self.quantity.name in block.pose else ORIENTATION.name][self._row]
@@ -165,7 +165,7 @@ class PoseEnv(DrawnEnv):
         return -error if error == error else 0.0
 
     def measurement(self) -> dict[str, np.ndarray]:
-        """What the sensors say now: channel → float64 ``(size,)``, NaN where there is no sample.
+        """The measurement of this time step: channel → float64 ``(size,)``, NaN where there is no sample.
 
         Raises:
             RuntimeError: :meth:`reset` was not called.
@@ -197,8 +197,8 @@ class PoseEnv(DrawnEnv):
             raise RuntimeError("call reset first: there is no episode")
         return Snapshot(
             copy.deepcopy(self.np_random),
-            self._tick,
-            self._last_tick,
+            self._step,
+            self._last_step,
             self._block,
             self._row,
             self.suite.save(),
@@ -209,7 +209,7 @@ class PoseEnv(DrawnEnv):
     def restore(self, snapshot: Snapshot) -> None:
         """Return to a snapshot: what follows is bitwise what followed it then, under equal actions."""
         self.np_random = copy.deepcopy(snapshot.generator)
-        self._tick, self._last_tick, self._block = snapshot.tick, snapshot.last_tick, snapshot.block
+        self._step, self._last_step, self._block = snapshot.step, snapshot.last_step, snapshot.block
         self._row, self._estimate = snapshot.row, snapshot.estimate.copy()
         self.suite.restore(snapshot.sensors)
         self.restore_source(snapshot.source)
@@ -232,7 +232,7 @@ class PoseEnv(DrawnEnv):
 
 
 def pose_error(quantity: Quantity, estimate: np.ndarray, truth: np.ndarray) -> float:
-    """:func:`.error` of one tick, in plain floats for orientations, where it is 20 times faster.
+    """:func:`.error` of one time step, in plain floats for orientations, where it is 20 times faster.
 
     Args:
         quantity: what is compared.

@@ -27,11 +27,11 @@ from .sensors.presets import SensorPreset
 
 RewardKind = Literal["error", "improvement"]
 NIS_FLOOR = 1e-6
-"""Smallest mean NIS that the consistency term tells from zero."""
+"""Smallest mean NIS of the consistency term."""
 
 
 class GainTuningEnv(DrawnEnv):
-    """What the gain-tuning environments share; subclasses say where trajectories come from.
+    """What the gain-tuning environments share; subclasses provide the trajectories.
 
     Args:
         filter: name of a Kalman filter with gains (:func:`poise.list_estimators`), or such a filter; it must read a
@@ -39,7 +39,7 @@ class GainTuningEnv(DrawnEnv):
             that the trajectory's metadata describe.
         gains: names of the gains to be tuned, in the order of the action; None for all.
         quantity: output of the filter whose error counts; None for ``up``, or the filter's first output.
-        interval: time from decision to decision, s, rounded to ticks.
+        interval: time from decision to decision, s, rounded to samples.
         reward: ``error`` or ``improvement``, see the subclasses.
         consistency: weight of the consistency term of the reward, rad.
         render_mode: ``human`` (a window), ``rgb_array`` or None.
@@ -49,7 +49,7 @@ class GainTuningEnv(DrawnEnv):
     """
 
     _episode_fields: ClassVar[tuple[str, ...]] = (
-        *("trajectory", "tuned", "_measurements", "_truth", "_reference", "_tick", "_state", "_estimates"),
+        *("trajectory", "tuned", "_measurements", "_truth", "_reference", "_step", "_state", "_estimates"),
     )
     """Attributes that belong to an episode."""
 
@@ -108,7 +108,7 @@ class GainTuningEnv(DrawnEnv):
         if self.reward_kind == "improvement":
             estimate = self.tuned.kalman.run(self._measurements)
             self._reference = error(self.quantity, estimate.pose[self.quantity.name], self._truth)
-        self._tick = 0
+        self._step = 0
         self._state = self.tuned.init({name: values[0] for name, values in self._measurements.items()})
         self._estimates = {output.name: np.full(output.size, np.nan) for output in self.tuned.kalman.outputs}
         self._show(0)
@@ -121,27 +121,27 @@ class GainTuningEnv(DrawnEnv):
             ValueError: the action has a wrong shape or is not finite.
             RuntimeError: :meth:`reset` was not called, or the episode is over.
         """
-        if self.trajectory is None or self._tick + self.tuned.interval_samples > len(self.trajectory):
+        if self.trajectory is None or self._step + self.tuned.interval_samples > len(self.trajectory):
             raise RuntimeError("call reset first: there is no episode, or it is over")
         chosen = np.asarray(action, dtype=float)
         if chosen.shape != self.action_space.shape or not np.isfinite(chosen).all():
             raise ValueError(f"action must hold {self.tuned.actions} finite numbers, got {action!r}")
-        ticks = slice(self._tick, self._tick + self.tuned.interval_samples)
-        chunk = {name: values[ticks] for name, values in self._measurements.items()}
+        samples = slice(self._step, self._step + self.tuned.interval_samples)
+        chunk = {name: values[samples] for name, values in self._measurements.items()}
         estimate, self._state = self.tuned.advance(self.tuned.decide(self._state, chosen), chunk)
-        self._tick = ticks.stop
-        errors = error(self.quantity, estimate.pose[self.quantity.name], self._truth[ticks])
-        scored = self.trajectory.mask[ticks]
+        self._step = samples.stop
+        errors = error(self.quantity, estimate.pose[self.quantity.name], self._truth[samples])
+        scored = self.trajectory.mask[samples]
         mean_error = interval_mean(errors, scored)
         reward = -mean_error if math.isfinite(mean_error) else 0.0
         if self._reference is not None:
-            reference = interval_mean(self._reference[ticks], scored)
+            reference = interval_mean(self._reference[samples], scored)
             reward += reference if math.isfinite(reference) else 0.0
         if self.consistency:
             reward -= self.consistency * inconsistency(estimate, self.tuned.kalman.model.residual_size)
-        truncated = self._tick + self.tuned.interval_samples > len(self.trajectory)
+        truncated = self._step + self.tuned.interval_samples > len(self.trajectory)
         self._estimates = {name: np.array(estimate.pose[name][-1]) for name in self._estimates}
-        self._show(self._tick // self.tuned.interval_samples)
+        self._show(self._step // self.tuned.interval_samples)
         return self.tuned.observe(self._state), reward, False, truncated, self._info(mean_error)
 
     def make_scene(self, gui: bool) -> Scene:
@@ -154,13 +154,13 @@ class GainTuningEnv(DrawnEnv):
         """Truth of the last sample, and the filter's attitude (its first output where it has none)."""
         if self.trajectory is None:
             return None
-        truth = {name: values[max(self._tick - 1, 0)] for name, values in self.trajectory.truth.items()}
+        truth = {name: values[max(self._step - 1, 0)] for name, values in self.trajectory.truth.items()}
         wanted = (self.quantity.name, "up", "orientation", "relative_orientation")
         known = [name for name in wanted if name in self._estimates and self._estimates[name].size in (3, 4)]
         return Shown(truth, truth, self._estimates[known[0]] if known else np.zeros(3))
 
     def save_episode(self) -> dict[str, Any] | None:
-        """Trajectory, filter and place in it; None where there is no episode."""
+        """Trajectory, filter and position in it; None where there is no episode."""
         return None if self.trajectory is None else {name: getattr(self, name) for name in self._episode_fields}
 
     def restore_episode(self, saved: dict[str, Any]) -> None:
@@ -170,7 +170,7 @@ class GainTuningEnv(DrawnEnv):
 
     def _info(self, mean_error: float) -> dict[str, Any]:
         assert self.trajectory is not None
-        row = max(self._tick - 1, 0)
+        row = max(self._step - 1, 0)
         pose = self._truth[row]
         sizes = gain_sizes(self.tuned.kalman.model, self.tuned.gains(self._state.action))
         return {
@@ -211,17 +211,17 @@ class HandMotionGainEnv(GainTuningEnv):
 
     ``error``: minus the mean error of ``quantity`` over the interval, rad (:func:`poise.filters.core.metrics.error`).
     ``improvement``: that of the published tuning, run beside it, minus the agent's: the same optimal policy with far
-    less variance. Ticks without truth or that are not scored do not count. With ``consistency`` w, minus
+    less variance. Samples without truth or outside the evaluation mask do not count. With ``consistency`` w, minus
     w·|ln(mean NIS / m)| of the m innovations of the interval.
 
     ## Start and end
 
-    The filter starts from nothing, so the first observation tells nothing. Truncated when the motion is over; never
-    terminated.
+    The filter is not yet initialised, so the first observation carries no information. Truncated when the motion is
+    over; never terminated.
 
     ## info
 
-    The same at reset and at every step, as of the last tick taken: ``time`` (s), ``pose`` (true ``quantity``),
+    The same at reset and at every step, as of the last sample taken: ``time`` (s), ``pose`` (true ``quantity``),
     ``truth`` (all that is known), ``estimate`` (outputs of the filter; NaN before it started), ``error_deg`` (mean
     over the interval; NaN at reset), ``gains`` (name → scaled constant).
 
@@ -279,7 +279,7 @@ class ReplayGainEnv(GainTuningEnv):
     ## Start and end
 
     Each reset draws one of the trajectories and, with a ``duration``, where the episode starts in it. Truncated when
-    the part is over (ticks that fill no interval are left out); never terminated.
+    the part is over (samples that fill no interval are left out); never terminated.
 
     ## Arguments
 
@@ -312,7 +312,7 @@ class ReplayGainEnv(GainTuningEnv):
             shortest = self.tuned.features.interval_samples(item.dt)
             length = len(item) if duration is None else math.floor(duration / item.dt + 1e-6)
             if min(length, len(item)) < shortest:
-                raise ValueError(f"an episode of {item.name!r} must last one interval at least ({shortest} ticks)")
+                raise ValueError(f"an episode of {item.name!r} must last one interval at least ({shortest} samples)")
         self.duration = duration
 
     def next_trajectory(self) -> Trajectory:
@@ -353,13 +353,13 @@ def true_values(trajectory: Trajectory, quantity: Quantity, kalman: KalmanFilter
 
 
 def interval_mean(errors: np.ndarray, scored: np.ndarray) -> float:
-    """Mean of the finite errors ``(T,)`` among the scored ticks; NaN where there is none."""
+    """Mean of the finite errors ``(T,)`` inside the evaluation mask; NaN where there is none."""
     counted = errors[scored & np.isfinite(errors)]
     return float(counted.mean()) if counted.size else math.nan
 
 
 def inconsistency(estimate: Estimate, size: int) -> float:
-    """|ln(mean NIS / m)| over the ticks ``(T,)`` that brought an innovation; 0 where none did."""
+    """|ln(mean NIS / m)| over the samples ``(T,)`` with an innovation; 0 without any."""
     nis = np.asarray(estimate.nis)
     nis = nis[nis > 0.0]
     return abs(math.log(max(float(nis.mean()) / size, NIS_FLOOR))) if nis.size else 0.0

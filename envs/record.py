@@ -25,7 +25,7 @@ Policy = Callable[[Any], Any]
 def record(
     env: Any, *, seed: int | None = None, policy: Policy | None = None, steps: int | None = None, progress: bool = False
 ) -> Trajectory:
-    """Play one episode and return it; tick 0 is the reset.
+    """Play one episode and return it; sample 0 is the reset.
 
     Args:
         env: an environment of this package, in wrappers that leave its observations unchanged or in none; or a
@@ -37,8 +37,8 @@ def record(
         progress: show a bar.
 
     Returns:
-        The trajectory of at most ``steps + 1`` ticks. Its truth is the pose and the truth of ``info``; ticks for which
-        ``info["scored"]`` is False are masked.
+        The trajectory of at most ``steps + 1`` samples. Its truth is the pose and the truth of ``info``, its mask
+        ``info["scored"]``.
 
     Raises:
         ValueError: ``steps`` is negative, or the environment does not follow the contract of this package.
@@ -123,7 +123,7 @@ def describe(env: Any, seed: int) -> dict[str, Any]:
     identity = type(env.unwrapped).__name__ if spec is None else spec.id
     suite = env.unwrapped.suite
     geometry = getattr(env.unwrapped, "geometry", None)
-    told = {} if geometry is None else {"geometry": geometry.describe()}
+    extra = {} if geometry is None else {"geometry": geometry.describe()}
     return {
         "name": f"{identity}-{seed}",
         "environment": {"id": identity, "kwargs": plain({} if spec is None else spec.kwargs)},
@@ -131,7 +131,7 @@ def describe(env: Any, seed: int) -> dict[str, Any]:
         "seed": seed,
         "version": poise_version(),
         "source": "simulation",
-        **told,
+        **extra,
     }
 
 

@@ -1,4 +1,4 @@
-"""Pictures of a device and of what an estimator thinks of it, drawn by PyBullet in a world of their own.
+"""Pictures of a device and of the estimate of its attitude, drawn by PyBullet in a world of their own.
 
 The world of the pictures is not the world of the physics: drawing cannot change an episode, and kinematic or recorded
 motion is drawn like any other.
@@ -52,7 +52,7 @@ class DeviceScene:
         if gui:
             pybullet.configureDebugVisualizer(pybullet.COV_ENABLE_GUI, 0, physicsClientId=self._physics.client)
         x, y, z = (0.5 * side for side in size)
-        # a body with two grips and a stick: its orientation can be told from any side
+        # a body with two grips and a stick: its orientation is visible from any side
         device: list[Box] = [
             ((x, 0.6 * y, z), (0.0, 0.2 * y, 0.0), BODY_COLOUR),
             ((0.25 * x, 0.5 * y, 0.8 * z), (-0.75 * x, -0.8 * y, 0.0), BODY_COLOUR),

@@ -44,12 +44,12 @@ class RecordedSensors(Sensing):
         }
 
     def describe(self) -> dict[str, Any]:
-        """What the trajectory says about its sensors."""
+        """What the trajectory's metadata hold about its sensors."""
         return dict(self._described)
 
 
 class ReplayEnv(PoseEnv):
-    """The sensors say what they said in a recording; the agent says the pose, and is judged by the recorded truth.
+    """The recorded measurements are replayed; the agent estimates the pose and is scored by the recorded truth.
 
     ## Description
 
@@ -61,8 +61,8 @@ class ReplayEnv(PoseEnv):
 
     The agent's estimate for the last observation. If the trajectory knows an orientation, it is
     ``Box(-1, 1, (4,), float32)``: a quaternion w, x, y, z, sensor axes to world axes, of any length (zeros count as no
-    rotation). If it knows only the vertical (``up``), ``Box(-1, 1, (3,), float32)``: the upward vertical in sensor
-    axes, of any length (zeros count as the z axis).
+    rotation). If it knows only the gravity direction (``up``), ``Box(-1, 1, (3,), float32)``: the upward unit vector in
+    sensor axes, of any length (zeros count as the z axis).
 
     ## Observation Space
 
@@ -79,12 +79,12 @@ class ReplayEnv(PoseEnv):
     ## Rewards
 
     Minus the error of the action in rad, at the pose of the observation it answers: total angle
-    (``score="orientation"``), inclination alone (``"relative_orientation"``), angle between verticals (``"up"``). 0 at
-    ticks that the trajectory does not score, and where its truth is unknown.
+    (``score="orientation"``), inclination alone (``"relative_orientation"``), inclination error (``"up"``). 0 at
+    samples outside the evaluation mask, and where the truth is unknown.
 
     ## Starting State
 
-    The first tick of the trajectory or, with ``random_start``, any tick that leaves room for the duration.
+    The first sample of the trajectory or, with ``random_start``, any sample that leaves room for the duration.
 
     ## Episode End
 
@@ -94,7 +94,7 @@ class ReplayEnv(PoseEnv):
 
     One structure at ``reset`` and ``step``: ``time`` (s, that of the trajectory), ``pose`` (``orientation`` (4,) and
     ``up`` (3,) as far as known), ``truth`` (everything else that the trajectory knows), ``scored`` (bool). The keys are
-    those that the trajectory knows at all; a value that it does not know at a tick is NaN of the same shape.
+    those of which the trajectory has any truth; where a value is unknown it is NaN of the same shape.
 
     ## Arguments
 
@@ -103,12 +103,12 @@ class ReplayEnv(PoseEnv):
             a hand of 30 s, always the same.
         duration: length of an episode, s; None for the rest of the trajectory.
         random_start: whether an episode starts anywhere instead of at the beginning.
-            ``reset(options={"start": tick})`` says where, for one episode.
-        score: ``orientation``, ``relative_orientation`` or ``up``; None for the first of them that is known.
+            ``reset(options={"start": index})`` starts one episode at that sample.
+        score: ``orientation``, ``relative_orientation`` or ``up``; None for the first of them with a truth.
         render_mode: ``human`` (a window), ``rgb_array`` or None.
 
     Raises:
-        ValueError: the trajectory has a single tick or no pose to judge by, or an argument is out of its range.
+        ValueError: the trajectory has a single sample or no true pose, or an argument is out of its range.
 
     ## Version History
 
@@ -133,7 +133,7 @@ class ReplayEnv(PoseEnv):
         check_duration(duration)
         trajectory = trajectory.on_grid()
         if len(trajectory) < 2:
-            raise ValueError(f"trajectory must have two ticks at least, {trajectory.name!r} has {len(trajectory)}")
+            raise ValueError(f"trajectory must have two samples at least, {trajectory.name!r} has {len(trajectory)}")
         self.trajectory, self.random_start = trajectory, random_start
         self._length = len(trajectory)
         if duration is not None:
@@ -145,7 +145,7 @@ class ReplayEnv(PoseEnv):
                 )
         quantity = scored_quantity(trajectory, score)
         super().__init__(RecordedSensors(trajectory), quantity, 1.0 / trajectory.dt, render_mode)
-        # an orientation says its relative orientation itself
+        # an orientation contains its relative orientation
         wanted = [name for name in POSE if name in trajectory.truth or name == "up"]
         self._pose = {name: trajectory.truth_of(name) for name in wanted if name in trajectory.quantities}
         self._truth = {name: values for name, values in trajectory.truth.items() if name not in POSE}
@@ -156,7 +156,7 @@ class ReplayEnv(PoseEnv):
         if "start" in options:
             start = options["start"]
             if isinstance(start, bool) or not isinstance(start, int | np.integer):
-                raise ValueError(f"start must be a tick, got {start!r}")
+                raise ValueError(f"start must be the index of a sample, got {start!r}")
             if not 0 <= start < len(self.trajectory) - 1:
                 raise ValueError(f"start must lie in [0, {len(self.trajectory) - 2}], got {start}")
         else:
@@ -167,18 +167,18 @@ class ReplayEnv(PoseEnv):
 
     def next_block(self, most: int) -> Block:
         """The whole episode."""
-        ticks = slice(self._start, self._start + most)
+        samples = slice(self._start, self._start + most)
         recorded = self.trajectory
 
         def cut(arrays: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-            return {name: values[ticks] for name, values in arrays.items()}
+            return {name: values[samples] for name, values in arrays.items()}
 
         return Block(
-            recorded.time[ticks],
+            recorded.time[samples],
             cut(recorded.measurements),
             cut(self._pose),
             cut(self._truth),
-            recorded.mask[ticks],
+            recorded.mask[samples],
         )
 
     def make_scene(self, gui: bool) -> Scene:

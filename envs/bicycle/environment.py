@@ -1,4 +1,4 @@
-"""``poise/RiderBicycle-v0``: a rider on a bicycle, their sensors, and an agent that says the pose."""
+"""``poise/RiderBicycle-v0``: a rider on a bicycle, their sensors, and an agent that estimates the pose."""
 
 from __future__ import annotations
 
@@ -34,11 +34,11 @@ from .sensors.sites import sensor_sites
 from .sensors.suites import CHANNELS, rider_bicycle_suite, suite_channels
 
 BLOCK = 50
-"""ticks that are computed together"""
+"""time steps computed at once"""
 
 
 class RiderBicycleEnv(PoseEnv):
-    """A rider balances a bicycle along a course; from few sensors an agent says the pose.
+    """A rider balances a bicycle along a course; from few sensors an agent estimates the pose.
 
     ## Description
 
@@ -105,7 +105,7 @@ class RiderBicycleEnv(PoseEnv):
     | ``truth/handlebar/force_…``, ``pedal/force_…`` | 3 | of hands and feet, bicycle axes, N |
     | ``truth/joints/angles``, ``torques`` | 19 | rad, N·m (torques of a lumped rider: 3) |
     | ``truth/steer/rate``, ``crank/rate``, ``wheel/rate``, ``wheel/angle`` | 1 | rad/s, rad |
-    | ``truth/<place>/gyroscope_bias`` … | | bias of the last sample of each sensor |
+    | ``truth/<site>/gyroscope_bias`` … | | bias of the last sample of each sensor |
 
     ## Arguments
 
@@ -115,7 +115,7 @@ class RiderBicycleEnv(PoseEnv):
         subject: 0…4, ``"random"``, or a :class:`poise.envs.bicycle.rider.anthropometry.RiderBody`; also a reset option.
         style: ``still``, ``mild``, ``normal``, ``aggressive``, or a style; None for that of the scenario.
         suite: ``two-gyro``, ``force-inertial``, ``whole-body``, ``all``, or a list of channels
-            (:mod:`poise.envs.bicycle.sensors.suites` says where they sit and how they err) and of
+            (:mod:`poise.envs.bicycle.sensors.suites` says where they sit and how large their errors are) and of
             :class:`.Sensor` objects of one's own on the bodies ``bicycle``, ``trunk``, ….
         sensors: ``paper``, ``ideal``, or a device (:func:`poise.envs.sensors.presets.list_sensor_presets`) in place of
             the papers' inertial sensors.
@@ -204,7 +204,7 @@ class RiderBicycleEnv(PoseEnv):
 
     @property
     def geometry(self) -> RiderGeometry:
-        """What a filter may be told about the present rider on this bicycle; before a reset the configured one."""
+        """Anthropometry and mounting with which a filter may be configured; before a reset that of the arguments."""
         return rider_geometry(self._posture, self._sites)
 
     @property
@@ -223,12 +223,12 @@ class RiderBicycleEnv(PoseEnv):
         chosen = named_scenario(options.get("scenario", self.scenario))
         subject = options.get("subject", self.subject)
         self._source.begin(chosen, subject, motion)
-        self._begun()
+        self._started()
         self.suite.reset(sensors)
         return max(1, round(self.duration * self.rate))
 
-    def _begun(self) -> None:
-        """Sensors and picture of the ride that has just begun."""
+    def _started(self) -> None:
+        """Sensors and picture of the new ride."""
         if self._source.posture is not self._posture:
             self._fit(self._source.posture)
         self.suite = self._suite
@@ -260,16 +260,16 @@ class RiderBicycleEnv(PoseEnv):
         return Block(log.time, measurements, pose, truth, np.ones(len(log.time), bool))
 
     def step(self, action: np.ndarray) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
-        """Judge the estimate ``action`` of the last observation, then advance by one tick; a fall terminates.
+        """Score ``action``, the estimate for the last observation, then advance by one time step; a fall terminates.
 
         Raises:
             ValueError: the action has another shape than the action space, or is not finite.
             RuntimeError: :meth:`reset` was not called, or the episode is over.
         """
         observation, reward, _, truncated, info = super().step(action)
-        terminated = self._tick >= self._source.fallen_at
+        terminated = self._step >= self._source.fallen_at
         if terminated:
-            self._last_tick = self._tick
+            self._last_step = self._step
         return observation, reward, terminated, truncated and not terminated, info
 
     def _checked(self, action: np.ndarray) -> np.ndarray:
@@ -300,7 +300,7 @@ class RiderBicycleEnv(PoseEnv):
         """Undo :meth:`save_source`."""
         ride, suite = saved
         self._source.restore(ride)
-        self._begun()
+        self._started()
         self._suite.restore(suite)
 
     def make_scene(self, gui: bool) -> Scene:

@@ -37,7 +37,7 @@ QUANTITIES = (
     Quantity("disk/relative_orientation", "rotation", 4, "1"),
 )
 BLOCK = 200
-"""ticks that are computed together"""
+"""time steps computed at once"""
 
 
 @dataclass(frozen=True)
@@ -117,7 +117,7 @@ class FixtureMotion:
 
 
 class BicycleFixtureEnv(PoseEnv):
-    """A bicycle is pushed around a circle; from two gyroscopes and a camera an agent says roll or orientation.
+    """A bicycle is pushed around a circle; from two gyroscopes and a camera an agent estimates roll or orientation.
 
     ## Description
 
@@ -195,7 +195,7 @@ class BicycleFixtureEnv(PoseEnv):
         super().__init__(self._suite, choose_quantity(score, QUANTITIES), self._suite.rate, render_mode)
         self.duration = float(duration)
         self._motion: FixtureMotion | None = None
-        self._ticks = 0
+        self._steps = 0
 
     @property
     def neutral_action(self) -> np.ndarray:
@@ -212,15 +212,15 @@ class BicycleFixtureEnv(PoseEnv):
 
     def begin(self, motion: np.random.Generator, sensors: np.random.Generator, options: Mapping[str, Any]) -> int:
         """Draw the push and the sensors' errors."""
-        self._motion, self._ticks = FixtureMotion.random(motion), 0
+        self._motion, self._steps = FixtureMotion.random(motion), 0
         self._suite.reset(sensors)
         return max(1, round(self.duration * self.rate))
 
     def next_block(self, most: int) -> Block:
         """Push on and let the sensors see it."""
         assert self._motion is not None
-        time = (self._ticks + np.arange(min(most, BLOCK))) / self.rate
-        self._ticks += len(time)
+        time = (self._steps + np.arange(min(most, BLOCK))) / self.rate
+        self._steps += len(time)
         bodies, speed = self._motion.sample(time)
         zero = np.zeros_like(time)
         ride = RideQuantities(bodies, self.sites, wheel_rate=speed / self.sites.wheel_radius, steer=zero, crank=zero)
@@ -242,11 +242,11 @@ class BicycleFixtureEnv(PoseEnv):
 
     def save_source(self) -> Any:
         """The push and how far it is."""
-        return self._motion, self._ticks
+        return self._motion, self._steps
 
     def restore_source(self, saved: Any) -> None:
         """Undo :meth:`save_source`."""
-        self._motion, self._ticks = saved
+        self._motion, self._steps = saved
 
     def make_scene(self, gui: bool) -> Scene:
         """Bicycle, disk and a level ground."""

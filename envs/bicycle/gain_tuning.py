@@ -43,7 +43,7 @@ class RiderBicycleGainEnv(GainTuningEnv):
     | ``two-gyro``, ``force-inertial``, ``whole-body``, ``odometry-aided`` … | ``env.unwrapped.tuned.kalman.gains`` |
 
     A filter of one IMU reads ``imu/gyr`` and ``imu/acc`` of the chosen ``site``. A filter of rides reads the channels
-    of the ride that it needs, and is told rider and bicycle of every episode.
+    of the ride that it needs, and is configured with rider and bicycle of every episode.
 
     ## Observation Space
 
@@ -58,16 +58,17 @@ class RiderBicycleGainEnv(GainTuningEnv):
 
     ## Starting State
 
-    Riding, as in ``poise/RiderBicycle-v0``; the filter has seen nothing, so the first observation tells nothing.
+    Riding, as in ``poise/RiderBicycle-v0``; the filter is not yet initialised, so the first observation carries no
+    information.
 
     ## Episode End
 
     Truncated when the ride is over, or early where the rider fell (no preset scenario makes them fall); never
-    terminated. Ticks that fill no interval are left out.
+    terminated. Samples that fill no interval are left out.
 
     ## Info
 
-    The same at reset and at every step, as of the last tick taken: ``time`` (s), ``pose`` (true ``quantity``),
+    The same at reset and at every step, as of the last sample taken: ``time`` (s), ``pose`` (true ``quantity``),
     ``truth`` (name → array: ``orientation`` of the sensor to the world, ``up``, ``angular_rate`` in rad/s,
     ``position`` in m, ``gyroscope_bias``, ``accelerometer_bias``; mounting included, see
     :func:`poise.envs.bicycle.sensors.single_imu.imu_of`), ``estimate`` (outputs of the filter; NaN before it started),
@@ -180,7 +181,7 @@ class RiderBicycleGainEnv(GainTuningEnv):
         shown = super().shown()
         if shown is None:
             return None
-        truth = {name: values[max(self._tick - 1, 0)] for name, values in self._ridden.truth.items()}
+        truth = {name: values[max(self._step - 1, 0)] for name, values in self._ridden.truth.items()}
         return Shown(truth, truth, shown.estimate)
 
     def close(self) -> None:

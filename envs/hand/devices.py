@@ -37,14 +37,14 @@ PAPER_RATE = 100.0
 """Hz, of the thesis' simulations."""
 
 
-def per_sample(deviation: float, full_scale: float, **others: Any) -> NoiseModel:
+def per_sample(std: float, full_scale: float, **others: Any) -> NoiseModel:
     """White noise of a given standard deviation a sample at 100 Hz."""
-    return NoiseModel(white_noise=deviation / math.sqrt(PAPER_RATE), full_scale=full_scale, **others)
+    return NoiseModel(white_noise=std / math.sqrt(PAPER_RATE), full_scale=full_scale, **others)
 
 
 @dataclass(frozen=True)
 class ArrayPreset(SensorPreset):
-    """Errors of a device with an array: noise, and how far the array is from what filters are told.
+    """Errors of a device with an array: noise, and how far the array is from the one that filters assume.
 
     The accelerometer's noise is that of each uniaxial accelerometer.
 
@@ -53,7 +53,7 @@ class ArrayPreset(SensorPreset):
     """
 
     axis_error: float = 0.0
-    """standard deviation by which each axis is turned, about each of two normals, rad"""
+    """standard deviation by which each axis is rotated, about each of two normals, rad"""
     position_error: float = 0.0
     """standard deviation of each coordinate of each position, m"""
 
@@ -157,7 +157,7 @@ class HandDevice:
     gyroscope: bool = True
     magnetometer: bool = True
     body: Device = field(default_factory=lambda: Device(0.25, (0.04, 0.30, 0.04)))
-    """mass and size of the box that the hand moves in the dynamic drive, centred in the reference point"""
+    """mass and size of the box that the hand moves with ``drive="dynamic"``, centred in the reference point"""
     magnetic_field: tuple[float, ...] | None = None
     """in the world (east, north, up), µT; None for that of :func:`poise.envs.sensors.ideal.magnetic_field`"""
 
@@ -199,7 +199,7 @@ DEVICES: Mapping[str, HandDevice] = MappingProxyType(
         )
     }
 )
-"""Name → device; ``imu`` is no device of this kind."""
+"""Name → device; ``imu`` is not a device of this kind."""
 
 
 def hand_device(device: str | Path | HandDevice) -> HandDevice | None:
@@ -241,7 +241,7 @@ def array_reading(motion: SiteMotion) -> np.ndarray:
 
 
 ARRAY = SensorKind("accelerometer-array", None, "m/s²", "acc", array_reading, 1000.0)
-"""Uniaxial accelerometers of one array; the environment tells the array as it is built."""
+"""Uniaxial accelerometers of one array; the surroundings are the array as it is built."""
 PLANAR_RATE = SensorKind("planar-gyroscope", 1, "rad/s", "gyr", lambda motion: motion.angular_rate[..., 2:], 100.0)
 """A gyroscope about the z axis of a planar device."""
 
@@ -269,20 +269,20 @@ def device_suite(
         raise ValueError(f"sensors must be errors (a preset) for the device {device.name!r}, not a whole suite")
     preset, rate = array_preset(device.noise if sensors is None else sensors), 100.0 if rate is None else rate
 
-    def placed(channel: Channel, kind: str | SensorKind, noise: NoiseModel, its_rate: float) -> Sensor:
+    def sensor(channel: Channel, kind: str | SensorKind, noise: NoiseModel, its_rate: float) -> Sensor:
         return Sensor(channel, kind, its_rate, noise, sampling=sampling, device=preset.name)
 
-    chosen = [placed(device.array.channel, ARRAY, replace(preset.accelerometer, g_sensitivity=0.0), rate)]
+    chosen = [sensor(device.array.channel, ARRAY, replace(preset.accelerometer, g_sensitivity=0.0), rate)]
     if device.gyroscope and device.planar:
-        chosen.append(placed(PLANAR_GYROSCOPE, PLANAR_RATE, replace(preset.gyroscope, g_sensitivity=0.0), rate))
+        chosen.append(sensor(PLANAR_GYROSCOPE, PLANAR_RATE, replace(preset.gyroscope, g_sensitivity=0.0), rate))
     elif device.gyroscope:
-        chosen.append(placed(GYROSCOPE, "gyroscope", preset.gyroscope, rate))
+        chosen.append(sensor(GYROSCOPE, "gyroscope", preset.gyroscope, rate))
     wanted = device.magnetometer if magnetometer is None else magnetometer
     if wanted is not False:
         if preset.magnetometer is None:
             raise ValueError(f"magnetometer must be False: the preset {preset.name!r} has none")
         its_rate = rate if wanted is True else float(wanted)
-        chosen.append(placed(Channel("imu/mag", 3, "µT"), "magnetometer", preset.magnetometer, its_rate))
+        chosen.append(sensor(Channel("imu/mag", 3, "µT"), "magnetometer", preset.magnetometer, its_rate))
     return SensorSuite(chosen, rate, field=device.magnetic_field)
 
 
@@ -290,7 +290,7 @@ def check_planar(device: HandDevice, config: GestureConfig, mounting: Mounting) 
     """Refuse what would take a planar device out of its plane.
 
     Raises:
-        ValueError: a spatial gesture, or turned axes.
+        ValueError: a spatial gesture, or rotated axes.
     """
     if not device.planar:
         return

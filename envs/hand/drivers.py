@@ -1,7 +1,7 @@
-"""What moves the hand-held device: :class:`DynamicDrive` by forces in a physics world, :class:`KinematicDrive` exactly.
+"""Motion drivers of the hand-held device: :class:`KinematicDriver`, and by forces in a world :class:`DynamicDriver`.
 
-A drive gives the states of the device in blocks of observation ticks. Estimates do not act on the motion, so looking a
-block ahead changes nothing and lets sensors and truth be computed for many ticks at once.
+A driver gives the states of the device in blocks of samples. Estimates do not act on the motion, so looking a block
+ahead changes nothing and lets sensors and truth be computed for many samples at once.
 """
 
 from __future__ import annotations
@@ -18,29 +18,29 @@ from .gestures import Gesture
 
 
 class States(NamedTuple):
-    """States of the device at consecutive ticks.
+    """States of the device at consecutive samples.
 
     Attributes:
-        now: states ``(n, …)`` at the ticks.
-        earlier: states ``(n, …)`` one physics step (kinematic: one tick) before each of them.
+        now: states ``(n, …)`` at the samples.
+        earlier: states ``(n, …)`` one physics step (kinematic: one sample) before each of them.
     """
 
     now: BodyState
     earlier: BodyState
 
 
-class Drive(Protocol):
+class MotionDriver(Protocol):
     """Source of the device's motion."""
 
     block: int
-    """Ticks that are best asked for at once."""
+    """Samples that are best asked for at once."""
 
     def start(self, gesture: Gesture, mass_factor: float = 1.0) -> None:
-        """Begin a gesture; the next state is that of tick 0."""
+        """Begin a gesture; the next state is that of sample 0."""
         ...
 
-    def advance(self, ticks: int) -> States:
-        """The states of the next ticks."""
+    def advance(self, samples: int) -> States:
+        """The states of the next samples."""
         ...
 
     def save(self) -> Any:
@@ -48,7 +48,7 @@ class Drive(Protocol):
         ...
 
     def restore(self, saved: Any) -> None:
-        """Go on from saved memory, bitwise."""
+        """Continue from saved memory, bitwise."""
         ...
 
     def close(self) -> None:
@@ -56,11 +56,11 @@ class Drive(Protocol):
         ...
 
 
-class KinematicDrive:
+class KinematicDriver:
     """The device follows the gesture exactly; no physics engine is involved.
 
     Args:
-        rate: ticks a second, Hz.
+        rate: samples a second, Hz.
     """
 
     block = 6000
@@ -68,26 +68,26 @@ class KinematicDrive:
     def __init__(self, rate: float) -> None:
         self.rate = rate
         self._gesture: Gesture | None = None
-        self._tick = 0
+        self._step = 0
 
     def start(self, gesture: Gesture, mass_factor: float = 1.0) -> None:
         """Begin a gesture; a mass means nothing here."""
-        self._gesture, self._tick = gesture, 0
+        self._gesture, self._step = gesture, 0
 
-    def advance(self, ticks: int) -> States:
-        """The states of the next ticks, accelerations included."""
+    def advance(self, samples: int) -> States:
+        """The states of the next samples, accelerations included."""
         assert self._gesture is not None
-        states = self._gesture.sample(np.arange(self._tick - 1, self._tick + ticks) / self.rate)
-        self._tick += ticks
+        states = self._gesture.sample(np.arange(self._step - 1, self._step + samples) / self.rate)
+        self._step += samples
         return States(states.at(slice(1, None)), states.at(slice(None, -1)))
 
     def save(self) -> tuple[Gesture | None, int]:
         """All memory, plain immutable data."""
-        return self._gesture, self._tick
+        return self._gesture, self._step
 
     def restore(self, saved: tuple[Gesture | None, int]) -> None:
-        """Go on from saved memory, bitwise."""
-        self._gesture, self._tick = saved
+        """Continue from saved memory, bitwise."""
+        self._gesture, self._step = saved
 
     def close(self) -> None:
         """Nothing to free."""
@@ -112,14 +112,14 @@ class Device:
         return self.mass * (y + z) / 12.0, self.mass * (x + z) / 12.0, self.mass * (x + y) / 12.0
 
 
-class DynamicDrive:
+class DynamicDriver:
     """A hand pulls and twists the device along the gesture: computed force and torque plus critically damped feedback.
 
     The computed part is the inverse dynamics of the engine's own integrator (semi-implicit Euler: second differences of
     the gesture at the physics steps), so what is left to the feedback is the rounding of the rotation.
 
     Args:
-        rate: ticks a second, Hz.
+        rate: samples a second, Hz.
         device: what is moved.
         bandwidth: undamped natural frequency of the feedback, Hz.
         longest_step: upper bound of the physics step, s.
@@ -145,7 +145,7 @@ class DynamicDrive:
         self.physics = Physics(time_step=1.0 / (rate * self.substeps), gravity=gravity)
         self._body = self.physics.create_body(self.device.mass, self.device.inertia)
         self._gesture: Gesture | None = None
-        self._mass_factor, self._tick = 1.0, 0
+        self._mass_factor, self._step = 1.0, 0
         self._state: tuple[tuple[float, ...], ...] = ()
 
     def start(self, gesture: Gesture, mass_factor: float = 1.0) -> None:
@@ -153,35 +153,35 @@ class DynamicDrive:
 
         The hand knows the nominal device only: its feedback makes up for the difference.
         """
-        self._gesture, self._mass_factor, self._tick = gesture, mass_factor, 0
+        self._gesture, self._mass_factor, self._step = gesture, mass_factor, 0
         inertia = np.multiply(self.device.inertia, mass_factor)
         self.physics.set_mass(self._body, mass_factor * self.device.mass, inertia)
 
-    def advance(self, ticks: int) -> States:
-        """Step the physics world and return the states of the next ticks; accelerations are unknown (None)."""
+    def advance(self, samples: int) -> States:
+        """Step the physics world and return the states of the next samples; accelerations are unknown (None)."""
         assert self._gesture is not None
         step, rows = self.physics.time_step, []
-        if self._tick == 0:
+        if self._step == 0:
             first = self._gesture.sample(np.array([-step, 0.0]))
             tuples = [tuple(tuple(field[row].tolist()) for field in first[1:5]) for row in (0, 1)]
             rows.append((tuples[0], tuples[1]))
             self._state = tuples[1]
-        count = ticks - len(rows)
-        start = (self._tick + len(rows) - 1) * self.substeps
+        count = samples - len(rows)
+        start = (self._step + len(rows) - 1) * self.substeps
         if count:
             rows += self._follow(start, count)
             self._state = rows[-1][1]
-        times = np.arange(self._tick, self._tick + ticks) / self.rate
-        self._tick += ticks
+        times = np.arange(self._step, self._step + samples) / self.rate
+        self._step += samples
         earlier, now = (
             [np.array(field) for field in zip(*(row[side] for row in rows), strict=True)] for side in (0, 1)
         )
         return States(BodyState(times, *now), BodyState(times - step, *earlier))
 
-    def _follow(self, start: int, ticks: int) -> list[tuple[Any, Any]]:
-        """Follow the gesture from physics step ``start``; states one step before each tick and at it."""
+    def _follow(self, start: int, samples: int) -> list[tuple[Any, Any]]:
+        """Follow the gesture from physics step ``start``; states one step before each sample and at it."""
         physics, body, substeps = self.physics, self._body, self.substeps
-        reference = self._reference(start, ticks * substeps)
+        reference = self._reference(start, samples * substeps)
         # putting the body where it is makes a block a function of plain numbers, which can be saved
         physics.set_base_tuples(body, *self._state)
         read, step, push, twist = physics.base_tuples, physics.step, physics.apply_force, physics.apply_torque
@@ -249,13 +249,13 @@ class DynamicDrive:
 
     def save(self) -> tuple[Any, ...]:
         """All memory, plain immutable data."""
-        return self._gesture, self._mass_factor, self._tick, self._state
+        return self._gesture, self._mass_factor, self._step, self._state
 
     def restore(self, saved: tuple[Any, ...]) -> None:
-        """Go on from saved memory, bitwise."""
-        gesture, mass_factor, tick, state = saved
+        """Continue from saved memory, bitwise."""
+        gesture, mass_factor, step, state = saved
         self.start(gesture, mass_factor)
-        self._tick, self._state = tick, state
+        self._step, self._state = step, state
 
     def close(self) -> None:
         """End the physics world."""

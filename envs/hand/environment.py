@@ -1,4 +1,4 @@
-"""``poise/HandMotion-v0``: a hand moves a device, its inertial sensors report, the agent says the orientation."""
+"""``poise/HandMotion-v0``: a hand moves a device, its inertial sensors measure, an agent estimates the orientation."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from ..sensors.ideal import Mounting, Sampling, vector
 from ..sensors.presets import SensorPreset
 from ..sensors.suite import SensorSuite
 from .devices import HandDevice, check_planar, hand_device
-from .drivers import Device, Drive, DynamicDrive, KinematicDrive
+from .drivers import Device, DynamicDriver, KinematicDriver, MotionDriver
 from .gestures import GestureConfig, gesture_config, make_gesture
-from .sensing import HandVariation, built_array, check_duration, hand_gesture, hand_suite, sense, ticks_of
+from .sensing import HandVariation, built_array, check_duration, hand_gesture, hand_suite, samples_of, sense
 
 DriveKind = Literal["dynamic", "kinematic"]
 
 
 class HandMotionEnv(PoseEnv):
-    """A hand-held device moves at random; from its inertial sensors an agent says how it is oriented.
+    """A hand-held device moves at random; from its inertial sensors an agent estimates its orientation.
 
     ## Description
 
@@ -35,7 +35,7 @@ class HandMotionEnv(PoseEnv):
     ## Action Space
 
     ``Box(-1, 1, (4,), float32)``: the agent's own estimate of the orientation at the last observation, a quaternion
-    w, x, y, z that turns sensor axes to world axes. The environment normalises it; zeros count as no rotation. A
+    w, x, y, z that rotates sensor axes to world axes. The environment normalises it; zeros count as no rotation. A
     quaternion and its negative are the same estimate.
 
     | num | action | unit |
@@ -58,14 +58,15 @@ class HandMotionEnv(PoseEnv):
     ``imu/acc``, and ``imu/gyr`` and ``imu/mag`` if it has these sensors; a planar one ``planar/gyr`` (1,), rad/s, about
     its z axis, in place of ``imu/gyr``.
 
-    The sample of a tick describes the interval that ends there: with ``sampling="interval"`` the rotation vector and
-    the velocity increment over the interval, divided by its length; with ``sampling="instant"`` the values at its end.
+    The sample of a time step describes the interval that ends with it: with ``sampling="interval"`` the rotation vector
+    and the velocity increment over the interval, divided by its length; with ``sampling="instant"`` the values at its
+    end.
 
     ## Rewards
 
     Minus the error of the action in rad, at the pose of the observation it answers: the angle of the rotation between
     estimate and truth, in [0, π]; with ``score="relative_orientation"`` only its inclination, which six-axis sensors
-    can tell, whatever the heading.
+    can observe, whatever the heading.
 
     ## Starting State
 
@@ -84,7 +85,7 @@ class HandMotionEnv(PoseEnv):
     |---|---|---|
     | ``time`` | float | s since the start |
     | ``pose/orientation`` | (4,) | sensor to world |
-    | ``pose/up`` | (3,) | the upward vertical in sensor axes |
+    | ``pose/up`` | (3,) | gravity direction: the upward unit vector in sensor axes |
     | ``truth/position``, ``truth/velocity`` | (3,) | of the sensor, world, m and m/s |
     | ``truth/angular_rate`` | (3,) | rad/s, sensor axes: what an ideal gyroscope reports |
     | ``truth/external_acceleration`` | (3,) | m/s², sensor axes: what an ideal accelerometer reports without gravity |
@@ -105,13 +106,13 @@ class HandMotionEnv(PoseEnv):
             ``reset(options={"gesture": …})`` replaces it for one episode.
         drive: ``dynamic`` or ``kinematic``.
         sensors: name of a preset (:func:`poise.envs.sensors.presets.list_sensor_presets`), a preset, or a whole
-            :class:`.SensorSuite` on one body; its mountings count from the place that ``lever_arm`` and
-            ``mounting`` describe, and that place is the one whose pose is asked for. None for ``xsens-mtw-awinda``, or
+            :class:`.SensorSuite` on one body; its mountings count from the site that ``lever_arm`` and
+            ``mounting`` describe, whose pose is to be estimated. None for ``xsens-mtw-awinda``, or
             for the errors of the device (:data:`poise.envs.hand.devices.ARRAY_PRESETS`).
         rate: Hz; None for 100, or for the rate of the suite.
         duration: length of an episode, s; None for that of the gesture.
         lever_arm: ``(3,)`` from the centre of the device to the sensor, m, device axes.
-        mounting: ``(4,)`` quaternion that turns sensor axes to device axes.
+        mounting: ``(4,)`` quaternion that rotates sensor axes to device axes.
         device: ``imu`` (one IMU), ``controller``, ``octa``, ``octa-gyroscope`` or ``planar``, a JSON file that
             describes an array, or a :class:`.HandDevice`. A planar device moves in the vertical plane
             of east and up only.
@@ -168,7 +169,7 @@ class HandMotionEnv(PoseEnv):
             if held.planar and self.variation.mounting:
                 raise ValueError("randomise must leave the mounting of a planar device as it is (mounting=0)")
         self._array: AccelerometerArray | None = None
-        self._drive: Drive | None = None
+        self._driver: MotionDriver | None = None
         self._episode_mounting = self.mounting
 
     def begin(self, motion: np.random.Generator, sensors: np.random.Generator, options: Mapping[str, Any]) -> int:
@@ -181,34 +182,34 @@ class HandMotionEnv(PoseEnv):
         setting = motion.spawn(1)[0]
         gesture = make_gesture(config, motion, duration)
         self._episode_mounting, mass_factor = self.variation.draw(self.mounting, setting)
-        self._ready_drive().start(gesture, mass_factor)
+        self._ready_driver().start(gesture, mass_factor)
         self._suite.reset(sensors)
         self._array = built_array(self.hand_device, self._sensors, sensors)
-        return ticks_of(duration, self.rate) - 1
+        return samples_of(duration, self.rate) - 1
 
-    def _ready_drive(self) -> Drive:
-        """The drive, made on first use and again after :meth:`close`."""
-        if self._drive is None:
+    def _ready_driver(self) -> MotionDriver:
+        """The motion driver, made on first use and again after :meth:`close`."""
+        if self._driver is None:
             if self.drive_kind == "kinematic":
-                self._drive = KinematicDrive(self.rate)
+                self._driver = KinematicDriver(self.rate)
             else:
-                self._drive = DynamicDrive(self.rate, self.device, gravity=self._suite.gravity)
-        return self._drive
+                self._driver = DynamicDriver(self.rate, self.device, gravity=self._suite.gravity)
+        return self._driver
 
     def next_block(self, most: int) -> Block:
         """Move the device on and let the sensors see it."""
-        drive = self._ready_drive()
-        states = drive.advance(min(most, drive.block))
+        driver = self._ready_driver()
+        states = driver.advance(min(most, driver.block))
         return sense(self._suite, states, self._episode_mounting, self._array)
 
     def save_source(self) -> Any:
-        """Drive, mounting, and the array as it is built."""
-        return self._ready_drive().save(), self._episode_mounting, self._array
+        """Motion driver, mounting, and the array as it is built."""
+        return self._ready_driver().save(), self._episode_mounting, self._array
 
     def restore_source(self, saved: Any) -> None:
         """Undo :meth:`save_source`."""
-        drive, self._episode_mounting, self._array = saved
-        self._ready_drive().restore(drive)
+        driver, self._episode_mounting, self._array = saved
+        self._ready_driver().restore(driver)
 
     def make_scene(self, gui: bool) -> Scene:
         """The device above the ground, and the axes of the estimate."""
@@ -219,6 +220,6 @@ class HandMotionEnv(PoseEnv):
     def close(self) -> None:
         """Close window and physics; may be called twice."""
         super().close()
-        drive, self._drive, self._block = self._drive, None, None
-        if drive is not None:
-            drive.close()
+        driver, self._driver, self._block = self._driver, None, None
+        if driver is not None:
+            driver.close()

@@ -1,7 +1,8 @@
 """Random motions of a hand with exact derivatives.
 
-A *configuration* (frozen dataclass: :class:`Rest`, :class:`Trial`, :class:`Turn`, :class:`Mixed`) says how the motion
-is distributed; ``configuration.draw(generator, duration)`` draws one :class:`Gesture`, an analytic function of time.
+A *configuration* (frozen dataclass: :class:`Rest`, :class:`Trial`, :class:`Turn`, :class:`Mixed`) describes how the
+motion is distributed; ``configuration.draw(generator, duration)`` draws one :class:`Gesture`, an analytic function of
+time.
 ``slow``, ``fast`` and ``severe`` reproduce the levels of external acceleration of tests A, B and C of J. K. Lee,
 E. J. Park, S. N. Robinovitch, "Estimation of Attitude and External Acceleration Using Inertial Sensor Measurement
 During Various Dynamic Conditions", IEEE Trans. Instrum. Meas. 61(8), 2012, doi 10.1109/TIM.2012.2187245; the frequency

@@ -1,4 +1,4 @@
-"""What is measured and true on a moving device, many ticks at once; and :func:`simulate_hand`, whole episodes of it."""
+"""Measurements and truth of a moving device, many time steps at once; :func:`simulate_hand` gives whole episodes."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from ..sensors.ideal import BodyState, Mounting, Sampling, mounted, vector
 from ..sensors.presets import SensorPreset, sensor_preset
 from ..sensors.suite import SensorSuite, imu_suite
 from .devices import HandDevice, actual_array, array_preset, check_planar, device_suite, hand_device
-from .drivers import KinematicDrive, States
+from .drivers import KinematicDriver, States
 from .gestures import GestureConfig, gesture_config, gesture_name, make_gesture
 from .planar_motion import planar_angle
 
@@ -30,9 +30,9 @@ class HandVariation:
     """What differs from episode to episode besides motion and sensor errors; standard deviations, 0 for no variation.
 
     Attributes:
-        lever_arm: of the sensor's place, m an axis.
+        lever_arm: of the sensor site, m an axis.
         mounting: of the sensor's axes on the device, rad an axis.
-        mass: of the logarithm of the device's mass and inertia, which the hand does not know (dynamic drive).
+        mass: of the logarithm of the device's mass and inertia, which the hand does not know (``drive="dynamic"``).
     """
 
     lever_arm: float = 0.02
@@ -55,13 +55,13 @@ class HandVariation:
 
 
 def check_duration(duration: float | None) -> None:
-    """Refuse what is no length of an episode."""
+    """Refuse what is not a length of an episode."""
     if duration is not None and not 0.0 < duration < math.inf:
         raise ValueError(f"duration must be positive and finite (s), got {duration}")
 
 
-def ticks_of(duration: float, rate: float) -> int:
-    """Ticks of an episode, the one at time 0 included; two at least."""
+def samples_of(duration: float, rate: float) -> int:
+    """Samples of an episode, the one at time 0 included; two at least."""
     return max(1, math.floor(duration * rate + 1e-6)) + 1
 
 
@@ -104,7 +104,7 @@ def hand_suite(
     if rate is not None and rate != sensors.rate:
         raise ValueError(f"rate must be None or that of the suite, {sensors.rate:g} Hz, got {rate}")
     if magnetometer is not None:
-        raise ValueError("magnetometer must be None where a whole suite is given: the suite says what it has")
+        raise ValueError("magnetometer must be None where a whole suite is given: the suite has its own")
     return sensors
 
 
@@ -119,7 +119,7 @@ def sense(suite: SensorSuite, states: States, mounting: Mounting, array: Acceler
     """
     now, earlier = (mounted(part, mounting) for part in states)
     first = suite.sensors[0]
-    # where the first sensor sits at this place and runs at this rate, its ideal readings are the truth
+    # where the first sensor sits at this site and runs at this rate, its motion serves for the truth too
     site = (first.body, Mounting(), first.sampling, suite.rate)
     measurements, biases, motions = suite.simulate(now, array, before=earlier, reference=site)
     truth = {
@@ -204,11 +204,11 @@ def simulate_hand(
         check_planar(held, config, where)
     duration = config.duration if duration is None else duration
     motion, errors = np.random.default_rng(seed).spawn(2)
-    drive = KinematicDrive(suite.rate)
-    drive.start(make_gesture(config, motion, duration))
+    driver = KinematicDriver(suite.rate)
+    driver.start(make_gesture(config, motion, duration))
     suite.reset(errors)
     array = built_array(held, sensors, errors)
-    block = sense(suite, drive.advance(ticks_of(duration, suite.rate)), where, array)
+    block = sense(suite, driver.advance(samples_of(duration, suite.rate)), where, array)
     metadata = {
         "name": f"hand-{gesture_name(gesture)}-{seed}",
         "gesture": gesture_name(gesture),

@@ -32,9 +32,10 @@ class HandTrajectories:
         sensors: names of sensor presets, or presets.
         noise_scale: lowest and highest factor on all errors of the sensor, drawn log-uniformly.
         duration: s.
-        lever_arm: standard deviation of the sensor's place on the body, m an axis.
+        lever_arm: standard deviation of the sensor site on the body, m an axis.
         mounting: ``random``: the axes of the sensor are drawn evenly from all rotations; ``aligned``: they are the
-        body's. drive: ``kinematic``: the body follows the gesture exactly; ``dynamic``: forces in the physics world,
+        body's.
+        drive: ``kinematic``: the body follows the gesture exactly; ``dynamic``: forces in the physics world,
         far slower.
 
     Raises:
@@ -92,13 +93,13 @@ class HandTrajectories:
         noise_scale = float(np.exp(choice.uniform(*np.log(self.noise_scale))))
         turn = rotation.random(choice)
         axes = turn if self.mounting == "random" else np.array([1.0, 0.0, 0.0, 0.0])
-        place: dict[str, Any] = {"lever_arm": choice.normal(0.0, self.lever_arm, 3), "mounting": axes}
+        site: dict[str, Any] = {"lever_arm": choice.normal(0.0, self.lever_arm, 3), "mounting": axes}
         suite = imu_suite(device, rate, noise_scale=noise_scale)
         seed = int(episode.integers(2**32))
         if self.drive == "kinematic":
-            trajectory = simulate_hand(gesture, seed, suite, duration=self.duration, **place)
+            trajectory = simulate_hand(gesture, seed, suite, duration=self.duration, **site)
         else:
-            env = HandMotionEnv(gesture, "dynamic", suite, duration=self.duration, **place)
+            env = HandMotionEnv(gesture, "dynamic", suite, duration=self.duration, **site)
             try:
                 trajectory = record(env, seed=seed)
             finally:

@@ -1,4 +1,4 @@
-"""Kinds of sensors as data: :data:`KINDS` says of each what an ideal one reads, in which unit, how wide and how far.
+"""Kinds of sensors as data: what an ideal one reads, its unit, size and range, in the table :data:`KINDS`.
 
 A further kind is one more entry, or a :class:`SensorKind` of one's own: given to a
 :class:`~poise.envs.sensors.sensor.Sensor` directly, or by name after :func:`register_sensor_kind`.

@@ -1,4 +1,4 @@
-"""Errors of real sensors: :class:`NoiseModel` says how large they are, :class:`NoiseProcess` draws those of an episode.
+"""Errors of real sensors: :class:`NoiseModel` holds their sizes, :class:`NoiseProcess` draws those of an episode.
 
 Order of the chain: scale factor, misalignment and g-sensitivity; white noise; low-pass; bias; quantisation;
 saturation; loss of samples. Everything that is independent of the signal is drawn from normal numbers in a fixed layout

@@ -1,7 +1,7 @@
 """Noise models of named devices.
 
 White noise, in-run bias stability, ranges and bandwidths are data-sheet values, typical, as named with each preset.
-Three things are choices of this project, because data sheets do not tell them:
+Three things are choices of this project, because data sheets do not give them:
 
 * In-run bias stability is the floor of the Allan deviation. It becomes a Gauss-Markov bias whose Allan deviation peaks
   there (standard deviation = stability / 0.617), with a correlation time of 200 s.

@@ -1,4 +1,4 @@
-"""One sensor of a suite: :class:`Sensor` says what it senses, where, how often and how badly."""
+"""One sensor of a suite: what it senses, where it sits, its rate and its errors."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Placement = tuple[str, Mounting, Sampling, float]
 
 @dataclass(frozen=True)
 class Sensor:
-    """One sensor: a channel, what it senses, where, how often and how badly.
+    """A channel with what it senses, where it sits, its rate and its errors.
 
     Raises:
         ValueError: a field out of its range, or a channel of another size than the kind has.

@@ -32,7 +32,7 @@ class SuiteState:
 
 
 class Sensed(NamedTuple):
-    """What a suite says of T time steps.
+    """Measurements of T time steps, and what they were made from.
 
     Attributes:
         measurements: channel → ``(T, size)``, NaN where not sampled or lost.

@@ -152,12 +152,12 @@ def test_bad_arguments_are_refused(trajectory):
         ReplayEnv(trajectory, duration=11.0)
     with pytest.raises(ValueError, match="duration must be positive"):
         ReplayEnv(trajectory, duration=0.0)
-    with pytest.raises(ValueError, match="two ticks"):
+    with pytest.raises(ValueError, match="two samples"):
         ReplayEnv(trajectory[:1])
     with pytest.raises(ValueError, match="score must be one of"):
         ReplayEnv(without(trajectory, "orientation"), score="orientation")
     env = ReplayEnv(trajectory)
-    for start, message in ((1000, "start must lie in"), (-1, "start must lie in"), (1.5, "start must be a tick")):
+    for start, message in ((1000, "must lie in"), (-1, "must lie in"), (1.5, "must be the index of a sample")):
         with pytest.raises(ValueError, match=message):
             env.reset(options={"start": start})
 

@@ -1,4 +1,4 @@
-"""Paths on the horizontal plane, told by their curvature over arc length."""
+"""Paths on the horizontal plane, given by their curvature over arc length."""
 
 from __future__ import annotations
 

@@ -64,7 +64,7 @@ class Scenario:
     ground: Callable[[np.random.Generator, Path, SpeedProfile], Ground]
     """generator, path, speed → ground"""
     style: str = "normal"
-    """how the rider moves unless told otherwise"""
+    """how the rider moves by default"""
 
     def draw(self, rng: np.random.Generator, duration: float) -> Course:
         """Draw a course for a ride of ``duration`` seconds."""

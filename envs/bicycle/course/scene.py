@@ -130,7 +130,7 @@ class FixtureScene(BicycleScene):
         super().__init__(bicycle_tree(bicycle), FlatGround(), gui=gui)
         flat, axle = (0.0, 0.0, 0.006), (0.0, 0.0, 0.012)
         marked = [rod_shape((0.0, 0.0, -0.006), flat, DISK_RADIUS, DISK_COLOUR)]
-        # markers of three colours: the disk's rotation can be told
+        # markers of three colours make the disk's rotation visible
         for angle, colour in zip(np.radians([90.0, 210.0, 330.0]), AXIS_COLOURS, strict=True):
             place = 0.15 * np.array([math.cos(angle), math.sin(angle), 0.0])
             marked.append(rod_shape(place + flat, place + axle, 0.035, colour))

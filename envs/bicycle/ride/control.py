@@ -114,7 +114,7 @@ def lateral_model(model: WhippleModel, bicycle: BicycleParameters, speed: float)
 def regulator(
     model: WhippleModel, bicycle: BicycleParameters, speed: float, settings: ControlSettings
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Feedback and preview gains of the steer torque for one speed, for torques held between control ticks.
+    """Feedback and preview gains of the steer torque at one speed, with a zero-order hold between control steps.
 
     The state is counted from that of the steady turn at the path's curvature, so that changes of the turn disturb it;
     these are known ahead, and the optimal torque answers them before they come (linear-quadratic preview control, M.
@@ -273,7 +273,7 @@ class Pilot:
         right = torque - float(self.gains(state.speed) @ np.concatenate([errors, ahead]))
         largest = self.settings.largest_torque
         self._wish(min(speed, limit))
-        self.command = (max(-largest, min(largest, -right)), self._drive(state))
+        self.command = (max(-largest, min(largest, -right)), self._driver(state))
         return self.command
 
     def _wish(self, speed: float) -> None:
@@ -283,7 +283,7 @@ class Pilot:
         self.target += change
         self.acceleration += (change / self.period - self.acceleration) * self.period / REACTION
 
-    def _drive(self, state: BicycleState) -> float:
+    def _driver(self, state: BicycleState) -> float:
         """Force at the wheels: for slope, drag and the wanted acceleration, and against the error of the speed.
 
         The error's integral is held while the force is at a limit.

@@ -1,4 +1,4 @@
-"""A ride as arrays: each tick is read from PyBullet as plain tuples, everything else is computed for many at once."""
+"""A ride as arrays: each sample is read from PyBullet as plain tuples, everything else is computed for many at once."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from .ride import Ride
 
 @dataclass(frozen=True)
 class RideLog:
-    """n consecutive ticks of a ride; time axis first. World axes unless said otherwise."""
+    """n consecutive samples of a ride; time axis first. World axes unless said otherwise."""
 
     time: np.ndarray
     """(n,) s of the physics"""
@@ -44,11 +44,11 @@ class RideLog:
 
 
 class RideRecorder:
-    """Advances a ride tick by tick.
+    """Advances a ride sample by sample.
 
     Args:
         ride: the ride.
-        steps: physics steps a tick.
+        steps: physics steps a sample.
     """
 
     def __init__(self, ride: Ride, steps: int) -> None:
@@ -65,11 +65,11 @@ class RideRecorder:
         body = self.ride.bicycle.body
         return [self.ride.physics.base_tuples(body.body), *body.link_tuples(self._links)]
 
-    def record(self, ticks: int) -> RideLog:
-        """Ride on for some ticks; stops early after the tick in which the rider fell."""
+    def record(self, samples: int) -> RideLog:
+        """Ride on for some samples; stops early after the one in which the rider fell."""
         ride, rider = self.ride, self.ride.rider
         before, after, forces, joints, torques, times, fallen, swivels = [], [], [], [], [], [], [], []
-        for _ in range(ticks):
+        for _ in range(samples):
             for _ in range(self.steps - 1):
                 ride.step()
             before.append(self._look())
@@ -170,7 +170,7 @@ class RideRecorder:
     def _contact(
         self, start: dict[str, BodyState], before: CentreMotion, after: CentreMotion, forces: np.ndarray
     ) -> Contact:
-        """Contact forces in the last physics step of each tick."""
+        """Contact forces in the last physics step of each sample."""
         rider, physics = self.ride.rider, self.ride.physics
         posture, frame, front, crank = rider.posture, start["rear_frame"], start["front_assembly"], start["crank"]
         saddle = frame.position + rotation.rotate(frame.orientation, np.array(posture.bicycle.saddle))

@@ -116,7 +116,7 @@ class Ride:
 
     @property
     def fallen(self) -> bool:
-        """Whether the bicycle lies down or has left the ground of reason (as of the last control tick)."""
+        """Whether the bicycle fell or left the ground (as of the last control step)."""
         roll = self.state.roll
         return not abs(roll) < FALLEN
 

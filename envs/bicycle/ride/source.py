@@ -1,4 +1,4 @@
-"""Rides for an environment: drawn from a generator, ridden tick by tick, saved and restored."""
+"""Rides for an environment: drawn from a generator, ridden sample by sample, saved and restored."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ from .ride import Ride, RideMemory
 from .truth import Quaternions, continuous_pose, segment_states, true_pose
 
 SETTLING = 1.0
-"""s of riding before the first tick"""
+"""s of riding before the first sample"""
 KEPT = 8
 """snapshots that can be restored without riding again"""
 
 
 class Ridden(NamedTuple):
-    """Some ticks of a ride; times count from the first tick."""
+    """Some samples of a ride; times count from the first one."""
 
     log: RideLog
     bodies: dict[str, BodyState]
@@ -38,11 +38,11 @@ class Ridden(NamedTuple):
 
 
 class SavedRide(NamedTuple):
-    """Enough to return to a tick, here or elsewhere."""
+    """Enough to return to a sample, here or elsewhere."""
 
     plan: tuple[Scenario, Any, np.random.Generator]
     """scenario, subject and generator from which the ride was drawn"""
-    ticks: int
+    samples: int
     fallen_at: float
     quaternions: Quaternions
     token: str
@@ -56,7 +56,7 @@ class RideSource:
         bicycle: what is ridden.
         style: how riders move; None for the style of each scenario.
         duration: s of a ride.
-        rate: ticks a second, Hz.
+        rate: samples a second, Hz.
         physics_rate: physics steps a second, Hz; a multiple of ``rate``.
         fidelity: ``full`` or ``lumped``.
         tyre: of both wheels.
@@ -103,7 +103,7 @@ class RideSource:
         assert self.ride is not None
         self._recorder = RideRecorder(self.ride, round(self.physics_rate / self.rate))
         self._began = self.ride.physics.time + 1.0 / self.rate
-        self._ticks, self.fallen_at = 0, math.inf
+        self._samples, self.fallen_at = 0, math.inf
         self._quaternions: Quaternions = {}
 
     def _ride_first_second(self, scenario: Scenario, subject: Any, motion: np.random.Generator) -> None:
@@ -141,14 +141,14 @@ class RideSource:
         self._first = self.ride.save()
 
     def record(self, most: int) -> Ridden:
-        """Ride on for ``most`` ticks, or to the one in which the rider fell."""
+        """Ride on for ``most`` samples, or to the one in which the rider fell."""
         log = self._recorder.record(most)
         log = replace(log, time=log.time - self._began)
         bodies = {name: state._replace(time=log.time) for name, state in segment_states(log).items()}
         pose, self._quaternions = continuous_pose(true_pose(log, bodies), self._quaternions)
         if log.fallen.any():
-            self.fallen_at = self._ticks + len(log.time) - 1
-        self._ticks += len(log.time)
+            self.fallen_at = self._samples + len(log.time) - 1
+        self._samples += len(log.time)
         return Ridden(log, bodies, pose)
 
     def save(self) -> SavedRide:
@@ -158,7 +158,7 @@ class RideSource:
         self._kept[token] = self.ride.save()
         if len(self._kept) > KEPT:
             self.ride.forget(self._kept.pop(next(iter(self._kept))))
-        return SavedRide(self._plan, self._ticks, self.fallen_at, dict(self._quaternions), token)
+        return SavedRide(self._plan, self._samples, self.fallen_at, dict(self._quaternions), token)
 
     def restore(self, saved: SavedRide) -> None:
         """Undo :meth:`save`: from memory where the ride is still there, else by riding it again."""
@@ -168,9 +168,9 @@ class RideSource:
             scenario, subject, motion = saved.plan
             self.begin(scenario, subject, copy.deepcopy(motion))
             self._plan = saved.plan
-            if saved.ticks:
-                self._recorder.record(saved.ticks)
-        self._ticks, self.fallen_at, self._quaternions = saved.ticks, saved.fallen_at, dict(saved.quaternions)
+            if saved.samples:
+                self._recorder.record(saved.samples)
+        self._samples, self.fallen_at, self._quaternions = saved.samples, saved.fallen_at, dict(saved.quaternions)
 
     def close(self) -> None:
         """End the world; may be called twice."""

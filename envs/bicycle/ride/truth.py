@@ -48,7 +48,7 @@ QUANTITIES = {
 """All quantities of ``info["pose"]`` by name."""
 
 Quaternions = dict[str, np.ndarray]
-"""Orientation → quaternion ``(4,)`` of one tick."""
+"""Orientation → quaternion ``(4,)`` of one sample."""
 
 
 def isb_zxy(q: np.ndarray) -> np.ndarray:
@@ -130,14 +130,14 @@ def true_pose(log: RideLog, states: dict[str, BodyState]) -> dict[str, np.ndarra
 
 
 def continuous_pose(pose: dict[str, np.ndarray], last: Quaternions) -> tuple[dict[str, np.ndarray], Quaternions]:
-    """The same pose with quaternions that never change sign from one tick to the next.
+    """The same pose with quaternions that never change sign from one sample to the next.
 
     Args:
         pose: quantity → ``(n, size)``, n ≥ 1.
-        last: quantity → quaternion ``(4,)`` of the tick before; empty at the first tick, where w ≥ 0 is chosen.
+        last: quantity → quaternion ``(4,)`` of the sample before; empty at the first one, where w ≥ 0 is chosen.
 
     Returns:
-        The pose, and its quaternions at the last tick.
+        The pose, and its quaternions at the last sample.
     """
     found, now = dict(pose), {}
     for name, values in pose.items():

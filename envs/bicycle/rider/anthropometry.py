@@ -56,7 +56,7 @@ MEAN_STATURE = {False: 1.741, True: 1.735}
 VERTEX_ABOVE_SUPRASTERNALE = {False: 0.3143, True: 0.3292}
 """m: table 4, vertex to cervicale plus cervicale above suprasternale"""
 SHALLOWEST, HEAVIEST = (1.2, 2.3), (30.0, 200.0)
-"""m and kg: outside these bounds the tables say nothing"""
+"""m and kg: outside these bounds the tables do not apply"""
 
 
 class Segment(NamedTuple):
@@ -136,7 +136,7 @@ SUBJECTS = (
     RiderBody(1.76, 68.0, name="subject 3"),
     RiderBody(1.68, 54.0, female=True, name="subject 4"),
 )
-"""Five riders with the means and deviations of the papers' subjects: 176 ± 5 cm, 68 ± 10 kg, one female."""
+"""Five riders with the means and standard deviations of the papers' subjects: 176 ± 5 cm, 68 ± 10 kg, one female."""
 
 
 def random_body(rng: np.random.Generator) -> RiderBody:

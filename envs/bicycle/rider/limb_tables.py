@@ -1,4 +1,4 @@
-"""What a rider knows by heart: how elbows and knees stand in every position, and what the legs weigh at the crank."""
+"""Lookup tables of the rider control model: posture of elbows and knees over steer and crank, weight of the legs."""
 
 from __future__ import annotations
 

@@ -47,7 +47,7 @@ class Saddle:
         self.load, self.parameters = load, SaddleParameters() if parameters is None else parameters
 
     def force(self, height: float, rate: float) -> float:
-        """Upward force on the pelvis, N, never negative: nobody sticks to a saddle.
+        """Upward force on the pelvis, N, never negative: the contact is unilateral.
 
         Args:
             height: of the pelvis above its place at rest, m.

@@ -1,4 +1,4 @@
-"""What a filter is told about rider and bicycle: exactly, or as a tape measure would have it."""
+"""Geometry of rider and bicycle for the configuration of filters: exact, or with the errors of a tape measure."""
 
 from __future__ import annotations
 

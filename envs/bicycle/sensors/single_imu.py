@@ -24,13 +24,13 @@ def imu_of(trajectory: Trajectory, site: str = "bicycle_imu") -> Trajectory:
         site: ``bicycle_imu`` or ``trunk_imu``.
 
     Returns:
-        The same ticks, mask and metadata (``name`` gets the site appended), with
+        The same samples, mask and metadata (``name`` gets the site appended), with
 
         * measurements ``imu/gyr`` (rad/s), ``imu/acc`` (m/s²) and, where the site has one, ``imu/mag`` (µT), each
           ``(T, 3)`` in sensor axes;
-        * truth ``orientation`` ``(T, 4)``, sensor to world: that of the body turned by the sensor's mounting; ``up``
-          ``(T, 3)``, world's vertical in sensor axes; and where the ride knows them ``angular_rate`` (rad/s, sensor
-          axes), ``position`` (m, world, of the sensor), ``gyroscope_bias``, ``accelerometer_bias`` and
+        * truth ``orientation`` ``(T, 4)``, sensor to world: that of the body times the sensor's mounting; ``up``
+          ``(T, 3)``, gravity direction (upward) in sensor axes; and where the ride knows them ``angular_rate`` (rad/s,
+          sensor axes), ``position`` (m, world, of the sensor), ``gyroscope_bias``, ``accelerometer_bias`` and
           ``magnetometer_bias`` (sensor axes).
 
     Raises:
@@ -56,16 +56,16 @@ def imu_of(trajectory: Trajectory, site: str = "bicycle_imu") -> Trajectory:
 
 
 def sensor_at(trajectory: Trajectory, channel: str) -> Mapping[str, Any]:
-    """What the metadata say about the sensor behind a channel: its ``body``, ``rotation``, ``lever_arm`` and more.
+    """The metadata of the sensor behind a channel: its ``body``, ``rotation``, ``lever_arm`` and more.
 
     Raises:
-        ValueError: they say nothing about it.
+        ValueError: there are none.
     """
     described = trajectory.metadata.get("sensors") or {}
     for sensor in described.get("sensors", ()):
         if sensor["channel"] == channel:
             return sensor
-    raise ValueError(f"the metadata of {trajectory.name!r} do not say where {channel!r} is mounted")
+    raise ValueError(f"the metadata of {trajectory.name!r} hold no mounting of {channel!r}")
 
 
 def sensor_truth(

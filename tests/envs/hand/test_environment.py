@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from poise.envs.base import pose_error
-from poise.envs.hand.drivers import DynamicDrive, KinematicDrive
+from poise.envs.hand.drivers import DynamicDriver, KinematicDriver
 from poise.envs.hand.environment import HandMotionEnv
 from poise.envs.hand.gestures import Turn, make_gesture
 from poise.envs.hand.sensing import HandVariation, simulate_hand
@@ -80,7 +80,7 @@ def test_zeros_count_as_no_rotation_and_bad_actions_are_refused():
 @pytest.mark.parametrize("gesture", ["slow", "fast", "severe", "mixed"])
 def test_dynamic_drive_tracks_the_gesture(gesture):
     drawn = make_gesture(gesture, np.random.default_rng(2), 12.0)
-    drive = DynamicDrive(100.0)
+    drive = DynamicDriver(100.0)
     drive.start(drawn)
     states = drive.advance(1200).now
     drive.close()
@@ -93,7 +93,7 @@ def test_dynamic_drive_tracks_the_gesture(gesture):
 
 def test_feedback_holds_a_device_of_unknown_mass():
     drawn = make_gesture("fast", np.random.default_rng(2))
-    drive = DynamicDrive(100.0)
+    drive = DynamicDriver(100.0)
     drive.start(drawn, mass_factor=1.05)
     states = drive.advance(1000).now
     drive.close()
@@ -106,7 +106,7 @@ def test_feedback_holds_a_device_of_unknown_mass():
 @pytest.mark.parametrize("kind", DRIVES)
 def test_drives_give_the_same_in_blocks_of_their_own_and_after_restoring(kind):
     drawn = make_gesture("fast", np.random.default_rng(2))
-    drive = DynamicDrive(100.0) if kind == "dynamic" else KinematicDrive(100.0)
+    drive = DynamicDriver(100.0) if kind == "dynamic" else KinematicDriver(100.0)
     drive.start(drawn)
     drive.advance(200)
     saved = pickle.loads(pickle.dumps(drive.save()))
@@ -309,7 +309,7 @@ def test_closed_environments_close_again_and_start_again():
 
 
 def test_states_of_the_first_tick_reach_back_into_the_rest():
-    drive = DynamicDrive(100.0)
+    drive = DynamicDriver(100.0)
     drive.start(make_gesture("slow", np.random.default_rng(0)))
     states = drive.advance(3)
     drive.close()

@@ -94,14 +94,14 @@ def test_what_is_missing_is_named(ride):
     half, anywhere, unknown = ride.replace(measurements=channels), ride.replace(metadata={}), ride.replace(truth={})
     with pytest.raises(ValueError, match=r"lacks the channels \['trunk_imu/acc'\]"):
         imu_of(half, "trunk_imu")
-    with pytest.raises(ValueError, match="do not say where"):
+    with pytest.raises(ValueError, match="hold no mounting of"):
         imu_of(anywhere)
     with pytest.raises(ValueError, match="knows no 'bicycle/orientation'"):
         imu_of(unknown)
 
 
 @pytest.mark.parametrize("fidelity", ["lumped", "full"])
-def test_gaps_from_the_truth_are_those_of_the_physics(fidelity):
+def test_loop_closure_errors_from_the_truth_are_those_of_the_physics(fidelity):
     env = RiderBicycleEnv("outdoor", 4, suite=IMUS, fidelity=fidelity, duration=0.49)
     trajectory = poise.record(env, seed=1)
     gaps = loop_closure_error(trajectory.truth, sit(MOUNTAIN_BIKE, rider_body(4)))
