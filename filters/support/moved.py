@@ -14,7 +14,6 @@ IMU = "bounded_motion external_acceleration mekf marins"
 MOVED = {
     **{f"poise.filters.{name}": f"poise.filters.core.{name}" for name in CORE.split()},
     **{f"poise.filters.{name}": f"poise.filters.imu.{name}" for name in IMU.split()},
-    "poise.filters.accelerometer_array": "poise.filters.arrays",
     "poise.filters.bounds": "poise.filters.analysis.bounds",
     "poise.envs.calibration": "poise.envs.data.calibration.records",
     "poise.envs.devices": "poise.envs.hand.devices",
