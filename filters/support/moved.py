@@ -48,4 +48,4 @@ class MovedModules:
 
 def install() -> None:
     """Find moved modules, after all that exist."""
-    sys.meta_path.append(MovedModules())  # type: ignore[arg-type]
+    sys.meta_path.append(MovedModules())
