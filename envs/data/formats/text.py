@@ -24,7 +24,11 @@ if TYPE_CHECKING:
 
 MISSING = ("", "nan", "na", "n/a", "null", "none", "-", "--", "#n/a", "nil", "missing")
 NUMBER = re.compile(r"[-+]?(\d+[.,]?\d*|[.,]\d+)([eE][-+]?\d+)?|[-+]?(inf|infinity)", re.IGNORECASE)
-DATE = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d(:\d\d([.,]\d+)?)?\s*(Z|UTC|[-+]\d\d:?\d\d)?")
+CLOCK = r"\d\d?:\d\d(:\d\d([.,]\d+)?)?"
+DATE = re.compile(
+    rf"((\d{{4}}[-/]\d\d[-/]\d\d|\d\d?[/.]\d\d?[/.]\d{{4}})[T ])?{CLOCK}\s*(Z|UTC|GMT|[-+]\d\d:?\d\d)?", re.IGNORECASE
+)
+"""A date with a time, or a time of the day; with a time zone or without."""
 COMMENT = ("#", "//", "%")
 DELIMITERS = (",", ";", "\t", "|", " ")
 SAMPLE = 400
@@ -139,6 +143,8 @@ def table_of(text: str, name: str) -> Table:
         if values is None or (column >= len(names) - 2 and not name and np.isnan(values.astype(float)).all()):
             continue
         arrays[name or str(column)] = values
+        if values.dtype.kind == "i" and frame[column].dtype.kind not in "iuf":
+            units[name or str(column)] = "ns"
         if wrong is not None:
             unreadable[name or str(column)] = wrong
     return Table(
@@ -237,9 +243,21 @@ def numeric(column: pandas.Series) -> tuple[np.ndarray | None, tuple[int, str] |
     wrong = filled & values.isna()
     if not filled.any() or wrong.sum() > 0.5 * filled.sum():
         first = str(texts[filled].iloc[0]) if filled.any() else ""
-        if not DATE.fullmatch(first):
-            return None, None
-        stamps = pandas.to_datetime(texts.str.replace(",", "."), errors="coerce", utc=True, format="ISO8601")
-        return stamps.to_numpy(dtype="datetime64[ns]").astype(np.int64), None
+        return (nanoseconds(texts), None) if DATE.fullmatch(first) else (None, None)
     row = int(np.flatnonzero(wrong)[0]) if wrong.any() else None
     return values.to_numpy(dtype=float), None if row is None else (row, str(texts.iloc[row]))
+
+
+def nanoseconds(texts: pandas.Series) -> np.ndarray | None:
+    """Dates or times of the day as whole ns; None where a text is neither."""
+    import pandas
+
+    plain = texts.str.replace(",", ".", regex=False).str.replace(r"\s*(UTC|GMT)$", "Z", regex=True, case=False)
+    if re.fullmatch(CLOCK, str(plain.iloc[0])):
+        values = pandas.to_timedelta(plain, errors="coerce")
+    else:
+        values = pandas.to_datetime(plain, errors="coerce", utc=True, format="mixed", dayfirst="-" not in plain.iloc[0])
+        values = values - values.iloc[0].normalize() if values.notna().all() else values
+    if values.isna().any():
+        return None
+    return values.to_numpy(dtype="timedelta64[ns]").astype(np.int64)

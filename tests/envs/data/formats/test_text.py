@@ -1,0 +1,222 @@
+"""Text tables in the dialects of devices, spreadsheets and scripts."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from poise.envs.data.formats.arrays import read_table
+from poise.envs.data.formats.names import classify, groups, time_column
+from poise.envs.data.formats.stamps import as_seconds
+from poise.envs.data.formats.table import factor, split_unit
+
+VALUES = np.round(np.random.default_rng(5).standard_normal((50, 4)), 4)
+NAMES = ["t", "Gyr_X", "Gyr_Y", "Gyr_Z"]
+
+
+def text(delimiter: str = ",", decimal: str = ".", end: str = "\n", tail: str = "", above: tuple[str, ...] = ()) -> str:
+    rows = [delimiter.join(f"{value:.4f}".replace(".", decimal) for value in row) + tail for row in VALUES]
+    return end.join([*above, delimiter.join(NAMES) + tail, *rows]) + end
+
+
+def table_of(path: Path, content: str | bytes):
+    path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    return read_table(path)
+
+
+@pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
+@pytest.mark.parametrize(
+    ("delimiter", "decimal"), [(",", "."), (";", "."), (";", ","), ("\t", "."), ("\t", ","), ("|", "."), (" ", ".")]
+)
+@pytest.mark.parametrize("tail", ["", "delimiter"])
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16"])
+def test_dialects_give_the_same_numbers(tmp_path, end, delimiter, decimal, tail, encoding):
+    content = text(delimiter, decimal, end, delimiter if tail else "")
+    table = table_of(tmp_path / "a.txt", content.encode(encoding))
+    assert list(table.arrays) == NAMES
+    np.testing.assert_allclose(table.matrix(NAMES), VALUES)
+
+
+@pytest.mark.parametrize(
+    "above",
+    [
+        ("# a comment", "# Rate: 100 Hz"),
+        ("// Update Rate: 100.0Hz", "// Option: on"),
+        ("sep=,", "Device:,x", "Rate:,100,Hz", ""),
+        ("\n", "A title of the recording", ""),
+        ("% MATLAB", "% rate = 100"),
+    ],
+)
+def test_lines_above_the_table_are_kept(tmp_path, above):
+    table = table_of(tmp_path / "a.csv", text(above=above))
+    assert list(table.arrays) == NAMES
+    assert table.preamble == tuple(line for line in above if line.strip())
+    if "100" in "".join(above):
+        assert table.rate_in_header("Rate", "Update Rate") == 100.0
+
+
+def test_headers_of_several_lines(tmp_path):
+    groups_over_axes = "Time (s);IMU Gyroscope;;;Vicon Orientation;;;;\n;X;Y;Z;W;X;Y;Z;\n" + "".join(
+        f"{k / 100};1;2;3;1;0;0;0\n" for k in range(5)
+    )
+    table = table_of(tmp_path / "a.csv", groups_over_axes)
+    assert table.units == {"Time": "s"}
+    assert [group.columns[0] for group in groups(table)] == ["IMU Gyroscope/X", "Vicon Orientation/W"]
+    units_below = "Time,Foot/Acceleration/X,Foot/Acceleration/Y\ns,m/s^2,m/s^2\n0,1,2\n1,1,2\n2,1,2\n"
+    table = table_of(tmp_path / "b.csv", units_below)
+    assert table.unit(["Foot/Acceleration/X", "Foot/Acceleration/Y"]) == "m/s^2"
+    table = table_of(tmp_path / "c.txt", "0.1 1 2 3\n0.2 1 2 3\n0.3 1 2 3\n")
+    assert not table.named
+    np.testing.assert_allclose(table.matrix(["0"])[:, 0], [0.1, 0.2, 0.3])
+
+
+@pytest.mark.parametrize("missing", ["", "NaN", "nan", "NULL", "None", "-", "n/a", "#N/A"])
+def test_texts_for_missing_values_are_missing(tmp_path, missing):
+    lines = text().splitlines()
+    fields = lines[4].split(",")
+    lines[4] = ",".join([fields[0], missing, *fields[2:]])
+    lines.insert(9, "")
+    values = table_of(tmp_path / "a.csv", "\n".join(lines)).matrix(NAMES)
+    assert len(values) == len(VALUES)
+    assert np.argwhere(np.isnan(values)).tolist() == [[3, 1]]
+
+
+def test_unreadable_cells_are_named_when_they_are_needed(tmp_path):
+    content = text().replace(f"{VALUES[7, 2]:.4f}", "oops")
+    table = table_of(tmp_path / "a.csv", content)
+    assert len(table.matrix(["Gyr_X"])) == len(VALUES)
+    with pytest.raises(ValueError, match="column Gyr_Y holds no number in row 7 of the table: 'oops'"):
+        table.matrix(NAMES)
+    with pytest.raises(ValueError, match=r"unknown column 'Gyr_y', did you mean 'Gyr_.'"):
+        table.matrix(["Gyr_y"])
+
+
+def test_a_last_row_that_was_cut_off_is_left_out(tmp_path):
+    content = text()
+    with pytest.warns(UserWarning, match=r"the last row is cut off \(3 of 4 fields\)"):
+        table = table_of(tmp_path / "a.csv", content[: content.rindex(",")])
+    np.testing.assert_allclose(table.matrix(NAMES), VALUES[:-1])
+
+
+@pytest.mark.parametrize(
+    "content", [b"", b"hello\nworld\n", b"a,b,c\n", bytes(range(256)) * 4, b"PK\x03\x04" + bytes(40)]
+)
+def test_what_holds_no_table_is_refused(tmp_path, content):
+    with pytest.raises(ValueError, match=r"no table|neither a text|is empty|not a readable|without NumPy"):
+        table_of(tmp_path / "a", content)
+
+
+@pytest.mark.parametrize(
+    "stamp",
+    [
+        lambda k: f"2024-05-01T12:00:{k / 100:09.6f}Z",
+        lambda k: f"2024-05-01 12:00:{k / 100:06.3f}",
+        lambda k: f"2024-05-01T12:00:{k / 100:06.3f}+02:00",
+        lambda k: f"2024-05-01 12:00:{k / 100:09.6f} UTC",
+        lambda k: f"31/05/2024 12:00:{k / 100:06.3f}",
+        lambda k: f"12:00:{k / 100:06.3f}",
+        lambda k: f"2024-05-01T23:59:{k / 100 + 59.8:06.3f}Z" if k < 20 else f"2024-05-02T00:00:{k / 100 - 0.2:06.3f}Z",
+    ],
+)
+def test_dates_are_times(tmp_path, stamp):
+    rows = "".join(f"{stamp(k)},{k},1,2\n" for k in range(50))
+    table = table_of(tmp_path / "a.csv", "timestamp,x,y,z\n" + rows)
+    seconds = as_seconds(table.column("timestamp"), table.units["timestamp"]).elapsed
+    np.testing.assert_allclose(seconds, np.arange(50) / 100.0, atol=1e-6)
+
+
+def test_whole_nanoseconds_keep_their_digits(tmp_path):
+    start = 1403715273262142976
+    rows = "".join(f"{start + 5_000_001 * k},1,2,3\n" for k in range(50))
+    table = table_of(tmp_path / "a.csv", "#timestamp [ns],x,y,z\n" + rows)
+    stamps = as_seconds(table.column("timestamp"), table.units["timestamp"])
+    np.testing.assert_allclose(np.diff(stamps.elapsed), 5.000001e-3, rtol=1e-9)
+    assert stamps.first == start
+    assert stamps.since(start - 1_000_000_000)[0] == 1.0
+
+
+@pytest.mark.parametrize(("end", "step"), [(2**16, 1), (2**32, 16667), (256, 1), (2**16, 3)])
+def test_counters_wrap(end, step):
+    count = (end - 20 * step + step * np.arange(50)) % end
+    np.testing.assert_array_equal(as_seconds(count, "s").elapsed, step * np.arange(50.0))
+
+
+def test_times_that_run_backwards_are_refused_and_neighbours_may_change_places():
+    for stamps in (np.r_[0:50, 20:70] / 100.0, np.r_[0:50, 0:50] / 100.0):
+        with pytest.raises(ValueError, match=r"column time must increase, got .* set back, or several recordings"):
+            as_seconds(stamps, "s")
+    assert as_seconds(np.r_[0:10, 11, 10, 12:50] / 100.0, "s").elapsed[11] == pytest.approx(0.10)
+    with pytest.raises(ValueError, match="column time holds no time in row 3"):
+        as_seconds(np.array([0.0, 1.0, 2.0, np.nan]), "s")
+
+
+@pytest.mark.parametrize(("unit", "scale"), [("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9)])
+@pytest.mark.parametrize("rate", [25.0, 100.0, 1000 / 3])
+def test_the_unit_of_stamps_without_one_is_told_by_their_interval(unit, scale, rate):
+    with pytest.warns(UserWarning, match=rf"taken for {unit} \({rate:.4g} Hz\)"):
+        stamps = as_seconds(np.arange(100) / rate / scale, "")
+    assert stamps.scale == scale
+
+
+@pytest.mark.parametrize(
+    ("unit", "kind", "expected"),
+    [
+        ("deg/s", "gyr", np.pi / 180),
+        ("°/s", "gyr", np.pi / 180),
+        ("rad s^-1", "gyr", 1.0),
+        ("dps", "gyr", np.pi / 180),
+        ("mdps", "gyr", np.pi / 180e3),
+        ("g", "acc", 9.80665),
+        ("mg", "acc", 9.80665e-3),
+        ("m s^-2", "acc", 1.0),
+        ("m/(s^2)", "acc", 1.0),
+        ("G", "acc", 9.80665),
+        ("uT", "mag", 1.0),
+        ("mT", "mag", 1000.0),
+        ("gauss", "mag", 100.0),
+        ("us", "time", 1e-6),
+    ],
+)
+def test_units_have_one_factor(unit, kind, expected):
+    assert factor(kind, unit) == pytest.approx(expected)
+    assert split_unit(f"Some name ({unit})") == ("Some name", unit)
+
+
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [
+        ("Gyr_X", ("", "gyr", "x")),
+        ("gyroX", ("", "gyr", "x")),
+        ("gx", ("", "gyr", "x")),
+        ("wz", ("", "gyr", "z")),
+        ("Acc. Y", ("", "acc", "y")),
+        ("angular_velocity.z", ("", "gyr", "z")),
+        ("accelerometerAccelerationX", ("", "acc", "x")),
+        ("LeftFoot.acc.z", ("left foot", "acc", "z")),
+        ("Static/Angular Velocity/X", ("static", "gyr", "x")),
+        ("w_RS_S_x", ("", "gyr", "x")),
+        ("Quat_q1", ("", "quaternion", "1")),
+        ("Mat[1][2]", ("", "matrix", "12")),
+        ("mag_z", ("", "mag", "z")),
+    ],
+)
+def test_names_say_kind_and_axis(name, expected):
+    found = classify(name)
+    assert found is not None
+    assert (found[0], found[1], found[3]) == expected
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["FreeAcc_X", "Linear Acceleration x", "motionUserAccelerationX", "gravity_x", "VelInc_X", "px", "Roll", "t"],
+)
+def test_what_lacks_gravity_or_is_none_of_the_sensors_is_left_alone(name):
+    assert classify(name) is None
+
+
+def test_the_finest_clock_is_the_time(tmp_path):
+    rows = "".join(f"{946684800000000000 + 10**7 * k},{k / 100},{k},1\n" for k in range(5))
+    table = table_of(tmp_path / "a.csv", "time,seconds_elapsed,counter,x\n" + rows)
+    assert time_column(table) == "seconds_elapsed"
