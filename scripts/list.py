@@ -131,6 +131,7 @@ def sensor_kinds() -> Rows:
             "values": kind.size,
             "unit": kind.unit or None,
             "full scale": kind.full_scale if kind.unit else None,
+            "description": kind.description,
         }
         for name, kind in KINDS.items()
     ]

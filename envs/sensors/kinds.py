@@ -99,6 +99,8 @@ class SensorKind:
     """whether a reading is a vector in sensor axes: its errors are added to it"""
     bias_name: str = ""
     """name of its bias in the truth, after that of the site; empty: the channel's name and ``_bias``"""
+    description: str = ""
+    """what an ideal sensor reads, and in which axes"""
 
     def __post_init__(self) -> None:
         if not (self.name and self.suffix):
@@ -123,6 +125,7 @@ KINDS: dict[str, SensorKind] = {
             100.0,
             vector=True,
             bias_name="gyroscope_bias",
+            description="angular rate, sensor axes",
         ),
         SensorKind(
             "accelerometer",
@@ -133,6 +136,7 @@ KINDS: dict[str, SensorKind] = {
             1000.0,
             vector=True,
             bias_name="accelerometer_bias",
+            description="specific force, sensor axes: +g on an axis that points up at rest",
         ),
         SensorKind(
             "magnetometer",
@@ -143,8 +147,17 @@ KINDS: dict[str, SensorKind] = {
             1000.0,
             vector=True,
             bias_name="magnetometer_bias",
+            description="magnetic field, sensor axes",
         ),
-        SensorKind("given", None, "", "value", None, on_body=False),
+        SensorKind(
+            "given",
+            None,
+            "",
+            "value",
+            None,
+            on_body=False,
+            description="what the environment hands over under the channel's name",
+        ),
     )
 }
 """Name → kind; ``given``: the environment hands the reading over."""
