@@ -9,12 +9,12 @@ run on NumPy, on torch and, traced once, as compiled code.
 from __future__ import annotations
 
 import copy
-import functools
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields, replace
-from typing import Any, ClassVar, Literal, Self, TypeVar, get_args, get_origin, get_type_hints
+from typing import Any, ClassVar, Literal, Self, TypeVar, get_args, get_origin
 
+from ..support.parameters import annotations_of
 from .backend import Array
 from .quantity import Channel, Measurement, Quantity
 
@@ -67,10 +67,9 @@ class Equations:
 
     def __post_init__(self) -> None:
         """Refuse parameters that are not finite numbers, choices that there are not, and intervals of no length."""
-        kind: Any = type(self)
-        for name, choices in _choices(kind).items():
-            if getattr(self, name) not in choices:
-                raise ValueError(f"{name} must be one of {choices}, got {getattr(self, name)!r}")
+        for name, hint in annotations_of(type(self)).items():
+            if get_origin(hint) is Literal and getattr(self, name) not in get_args(hint):
+                raise ValueError(f"{name} must be one of {get_args(hint)}, got {getattr(self, name)!r}")
         for field in fields(self):
             value = getattr(self, field.name)
             if isinstance(value, int) and isinstance(field.default, float):
@@ -183,16 +182,6 @@ def equations_of(estimator: Any) -> Any:
         if hasattr(inner, "channels"):
             return equations_of(inner)
     return estimator
-
-
-@functools.cache
-def _choices(model: Any) -> dict[str, tuple[Any, ...]]:
-    """Field → the values that its annotation as a ``Literal`` allows."""
-    try:
-        hints = get_type_hints(model)
-    except NameError:  # an annotation names something that is not there when the program runs
-        return {}
-    return {name: get_args(hint) for name, hint in hints.items() if get_origin(hint) is Literal}
 
 
 def check_positive(model: Equations, *names: str, or_zero: tuple[str, ...] = ()) -> None:

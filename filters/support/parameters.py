@@ -17,11 +17,11 @@ POSITIVE = re.compile(
 )
 """Names of numbers that are above zero: masses, times, lengths of things."""
 NOT_NEGATIVE = re.compile(
-    r"(noise|deviation|variance|prior|drift|bound|range|tolerance|threshold|adaptation|rejection|decay|jerk|lag|hold"
+    r"(noise|std|deviation|variance|prior|drift|bound|range|tolerance|threshold|adaptation|rejection|decay|jerk|lag|hold"
     r"|inflation|filter|gain|scale|share|weight|guard|follow|acceleration)$|(gain|k)_"
 )
 """Names of numbers that are zero or above: standard deviations, limits, gains."""
-MEASURED = re.compile(r"(accelerometer|magnetometer|array|orientation|distance)_(noise|deviation|variance)$")
+MEASURED = re.compile(r"(accelerometer|magnetometer|array|orientation|distance)_(noise|std|variance)$")
 """Noises of measurements: without any, an innovation has no covariance."""
 LARGEST = 1e100
 """Magnitude up to which squares and products of parameters stay finite."""
