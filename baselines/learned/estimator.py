@@ -11,10 +11,10 @@ import numpy as np
 
 from ...filters.core.backend import Array, is_torch, namespace
 from ...filters.core.estimator import check_measurements, run_by_steps
-from ...filters.core.observer import Observer, ObserverState
+from ...filters.core.observer import Observer
 from ...filters.core.quantity import ACCELEROMETER, GYROSCOPE, UP, Channel, Estimate, Measurement, Quantity
 from ...filters.core.rotation import normalize, rotate_back
-from ...filters.core.sampling import empty_memory, join
+from ...filters.core.sampling import FilterState, join, zeros
 from ..weights_io import load_weights
 from .gravity_aligned_frame import GravityAlignedFrame
 from .gru import GruNetwork
@@ -24,18 +24,14 @@ class LearnedState(NamedTuple):
     """All memory of the estimator.
 
     Attributes:
-        x: ``(*batch, n)`` state of the gravity-aligned frame; zeros before the start.
+        frame: of the gravity-aligned frame.
         memory: ``(*batch, H)`` of the network.
         tilt: ``(*batch, 2)`` last output of the network: horizontal part of the up vector in the gravity-aligned frame.
-        held: ``(*batch, 6)`` last valid sample of every channel element, NaN if there was none.
-        started: ``(*batch,)`` bool.
     """
 
-    x: Array
+    frame: FilterState
     memory: Array
     tilt: Array
-    held: Array
-    started: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,12 +93,11 @@ class LearnedEstimator:
     def init(self, measurement: Measurement) -> LearnedState:
         """Empty memory with the batch shape and array kind of ``measurement`` (no sample is used up)."""
         like = join(check_measurements(self.channels, measurement, time_axis=False), self.channels)
-        return LearnedState(*empty_memory(like, (self.frame.state_size,), (self.network.size,), (2,)))
+        return LearnedState(self._observer().init(measurement), zeros(like, self.network.size), zeros(like, 2))
 
     def step(self, state: LearnedState, measurement: Measurement) -> tuple[LearnedState, Estimate]:
         """Take one sample of every channel, ``(*batch, 3)``; NaN where there is none."""
-        before = ObserverState(state.x, state.held, state.started)
-        front, seen = self._observer().step(before, measurement)
+        frame, seen = self._observer().step(state.frame, measurement)
         features, due = seen.pose["features"], seen.pose["due"]
         memory, tilt = state.memory, state.tilt
         if bool((due == 1.0).any()):
@@ -114,7 +109,7 @@ class LearnedEstimator:
                 moved, leaning = self.network.step(xp.where(now, features, xp.zeros_like(features)), memory)
                 memory, tilt = xp.where(now, moved, memory), xp.where(now, leaning, tilt)
         pose = {"up": upward(seen.pose["relative_orientation"], tilt)}
-        return LearnedState(front.x, memory, tilt, front.held, front.started), Estimate(pose)
+        return LearnedState(frame, memory, tilt), Estimate(pose)
 
     def run(self, measurements: Mapping[str, Any]) -> Estimate:
         """Estimates of a whole sequence, ``(T, *batch, 3)`` in and out; equal to stepping."""

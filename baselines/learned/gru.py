@@ -19,6 +19,7 @@ from typing import Self
 
 import numpy as np
 
+from ...filters.compile.cache import jit
 from ...filters.core.backend import Array, constant, namespace
 from .gravity_aligned_frame import FEATURES
 
@@ -148,10 +149,8 @@ class GruNetwork:
 
 @lru_cache(maxsize=1)
 def compiled_kernel() -> Callable[..., None]:
-    """:func:`advance_all`, compiled."""
-    from numba import njit
-
-    return njit(cache=True, nogil=True, error_model="numpy")(advance_all)
+    """:func:`advance_all`, compiled on first use."""
+    return jit(advance_all)
 
 
 def advance_all(features, due, memory, tilt, tilts, A, a, W, b, V, d, C, c):  # type: ignore[no-untyped-def]  # noqa: D103, ANN

@@ -1,24 +1,31 @@
 """The Kalman recursion as plain loops: the part of the compiled filter that is the same for every model.
 
-The text of this file is put in front of the traced equations of a model and compiled with them
-(:mod:`poise.filters.compile.run`), so it holds nothing but functions of arrays. It runs without a compiler too.
+Printed models (:mod:`.printer`) import it. F, H and R of most models are mostly zeros, so products run over lists of
+the elements that are not (:func:`nonzero`), found anew at every tick.
 """
+
+from __future__ import annotations
 
 import numpy as np
 
+from .cache import jit
 
+
+@jit
 def fill(array, value):  # type: ignore[no-untyped-def]
     """Every element of a vector ← value; loops compile faster than slices."""
     for i in range(array.shape[0]):
         array[i] = value
 
 
+@jit
 def copy(source, target):  # type: ignore[no-untyped-def]
     """A vector into another."""
     for i in range(source.shape[0]):
         target[i] = source[i]
 
 
+@jit
 def finite(array):  # type: ignore[no-untyped-def]
     """Whether every element of a vector is finite."""
     for i in range(array.shape[0]):
@@ -27,125 +34,139 @@ def finite(array):  # type: ignore[no-untyped-def]
     return True
 
 
-def at(index, i):  # type: ignore[no-untyped-def]
-    """Element of an index list; None is the list 0, 1, 2 …, which costs nothing when compiled."""
-    if index is None:
-        return i
-    return index[i]
+@jit
+def zeros(rows, columns):  # type: ignore[no-untyped-def]
+    """A matrix of zeros; numpy.zeros takes longer to compile."""
+    matrix = np.empty((rows, columns))
+    for i in range(rows):
+        fill(matrix[i], 0.0)
+    return matrix
 
 
-def begin(first, i):  # type: ignore[no-untyped-def]
-    """Where line i of a sparsity pattern starts; None is the pattern without zeros."""
-    if first is None:
-        return 0
-    return first[i]
+@jit
+def scratch(n, e, m, d):  # type: ignore[no-untyped-def]
+    """Memory of a run, reused at every tick: vectors, matrices of states and of rows, lists of integers.
 
-
-def end(first, i, n):  # type: ignore[no-untyped-def]
-    """Where line i of a sparsity pattern of n columns ends."""
-    if first is None:
-        return n
-    return first[i + 1]
-
-
-def coupled(P, part):  # type: ignore[no-untyped-def]
-    """Whether a covariance links states of different parts; ``part`` ``(e,)`` tells the part of each state."""
-    e = P.shape[0]
-    for i in range(e):
-        for j in range(i):
-            if part[i] != part[j] and (P[i, j] != 0.0 or P[j, i] != 0.0):
-                return True
-    return False
-
-
-def gather(P, states, local):  # type: ignore[no-untyped-def]
-    """The block of a matrix that belongs to some states, put together."""
-    n = states.shape[0]
-    for i in range(n):
-        for j in range(n):
-            local[i, j] = P[states[i], states[j]]
-
-
-def scatter(local, states, P):  # type: ignore[no-untyped-def]
-    """Undo :func:`gather`."""
-    n = states.shape[0]
-    for i in range(n):
-        for j in range(n):
-            P[states[i], states[j]] = local[i, j]
-
-
-def propagate(F, P, Q, work, states, first, column):  # type: ignore[no-untyped-def]
-    """P ← F P Fᵀ + Q in place, for the states of one part.
-
-    F and Q are the whole matrices ``(e, e)``, P ``(n, n)`` is that of the part, ``states`` ``(n,)`` its place in them.
-    F can be other than zero in row i at the part's columns ``column[first[i]:first[i + 1]]``. ``work`` is scratch.
-    None for all three lists: one part, no zeros.
+    For n states, e error states, m rows and d numbers a sample: current, present, before, x1, x0, r, dx; P0, F, Q,
+    work; H, R, S, HP, K; every, first, column, rows.
     """
-    n = P.shape[0] if states is None else states.shape[0]
+    vectors = np.empty(d), np.empty(d), np.empty(d), np.empty(n), np.empty(n), np.empty(m), np.empty(e)
+    square = zeros(e, e), zeros(e, e), zeros(e, e), zeros(e, e)
+    measured = zeros(m, e), zeros(m, m), zeros(m, m), zeros(m, e), zeros(m, e)
+    every, most = np.empty(e, np.int64), max(e, m)
+    for i in range(e):
+        every[i] = i
+    lists = every, np.empty(most + 1, np.int64), np.empty(most * e, np.int64), np.empty(m, np.int64)
+    return vectors, square, measured, lists
+
+
+@jit
+def take(z, held, current, present, before):  # type: ignore[no-untyped-def]
+    """A sample with the last one where it is missing (current), with zeros where nothing is known (present, before)."""
+    for i in range(z.shape[0]):
+        current[i] = z[i] if np.isfinite(z[i]) else held[i]
+        present[i] = current[i] if np.isfinite(current[i]) else 0.0
+        before[i] = held[i] if np.isfinite(held[i]) else 0.0
+        held[i] = current[i]
+
+
+@jit
+def begin(x0, P0, x, P):  # type: ignore[no-untyped-def]
+    """Start from a prior if it is finite; returns whether it is."""
+    if not finite(x0):
+        return False
+    for i in range(P0.shape[0]):
+        if not finite(P0[i]):
+            return False
+    copy(x0, x)
+    for i in range(P0.shape[0]):
+        copy(P0[i], P[i])
+    return True
+
+
+@jit
+def keep(started, P, pose, covariances, t, b):  # type: ignore[no-untyped-def]
+    """Write the covariance of a tick, if covariances are kept; before the start that and the pose are NaN."""
+    if not started:
+        fill(pose, np.nan)
+    if covariances.shape[0] > 0:
+        for i in range(P.shape[0]):
+            for j in range(P.shape[0]):
+                covariances[t, b, i, j] = P[i, j] if started else np.nan
+
+
+@jit
+def nonzero(matrix, rows, count, first, column):  # type: ignore[no-untyped-def]
+    """List where the given rows of a matrix are not zero: line i has ``column[first[i]:first[i + 1]]``."""
+    total = 0
+    for i in range(count):
+        first[i] = total
+        for k in range(matrix.shape[1]):
+            if matrix[rows[i], k] != 0.0:
+                column[total] = k
+                total += 1
+    first[count] = total
+
+
+@jit
+def propagate(F, P, Q, work, every, first, column):  # type: ignore[no-untyped-def]
+    """P ← F P Fᵀ + Q in place; all ``(e, e)``.
+
+    ``every`` is 0, 1, … e − 1. Scratch: work ``(e, e)``; first, column, integers as for :func:`nonzero`.
+    """
+    n = P.shape[0]
+    nonzero(F, every, n, first, column)
     for i in range(n):
         for j in range(n):
             work[i, j] = 0.0
-        for t in range(begin(first, i), end(first, i, n)):
-            k = at(column, t)
-            f = F[at(states, i), at(states, k)]
-            if f != 0.0:
-                for j in range(n):
-                    work[i, j] += f * P[k, j]
+        for t in range(first[i], first[i + 1]):
+            k = column[t]
+            f = F[i, k]
+            for j in range(n):
+                work[i, j] += f * P[k, j]
     for i in range(n):
         for j in range(i + 1):
             total = 0.0
-            for t in range(begin(first, j), end(first, j, n)):
-                k = at(column, t)
-                total += work[i, k] * F[at(states, j), at(states, k)]
-            a, b = at(states, i), at(states, j)
-            P[i, j] = total + 0.5 * (Q[a, b] + Q[b, a])
+            for t in range(first[j], first[j + 1]):
+                total += work[i, column[t]] * F[j, column[t]]
+            P[i, j] = total + 0.5 * (Q[i, j] + Q[j, i])
             P[j, i] = P[i, j]
 
 
-def correct(  # type: ignore[no-untyped-def]
-    r, H, R, P, dx, white, rows, S, HP, K, states, own, first, column, uncorrelated
-):
-    """Condition the states of one part on its rows of a measurement; those with anything not finite are left out.
+@jit
+def correct(r, H, R, P, dx, white, rows, S, HP, K, first, column):  # type: ignore[no-untyped-def]
+    """Condition on a measurement; rows with anything not finite are left out.
 
     S = H P Hᵀ + R = L Lᵀ,  K = P Hᵀ S⁻¹,  P ← (I − K H) P (I − K H)ᵀ + K R Kᵀ,  dx = K r,  white = L⁻¹ r
 
-    In: residual r ``(m,)``, Jacobian H ``(m, e)``, covariance R ``(m, m)``, all of the whole; the part's ``states``
-    ``(n,)`` and rows ``own``; where H can be other than zero (as for :func:`propagate`); whether R is diagonal. Changed
-    in place: the part's P ``(n, n)``. Out, at the part's places: dx ``(e,)``, white ``(m,)``. Scratch: rows ``(m,)``
-    integers, S ``(m, m)``, HP and K ``(m, e)``. Returns the normalised innovation squared, 0 if every row was left out.
+    In: residual r ``(m,)``, Jacobian H ``(m, e)``, covariance R ``(m, m)``. Changed in place: P ``(e, e)``. Out: dx
+    ``(e,)``, white ``(m,)``. Scratch: rows ``(m,)`` integers, S ``(m, m)``, HP and K ``(m, e)``; first, column as for
+    :func:`nonzero`. Returns the normalised innovation squared, 0 if every row was left out.
     """
-    n = P.shape[0] if states is None else states.shape[0]
+    n = P.shape[0]
     count = 0
-    for q in range(r.shape[0] if own is None else own.shape[0]):
-        a = at(own, q)
+    for a in range(r.shape[0]):
         white[a] = 0.0
-        usable = np.isfinite(r[a]) and np.isfinite(R[a, a])
-        for t in range(begin(first, q), end(first, q, n)):
-            usable = usable and np.isfinite(H[a, at(states, at(column, t))])
-        if usable:
-            rows[count] = q
+        if np.isfinite(r[a]) and np.isfinite(R[a, a]) and finite(H[a]):
+            rows[count] = a
             count += 1
-    for j in range(n):
-        dx[at(states, j)] = 0.0
+    fill(dx, 0.0)
     if count == 0:
         return 0.0
+    nonzero(H, rows, count, first, column)
     for a in range(count):
-        q = rows[a]
         for j in range(n):
             HP[a, j] = 0.0
-        for t in range(begin(first, q), end(first, q, n)):
-            k = at(column, t)
-            h = H[at(own, q), at(states, k)]
-            if h != 0.0:
-                for j in range(n):
-                    HP[a, j] += h * P[k, j]
+        for t in range(first[a], first[a + 1]):
+            k = column[t]
+            h = H[rows[a], k]
+            for j in range(n):
+                HP[a, j] += h * P[k, j]
     for a in range(count):
         for b in range(a + 1):
-            q = rows[b]
-            total = 0.5 * (R[at(own, rows[a]), at(own, q)] + R[at(own, q), at(own, rows[a])])
-            for t in range(begin(first, q), end(first, q, n)):
-                k = at(column, t)
-                total += HP[a, k] * H[at(own, q), at(states, k)]
+            total = 0.5 * (R[rows[a], rows[b]] + R[rows[b], rows[a]])
+            for t in range(first[b], first[b + 1]):
+                total += HP[a, column[t]] * H[rows[b], column[t]]
             S[a, b] = total
     # Cholesky factor in the lower triangle of S, then L⁻¹ r and the gain by substitution.
     for a in range(count):
@@ -156,26 +177,28 @@ def correct(  # type: ignore[no-untyped-def]
             S[a, b] = np.sqrt(total) if a == b else total / S[b, b]
     nis = 0.0
     for a in range(count):
-        total = r[at(own, rows[a])]
+        total = r[rows[a]]
         for k in range(a):
-            total -= S[a, k] * white[at(own, rows[k])]
+            total -= S[a, k] * white[rows[k]]
         total /= S[a, a]
-        white[at(own, rows[a])] = total
+        white[rows[a]] = total
         nis += total * total
         for j in range(n):
             K[a, j] = HP[a, j]
         for k in range(a):
-            for j in range(n):
-                K[a, j] -= S[a, k] * K[k, j]
+            if S[a, k] != 0.0:
+                for j in range(n):
+                    K[a, j] -= S[a, k] * K[k, j]
         for j in range(n):
             K[a, j] /= S[a, a]
     for a in range(count):
         for j in range(n):
-            dx[at(states, j)] += K[a, j] * white[at(own, rows[a])]
+            dx[j] += K[a, j] * white[rows[a]]
     for a in range(count - 1, -1, -1):
         for k in range(a + 1, count):
-            for j in range(n):
-                K[a, j] -= S[k, a] * K[k, j]
+            if S[k, a] != 0.0:
+                for j in range(n):
+                    K[a, j] -= S[k, a] * K[k, j]
         for j in range(n):
             K[a, j] /= S[a, a]
     # (I − K H) P, then times (I − K H)ᵀ plus K R Kᵀ; both products have the rank of the measurement.
@@ -185,18 +208,16 @@ def correct(  # type: ignore[no-untyped-def]
             for j in range(n):
                 P[i, j] -= gain * HP[a, j]
     for a in range(count):
-        q = rows[a]
         for i in range(n):
             total = 0.0
-            for t in range(begin(first, q), end(first, q, n)):
-                k = at(column, t)
-                total += P[i, k] * H[at(own, q), at(states, k)]
-            if uncorrelated:
-                total -= K[a, i] * R[at(own, q), at(own, q)]
-            else:
-                for b in range(count):
-                    total -= K[b, i] * 0.5 * (R[at(own, rows[b]), at(own, q)] + R[at(own, q), at(own, rows[b])])
+            for t in range(first[a], first[a + 1]):
+                total += P[i, column[t]] * H[rows[a], column[t]]
             HP[a, i] = total
+        for b in range(count):
+            noise = 0.5 * (R[rows[b], rows[a]] + R[rows[a], rows[b]])
+            if noise != 0.0:
+                for i in range(n):
+                    HP[a, i] -= K[b, i] * noise
     for i in range(n):
         for j in range(i + 1):
             total = 0.5 * (P[i, j] + P[j, i])

@@ -1,146 +1,71 @@
-"""Equations → printed module → compiled module, kept in the user's cache folder.
+"""Equations → text of a module with one function, ``run``, that runs them over time.
 
-A model runs once on recorded scalars (:mod:`.trace`); its floats stay parameters, so one printed file
-serves every tuning, sampling interval and gain. The file is headed by the text of :mod:`.kernel` and lies
-under the hash of its content; numba keeps the machine code beside it, so only the first run on a machine pays for
-compiling.
+A model runs once on recorded scalars (:mod:`.trace`); its floats stay parameters, so one printed module serves every
+tuning, sampling interval and gain. What is the same for every model is imported from :mod:`.kernel`. A method without
+covariance is a Kalman filter whose error state and measurement are empty.
 """
 
 from __future__ import annotations
 
-import hashlib
-import importlib.util
-import inspect
-import itertools
-import os
-import sys
-import tempfile
-from pathlib import Path
-from types import ModuleType
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
 from ..core.model import Equations, Model, Recurrence, parameters_of, with_parameters
 from ..core.sampling import split
-from . import kernel
-from .sparsity import Part, can_differ_from_zero, find_parts, whole
 from .trace import Tape, print_code
 
-_TICK = '''
-@njit(cache=True, nogil=True, error_model="numpy")
-def run(x, {state}held, started, Z, parameters, poses{outputs}):
-    """All ticks of all sequences of a batch; the state arrays are changed in place."""
-    T, B, d = Z.shape
-    n = x.shape[1]
-    current, present, before, x1, x0 = np.empty(d), np.empty(d), np.empty(d), np.zeros(n), np.zeros(n)
-    {scratch}
-    for t in range(T):
-        for b in range(B):
+_HEAD = """
+from math import *
+
+import numpy as np
+from numba import njit
+
+from poise.filters.compile.cache import jit
+from poise.filters.compile.kernel import begin, correct, fill, keep, propagate, scratch, take
+
+inf, nan = np.inf, np.nan
+
+"""
+
+_INNER = '@njit(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)'
+
+_RUN = '''
+@jit
+def run(x, P, held, started, Z, parameters, poses, covariances, whites, nis):
+    """All ticks of all sequences of a batch; x, P, held and started are changed in place."""
+    vectors, square, measured, lists = scratch(x.shape[1], P.shape[1], whites.shape[2], Z.shape[2])
+    current, present, before, x1, x0, r, dx = vectors
+    P0, F, Q, work = square
+    H, R, S, HP, K = measured
+    every, first, column, rows = lists
+    for t in range(Z.shape[0]):
+        for b in range(Z.shape[1]):
             p = parameters[t if parameters.shape[0] > 1 else 0, b if parameters.shape[1] > 1 else 0]
-            z = Z[t, b]
-            for i in range(d):
-                current[i] = z[i] if np.isfinite(z[i]) else held[b, i]
-                present[i] = current[i] if np.isfinite(current[i]) else 0.0
-                before[i] = held[b, i] if np.isfinite(held[b, i]) else 0.0
-                held[b, i] = current[i]
+            z, state, P1, white = Z[t, b], x[b], P[b], whites[t, b]
+            take(z, held[b], current, present, before)
             if started[b]:
-                {advance}
+                predict(state, present, before, p, x1, F, Q)
+                if P1.shape[0] > 0:
+                    propagate(F, P1, Q, work, every, first, column)
+                    residual(x1, z, p, r, H, R)
+                    nis[t, b] = correct(r, H, R, P1, dx, white, rows, S, HP, K, first, column)
+                retract(x1, dx, p, x0)
+                finish(x0, z, p, state)
             else:
-                {begin}
-            if started[b]:
-                pose(x[b], p, poses[t, b])
-            else:
-                fill(poses[t, b], np.nan)
-            {keep}
+                prior(current, p, x0, P0)
+                nis[t, b] = 0.0
+                fill(white, 0.0)
+                started[b] = begin(x0, P0, state, P1)
+            pose(state, p, poses[t, b])
+            if covariances.shape[0] > 0 or not started[b]:
+                keep(started[b], P1, poses[t, b], covariances, t, b)
 '''
 
-_KALMAN = {
-    "state": "P, ",
-    "outputs": ", covariances, whites, nis",
-    "scratch": """e, m = P.shape[1], whites.shape[2]
-    P0, F, Q, work, dx = np.zeros((e, e)), np.zeros((e, e)), np.zeros((e, e)), np.empty((e, e)), np.empty(e)
-    r, H, R = np.zeros(m), np.zeros((m, e)), np.zeros((m, m))
-    rows, S, HP, K = np.empty(m, np.int64), np.empty((m, m)), np.empty((m, e)), np.empty((m, e))
-    {parts}""",
-    "advance": """predict(x[b], present, before, p, x1, F, Q)
-                residual(x1, z, p, r, H, R)
-                {update}
-                retract(x1, dx, p, x0)
-                finish(x0, z, p, x[b])""",
-    "begin": """prior(current, p, x0, P0)
-                nis[t, b] = 0.0
-                fill(whites[t, b], 0.0)
-                if finite(x0) and finite(P0.ravel()):
-                    started[b] = True
-                    copy(x0, x[b])
-                    for i in range(e):
-                        copy(P0[i], P[b, i])""",
-    "keep": """if covariances.shape[0] > 0:
-                for i in range(e):
-                    for j in range(e):
-                        covariances[t, b, i, j] = P[b, i, j] if started[b] else np.nan""",
-}
 
-_UPDATE = """propagate(F, {P}, Q, work, s{k}, ff{k}, fc{k})
-{indent}{total} correct(r, H, R, {P}, dx, whites[t, b], rows, S, HP, K, s{k}, r{k}, hf{k}, hc{k}, {uncorrelated})"""
-
-_WHOLE = """propagate(F, P[b], Q, work, None, None, None)
-                nis[t, b] = correct(r, H, R, P[b], dx, whites[t, b], rows, S, HP, K, None, None, None, None, False)"""
-
-_RECURRENCE = {
-    "state": "",
-    "outputs": "",
-    "scratch": "",
-    "advance": """predict(x[b], present, before, p, x1)
-                finish(x1, z, p, x[b])""",
-    "begin": """prior(current, p, x0)
-                if finite(x0):
-                    started[b] = True
-                    copy(x0, x[b])""",
-    "keep": "",
-}
-
-
-def _print_parts(parts: list[Part], everything: Part) -> tuple[list[str], dict[str, str]]:
-    """Index lists of the parts (module constants), and what the recursion of a tick does with each part.
-
-    A covariance that links parts (one that the user made) is treated as a whole.
-    """
-    several = len(parts) > 1
-    constants = []
-    for k, part in enumerate(parts if several else []):
-        lists = {"s": part.states, "r": part.rows}
-        for name, lines in (("f", part.transition), ("h", part.jacobian)):
-            lists[f"{name}f"] = (0, *itertools.accumulate(len(line) for line in lines))
-            lists[f"{name}c"] = tuple(itertools.chain.from_iterable(lines))
-        constants += [f"{name}{k} = np.array({list(values)}, dtype=np.int64)" for name, values in lists.items()]
-    if not several:
-        return [], {"parts": "", "update": _WHOLE}
-    owner = [next(k for k, part in enumerate(parts) if i in part.states) for i in everything.states]
-    constants.append(f"owner = np.array({owner}, dtype=np.int64)")
-    steps = ["nis[t, b] = 0.0", "if linked[b]:"]
-    steps += [f"    {line.strip()}" for line in _WHOLE.splitlines()] + ["else:"]
-    for k, part in enumerate(parts):
-        text = _UPDATE.format(k=k, P="local", total="nis[t, b] +=", uncorrelated=part.uncorrelated, indent=" " * 20)
-        steps += [f"    gather(P[b], s{k}, local)", f"    {text}", f"    scatter(local, s{k}, P[b])"]
-    largest = max(len(part.states) for part in parts)
-    scratch = f"""local, linked = np.empty(({largest}, {largest})), np.zeros(B, np.bool_)
-    for b in range(B):
-        linked[b] = coupled(P[b], owner)"""
-    return [*constants, ""], {"parts": scratch, "update": ("\n" + " " * 16).join(steps)}
-
-
-def cache_folder() -> Path:
-    """Folder of the printed and compiled filters (below ``POISE_CACHE`` or the user's cache folder)."""
-    import platformdirs
-
-    folder = Path(os.environ.get("POISE_CACHE") or platformdirs.user_cache_dir("poise")) / "compiled"
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=folder):
-            return folder
-    except OSError:
-        return Path(tempfile.mkdtemp(prefix="poise-compiled-"))
+class UntraceableError(TypeError):
+    """A method of a model that computes something that cannot be recorded."""
 
 
 def print_model(model: Equations) -> str:
@@ -148,70 +73,54 @@ def print_model(model: Equations) -> str:
 
     Raises:
         ValueError: an equation returns another shape than the model's sizes say.
-        TypeError: an equation branches on values.
+        UntraceableError: an equation branches on values, or uses functions that know nothing of traced numbers.
     """
-    tape, template = Tape(), _RECURRENCE
+    tape, kind = Tape(), type(model).__name__
     names = list(parameters_of(model))
     traced = with_parameters(model, dict(zip(names, tape.inputs("p", len(names)), strict=True)))
-    width, n = sum(channel.size for channel in model.channels), model.state_size
-    x = tape.inputs("x", n)
+    width, n, e, m = (sum(c.size for c in model.channels), model.state_size, model.error_size, model.residual_size)
+    x, dx = tape.inputs("x", n), tape.inputs("dx", e)
     z, previous = (split(tape.inputs(name, width), model.channels) for name in ("z", "previous"))
-    shapes: dict[str, tuple[int, ...]] = {"xn": (n,)}
-    functions: dict[str, dict[str, np.ndarray]] = {}
-    if isinstance(traced, Model):
-        e, m = traced.error_size, traced.residual_size
-        shapes |= {"P": (e, e), "F": (e, e), "Q": (e, e), "r": (m,), "H": (m, e), "R": (m, m)}
-        functions["prior(z, p, xn, P)"] = dict(zip(("xn", "P"), traced.prior(z), strict=True))
-        predicted = traced.predict(x, z, previous)
-        functions["predict(x, z, previous, p, xn, F, Q)"] = dict(zip(("xn", "F", "Q"), predicted, strict=True))
-        functions["residual(x, z, p, r, H, R)"] = dict(zip(("r", "H", "R"), traced.residual(x, z), strict=True))
-        functions["retract(x, dx, p, xn)"] = {"xn": traced.retract(x, tape.inputs("dx", e))}
-    elif isinstance(traced, Recurrence):
-        functions["prior(z, p, xn)"] = {"xn": traced.prior(z)}
-        functions["predict(x, z, previous, p, xn)"] = {"xn": traced.predict(x, z, previous)}
-    else:
-        raise TypeError(f"{type(model).__name__} is neither a Model nor a Recurrence")
-    functions["finish(x, z, p, xn)"] = {"xn": traced.finish(x, z)}
-    pose = traced.pose(x)
+    shapes = {"xn": (n,), "P": (e, e), "F": (e, e), "Q": (e, e), "r": (m,), "H": (m, e), "R": (m, m)}
     shapes["out"] = (sum(quantity.size for quantity in model.outputs),)
-    functions["pose(x, p, out)"] = {"out": np.concatenate([pose[quantity.name] for quantity in model.outputs])}
-    head = inspect.getsource(kernel).replace("\ndef ", '\n@njit(error_model="numpy")\ndef ')
-    lines = ["from math import *", "from numba import njit", head, "inf, nan = np.inf, np.nan", ""]
-    matrices: dict[str, np.ndarray] = {}
-    for signature, outputs in functions.items():
-        for name, array in outputs.items():
-            if np.shape(array) != shapes[name]:
-                where = f"{type(model).__name__}.{signature.split('(')[0]}"
-                raise ValueError(f"{where}: {name} must have shape {shapes[name]}, got {np.shape(array)}")
-            matrices[name] = np.asarray(array, dtype=object)
+
+    def posed() -> Any:
+        pose = traced.pose(x)
+        return np.concatenate([pose[quantity.name] for quantity in model.outputs])
+
+    # Signature → the arrays that the function fills, and what gives them (an array or a tuple of arrays).
+    equations: dict[str, tuple[tuple[str, ...], Callable[[], Any]]]
+    if isinstance(traced, Model):
+        equations = {
+            "prior(z, p, xn, P)": (("xn", "P"), lambda: traced.prior(z)),
+            "predict(x, z, previous, p, xn, F, Q)": (("xn", "F", "Q"), lambda: traced.predict(x, z, previous)),
+            "residual(x, z, p, r, H, R)": (("r", "H", "R"), lambda: traced.residual(x, z)),
+            "retract(x, dx, p, xn)": (("xn",), lambda: traced.retract(x, dx)),
+        }
+    elif isinstance(traced, Recurrence):
+        equations = {
+            "prior(z, p, xn, P)": (("xn",), lambda: traced.prior(z)),
+            "predict(x, z, previous, p, xn, F, Q)": (("xn",), lambda: traced.predict(x, z, previous)),
+            "residual(x, z, p, r, H, R)": ((), tuple),
+            "retract(x, dx, p, xn)": (("xn",), lambda: x),
+        }
+    else:
+        raise TypeError(f"{kind} is neither a Model nor a Recurrence")
+    equations["finish(x, z, p, xn)"] = (("xn",), lambda: traced.finish(x, z))
+    equations["pose(x, p, out)"] = (("out",), posed)
+    text = [_HEAD]
+    for signature, (outputs, compute) in equations.items():
+        where = f"{kind}.{signature.split('(')[0]}"
+        try:
+            found = compute()
+        except Exception as reason:  # functions that do not know traced numbers raise whatever they like
+            raise UntraceableError(f"{where}: {reason}") from reason
+        found = found if isinstance(found, tuple) else (found,)
+        arrays = {name: np.asarray(part, dtype=object) for name, part in zip(outputs, found, strict=True)}
+        for name, array in arrays.items():
+            if array.shape != shapes[name]:
+                raise ValueError(f"{where}: {name} must have shape {shapes[name]}, got {array.shape}")
         # Zeros are not printed; matrices keep theirs between calls, vectors share their memory and are cleared.
         clear = [f"    fill({name}, 0.0)" for name in outputs if name in ("xn", "out", "r")]
-        code = print_code({name: np.asarray(array, dtype=object) for name, array in outputs.items()})
-        lines += ['@njit(error_model="numpy")', f"def {signature}:", *clear, *code, "    return", ""]
-    if isinstance(traced, Model):
-        F, Q, P0, H, R = (can_differ_from_zero(matrices[name]) for name in ("F", "Q", "P", "H", "R"))
-        constants, texts = _print_parts(find_parts(F, Q, P0, H, R), whole(F, H, R))
-        lines += constants
-        template = {name: text.format(**texts) for name, text in _KALMAN.items()}
-    return "\n".join([*lines, _TICK.format(**template)])
-
-
-def load(text: str, label: str) -> ModuleType:
-    """Write a printed module to the cache folder (once) and import it."""
-    import numba
-
-    digest = hashlib.sha256(f"{numba.__version__} {np.__version__} {sys.version}\n{text}".encode()).hexdigest()[:20]
-    path = cache_folder() / f"{label}_{digest}.py"
-    if not path.exists():
-        handle, temporary = tempfile.mkstemp(dir=path.parent, suffix=".tmp")
-        with os.fdopen(handle, "w", encoding="utf-8") as file:
-            file.write(text)
-        os.replace(temporary, path)
-    name = f"poise_compiled_{path.stem}"
-    spec = importlib.util.spec_from_file_location(name, path)
-    if spec is None or spec.loader is None:
-        raise ImportError(f"cannot load the compiled filter {path}")
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module
-    spec.loader.exec_module(module)
-    return module
+        text += [_INNER, f"def {signature}:", *clear, *print_code(arrays), "    return", "", ""]
+    return "\n".join([*text, _RUN.lstrip("\n")])

@@ -153,6 +153,13 @@ class Expression:
         array[()] = self
         return array[key]
 
+    def __eq__(self, other: object) -> bool:
+        if self is other:
+            return True
+        raise TypeError("model code must not compare values: use xp.where, xp.greater, xp.less, xp.isfinite …")
+
+    __hash__ = object.__hash__
+
     def __len__(self) -> int:
         raise TypeError("a traced scalar has no length")
 
@@ -313,6 +320,8 @@ class TracedNamespace:
         return np.eye(size).astype(object)
 
 
+LARGEST_DEPTH = 8
+"""Nested operations in one printed line."""
 INFIX = {"+", "-", "*", "/", ">", ">=", "<", "<=", "and", "or"}
 
 
@@ -327,49 +336,55 @@ def print_code(outputs: dict[str, np.ndarray], *, indent: str = "    ") -> list[
     Returns:
         Lines of code that use ``sin``, ``sqrt`` … of ``math`` and ``isfinite`` by these names.
     """
+    uses: dict[int, int] = {}
     live: dict[int, Expression] = {}
     pending = [item for array in outputs.values() for item in array.ravel() if isinstance(item, Expression)]
     while pending:
         node = pending.pop()
+        uses[node.index] = uses.get(node.index, 0) + 1
         if node.index not in live:
             live[node.index] = node
             pending.extend(operand for operand in node.operands if isinstance(operand, Expression))
+    # What is used once is written where it is used, up to a depth that parsers like: fewer variables compile faster.
+    texts: dict[int, tuple[str, int]] = {}
     lines = []
     for index in sorted(live):
         node = live[index]
-        if node.operation not in ("input", "constant"):
-            lines.append(f"{indent}v{index} = {_formula(node)}")
+        operands = [texts[part.index] if isinstance(part, Expression) else (part, 0) for part in node.operands]
+        formula = _formula(node.operation, [text for text, _ in operands])
+        depth = 1 + max((level for _, level in operands), default=0)
+        if node.operation == "constant" or (uses[index] == 1 and depth < LARGEST_DEPTH):
+            texts[index] = formula, depth
+        else:
+            lines.append(f"{indent}v{index} = {formula}")
+            texts[index] = f"v{index}", 0
     for name, array in outputs.items():
         for position in np.ndindex(array.shape):
             item = array[position]
             number = item.value if isinstance(item, Expression) else float(item)
             if number != 0.0:
-                lines.append(f"{indent}{name}[{', '.join(map(str, position))}] = {_name(item)}")
+                text = texts[item.index][0] if isinstance(item, Expression) else _number(float(item))
+                lines.append(f"{indent}{name}[{', '.join(map(str, position))}] = {text}")
     return lines
-
-
-def _name(item: Any) -> str:
-    if not isinstance(item, Expression):
-        return _number(float(item))
-    if item.operation == "constant":
-        return _number(float(item.operands[0]))
-    return item.operands[0] if item.operation == "input" else f"v{item.index}"
 
 
 def _number(value: float) -> str:
     return repr(value) if math.isfinite(value) else ("nan" if math.isnan(value) else "inf" if value > 0 else "-inf")
 
 
-def _formula(node: Expression) -> str:
-    operands = [_name(operand) if isinstance(operand, Expression) else operand for operand in node.operands]
-    if node.operation in INFIX:
-        return f"{operands[0]} {node.operation} ({operands[1]})"
-    if node.operation == "neg":
-        return f"-({operands[0]})"
-    if node.operation == "not":
-        return f"not {operands[0]}"
-    if node.operation == "**":
-        return f"({operands[0]})**{operands[1]}"
-    if node.operation == "where":
-        return f"{operands[1]} if {operands[0]} else {operands[2]}"
-    return f"{node.operation}({', '.join(operands)})"
+def _formula(operation: str, operands: list[str]) -> str:
+    if operation == "input":
+        return operands[0]
+    if operation == "constant":
+        return _number(float(operands[0]))
+    if operation in INFIX:
+        return f"({operands[0]} {operation} {operands[1]})"
+    if operation == "neg":
+        return f"(-{operands[0]})"
+    if operation == "not":
+        return f"(not {operands[0]})"
+    if operation == "**":
+        return f"({operands[0]}**{operands[1]})"
+    if operation == "where":
+        return f"({operands[1]} if {operands[0]} else {operands[2]})"
+    return f"{operation}({', '.join(operands)})"

@@ -52,8 +52,9 @@ class Equations:
     A float parameter may be an array ``(*batch,)``: use :func:`.expand` where it scales a matrix.
 
     Attributes of the class: ``channels``, what is read; ``outputs``, the quantities of ``pose``; ``state_size`` n, the
-    numbers in the state; ``gains``, name → :class:`Gain`; ``error_parts``, quantity → (start, stop) of its part of the
-    error state, if it has one (of a rotation: in world axes).
+    numbers in the state; ``error_size`` e and ``residual_size`` m, zero without covariance; ``gains``, name →
+    :class:`Gain`; ``error_parts``, quantity → (start, stop) of its part of the error state, if it has one (of a
+    rotation: in world axes).
     """
 
     dt: float = 0.01
@@ -62,6 +63,8 @@ class Equations:
     channels: ClassVar[tuple[Channel, ...]]
     outputs: ClassVar[tuple[Quantity, ...]]
     state_size: ClassVar[int]
+    error_size: ClassVar[int] = 0
+    residual_size: ClassVar[int] = 0
     gains: ClassVar[Mapping[str, Gain]] = {}
     error_parts: ClassVar[Mapping[str, tuple[int, int]]] = {}
 
@@ -129,11 +132,7 @@ class Model(Equations):
     """Equations of a Kalman filter with state x (``n`` numbers) and error state (``e`` numbers).
 
     Subclasses write ``prior``, ``predict``, ``residual`` and ``pose``; ``retract`` and ``finish`` have defaults.
-    Further attributes of the class: ``error_size`` e, ``residual_size`` m.
     """
-
-    error_size: ClassVar[int]
-    residual_size: ClassVar[int]
 
     def prior(self, z: Measurement) -> tuple[Array, Array]:
         """State ``(..., n)`` and covariance ``(..., e, e)`` from the first samples; NaN while they do not suffice."""

@@ -1,21 +1,34 @@
-"""What every recursion does with samples: split channels, hold the last one, wait for the first.
-
-Shared by the Kalman filter and the observers, so that a drop-out means the same everywhere.
-"""
+"""The memory of a recursion, and what it does with samples: split channels, hold the last one, wait for the first."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from .backend import Array, constant, is_torch, namespace, stack_channels, to_numpy
-from .model import E, Gain, parameters_of, with_parameters
+from .model import E, Equations, Gain, parameters_of, with_parameters
 from .quantity import Channel, Measurement
 
 Gains = Mapping[str, Any]
 """Gain name → log factor: a number or ``(*batch,)``; over a sequence also ``(T,)`` or ``(T, *batch)``."""
+
+
+class FilterState(NamedTuple):
+    """All memory of a filter or observer; arrays only, so copying them is saving it.
+
+    Attributes:
+        x: ``(*batch, n)`` state; zeros before the start.
+        covariance: ``(*batch, e, e)`` of the error state; e is 0 for an observer.
+        held: ``(*batch, d)`` last finite sample of every channel element, NaN if there was none.
+        started: ``(*batch,)`` bool.
+    """
+
+    x: Array
+    covariance: Array
+    held: Array
+    started: Array
 
 
 def split(sample: Array, channels: tuple[Channel, ...]) -> dict[str, Array]:
@@ -44,22 +57,22 @@ def filled(sample: Array) -> Array:
     return xp.where(xp.isfinite(sample), sample, xp.zeros_like(sample))
 
 
-def empty_memory(like: Array, *shapes: tuple[int, ...]) -> tuple[Array, ...]:
-    """Fresh arrays for a recursion over samples ``like`` ``(*batch, d)``.
-
-    Returns:
-        One array of zeros ``(*batch, *shape)`` for each of ``shapes``, then the held sample (NaN) and the flags
-        ``started`` (False).
-    """
+def zeros(like: Array, *shape: int) -> Array:
+    """Fresh zeros ``(*batch, *shape)`` for samples ``like`` ``(*batch, d)``."""
     xp, batch = namespace(like), tuple(like.shape[:-1])
-    zero = xp.zeros_like(like[..., :1])
-    copy = (lambda array: array.clone()) if is_torch(like) else np.array
-    arrays = []
-    for shape in shapes:
-        zeros = xp.reshape(zero, (*batch, *(1,) * len(shape)))
-        arrays.append(copy(xp.broadcast_to(zeros, (*batch, *shape))))
-    started = xp.greater(zero[..., 0], 0.5)
-    return (*arrays, copy(xp.zeros_like(like) + xp.nan), copy(started))
+    zero = xp.reshape(xp.zeros_like(like[..., :1]), (*batch, *(1,) * len(shape)))
+    array = xp.broadcast_to(zero, (*batch, *shape))
+    return array.clone() if is_torch(like) else np.array(array)
+
+
+def empty_state(model: Equations, like: Array) -> FilterState:
+    """Memory before the first sample, of the batch shape and kind of samples ``like`` ``(*batch, d)``."""
+    e = model.error_size
+    held = zeros(like, like.shape[-1]) + namespace(like).nan
+    started = zeros(like) > 0.5
+    return FilterState(
+        zeros(like, model.state_size), zeros(like, e, e), held, started if is_torch(like) else np.array(started)
+    )
 
 
 def check_batch(arrays: Measurement, started: Array) -> None:

@@ -1,4 +1,4 @@
-"""Printing, compiling and caching of equations; equality with the array form is in test_contracts."""
+"""Printing and running of equations; equality with the array form is in test_contracts."""
 
 import os
 import pickle
@@ -12,7 +12,7 @@ import pytest
 
 from poise.filters.compile import kernel
 from poise.filters.compile import run as compiled
-from poise.filters.compile.printer import cache_folder, print_model
+from poise.filters.compile.printer import print_model
 from poise.filters.core.backend import constant
 from poise.filters.core.kalman import KalmanFilter, correct
 from poise.filters.core.model import Model, parameters_of, structure_of
@@ -28,8 +28,8 @@ def measurements():
 
 
 def test_tunings_share_one_compiled_form(measurements):
-    one = compiled.compiled_model(ExternalAcceleration())
-    assert compiled.compiled_model(ExternalAcceleration(c_a=0.3, dt=0.02)) is one
+    one = compiled.compiled_equations(ExternalAcceleration())
+    assert compiled.compiled_equations(ExternalAcceleration(c_a=0.3, dt=0.02)) is one
     assert structure_of(ExternalAcceleration(mode=3)) != structure_of(ExternalAcceleration())
     for c_a in (0.0, 0.3):
         kalman = KalmanFilter(ExternalAcceleration(c_a=c_a))
@@ -43,7 +43,7 @@ def test_threads_do_not_change_the_numbers(measurements, monkeypatch):
     kalman = KalmanFilter(ExternalAcceleration())
     alone = kalman.run(measurements)
     monkeypatch.setattr(compiled, "PARALLEL_WORK", 1)
-    monkeypatch.setattr(compiled, "PROCESSORS", 3)
+    monkeypatch.setattr(compiled, "available_threads", lambda: 3)
     shared = kalman.run(measurements, {"measurement": np.zeros((50, 4))})
     for one, other in zip((alone.pose["up"], *alone[1:]), (shared.pose["up"], *shared[1:]), strict=True):
         np.testing.assert_array_equal(one, other)
@@ -69,43 +69,37 @@ def test_the_kernel_is_the_array_form_also_with_rows_left_out():
         outputs = np.empty(e), np.empty(m)
         covariance = P.copy()
         scratch = np.empty(m, np.int64), np.empty((m, m)), np.empty((m, e)), np.empty((m, e))
-        # every element of H and R counts: one part
-        part = np.arange(e), np.arange(m), e * np.arange(m + 1), np.tile(np.arange(e), m), False
-        nis = kernel.correct(r, H, R, covariance, *outputs, *scratch, *part)
+        lists = np.empty(e + 1, np.int64), np.empty(m * e, np.int64)
+        nis = kernel.correct(r, H, R, covariance, *outputs, *scratch, *lists)
         np.testing.assert_allclose(covariance, expected, rtol=0, atol=1e-12)
         np.testing.assert_allclose(outputs[0], dx, rtol=0, atol=1e-12)
         np.testing.assert_allclose(outputs[1], white, rtol=0, atol=1e-12)
         assert nis == pytest.approx(np.sum(white**2), abs=1e-12)
 
 
-def test_the_printed_file_is_cached_under_its_content(tmp_path, monkeypatch, measurements):
-    monkeypatch.setenv("POISE_CACHE", str(tmp_path))
-    assert cache_folder() == tmp_path / "compiled"
-    text = print_model(ExternalAcceleration())
-    assert text == print_model(ExternalAcceleration(c_a=0.5))
-    compile(text, "printed", "exec")
-    blocked = tmp_path / "file"
-    blocked.write_text("")
-    monkeypatch.setenv("POISE_CACHE", str(blocked))
-    assert cache_folder().is_dir()
+def test_zeros_that_are_skipped_change_nothing():
+    generator = np.random.default_rng(2)
+    e = 6
+    root = generator.standard_normal((e, e))
+    P, Q = root @ root.T, np.diag(generator.random(e))
+    F = np.where(generator.random((e, e)) < 0.4, generator.standard_normal((e, e)), 0.0)
+    moved = P.copy()
+    lists = np.arange(e), np.empty(e + 1, np.int64), np.empty(e * e, np.int64)
+    kernel.propagate(F, moved, Q, np.empty((e, e)), *lists)
+    np.testing.assert_allclose(moved, F @ P @ F.T + Q, rtol=0, atol=1e-12)
 
 
-def test_without_numba_the_array_form_serves_with_one_hint():
-    code = """
-import sys, warnings
-sys.modules["numba"] = None
-import numpy as np
-from poise.filters.imu.external_acceleration import ExternalAcceleration
-from poise.filters.core.kalman import KalmanFilter
-with warnings.catch_warnings(record=True) as caught:
-    warnings.simplefilter("always")
-    for mode in (1, 2):
-        up = KalmanFilter(ExternalAcceleration(mode=mode)).run(
-            {"imu/gyr": np.zeros((3, 3)), "imu/acc": np.tile([0.0, 0.0, 9.8], (3, 1))}).pose["up"]
-assert np.allclose(up, [0, 0, 1])
-assert len([w for w in caught if "numba" in str(w.message)]) == 1, caught
-"""
-    subprocess.run([sys.executable, "-c", code], check=True, env={**os.environ})
+@pytest.mark.parametrize(
+    ("environment", "expected"),
+    [({}, 2), ({"OMP_NUM_THREADS": "1"}, 1), ({"NUMBA_NUM_THREADS": "1"}, 1), ({"OMP_NUM_THREADS": "8"}, 2)],
+)
+def test_threads_are_those_that_the_process_may_use(environment, expected, monkeypatch):
+    monkeypatch.setattr(os, "sched_getaffinity", lambda process: {3, 5}, raising=False)
+    for name in ("OMP_NUM_THREADS", "NUMBA_NUM_THREADS"):
+        monkeypatch.delenv(name, raising=False)
+    for name, value in environment.items():
+        monkeypatch.setenv(name, value)
+    assert compiled.available_threads() == expected
 
 
 @dataclass(frozen=True)

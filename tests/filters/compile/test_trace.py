@@ -73,7 +73,7 @@ def test_zeros_and_ones_are_folded_and_equal_operations_are_recorded_once():
 def test_numbers_that_meet_on_a_tape_are_computed_at_once():
     tape = Tape()
     two, three = tape.constant(2.0), tape.constant(3.0)
-    results = {
+    results = {  # hashed by identity
         two + three: 5.0,
         two - three: -1.0,
         two * three: 6.0,

@@ -1,0 +1,136 @@
+"""Where compiled code is kept: the folder, the compiler that writes to it, and modules whose text lies in it.
+
+The folder is ``compiled`` below the one that the environment variable ``POISE_CACHE`` names, or below the user's cache
+folder. Machine code is stored with a checksum, so that a damaged file is compiled anew. Where no folder can be written,
+everything is compiled in memory, at every start, after one warning.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import importlib
+import os
+import pickle
+import sys
+import tempfile
+import threading
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+_LOCK = threading.RLock()
+_WARNED: set[Path] = set()
+PATIENCE = 1.0
+"""s of compiling after which a line on standard error says what takes so long"""
+
+
+def cache_folder() -> Path | None:
+    """Folder of the printed and compiled filters; None, with one warning, where it cannot be written."""
+    import platformdirs
+
+    folder = Path(os.environ.get("POISE_CACHE") or platformdirs.user_cache_dir("poise")) / "compiled"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            return folder
+    except OSError as reason:
+        if folder not in _WARNED:
+            _WARNED.add(folder)
+            warnings.warn(
+                f"compiled filters cannot be kept in {folder} ({reason}): they are compiled anew at every start. "
+                "Set the environment variable POISE_CACHE to a folder that can be written",
+                stacklevel=2,
+            )
+        return None
+
+
+def jit(function: Callable[..., Any]) -> Any:
+    """The function compiled by numba on first use, kept in :func:`cache_folder`."""
+    numba: Any = importlib.import_module("numba")
+    options = {"nogil": True, "error_model": "numpy"}
+    folder = cache_folder()
+    if folder is None:
+        return numba.njit(**options)(function)
+    with _LOCK:
+        # numba reads the place when it decorates; other code that uses numba keeps its own.
+        before, numba.config.CACHE_DIR = numba.config.CACHE_DIR, str(folder)
+        try:
+            compiled = numba.njit(cache=True, **options)(function)
+        finally:
+            numba.config.CACHE_DIR = before
+    files = compiled._cache._cache_file
+    files.__class__ = _checked(type(files))
+    return compiled
+
+
+def _checked(files: Any) -> type:
+    """Numba's index and data files with a checksum; what does not match it counts as not there."""
+
+    class Checked(files):
+        def _load_index(self) -> dict[Any, str]:
+            try:
+                return dict(super()._load_index())
+            except Exception:  # whatever unpickling a damaged file raises
+                return {}
+
+        def _save_data(self, name: str, data: Any) -> None:
+            content = self._dump(data)
+            with self._open_for_write(self._data_path(name)) as file:
+                file.write(hashlib.sha256(content).digest() + content)
+
+        def _load_data(self, name: str) -> Any:
+            content = Path(self._data_path(name)).read_bytes()
+            if hashlib.sha256(content[32:]).digest() != content[:32]:
+                raise OSError(f"{name} is damaged")
+            return pickle.loads(content[32:])
+
+    return Checked
+
+
+def load(text: str, label: str) -> ModuleType:
+    """Import a printed module; its text lies in the cache folder, under the hash of it and of what it is built on."""
+    import numba
+
+    versions = f"{numba.__version__} {np.__version__} {sys.version}"
+    foundation = Path(__file__).with_name("kernel.py").read_text(encoding="utf-8")
+    name = f"{label}_{hashlib.sha256(f'{versions}{foundation}{text}'.encode()).hexdigest()[:20]}"
+    folder = cache_folder()
+    path = f"<{name}>" if folder is None else str(_written(folder / f"{name}.py", text))
+    module = ModuleType(f"poise_compiled_{name}")
+    module.__file__ = path
+    sys.modules[module.__name__] = module
+    exec(compile(text, path, "exec"), module.__dict__)
+    return module
+
+
+def _written(path: Path, text: str) -> Path:
+    """The path, with exactly this text in it."""
+    if not path.exists() or path.read_bytes() != text.encode():
+        handle, temporary = tempfile.mkstemp(dir=path.parent, suffix=".tmp")
+        with os.fdopen(handle, "w", encoding="utf-8") as file:
+            file.write(text)
+        os.replace(temporary, path)
+    return path
+
+
+def compile_now(function: Any, arguments: tuple[Any, ...], label: str) -> None:
+    """Compile a function of :func:`jit` for the types of ``arguments`` by calling it; say so if that takes long."""
+    done = threading.Event()
+
+    def tell() -> None:
+        while not done.wait(PATIENCE):
+            if function.stats.cache_misses:  # what is found in the cache needs no word
+                folder = cache_folder()
+                kept = "not kept, as no cache folder can be written" if folder is None else f"once; kept in {folder}"
+                print(f"poise: compiling {label} for this machine ({kept})", file=sys.stderr, flush=True)
+                return
+
+    threading.Thread(target=tell, daemon=True).start()
+    try:
+        function(*arguments)
+    finally:
+        done.set()

@@ -1,0 +1,232 @@
+"""The recursion around equations: what Kalman filters and observers do with samples, alike in every form.
+
+Whatever the equations, four things hold here and nowhere else:
+
+* a row of a measurement that is not finite (no sample, drop-out, out of range) corrects nothing;
+* a missing sample of an input (a gyroscope, say) is replaced by the channel's last one;
+* an estimator starts by itself at the first tick at which its prior is finite; estimates before are NaN;
+* gains, log factors on named constants, may change at every tick; all zeros is exactly the published tuning.
+
+NumPy data run through the compiled form (:mod:`poise.filters.compile.run`). The array form below is its definition, the
+one that gradients flow through, and what equations run in that cannot be traced.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, Self
+
+import numpy as np
+
+from ..compile.run import compiled_equations
+from .backend import Array, constant, is_torch, namespace
+from .estimator import check_measurements, stack_estimates
+from .model import Gain, Model, Recurrence
+from .quantity import Channel, Estimate, Measurement, Quantity
+from .sampling import (
+    FilterState,
+    Gains,
+    check_batch,
+    check_gains,
+    empty_state,
+    filled,
+    hold,
+    join,
+    per_tick_gains,
+    scaled,
+    split,
+)
+
+
+@dataclass(frozen=True)
+class Recursion:
+    """Equations made an estimator: what :class:`.KalmanFilter` and :class:`.Observer` share.
+
+    Attributes:
+        model: the equations and their parameters.
+        compiled: use the traced and compiled form for NumPy data.
+    """
+
+    model: Model | Recurrence
+    compiled: bool = True
+
+    @property
+    def dt(self) -> float:
+        """Sampling interval, s."""
+        return self.model.dt
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        """What it reads."""
+        return self.model.channels
+
+    @property
+    def outputs(self) -> tuple[Quantity, ...]:
+        """What it gives."""
+        return self.model.outputs
+
+    @property
+    def gains(self) -> Mapping[str, Gain]:
+        """Constants that may be scaled at every tick."""
+        return self.model.gains
+
+    @property
+    def _keeps_covariance(self) -> bool:
+        return False
+
+    def with_dt(self, dt: float) -> Self:
+        """The same for another sampling interval."""
+        return replace(self, model=self.model.with_dt(dt))
+
+    def init(self, measurement: Measurement) -> FilterState:
+        """Empty memory with the batch shape and array kind of ``measurement`` (no sample is used up)."""
+        arrays = check_measurements(self.channels, measurement, time_axis=False)
+        return empty_state(self.model, join(arrays, self.channels))
+
+    def step(
+        self, state: FilterState, measurement: Measurement, gains: Gains | None = None
+    ) -> tuple[FilterState, Estimate]:
+        """Take one sample of every channel, ``(*batch, size)``; NaN where there is none.
+
+        Args:
+            state: from :meth:`init` or the step before; it is not changed.
+            measurement: the samples.
+            gains: log factors for this tick.
+
+        Raises:
+            ValueError: a channel is missing or has a wrong shape, a gain is unknown, or the state belongs to another
+                batch.
+        """
+        arrays = check_measurements(self.channels, measurement, time_axis=False)
+        check_batch(arrays, state.started)
+        check_gains(self.gains, gains, type(self.model).__name__)
+        if self.compiled and not is_torch(state.x):
+            form = compiled_equations(self.model)
+            return form.step(self.model, state, arrays, gains) if form else self._step_each(state, arrays, gains)
+        return self._step_arrays(state, arrays, gains)
+
+    def run(self, measurements: Mapping[str, Any], gains: Gains | None = None) -> Estimate:
+        """Estimates of a whole sequence, ``(T, *batch, size)`` in and out; equal to stepping.
+
+        Args:
+            measurements: channel → ``(T, *batch, size)``; NaN where there is no sample.
+            gains: log factors, constant or per tick.
+        """
+        estimate, _ = self.run_from(None, measurements, gains)
+        return estimate
+
+    def run_from(
+        self, state: FilterState | None, measurements: Mapping[str, Any], gains: Gains | None = None
+    ) -> tuple[Estimate, FilterState]:
+        """As :meth:`run`, but going on from ``state`` (None: from the start) and giving the last state too."""
+        arrays = check_measurements(self.channels, measurements, time_axis=True)
+        check_gains(self.gains, gains, type(self.model).__name__)
+        first = {name: array[0] for name, array in arrays.items()}
+        if state is None:
+            state = empty_state(self.model, join(first, self.channels))
+        check_batch(first, state.started)
+        step, length = self._step_arrays, next(iter(arrays.values())).shape[0]
+        if self.compiled and not is_torch(state.x):
+            form = compiled_equations(self.model)
+            if form:
+                return form.run(self.model, state, arrays, gains, self._keeps_covariance)
+            step = self._step_each
+        factors, estimates = per_tick_gains(gains, length), []
+        for t in range(length):
+            now = {name: factor[t] for name, factor in factors.items()}
+            state, estimate = step(state, {name: array[t] for name, array in arrays.items()}, now)
+            estimates.append(estimate if self._keeps_covariance else estimate._replace(covariance=None))
+        return stack_estimates(estimates), state
+
+    def _step_each(self, state: FilterState, arrays: Measurement, gains: Gains | None) -> tuple[FilterState, Estimate]:
+        """One tick of every sequence by itself, for equations whose code depends on values."""
+        batch = tuple(state.started.shape)
+        if not batch:
+            return self._step_arrays(state, arrays, gains)
+        factors = {name: np.broadcast_to(factor, batch) for name, factor in (gains or {}).items()}
+        states, estimates = [], []
+        for index in np.ndindex(batch):
+            own = FilterState(*(array[index] for array in state))
+            sample = {name: array[index] for name, array in arrays.items()}
+            own, estimate = self._step_arrays(own, sample, {name: factor[index] for name, factor in factors.items()})
+            states.append(own)
+            estimates.append(estimate)
+        parts = (np.stack(part) for part in zip(*states, strict=True))
+        joined = FilterState(*(part.reshape((*batch, *part.shape[1:])) for part in parts))
+        estimate = stack_estimates(estimates)
+        pose = {name: array.reshape((*batch, *array.shape[1:])) for name, array in estimate.pose.items()}
+        rest = (None if part is None else part.reshape((*batch, *part.shape[1:])) for part in estimate[1:])
+        return joined, Estimate(pose, *rest)
+
+    def _step_arrays(
+        self, state: FilterState, arrays: Measurement, gains: Gains | None
+    ) -> tuple[FilterState, Estimate]:
+        model = scaled(self.model, gains, state.x)
+        sample = join(arrays, self.channels)
+        xp = namespace(sample, state.x)
+        current, started, samples = hold(sample, state.held), state.started, split(sample, self.channels)
+        whitened = xp.zeros_like(state.x[..., :1]) + constant([0.0] * model.residual_size, state.x)
+        x, P = state.x, state.covariance
+        if bool(xp.any(started)):
+            now, before = (split(filled(part), self.channels) for part in (current, state.held))
+            if isinstance(model, Model):
+                x1, F, Q = model.predict(x, now, before)
+                P1 = F @ P @ F.mT + 0.5 * (Q + Q.mT)
+                dx, P1, whitened = correct(P1, *model.residual(x1, samples))
+                x1 = model.retract(x1, dx)
+            else:
+                x1, P1 = model.predict(x, now, before), P
+            x1 = model.finish(x1, samples)
+            if bool(xp.all(started)):
+                x, P = x1, P1
+            else:
+                x = xp.where(started[..., None], x1, x)
+                P = xp.where(started[..., None, None], P1, P)
+                whitened = xp.where(started[..., None], whitened, xp.zeros_like(whitened))
+        if not bool(xp.all(started)):
+            first = model.prior(split(current, self.channels))
+            x0, P0 = first if isinstance(model, Model) else (first, P)
+            P0 = P0 + xp.zeros_like(P)
+            ready = xp.all(xp.isfinite(x0), axis=-1) & xp.all(xp.all(xp.isfinite(P0), axis=-1), axis=-1)
+            new = ready & ~started
+            x = xp.where(new[..., None], x0, x)
+            P = xp.where(new[..., None, None], P0, P)
+            started = started | ready
+        pose, covariance = model.pose(x), P
+        if not bool(xp.all(started)):
+            pose = {name: xp.where(started[..., None], value, value + xp.nan) for name, value in pose.items()}
+            covariance = xp.where(started[..., None, None], P, P + xp.nan)
+        after = FilterState(x, P, current, started)
+        if not isinstance(model, Model):
+            return after, Estimate(pose)
+        return after, Estimate(pose, covariance, whitened, xp.sum(whitened * whitened, axis=-1))
+
+
+def correct(P: Array, r: Array, H: Array, R: Array) -> tuple[Array, Array, Array]:
+    """Condition on one measurement; rows with anything not finite are left out.
+
+        S = H P Hᵀ + R,   K = P Hᵀ S⁻¹,   P⁺ = (I − K H) P (I − K H)ᵀ + K R Kᵀ,   dx = K r
+
+    Args:
+        P: ``(..., e, e)`` covariance before.
+        r: ``(..., m)`` measured minus expected.
+        H: ``(..., m, e)`` Jacobian of the expectation with respect to the error state.
+        R: ``(..., m, m)`` measurement covariance.
+
+    Returns:
+        ``dx`` ``(..., e)``, ``P⁺``, and the whitened innovation ``L⁻¹ r`` ``(..., m)`` with ``S = L Lᵀ``.
+    """
+    xp = namespace(P, r)
+    usable = xp.isfinite(r) & xp.all(xp.isfinite(H), axis=-1) & xp.isfinite(xp.linalg.diagonal(R))
+    unit = constant(np.eye(r.shape[-1]), P)
+    r = xp.where(usable, r, xp.zeros_like(r))
+    H = xp.where(usable[..., None], H, xp.zeros_like(H))
+    R = xp.where(usable[..., None] & usable[..., None, :], 0.5 * (R + R.mT), unit + 0.0 * P[..., :1, :1])
+    S = H @ P @ H.mT + R
+    L = xp.linalg.cholesky(S)
+    K = xp.linalg.solve(S, H @ P).mT
+    A = constant(np.eye(P.shape[-1]), P) - K @ H
+    joseph = A @ P @ A.mT + K @ R @ K.mT
+    whitened = xp.linalg.solve(L, r[..., None])[..., 0]
+    return (K @ r[..., None])[..., 0], 0.5 * (joseph + joseph.mT), whitened

@@ -1,0 +1,95 @@
+"""What is kept of compiled filters, and what happens where it is damaged or cannot be kept."""
+
+from __future__ import annotations
+
+import os
+import stat
+import tempfile
+import warnings
+from pathlib import Path
+
+import pytest
+
+from poise.filters.compile import cache
+
+TEXT = """
+from poise.filters.compile.cache import jit
+
+@jit
+def run(x):
+    return 2.0 * x
+"""
+
+
+def compiled(folder: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[int, int]:
+    """Load and call a function as a new process would; hits and misses of the cache."""
+    monkeypatch.setenv("POISE_CACHE", str(folder))
+    module = cache.load(TEXT, "double")
+    cache.compile_now(module.run, (0.0,), "double")
+    assert module.run(3.0) == 6.0
+    return len(module.run.stats.cache_hits), len(module.run.stats.cache_misses)
+
+
+def test_a_line_tells_what_takes_long_and_only_then(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(cache, "PATIENCE", 1e-3)
+    assert compiled(tmp_path, monkeypatch) == (0, 1)
+    told = capsys.readouterr().err
+    assert told.count("\n") == 1
+    assert "compiling double" in told
+    assert str(tmp_path) in told
+    assert compiled(tmp_path, monkeypatch) == (1, 0)
+    assert capsys.readouterr().err == ""
+
+
+@pytest.mark.parametrize("damage", ["cut", "empty", "garbage", "flipped"])
+@pytest.mark.parametrize("suffix", [".py", ".nbi", ".nbc"])
+def test_a_damaged_entry_is_made_anew(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, suffix: str, damage: str
+) -> None:
+    compiled(tmp_path, monkeypatch)
+    (path,) = (path for path in (tmp_path / "compiled").rglob(f"double*{suffix}"))
+    content = path.read_bytes()
+    middle = len(content) // 2
+    path.write_bytes(
+        {
+            "cut": content[:middle],
+            "empty": b"",
+            "garbage": b"garbage",
+            "flipped": content[:middle] + bytes([content[middle] ^ 255]) + content[middle + 1 :],
+        }[damage]
+    )
+    compiled(tmp_path, monkeypatch)
+    assert compiled(tmp_path, monkeypatch) == (1, 0)
+    if suffix == ".py":
+        assert path.read_bytes() == content
+
+
+def test_without_a_folder_there_is_one_warning_and_nothing_is_left(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    blocked, temporary = tmp_path / "file", tmp_path / "temporary"
+    blocked.write_text("")
+    temporary.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(temporary))
+    with pytest.warns(UserWarning, match="POISE_CACHE") as caught:
+        assert compiled(blocked, monkeypatch) == (0, 1)
+    assert len(caught) == 1
+    assert list(temporary.iterdir()) == []
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["file", "temporary"]
+
+
+@pytest.mark.skipif(os.name != "posix" or os.geteuid() == 0, reason="root may write everywhere")
+def test_a_folder_without_permission_counts_as_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    tmp_path.chmod(stat.S_IRUSR | stat.S_IXUSR)
+    monkeypatch.setenv("POISE_CACHE", str(tmp_path))
+    with pytest.warns(UserWarning, match="POISE_CACHE"):
+        assert cache.cache_folder() is None
+
+
+def test_the_folder_is_below_the_variable(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("POISE_CACHE", str(tmp_path / "new"))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert cache.cache_folder() == tmp_path / "new" / "compiled"
