@@ -70,7 +70,8 @@ class Equations:
 
     def __post_init__(self) -> None:
         """Refuse parameters that are not finite numbers, choices that there are not, and intervals of no length."""
-        for name, hint in annotations_of(type(self)).items():
+        kind: Any = type(self)
+        for name, hint in annotations_of(kind).items():
             if get_origin(hint) is Literal and getattr(self, name) not in get_args(hint):
                 raise ValueError(f"{name} must be one of {get_args(hint)}, got {getattr(self, name)!r}")
         for field in fields(self):

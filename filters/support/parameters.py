@@ -85,8 +85,8 @@ def number_refused(name: str, value: Any) -> str:
     if isinstance(value, bool | np.bool_) or not isinstance(value, Real) or not abs(float(value)) <= LARGEST:
         return f"a finite number (at most {LARGEST:g} in magnitude)"
     if POSITIVE.search(name) or MEASURED.match(name):
-        return "" if value > 0 else "above 0"
-    return "" if value >= 0 or not NOT_NEGATIVE.search(name) else "0 or above"
+        return "" if float(value) > 0.0 else "above 0"
+    return "" if float(value) >= 0.0 or not NOT_NEGATIVE.search(name) else "0 or above"
 
 
 def tuple_refused(name: str, value: Any, parts: tuple[Any, ...], default: Any) -> str:
