@@ -7,7 +7,7 @@ import json
 import re
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, is_dataclass
 from pathlib import Path
 from typing import Any
 
@@ -213,9 +213,11 @@ def compute(path: Path, key: dict[str, Any], function: Callable[..., Any], job: 
 
 
 def as_list(value: Any) -> Any:
-    """What JSON does not know by itself: arrays and numbers of NumPy."""
+    """What JSON does not know by itself: arrays and numbers of NumPy, dataclasses."""
     if isinstance(value, np.ndarray | np.generic):
         return value.tolist()
+    if is_dataclass(value) and not isinstance(value, type):
+        return asdict(value)
     raise TypeError(f"a result must be made of numbers, texts, lists and mappings, got {type(value).__name__}")
 
 

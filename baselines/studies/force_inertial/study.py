@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from ..claims import Claim
 from ..kit import Study
+from ..model_draws import within_bounds
 from ..report import Report
 from .consistency import ideal_consistency
 from .rides import rides
@@ -21,15 +21,8 @@ def reproduce(study: Study, report: Report) -> None:
     simulations(study, report)
     runs = 50 if study.quick else 100
     found = study.cached("consistency", ideal_consistency, runs, 6.0, study.seed)
-    report.claims(
-        "Consistency where the model is exact",
-        [
-            Claim.within(f"{name}: within the bounds", each["ratio"], each["lower"], each["upper"])
-            for name, each in found.items()
-        ],
-        f"{runs} runs drawn from the model itself. Ratio to the degrees of freedom, with the 95 % bounds of a "
-        "consistent filter.",
-    )
+    note = f"{runs} runs drawn from the model. Ratio to the degrees of freedom, and 95 % bounds of a consistent filter."
+    report.claims("Consistency where the model is exact", within_bounds(found), note)
     report.text(LESSONS, "Where this filter differs from the published one, and why")
 
 

@@ -18,6 +18,7 @@ from ....filters.bicycle.whole_body.linkage import ERROR_SIZE, ROLL, SHOULDER, S
 from ....filters.core import rotation
 from ..claims import Claim
 from ..kit import Study
+from ..model_draws import within_bounds
 from ..report import Report
 from ..ride_study import Variant, mean_of, windowed
 from .angles import ANGLES, STATES, short
@@ -182,20 +183,6 @@ def bound_scores(seed: int, duration: float = 15.0) -> dict[str, Any]:
     return found
 
 
-def consistency_rows(runs: int, seed: int) -> list[dict[str, Any]]:
-    """NEES and NIS of rides in which everything that the filter assumes holds."""
-    return [
-        {
-            "part": name,
-            "ratio": found.ratio,
-            "lower": found.lower,
-            "upper": found.upper,
-            "inside": bool(found.consistent),
-        }
-        for name, found in consistencies(GEOMETRY, runs, seed, 1.5).items()
-    ]
-
-
 def synthetic(study: Study, report: Report) -> None:
     """Every table on exact rides."""
     seeds = [study.seed_of("exact", index) % 10_000 for index in range(2 if study.quick else 5)]
@@ -282,12 +269,8 @@ def synthetic(study: Study, report: Report) -> None:
         below = sum(ratio < 1.0 for ratio in ratios.values())
         statement = f"{name}: no error lies below the bound"
         claims.append(Claim(statement, f"{below} of {len(ratios)} lie below", below == 0))
-    found = study.cached("consistency", consistency_rows, 50, seeds[0])
-    report.table("Consistency where the model is exact", found, "50 runs: NEES at their ends, NIS over all samples.")
-    claims += [
-        Claim.within(f"Where the model is exact, {row['part']} is consistent", row["ratio"], row["lower"], row["upper"])
-        for row in found
-    ]
+    found = study.cached("consistency", consistencies, GEOMETRY, 50, seeds[0], 1.5)
+    claims += within_bounds(found)
     report.claims("Exact rides: what holds", claims)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from poise.baselines.studies.force_inertial.consistency import FREE, forces_for, ideal_consistency
+from poise.baselines.studies.force_inertial.consistency import ideal_consistency
 from poise.baselines.studies.force_inertial.motion import NO_ERRORS, Errors, draw_motion, simulate
 from poise.baselines.studies.force_inertial.simulation import synthetic, variant, without_forces
 from poise.baselines.studies.force_inertial.states import from_the_truth, torques, true_states
@@ -40,21 +40,9 @@ def test_true_states_remember_as_the_filter_does():
         np.testing.assert_allclose(model.predict(x[k - 1], now, before)[0][7:], x[k][7:], atol=1e-9)
 
 
-def test_forces_are_found_for_any_residual():
-    samples, _ = synthetic("indoor", 3, 0.2, 2, NO_ERRORS)
-    model = ForceInertial.published()
-    z = {name: array[5] for name, array in samples.items()}
-    x = model.prior(z)[0]
-    wanted = np.random.default_rng(0).normal(size=(3, 3)) * [6.0, 6.0, 0.03]
-    wrench = forces_for(model, x, z, wanted)
-    np.testing.assert_allclose(model.residual(x, {**z, "seat/wrench": wrench})[0][:, :3], wanted, atol=1e-6)
-    untouched = [k for k in range(6) if k not in FREE]
-    np.testing.assert_array_equal(wrench[:, untouched], z["seat/wrench"][:, untouched])
-
-
 def test_consistent_where_the_model_is_exact():
     for name, found in ideal_consistency(60, 4.0, 1, level=0.999).items():
-        assert found["lower"] <= found["ratio"] <= found["upper"], name
+        assert found.consistent, (name, found)
 
 
 def test_sensors_without_errors_are_the_environment_s():

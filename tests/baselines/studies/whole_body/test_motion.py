@@ -50,4 +50,4 @@ def test_the_filter_is_consistent_where_its_model_is_exact():
     found = consistencies(GEOMETRY, runs=50, seed=1, duration=0.8)
     for name in ("roll", "trunk and arms", "right leg", "all"):
         assert found[name].consistent, (name, found[name])
-    assert found["innovation"].ratio == pytest.approx(1.0, abs=0.02)
+    assert found["NIS"].ratio == pytest.approx(1.0, abs=0.02)
