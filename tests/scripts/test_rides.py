@@ -55,13 +55,13 @@ def test_recording_goes_on_where_it_was_interrupted(episodes, capsys):
 
 def test_filters_are_evaluated_on_one_imu_of_recorded_rides(episodes, tmp_path, capsys):
     words = ["evaluate", str(episodes), "--estimators", "mekf", "tilt", "--runs", str(tmp_path)]
-    assert main([*words, "--place", "trunk_imu"]) == 0
+    assert main([*words, "--site", "trunk_imu"]) == 0
     assert "Inclination error" in capsys.readouterr().out
     (folder,) = (tmp_path / "evaluate").iterdir()
     table = pandas.read_csv(folder / "results.csv")
     assert set(table["trajectory"]) == {"rider_bicycle_0000-trunk_imu", "rider_bicycle_0001-trunk_imu"}
-    assert main([*words, "--place", "nose"]) == 2
-    assert "place must be one of" in capsys.readouterr().err
+    assert main([*words, "--site", "nose"]) == 2
+    assert "there are bicycle_imu, trunk_imu, " in capsys.readouterr().err
 
 
 def test_wrong_options_are_explained(tmp_path, capsys):
