@@ -198,7 +198,7 @@ class RideStudy:
             results: of :meth:`run`.
             claims: further ones of this study.
         """
-        rows = []
+        rows: list[dict[str, Any]] = []
         compared = self.tabled if any(key[0] == course for key in self.published) else ()
         for name in compared:
             printed = self.published.get((course, name), {})
@@ -251,8 +251,9 @@ class RideStudy:
             Claim.less("The roll is estimated better than by zero", ours[roll], mean_rms(results, ZERO)[roll]),
         ]
         for each in self.comparisons:
-            pair = [mean_rms(results, name, each.window)[each.angle] for name in (each.method, each.other)]
-            found.append(Claim.less(each.statement, *pair, factor=each.factor, names=(each.method, each.other)))
+            names = (each.method, each.other)
+            one, other = (mean_rms(results, name, each.window)[each.angle] for name in names)
+            found.append(Claim.less(each.statement, one, other, factor=each.factor, names=names))
         for name in self.checked:
             for statistic, value in mean_of(each["consistency"][name] for each in results).items():
                 found.append(Claim.within(f"{name}: {statistic} is right within a factor of two", value, 0.5, 2.0))

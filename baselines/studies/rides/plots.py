@@ -35,7 +35,7 @@ def example_ride(scenario: str, subject: int, seed: int, duration: float, fideli
     from ....envs.bicycle.environment import RiderBicycleEnv
     from ....envs.record import record
 
-    env = RiderBicycleEnv(scenario, subject, suite="all", duration=duration, fidelity=fidelity)  # type: ignore[arg-type]
+    env = RiderBicycleEnv(scenario, subject, suite="all", duration=duration, fidelity=fidelity)
     try:
         return record(env, seed=seed)
     finally:

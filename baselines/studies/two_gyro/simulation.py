@@ -164,7 +164,7 @@ def simulations(study: Study, report: Report) -> None:
     )
 
 
-def claims_of_motions(found: dict[tuple[str, str, str], dict[str, Any]]) -> list[Claim]:
+def claims_of_motions(found: Mapping[Any, dict[str, Any]]) -> list[Claim]:
     """What the table of motions says of both models and steps."""
     late = {key: float(result["late"][3]) for key, result in found.items()}
     cases = [(motion, "sigma2") for motion in ("circle", "sine", "vibration", "pulses", "straight")]

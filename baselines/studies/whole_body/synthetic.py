@@ -43,7 +43,7 @@ SENSORS = {
 """White noises of the synthetic sensors; accelerations with what differences of the gyroscope add."""
 ABSENT = 1e3
 """Deviation of a constraint that is as good as not there."""
-ABLATIONS: dict[str, dict[str, float]] = {
+ABLATIONS: dict[str, dict[str, Any]] = {
     "all": {},
     "no C1, C5": {"length_noise": ABSENT},
     "no C2, C6": {"hinge_noise": ABSENT},
