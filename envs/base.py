@@ -23,6 +23,8 @@ from .drawn import DrawnEnv, Shown
 from .sensors.observation import Sensing
 
 Observation = dict[str, np.ndarray]
+UNIT_ENTRY = {"rotation": 0, "direction": -1}
+"""Kind of quantity → entry that is 1 where there is no rotation, or up is straight up."""
 
 
 class Block(NamedTuple):
@@ -60,21 +62,39 @@ class Snapshot:
 class PoseEnv(DrawnEnv):
     """An agent reads sensors and outputs a pose estimate; the reward is minus the error of the estimate.
 
-    The action of a step is the estimate for the observation *before* the step. Rotations and directions may have any
-    length that is not zero; an action of zeros counts as no rotation (or as straight up).
+    The action of a step is the estimate for the observation *before* the step: the scored quantities one after the
+    other. Rotations and directions may have any length that is not zero; zeros count as no rotation, or straight up.
 
     Attributes:
         suite: the sensors: channels, observation space, observation ↔ measurement.
-        quantity: the pose that the action estimates.
-        neutral_action: the estimate of an agent without information: no rotation, or straight up.
+        quantities: what the action estimates.
+        neutral_action: the estimate of an agent without information: no rotation, straight up, zero.
         rate: time steps a second, Hz.
+
+    Args:
+        suite: see above.
+        quantities: see above.
+        rate: see above.
+        render_mode: see :class:`.DrawnEnv`.
+        bounds: largest magnitude of the action, for each quantity; None for 1.
     """
 
-    def __init__(self, suite: Sensing, quantity: Quantity, rate: float, render_mode: str | None = None) -> None:
+    def __init__(
+        self,
+        suite: Sensing,
+        quantities: Sequence[Quantity],
+        rate: float,
+        render_mode: str | None = None,
+        bounds: Sequence[float] | None = None,
+    ) -> None:
         super().__init__(render_mode, rate)
-        self.suite, self.quantity, self.rate = suite, quantity, float(rate)
+        self.suite, self.quantities, self.rate = suite, tuple(quantities), float(rate)
         self.observation_space: spaces.Space[Any] = suite.observation_space
-        self.action_space = spaces.Box(-1.0, 1.0, (quantity.size,), np.float32)
+        sizes = [quantity.size for quantity in self.quantities]
+        limits = np.repeat(np.array(bounds or [1.0] * len(sizes), np.float32), sizes)
+        self.action_space = spaces.Box(-limits, limits, dtype=np.float32)
+        ends = np.cumsum(sizes).tolist()
+        self._parts = tuple(slice(end - size, end) for size, end in zip(sizes, ends, strict=True))
         self._block: Block | None = None
         self._estimate = self.neutral_action
         self._row = self._step = self._last_step = 0
@@ -82,8 +102,10 @@ class PoseEnv(DrawnEnv):
     @property
     def neutral_action(self) -> np.ndarray:
         """``(size,)`` float32."""
-        neutral = np.zeros(self.quantity.size, np.float32)
-        neutral[0 if self.quantity.kind == "rotation" else -1] = 1.0
+        neutral = np.zeros(self.action_space.shape or (), np.float32)
+        for quantity, part in zip(self.quantities, self._parts, strict=True):
+            if quantity.kind in UNIT_ENTRY:
+                neutral[part][UNIT_ENTRY[quantity.kind]] = 1.0
         return neutral
 
     def begin(self, motion: np.random.Generator, sensors: np.random.Generator, options: Mapping[str, Any]) -> int:
@@ -151,18 +173,23 @@ class PoseEnv(DrawnEnv):
         return self._observe(), reward, False, self._step >= self._last_step, self._info()
 
     def _checked(self, action: np.ndarray) -> np.ndarray:
-        estimate = np.asarray(action, dtype=float)
+        estimate = np.array(action, dtype=float)
         if estimate.shape != self.action_space.shape or not all(map(math.isfinite, estimate.tolist())):
-            raise ValueError(f"action must hold {self.quantity.size} finite numbers, got {action!r}")
-        return estimate if estimate.any() else self.neutral_action.astype(float)
+            raise ValueError(f"action must hold {self._parts[-1].stop} finite numbers, got {action!r}")
+        for quantity, part in zip(self.quantities, self._parts, strict=True):
+            if quantity.kind in UNIT_ENTRY and not estimate[part].any():
+                estimate[part][UNIT_ENTRY[quantity.kind]] = 1.0
+        return estimate
 
     def _reward(self, block: Block) -> float:
-        """Minus the error of the estimate at this time step; 0 outside the evaluation mask or without truth."""
+        """Minus the errors of the estimate at this time step; 0 outside the evaluation mask or without truth."""
         if not block.scored[self._row]:
             return 0.0
-        truth = block.pose[self.quantity.name if self.quantity.name in block.pose else ORIENTATION.name][self._row]
-        error = pose_error(self.quantity, self._estimate, truth)
-        return -error if error == error else 0.0
+        total = 0.0
+        for quantity, part in zip(self.quantities, self._parts, strict=True):
+            truth = block.pose[quantity.name if quantity.name in block.pose else ORIENTATION.name][self._row]
+            total += pose_error(quantity, self._estimate[part], truth)
+        return -total if total == total else 0.0
 
     def measurement(self) -> dict[str, np.ndarray]:
         """The measurement of this time step: channel → float64 ``(size,)``, NaN where there is no sample.

@@ -54,7 +54,7 @@ class ReplayEnv(PoseEnv):
     ## Description
 
     Any :class:`poise.Trajectory` as an environment with the interface of ``poise/HandMotion-v0``. It keeps the
-    recording's time: on its uniform grid (:meth:`poise.Trajectory.on_grid`) a gap is a stretch without samples, of its
+    recording's time: on its uniform grid (:meth:`.Trajectory.on_grid`) a gap is a stretch without samples, of its
     true length, that is not scored. Nothing is random but where an episode starts.
 
     ## Action Space
@@ -144,7 +144,7 @@ class ReplayEnv(PoseEnv):
                     f"{trajectory.name!r}, got {duration}"
                 )
         quantity = scored_quantity(trajectory, score)
-        super().__init__(RecordedSensors(trajectory), quantity, 1.0 / trajectory.dt, render_mode)
+        super().__init__(RecordedSensors(trajectory), [quantity], 1.0 / trajectory.dt, render_mode)
         # an orientation contains its relative orientation
         wanted = [name for name in POSE if name in trajectory.truth or name == "up"]
         self._pose = {name: trajectory.truth_of(name) for name in wanted if name in trajectory.quantities}

@@ -7,11 +7,10 @@ from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
 import numpy as np
-from gymnasium import spaces
 
 from ...filters.bicycle.geometry import RiderGeometry
 from ...filters.core.quantity import Quantity
-from ..base import Block, Observation, PoseEnv, pose_error, renamed
+from ..base import Block, Observation, PoseEnv, renamed
 from ..drawn import Scene
 from ..sensors.ideal import STANDARD_GRAVITY, Sampling
 from ..sensors.sensor import Sensor
@@ -189,13 +188,12 @@ class RiderBicycleEnv(PoseEnv):
         for name, value in (("the sensors' rate", made.rate), ("the control rate", control)):
             if abs(physics_rate / value - max(1, round(physics_rate / value))) > 1e-9:
                 raise ValueError(f"physics_rate must be a multiple of {name} of {value:g} Hz, got {physics_rate:g} Hz")
-        self.quantities = _quantities(score)
+        quantities = _quantities(score)
         self._source = RideSource(
             self.parameters, style, self.duration, made.rate, self.physics_rate, fidelity, self.tyre
         )
-        super().__init__(made, self.quantities[0], made.rate, render_mode)
-        limits = np.concatenate([np.full(q.size, _bound(q), np.float32) for q in self.quantities])
-        self.action_space = spaces.Box(-limits, limits, dtype=np.float32)
+        bounds = [{"rotation": 1.0, "angle": math.pi}.get(quantity.kind, 20.0) for quantity in quantities]
+        super().__init__(made, quantities, made.rate, render_mode, bounds)
 
     @property
     def ride(self) -> Ride | None:
@@ -211,12 +209,6 @@ class RiderBicycleEnv(PoseEnv):
     def scenery(self) -> tuple[Posture, Ground]:
         """The person on the bicycle and the ground of the present ride, for a picture."""
         return self._posture, self._source.ground
-
-    @property
-    def neutral_action(self) -> np.ndarray:
-        """``(size,)`` float32: no rotations, zero angles."""
-        parts = [np.eye(1, q.size, dtype=np.float32)[0] * (q.kind == "rotation") for q in self.quantities]
-        return np.concatenate(parts).astype(np.float32)
 
     def begin(self, motion: np.random.Generator, sensors: np.random.Generator, options: Mapping[str, Any]) -> int:
         """Draw rider, course and movements, and start the ride."""
@@ -272,26 +264,6 @@ class RiderBicycleEnv(PoseEnv):
             self._last_step = self._step
         return observation, reward, terminated, truncated and not terminated, info
 
-    def _checked(self, action: np.ndarray) -> np.ndarray:
-        estimate = np.array(action, dtype=float)
-        if estimate.shape != self.action_space.shape or not np.isfinite(estimate).all():
-            raise ValueError(f"action must hold {self.action_space.shape[0]} finite numbers, got {action!r}")  # type: ignore[index]
-        begin = 0
-        for quantity in self.quantities:
-            part = estimate[begin : begin + quantity.size]
-            if quantity.kind == "rotation" and not part.any():
-                part[0] = 1.0
-            begin += quantity.size
-        return estimate
-
-    def _reward(self, block: Block) -> float:
-        begin, total = 0, 0.0
-        for quantity in self.quantities:
-            part = self._estimate[begin : begin + quantity.size]
-            total += pose_error(quantity, part, block.pose[quantity.name][self._row])
-            begin += quantity.size
-        return -total
-
     def save_source(self) -> tuple[SavedRide, Any]:
         """The ride, and the sensors' state."""
         return self._source.save(), self._suite.save()
@@ -331,7 +303,3 @@ def _quantities(score: str | Sequence[str]) -> tuple[Quantity, ...]:
     if unknown or not names or len(set(names)) < len(names):
         raise ValueError(f"score must name different ones of {list(QUANTITIES)}, got {list(names)}")
     return tuple(QUANTITIES[name] for name in names)
-
-
-def _bound(quantity: Quantity) -> float:
-    return {"rotation": 1.0, "angle": math.pi}.get(quantity.kind, 20.0)

@@ -192,18 +192,10 @@ class BicycleFixtureEnv(PoseEnv):
         forces = [s.channel.name for s in self._suite.sensors if s.channel.name.split("/")[0] in ("seat", "handlebar")]
         if missing or forces:
             raise ValueError(f"suite must not need a rider, but it has sensors on {sorted(missing) or forces}")
-        super().__init__(self._suite, choose_quantity(score, QUANTITIES), self._suite.rate, render_mode)
+        super().__init__(self._suite, [choose_quantity(score, QUANTITIES)], self._suite.rate, render_mode)
         self.duration = float(duration)
         self._motion: FixtureMotion | None = None
         self._steps = 0
-
-    @property
-    def neutral_action(self) -> np.ndarray:
-        """``(size,)`` float32: no rotation, no roll."""
-        neutral = np.zeros(self.quantity.size, np.float32)
-        if self.quantity.kind == "rotation":
-            neutral[0] = 1.0
-        return neutral
 
     @property
     def geometry(self) -> RiderGeometry:

@@ -157,7 +157,7 @@ class HandMotionEnv(PoseEnv):
             raise ValueError(f"drive must be 'dynamic' or 'kinematic', got {drive!r}")
         suite = hand_suite(sensors, rate, magnetometer, sampling, held)
         quantity = choose_quantity(score, (ORIENTATION, RELATIVE_ORIENTATION))
-        super().__init__(suite, quantity, suite.rate, render_mode)
+        super().__init__(suite, [quantity], suite.rate, render_mode)
         self._suite = suite
         self.gesture, self.drive_kind, self.duration = gesture, drive, duration
         self.mounting = Mounting(vector("lever_arm", lever_arm, 3), vector("mounting", mounting, 4))
