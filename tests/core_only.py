@@ -6,8 +6,9 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
 import os
-import subprocess
 import sys
 import tempfile
 from collections.abc import Sequence
@@ -33,6 +34,7 @@ import gymnasium  # noqa: E402
 import numpy as np  # noqa: E402
 
 import poise  # noqa: E402
+from poise.scripts.main import main  # noqa: E402
 
 FAST = ("external-acceleration", "mahony", "tilt")
 SHIPPED = ("gru", "external-acceleration+policy", "bounded-motion+policy")
@@ -94,33 +96,30 @@ def recordings_are_evaluated(folder: Path) -> None:
     data = os.environ.get("POISE_DATA")
     paths = sorted(Path(data).rglob("*.mat"))[:1] if data else []
     words = ["evaluate", *map(str, paths or [folder / "hand.h5"]), "--estimators", "gru", *FAST, "--runs", str(folder)]
-    done = command(*words, "--json")
-    assert done.returncode == 0, done.stderr
-    assert '"estimator": "gru"' in done.stdout
+    status, out, err = command(*words, "--json")
+    assert status == 0, err
+    assert '"estimator": "gru"' in out
 
 
-def command(*words: str) -> subprocess.CompletedProcess[str]:
-    """Run ``poise`` as this process runs."""
-    code = "from poise.scripts.main import main; sys.exit(main())"
-    if "--block" in sys.argv:
-        code = f"sys.path.insert(0, {str(Path(__file__).parent)!r}); sys.argv.append('--block'); import core_only; " + (
-            "sys.argv.remove('--block'); " + code
-        )
-    return subprocess.run([sys.executable, "-c", f"import sys; {code}", *words], capture_output=True, text=True)
+def command(*words: str) -> tuple[int, str, str]:
+    """Exit status and both outputs of ``poise``."""
+    with contextlib.redirect_stdout(io.StringIO()) as out, contextlib.redirect_stderr(io.StringIO()) as err:
+        status = main(words)
+    return status, out.getvalue(), err.getvalue()
 
 
 def the_rest_says_what_it_needs() -> None:
     """One line that names the extra; an ImportError from Python."""
-    listed = command("list")
-    assert listed.returncode == 0, listed.stderr
-    assert "pip install 'poise[sim]'" in listed.stdout
+    status, out, err = command("list")
+    assert status == 0, err
+    assert "pip install 'poise[sim]'" in out
     for words, extra in (
         (("record", "rider-bicycle", "--episodes", "1"), "sim"),
         (("train", "gru"), "learn"),
     ):
-        done = command(*words)
-        assert done.returncode == 2, done.stderr
-        assert f"is not installed: pip install 'poise[{extra}]'" in done.stderr.splitlines()[-1]
+        status, _, err = command(*words)
+        assert status == 2, err
+        assert f"is not installed: pip install 'poise[{extra}]'" in err.splitlines()[-1]
     for env_id in ("poise/RiderBicycle-v0", "poise/BicycleFixture-v0"):
         assert "pip install 'poise[sim]'" in complaint(env_id)
     skipped = poise.evaluate(["tilt", "vqf"], poise.record(hand(), seed=1)).attrs["skipped"]
@@ -141,7 +140,7 @@ def hand() -> gymnasium.Env:
     return gymnasium.make("poise/HandMotion-v0", drive="kinematic", duration=1.0)
 
 
-def main() -> None:
+def check() -> None:
     """Check one after the other."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
@@ -156,4 +155,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    check()
