@@ -29,7 +29,7 @@ class Study:
     """How much is ridden and computed for one paper, and where it is kept.
 
     Rides are ``subjects`` x ``seeds``; what is finished stays in ``folder``, so that an interrupted study is resumed.
-    Rides and results belong to the code that computed them: another version computes them again, and says so.
+    Rides and results belong to the code that computed them: another version computes them again, with a notice.
     """
 
     folder: Path
@@ -67,7 +67,7 @@ class Study:
         return named_seed(self.seed, *names)
 
     def rides(self, scenario: str, suite: str | Sequence[str], **settings: Any) -> list[Trajectory]:
-        """The rides of :meth:`ride_files`, which says what may be set.
+        """The rides of :meth:`ride_files`, which lists the settings.
 
         Returns:
             Trajectories named ``<scenario>-<subject>-<index>``, subjects first, with ``metadata`` ``group`` (the
@@ -194,7 +194,7 @@ class Study:
         return [kept(task[0]) for task in tasks]
 
     def _compute(self, function: Callable[..., Any], jobs: Sequence[tuple[Any, ...]], label: str, unit: str) -> None:
-        """Call a function that leaves files, several at a time; say it if another version has worked in the folder."""
+        """Call a function that leaves files, several at a time; warn if another version has worked in the folder."""
         path, now = self.folder / "code.txt", code_version()
         before = path.read_text(encoding="utf-8").strip() if path.exists() else None
         if before not in (None, now):
@@ -222,7 +222,7 @@ def as_list(value: Any) -> Any:
 
 
 def load_ride(path: Path) -> Trajectory:
-    """A recorded ride, with what its name tells in the metadata."""
+    """A recorded ride, with subject, index and group in its metadata."""
     ride = load_trajectory(path)
     kwargs = (ride.metadata.get("environment") or {}).get("kwargs") or {}
     known = {"index": int(path.stem.rsplit("-", 1)[1]), "group": kwargs.get("scenario", path.stem.rsplit("-", 1)[0])}
@@ -237,5 +237,5 @@ def slug(text: str) -> str:
 
 
 def digest(value: Any) -> str:
-    """Eight letters that tell settings apart."""
+    """Eight hexadecimal digits of a SHA-256, to name settings."""
     return hashlib.sha256(json.dumps(value, sort_keys=True).encode()).hexdigest()[:8]

@@ -1,6 +1,6 @@
-"""Whether a filter's covariance tells the truth where its model does: data whose residual at the truth is drawn.
+"""Whether a filter's covariance is right where its model is exact: data whose residual at the truth is drawn.
 
-An offset of the residual, a channel of its own, takes the place of measurement errors: at the true state the residual
+An offset of the residual, a channel of its own, replaces measurement errors: at the true state the residual
 then is white noise of the filter's own covariance, whatever the sensors of the recording read. What remains between
 such a filter and a perfect one is linearisation.
 """

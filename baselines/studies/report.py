@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 RANGE = "mean, smallest … largest over riders and seeds"
 OVER_MOTIONS = "mean, smallest … largest over the motions"
-DEVIATION = "mean ± standard deviation over riders and seeds"
+STD = "mean ± standard deviation over riders and seeds"
 
 
 @dataclass(frozen=True)
@@ -107,9 +107,9 @@ class Report:
             title: heading.
             rows: each with ``quantity``, ``published`` (text or number; None where the paper has none), ``unit``, and
                 ours: either ``values`` (one a ride; NaN are left out), or ``ours`` and ``interval`` ``(low, high)``
-                (for :data:`DEVIATION` the deviation). Further keys are columns before the quantity (``filter``, …).
+                (for :data:`STD` the deviation). Further keys are columns before the quantity (``filter``, …).
             note: Markdown beneath.
-            interval: what stands behind our value: :data:`RANGE`, :data:`OVER_MOTIONS`, :data:`DEVIATION`, or a text of
+            interval: what stands behind our value: :data:`RANGE`, :data:`OVER_MOTIONS`, :data:`STD`, or a text of
                 one's own for a pair.
 
         Raises:
@@ -122,14 +122,14 @@ class Report:
                 raise ValueError(
                     f"a comparison needs quantity, published, unit, and values or ours and interval; got {sorted(row)}"
                 )
-            ours, spread = row.get("ours"), row.get("interval")
+            ours, extent = row.get("ours"), row.get("interval")
             if "values" in row:
-                ours, spread = summarised(row["values"], interval)
+                ours, extent = summarised(row["values"], interval)
             others = {name: value for name, value in row.items() if name not in OWN}
             shown.append(
                 others
                 | {"quantity": row["quantity"], "published": row["published"], "ours": ours}
-                | {"interval": interval_text(spread), "unit": row["unit"]}
+                | {"interval": interval_text(extent), "unit": row["unit"]}
             )
         self.table(title, shown, f"Ours: {interval}. {note}".strip())
 
@@ -162,21 +162,21 @@ OWN = ("quantity", "published", "ours", "interval", "unit", "values")
 
 
 def summarised(values: Any, interval: str = RANGE) -> tuple[float, Any]:
-    """Mean of values (NaN left out), and their smallest and largest, or for :data:`DEVIATION` their deviation."""
+    """Mean of values (NaN left out), and their smallest and largest, or for :data:`STD` their deviation."""
     found = np.asarray(values, dtype=float).ravel()
     found = found[np.isfinite(found)]
     if len(found) == 0:
         return float("nan"), None
-    if interval == DEVIATION:
+    if interval == STD:
         return float(found.mean()), float(found.std(ddof=1)) if len(found) > 1 else None
     return float(found.mean()), (float(found.min()), float(found.max()))
 
 
-def interval_text(spread: Any) -> str | None:
+def interval_text(extent: Any) -> str | None:
     """An interval as text: ``± 0.4`` or ``0.9 … 1.6``."""
-    if spread is None:
+    if extent is None:
         return None
-    if np.ndim(spread) == 0:
-        return f"± {float(spread):.3g}"
-    low, high = spread
+    if np.ndim(extent) == 0:
+        return f"± {float(extent):.3g}"
+    low, high = extent
     return f"{float(low):.3g} … {float(high):.3g}"

@@ -20,7 +20,7 @@ from ..evaluation import COLUMNS
 from ..plots import TRUTH_COLOR, legend_above, new_figure
 from .claims import Claim
 from .kit import Study, load_ride
-from .report import DEVIATION, Report
+from .report import STD, Report
 
 SETTLED = 10.0
 """s: errors count from here, when a filter has forgotten its start"""
@@ -36,11 +36,11 @@ class Variant:
     options: Mapping[str, Any] = field(default_factory=dict)
     """of the model"""
     samples: Callable[[Trajectory], Samples] | None = None
-    """what it gets in the place of the recorded samples"""
+    """replaces the recorded samples"""
     geometry: Callable[[RiderGeometry, Trajectory], RiderGeometry] | None = None
-    """what it is configured with in the place of the rider's geometry"""
+    """replaces the rider's geometry"""
     model: Any = None
-    """class in the place of the study's"""
+    """replaces the model of the study"""
 
 
 class Less(NamedTuple):
@@ -201,14 +201,14 @@ class RideStudy:
         rows: list[dict[str, Any]] = []
         compared = self.tabled if any(key[0] == course for key in self.published) else ()
         for name in compared:
-            printed = self.published.get((course, name), {})
+            published = self.published.get((course, name), {})
             for angle in self.angles:
                 values = [each["rms"][name]["settled"].get(angle, float("nan")) for each in results]
                 if np.isfinite(values).any():
-                    row = {"filter": name, "quantity": angle, "published": printed.get(angle)}
+                    row = {"filter": name, "quantity": angle, "published": published.get(angle)}
                     rows.append(row | {"values": values, "unit": "deg"})
         if rows:
-            report.compare(f"{self.table}, {course}", rows, f"RMS from {SETTLED:g} s on.", interval=DEVIATION)
+            report.compare(f"{self.table}, {course}", rows, f"RMS from {SETTLED:g} s on.", interval=STD)
         cells = self.cells or rounded
         methods = [*self.variants, ZERO, MEAN]
         report.table(

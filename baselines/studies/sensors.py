@@ -36,8 +36,8 @@ def without_errors(ride: Trajectory, unbiased: Sequence[str] = (), exact: Sequen
         if name not in samples:
             raise ValueError(f"the ride has no channel {name!r}, only {', '.join(samples)}")
     for name in unbiased:
-        place, kind = name.split("/")
-        bias = ride.truth.get(f"{place}/{BIASES[kind]}" if kind in BIASES else f"{name}_bias")
+        site, kind = name.split("/")
+        bias = ride.truth.get(f"{site}/{BIASES[kind]}" if kind in BIASES else f"{name}_bias")
         if bias is None:
             continue
         if name == "relative/orientation":
@@ -53,13 +53,13 @@ def without_errors(ride: Trajectory, unbiased: Sequence[str] = (), exact: Sequen
 
 def _rate(ride: Trajectory, name: str) -> np.ndarray:
     """Rotation vector of each interval over its length; the bicycle's gyroscope is mounted nose up."""
-    place, kind = name.split("/")
-    if kind != "gyr" or place not in BODIES:
+    site, kind = name.split("/")
+    if kind != "gyr" or site not in BODIES:
         raise ValueError(f"ideal samples of {name!r} are not known, only of gyroscopes and {', '.join(IDEAL)}")
-    q = ride.truth[f"{BODIES[place]}/orientation"]
+    q = ride.truth[f"{BODIES[site]}/orientation"]
     rate = rotation.log(rotation.multiply(rotation.conjugate(q[:-1]), q[1:])) / ride.dt
     rate = np.concatenate([rate[:1], rate])
-    if place != "bicycle_imu":
+    if site != "bicycle_imu":
         return rate
     mounted = rotation.exp(np.array([0.0, -RiderGeometry.of(ride.metadata).bicycle_imu_tilt, 0.0]))
     return rotation.rotate_back(mounted, rate)

@@ -1,4 +1,4 @@
-"""Whether the force/inertial filter's covariance tells the truth where its model does.
+"""Whether the force/inertial filter's covariance is right where its model is exact.
 
 The gyroscopes' samples are given, the true angles move as these say plus the process noise, and the residual at the
 truth is measurement noise.

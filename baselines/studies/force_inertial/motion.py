@@ -98,7 +98,7 @@ def draw_motion(rng: np.random.Generator, course: Course, errors: Errors, pitch:
     Args:
         rng: draws.
         course: ``indoor`` or ``outdoor``.
-        errors: tell the shoulders' tilt.
+        errors: give the shoulders' tilt.
         pitch: mean θ.
 
     Raises:
@@ -137,7 +137,7 @@ def angular_velocity(orientation: Callable[[np.ndarray], np.ndarray], t: np.ndar
 
 @dataclass(frozen=True)
 class Exact:
-    """What truly happens at the ticks, paper's axes."""
+    """What truly happens at each sample, paper's axes."""
 
     force: np.ndarray
     """(T, 3) of the rider on the seat, bicycle axes, N"""

@@ -72,7 +72,7 @@ def errors_of(pose: dict[str, np.ndarray], truth: dict[str, np.ndarray], settled
 
 
 def without_forces(samples: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """The samples with the forces missing after the first tick."""
+    """The samples with the forces missing after the first sample."""
     lost = samples | {"seat/wrench": samples["seat/wrench"].copy()}
     lost["seat/wrench"][1:] = np.nan
     return lost

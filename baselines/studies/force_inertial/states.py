@@ -19,7 +19,7 @@ def true_states(
     """The filter's state ``(T, 27)`` at the truth: true angles and bias, and what the filter remembers of its inputs.
 
     Args:
-        model: tells the interval and the low-passes.
+        model: gives the interval and the low-passes.
         measurements: without missing samples.
         truth: with ``force-inertial/trunk_angles``, ``bicycle/roll``, ``trunk_imu/gyroscope_bias``.
     """
@@ -37,7 +37,7 @@ def true_states(
 
 
 def read_forces(model: ForceInertial, states: np.ndarray, measurements: Mapping[str, np.ndarray]) -> Readings:
-    """What seat and hands read, with the handlebar turned as the true motion says."""
+    """What seat and hands read, with the handlebar turned as in the true motion."""
     angles = Angles(*states[:, :4].T)
     omega_h = states[:, 7:10] @ UP_THE_TRUNK.T - states[:, 4:7]
     omega_b = states[:, 10:13] * [1.0, -1.0, -1.0]
@@ -66,7 +66,7 @@ def from_the_truth(
     """Estimates of a filter that starts at the true angles, φ_h off by so many rad, zero bias.
 
     Returns:
-        The pose from the second tick on.
+        The pose from the second sample on.
     """
     first = {name: array[0] for name, array in samples.items()}
     state, _ = kalman.step(kalman.init(first), first)

@@ -34,7 +34,7 @@ LESSONS = """
 * **A rider is more than a point mass on a saddle.** The saddle carries the pelvis and part of the legs, the trunk turns
   about a point above it, each hand pushes at its own grip, and grips turn with the handlebar. The pedals carry what
   seat and hands do not.
-* **Zeros of the force sensors** look like a lean: a moment that lasts cannot be told from one.
+* **Zeros of the force sensors** look like a lean: a moment that lasts cannot be distinguished from one.
 * **Shoulders are not level.** (17) decides φ, so φ is wrong by what the shoulders really tilt, times 1/cos θ.
 * **The centre of pressure cancels** in (10) to (12), and with it the load cells.
 """

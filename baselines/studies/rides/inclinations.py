@@ -19,7 +19,7 @@ RIDES = (
     ("straight", "bicycle_imu"),
     ("slalom", "bicycle_imu"),
 )
-"""Scenario and place of the IMU."""
+"""Scenario and site of the IMU."""
 
 
 def inclination_rows(
@@ -30,17 +30,17 @@ def inclination_rows(
     seed: int = 7,
     duration: float = 40.0,
 ) -> Iterator[dict[str, Any]]:
-    """Rows: scenario and place, then the RMS error of inclination (deg) of each estimator.
+    """Rows: scenario and site of the IMU, then the RMS error of inclination (deg) of each estimator.
 
     Args:
         estimators: names of estimators.
-        rides: scenario and place of the IMU of each row; rides of one scenario are the same ride.
+        rides: scenario and site of the IMU of each row; rides of one scenario are the same ride.
         subject: number of the rider, lumped, with the papers' sensors.
         seed: of the rides.
         duration: s.
     """
     ridden: dict[str, Any] = {}
-    for scenario, place in rides:
+    for scenario, site in rides:
         if scenario not in ridden:
             suite = ["bicycle_imu/gyr", "bicycle_imu/acc", "trunk_imu/gyr", "trunk_imu/acc"]
             env = RiderBicycleEnv(scenario, subject, suite=suite, duration=duration, fidelity="lumped")
@@ -48,6 +48,6 @@ def inclination_rows(
                 ridden[scenario] = record(env, seed=seed)
             finally:
                 env.close()
-        table = evaluate(list(estimators), imu_of(ridden[scenario], place))
+        table = evaluate(list(estimators), imu_of(ridden[scenario], site))
         errors = table[(table["metric"] == "inclination")].set_index("estimator")["value"]
-        yield {"scenario": scenario, "IMU": place} | {name: f"{errors[name]:.1f}" for name in estimators}
+        yield {"scenario": scenario, "IMU": site} | {name: f"{errors[name]:.1f}" for name in estimators}

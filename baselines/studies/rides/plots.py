@@ -1,4 +1,4 @@
-"""One ride drawn: what its sensors say, and what is true."""
+"""One ride drawn: what its sensors read, and what is true."""
 
 from __future__ import annotations
 

@@ -82,7 +82,7 @@ def ride_statistics(
         trajectory: of ``poise/RiderBicycle-v0`` with the channel ``bicycle_imu/acc``.
         scenario: its name.
         subject: number of the rider.
-        gaps: ``(T, 4)`` m, see :func:`.loop_closure_error`; None if there is nothing to tell.
+        gaps: ``(T, 4)`` m, see :func:`.loop_closure_error`; None if they are not known.
     """
     truth = trajectory.truth
     speed, roll, pitch = (truth[f"bicycle/{name}"][:, 0] for name in ("speed", "roll", "pitch"))
@@ -119,7 +119,7 @@ def ride_statistics(
 
 
 def ride(scenario: str, subject: int, duration: float, fidelity: str, seed: int) -> RideStatistics:
-    """Ride once and say what happened.
+    """Ride once and summarise what happened.
 
     Args:
         scenario: name of a scenario.

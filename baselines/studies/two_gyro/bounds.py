@@ -21,7 +21,7 @@ from .motion import MOTIONS, Errors, Motion, filter_of, simulate, turning
 DT = 0.02
 """s"""
 STUDY = Errors(bias=0.1 * DEG)
-"""0.1 °/s a gyroscope sample, 1° a frame at every tick, biases of 0.1 °/s; the paper gives no numbers"""
+"""0.1 °/s a gyroscope sample, 1° a frame at every sample, biases of 0.1 °/s; the paper gives no numbers"""
 TIMES = (2, 5, 10, 20, 60, 120)
 """s"""
 INDEPENDENT = {
@@ -167,7 +167,7 @@ def observability(study: Study, report: Report) -> None:
         published, closed = found["+ L_f5 f0 (as published)"], found["h, L_f0, L_f5, L_f0 f1"]
         claims = [
             Claim("(20)–(22): the published gradients have rank 9", f"{published} of 9", published == 9),
-            Claim("With ∇L_f0 f1 h in the place of ∇L_f5 f0 h they have rank 9", f"{closed} of 9", closed == 9),
+            Claim("With ∇L_f0 f1 h instead of ∇L_f5 f0 h they have rank 9", f"{closed} of 9", closed == 9),
         ]
         rows = [
             {"gradients stacked (Σ2)": name, "rank": rank, "other": other, "of": 9}

@@ -124,7 +124,7 @@ class Errors:
     camera_offset: float = 0.0
     """constant error of the relative angles"""
     camera_interval: int = 1
-    """ticks from frame to frame"""
+    """samples from frame to frame"""
 
 
 IDEAL = Errors(0.0, 0.0, 0.0, 0.0, 0.0)
@@ -133,7 +133,7 @@ IDEAL = Errors(0.0, 0.0, 0.0, 0.0, 0.0)
 def filter_of(
     errors: Errors, dt: float, model: Literal["sigma1", "sigma2"] = "sigma2", roll_prior: float = 5.0 * DEG
 ) -> TwoGyro:
-    """The filter that knows these errors, with the printed Euler step; densities are deviations times √dt."""
+    """The filter that knows these errors, with the published Euler step; densities are deviations times √dt."""
     root = math.sqrt(dt)
     return TwoGyro(
         dt=dt,

@@ -1,7 +1,7 @@
 r"""Exact ranks of the two-gyroscope paper's observability argument (17)–(22), by Lie derivatives in rational numbers.
 
 The published gradients {h, L_f0 h, L_f5 h, L_f5 f0 h} have rank 8, not 9: a common rate about the vertical in both
-gyroscopes (δb_z^p = 1, δb^h = R_PHᵀ [0, tan φ, 1]) is not told apart. L_f0 f1 h in the place of the last closes the
+gyroscopes (δb_z^p = 1, δb^h = R_PHᵀ [0, tan φ, 1]) cannot be distinguished. L_f0 f1 h instead of the last closes the
 gap, so the conclusion stands.
 """
 

@@ -151,7 +151,7 @@ def rides(study: Study, report: Report) -> None:
 
 
 def claims(results: list[dict[str, Any]]) -> list[Claim]:
-    """Whether Σ2 drifts, if the rides are long enough to say it, and how far its roll is off at most."""
+    """Whether Σ2 drifts, if the rides are long enough, and how far its roll is off at most."""
     long = min(each["length"] for each in results) >= 40.0
     settled = mean_rms(results, "Σ2")["φ"] if long else float("nan")
     late, peak = mean_rms(results, "Σ2", "last 20 s")["φ"], mean_of(each["peak"]["Σ2"] for each in results)["φ"]

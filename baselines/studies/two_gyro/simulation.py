@@ -231,7 +231,7 @@ def disturbed(study: Study, report: Report, count: int) -> list[Claim]:
         *(Claim.less(f"{name}: φ is never off by 5°", peak[name], 5.0) for name in bumps),
         *(Claim.less(f"{name}: forgotten, less than 1° after 30 s", late[name], 1.0) for name in bumps),
         Claim.less("A constant camera error of 2° passes to φ by at least half where nothing moves", 1.0, still),
-        Claim.less("A moving body tells the camera's error apart: less of it passes to φ", moving, still),
+        Claim.less("A moving body separates the camera's error: less of it passes to φ", moving, still),
     ]
 
 

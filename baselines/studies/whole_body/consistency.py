@@ -69,8 +69,8 @@ def consistencies(
     }
     for name, values in measurements.items():
         if name.endswith("/gyr"):
-            place = name.split("_")[0]
-            density = getattr(model, f"{place if place in ('bicycle', 'trunk') else 'limb'}_gyroscope_noise")
+            site = name.split("_")[0]
+            density = getattr(model, f"{site if site in ('bicycle', 'trunk') else 'limb'}_gyroscope_noise")
             values += density / math.sqrt(model.dt) * rng.standard_normal(values.shape)
 
     def move(k: int, x: np.ndarray, _: np.ndarray) -> np.ndarray:

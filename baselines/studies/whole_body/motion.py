@@ -2,7 +2,7 @@
 
 A bicycle rolls without slip on a plane, a rigid trunk turns about its pivot, hands and feet stay where they hold, the
 pelvis is fixed to the frame. Positions and attitudes are closed functions of time; rates and accelerations are their
-central differences of fourth order (1e-7 m/s²). Sensors report values at ticks (``sampling="instant"``).
+central differences of fourth order (1e-7 m/s²). Sensors report values at sampling instants (``sampling="instant"``).
 """
 
 from __future__ import annotations
@@ -214,8 +214,8 @@ class ExactRide:
             duration: s.
             dt: sampling interval, s.
             errors: of the sensors; None for the defaults of :class:`SensorErrors`.
-            sampling: inertial sensors give the value at the tick, or the mean over the interval before it (Simpson's
-                rule, as the environment's sensors do).
+            sampling: inertial sensors give the value at the sampling instant, or the mean over the interval before it
+                (Simpson's rule, as the environment's sensors do).
         """
         errors = SensorErrors() if errors is None else errors
         rng = np.random.default_rng(np.random.SeedSequence(self.seed).spawn(2)[1])

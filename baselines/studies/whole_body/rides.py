@@ -47,7 +47,7 @@ def _tape_measure(geometry: RiderGeometry, ride: Trajectory) -> RiderGeometry:
 
 
 def with_trunk_on_the_seat(ride: Trajectory) -> dict[str, np.ndarray]:
-    """The samples with load cells that feel just what (9*) says: no pedals, and hands that carry nothing."""
+    """The samples with load cells that feel just what (9*) gives: no pedals, and hands that carry nothing."""
     model = WholeBody.for_rider(RiderGeometry.of(ride.metadata), seat_share=1.0)
     found = dict(ride.measurements)
     angles = true_angles(ride.truth)["trunk/angles"]

@@ -6,7 +6,7 @@ import pandas
 import pytest
 
 from poise.baselines.plots import new_figure
-from poise.baselines.studies.report import DEVIATION, Report
+from poise.baselines.studies.report import STD, Report
 
 
 def test_tables_are_entries_and_files(tmp_path):
@@ -49,7 +49,7 @@ def test_printed_values_stand_beside_ours_with_what_the_interval_means(tmp_path)
         {"filter": "z", "quantity": "roll", "published": None, "values": [float("nan")], "unit": "deg"},
     ]
     report.compare("Table", rows, "Why.")
-    report.compare("Table with deviations", rows[:1], interval=DEVIATION)
+    report.compare("Table with deviations", rows[:1], interval=STD)
     (first, second, third), (deviation,) = (entry.rows for entry in report.entries)
     assert first == {
         "filter": "x",
