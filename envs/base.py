@@ -12,7 +12,7 @@ import math
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar, cast
 
 import numpy as np
 from gymnasium import spaces
@@ -23,6 +23,7 @@ from .drawn import DrawnEnv, Shown
 from .sensors.observation import Sensing
 
 Observation = dict[str, np.ndarray]
+Function = TypeVar("Function", bound=Callable[..., Any])
 UNIT_ENTRY = {"rotation": 0, "direction": -1}
 """Kind of quantity → entry that is 1 where there is no rotation, or up is straight up."""
 
@@ -295,10 +296,10 @@ def choose_quantity(score: str, choices: Sequence[Quantity]) -> Quantity:
     raise ValueError(f"score must be one of {[quantity.name for quantity in choices]}, got {score!r}")
 
 
-def renamed(**names: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+def renamed(**names: str) -> Callable[[Function], Function]:
     """Let a function understand former names of its keyword arguments (old → new), with a DeprecationWarning."""
 
-    def decorate(function: Callable[..., Any]) -> Callable[..., Any]:
+    def decorate(function: Function) -> Function:
         @functools.wraps(function)
         def call(*args: Any, **kwargs: Any) -> Any:
             for old in names.keys() & kwargs.keys():
@@ -307,6 +308,6 @@ def renamed(**names: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
             return function(*args, **kwargs)
 
         call.former_names = names  # type: ignore[attr-defined]
-        return call
+        return cast(Function, call)
 
     return decorate

@@ -56,6 +56,7 @@ class DrawnEnv(gymnasium.Env[Any, np.ndarray]):
     metadata: dict[str, Any] = {"render_modes": list(RENDER_MODES), "render_fps": 100}  # noqa: RUF012
     reset_options: ClassVar[tuple[str, ...]] = ()
     """Names that ``reset(options=...)`` understands."""
+    _made_with: tuple[tuple[Any, ...], dict[str, Any]]
 
     def __new__(cls, *args: Any, **kwargs: Any) -> Self:
         """Remember the arguments, for copies."""

@@ -73,7 +73,9 @@ PRESETS = (
     SensorPreset(
         "ideal",
         "no errors; generous ranges, because observations need bounds",
-        *(NoiseModel(full_scale=KINDS[kind].full_scale) for kind in ("gyroscope", "accelerometer", "magnetometer")),
+        NoiseModel(full_scale=KINDS["gyroscope"].full_scale),
+        NoiseModel(full_scale=KINDS["accelerometer"].full_scale),
+        NoiseModel(full_scale=KINDS["magnetometer"].full_scale),
     ),
     SensorPreset(
         "paper-hand",

@@ -35,7 +35,8 @@ def example_ride(scenario: str, subject: int, seed: int, duration: float, fideli
     from ....envs.bicycle.environment import RiderBicycleEnv
     from ....envs.record import record
 
-    env = RiderBicycleEnv(scenario, subject, suite="all", duration=duration, fidelity=fidelity)
+    options = {"suite": "all", "duration": duration, "fidelity": fidelity}
+    env = RiderBicycleEnv(scenario, subject, **options)  # type: ignore[arg-type]
     try:
         return record(env, seed=seed)
     finally:

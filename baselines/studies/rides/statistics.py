@@ -142,7 +142,7 @@ def ride(scenario: str, subject: int, duration: float, fidelity: str, seed: int)
         suite=SUITE,
         sensors="ideal",
         duration=duration,
-        fidelity=fidelity,
+        fidelity=fidelity,  # type: ignore[arg-type]
     )
     try:
         trajectory = record(env, seed=seed)
