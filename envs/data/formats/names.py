@@ -97,8 +97,17 @@ def groups(table: Table) -> list[Group]:
             units = {table.units.get(column, "") for column in columns}
             if not sensor and variant in sensors:
                 sensor, variant = variant, ""
-            result.append(Group(sensor, kind, variant, columns, units.pop() if len(units) == 1 else ""))
+            label = spelled(columns[0], sensor)
+            result.append(Group(label, kind, variant, columns, units.pop() if len(units) == 1 else ""))
     return result
+
+
+def spelled(column: str, sensor: str) -> str:
+    """The name of a sensor as a column has it: ``Right Foot`` of ``Right Foot/Acceleration/X``."""
+    for end in range(1, len(column)):
+        if " ".join(word for word in words(column[:end]) if word not in FILLERS) == sensor != "":
+            return column[:end].strip(" _-./")
+    return sensor
 
 
 def ordered(kind: str, by_axis: Mapping[str, str]) -> list[str] | None:
