@@ -119,8 +119,8 @@ def load_mat(path: Path) -> dict[str, Any]:
             for name, inner in value.items():
                 if not str(name).startswith("__"):
                     visit(f"{prefix}/{name}" if prefix else str(name), inner)
-        elif isinstance(value, np.ndarray):
-            flat[prefix] = value
+        elif isinstance(value, np.ndarray | int | float):
+            flat[prefix] = np.asarray(value)
 
     visit("", fields)
     return flat
