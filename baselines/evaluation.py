@@ -9,7 +9,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
-from ..envs.data.formats.load import load_recording
+from ..envs.data.formats.load import load_recordings
 from ..envs.data.plausibility import check_recording
 from ..envs.data.reference_clock import measured
 from ..envs.data.trajectory import REFERENCE_CLOCK, Trajectory
@@ -210,8 +210,13 @@ def named_trajectories(trajectories: Trajectories) -> list[Trajectory]:
         FileNotFoundError: a recording that is not there.
     """
     items = [trajectories] if isinstance(trajectories, Trajectory | str | Path) else list(trajectories)
-    loaded = [item if isinstance(item, Trajectory) else load_recording(item) for item in items]
-    return distinct(loaded, [None if isinstance(item, Trajectory) else Path(item) for item in items])
+    loaded: list[Trajectory] = []
+    sources: list[Path | None] = []
+    for item in items:
+        found = [item] if isinstance(item, Trajectory) else load_recordings(item)
+        loaded += found
+        sources += [None if isinstance(item, Trajectory) else Path(item)] * len(found)
+    return distinct(loaded, sources)
 
 
 def distinct(trajectories: Sequence[Trajectory], paths: Sequence[Path | None]) -> list[Trajectory]:

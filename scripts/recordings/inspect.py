@@ -17,6 +17,8 @@ class Args:
 
     recordings: tyro.conf.Positional[tuple[Path, ...]]
     """files, or folders that are searched for recordings"""
+    write_map: Path | None = None
+    """draft a mapping (TOML) of the first file, of any table, to be checked, completed and saved beside the data"""
     plot: Path | None = None
     """picture of rates, specific force and field over time, of the first recording"""
     calibration: Path | None = None
@@ -32,6 +34,13 @@ def run(args: Args) -> int:
     from .load import load_all, passed_over_text, plain_warnings
 
     with plain_warnings(), Output("inspect", args) as out:
+        if args.write_map is not None:
+            from ...envs.data.formats.draft import draft_map
+            from ...filters.support.files import write_text
+
+            text = draft_map(args.recordings[0])
+            out.say(f"{text}\ndraft of a mapping: {write_text(args.write_map, text)}")
+            return 0
         loaded, passed_over = load_all(args.recordings, args.calibration)
         for trajectory in loaded:
             found, findings = inspect_recording(trajectory), check_recording(trajectory)

@@ -31,7 +31,7 @@ def load_all(
         FileNotFoundError: a path leads nowhere.
     """
     from ...baselines.evaluation import distinct
-    from ...envs.data.formats.load import find_recordings, load_recording
+    from ...envs.data.formats.load import find_recordings, load_recordings
 
     found: list[Trajectory] = []
     sources: list[Path | None] = []
@@ -40,9 +40,10 @@ def load_all(
         files = find_recordings(path) if path.is_dir() else [path]
         for file in files:
             try:
-                trajectory = load_recording(file, calibration)
-                found.append(trajectory if site is None else at_site(trajectory, site))
-                sources.append(file)
+                loaded = load_recordings(file, calibration)
+                loaded = loaded if site is None else chosen(loaded, site)
+                found += loaded
+                sources += [file] * len(loaded)
             except ValueError as reason:
                 if not path.is_dir():
                     raise
@@ -51,11 +52,22 @@ def load_all(
             others = (file for file in path.rglob("*") if file.is_file() and not file.name.startswith("."))
             # A folder may be a recording itself.
             unread = [file for file in sorted(others) if not set(files) & {file, *file.parents}]
-            passed_over += [(file, "no known format") for file in unread]
+            passed_over += [(file, "no known format, or part of another recording") for file in unread]
     if not found:
         reasons = "; ".join(f"{file.name}: {reason}" for file, reason in passed_over[:5])
         raise ValueError(f"no recording in {', '.join(map(str, paths))}{f' ({reasons})' if reasons else ''}")
     return distinct(found, sources), passed_over
+
+
+def chosen(trajectories: list[Trajectory], site: str) -> list[Trajectory]:
+    """One sensor of a recording: a trajectory of its own, or channels of the only trajectory."""
+    named = [one for one in trajectories if str(one.metadata.get("sensor", "")).lower() == site.lower()]
+    if named or len(trajectories) > 1:
+        if not named:
+            there = ", ".join(str(one.metadata.get("sensor")) for one in trajectories)
+            raise ValueError(f"no sensor {site!r}; there are {there}")
+        return named
+    return [at_site(trajectories[0], site)]
 
 
 def at_site(trajectory: Trajectory, site: str) -> Trajectory:
