@@ -2,16 +2,36 @@
 
 from __future__ import annotations
 
+import json
+import statistics
 from collections.abc import Collection, Sequence
 from typing import Any
 
-from ..envs.data.trajectory import Trajectory
+from ..envs.data.trajectory import REFERENCE_CLOCK, Trajectory
 from ..filters.core.estimator import Estimator
 from ..filters.support.seeds import child_seeds
 from .registry import list_estimators, make_estimator
 
 GESTURES = ("slow", "fast", "severe", "mixed")
 """Gestures of the simulated part: tests A, B, C of the external-acceleration paper, and changing intensity."""
+
+RIDES = ("outdoor", "slalom", "bumps")
+"""Scenarios of the simulated rides."""
+
+DATA_SETS = {
+    "broad": "BROAD",
+    "repoimu": "RepoIMU",
+    "smartphones": "phones",
+    "senslogs": "phones",
+    "euroc": "EuRoC",
+}
+"""Format, or folder of archives, in lower case → data set."""
+
+NORTH = ("BROAD", "simulated hand")
+"""Data sets whose truth has its heading from north; that of the others is arbitrary."""
+
+CLOCK_DIFFERS = 5e-4
+"""s: median offset of the reference's clock from which a data set is compared on the corrected clock as well."""
 
 HAND_CHANNELS = ("imu/gyr", "imu/acc", "imu/mag")
 """What ``poise/HandMotion-v0`` measures."""
@@ -48,6 +68,49 @@ def simulated(seed: int, episodes: int, gestures: Sequence[str] = GESTURES, **op
         finally:
             env.close()
     return trajectories
+
+
+def simulated_rides(seed: int, scenarios: Sequence[str] = RIDES, duration: float = 40.0) -> list[Trajectory]:
+    """Record rides of a bicycle, and look at the IMU of the bicycle and at that of the trunk, each by itself.
+
+    Args:
+        seed: root seed; each ride has a child, and a subject of its own.
+        scenarios: of ``poise/RiderBicycle-v0``.
+        duration: s.
+    """
+    from ..envs.bicycle.environment import RiderBicycleEnv
+    from ..envs.bicycle.sensors.single_imu import SITES, imu_of
+    from ..envs.record import record
+
+    trajectories = []
+    for number, (scenario, child) in enumerate(zip(scenarios, child_seeds(seed, len(scenarios)), strict=True)):
+        env = RiderBicycleEnv(scenario, subject=number, suite="whole-body", fidelity="lumped", duration=duration)
+        try:
+            ride = record(env, seed=child)
+        finally:
+            env.close()
+        ride = ride.replace(metadata={**ride.metadata, "name": scenario})
+        trajectories += [imu_of(ride, site) for site in SITES]
+    return trajectories
+
+
+def dataset_of(trajectory: Trajectory) -> str:
+    """The data set that a trajectory belongs to: a benchmark's name, a simulation, or its group or format."""
+    metadata = trajectory.metadata
+    group, origin = str(metadata.get("group") or ""), metadata.get("environment")
+    known = DATA_SETS.get(str(metadata.get("format", "")).lower()) or DATA_SETS.get(group.lower())
+    if known is None and origin is not None:
+        known = "simulated rides" if "bicycle" in json.dumps(origin).lower() else "simulated hand"
+    return known or group or str(metadata.get("format") or "recordings")
+
+
+def with_other_clocks(trajectories: Sequence[Trajectory]) -> list[Trajectory]:
+    """The recordings of data sets whose reference runs on another clock than the gyroscope, by the median offset."""
+    offsets: dict[str, list[float]] = {}
+    for trajectory in trajectories:
+        offset = trajectory.metadata.get(REFERENCE_CLOCK)
+        offsets.setdefault(dataset_of(trajectory), []).append(0.0 if offset is None else abs(float(offset)))
+    return [one for one in trajectories if statistics.median(offsets[dataset_of(one)]) > CLOCK_DIFFERS]
 
 
 def groups_of(trajectories: Sequence[Trajectory]) -> dict[str, str]:

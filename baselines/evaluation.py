@@ -25,6 +25,7 @@ from .scoring import (
     automatic_reference,
     errors,
     family,
+    heading_offset,
     reference_pose,
     with_up,
     without_truth,
@@ -181,10 +182,19 @@ class Evaluation:
             if self.everyone:
                 poses = {label: with_up(estimate.pose) for label, (_, estimate) in self.estimates.items()}
                 others += [(label, pose) for label, pose in poses.items() if label not in known]
-        found = {}
+        found, told = {}, False
         for label, (estimator, estimate) in self.estimates.items():
             # That an estimator agrees with itself says nothing.
             found[label] = errors(estimator, estimate, self.trajectory, [one for one in others if one[0] != label])
+            offset = heading_offset(estimate, self.trajectory)
+            if offset is not None and not told:
+                told = True
+                warnings.warn(
+                    f"{self.trajectory.name}: the heading of the truth differs from that of {label} by a constant "
+                    f"{offset:.0f}°; likely cause: the x axis of the reference does not point east. Its heading and "
+                    "total errors are this offset",
+                    stacklevel=3,
+                )
             nis = next((value for _, metric, value, _ in found[label] if metric == "nis"), 0.0)
             if nis > LARGEST_NIS.get(family(label), float("inf")):
                 warnings.warn(

@@ -24,6 +24,9 @@ ONBOARD = "onboard"
 AUTOMATIC = ("mekf-9", "bounded-motion")
 """References for recordings without truth, the first that the channels suffice for."""
 
+LARGEST_NORTH = 15.0
+"""deg: declination and disturbances that are taken for errors of a heading; more is another definition of north."""
+
 StandIn = tuple[str, dict[str, np.ndarray]]
 """Label and pose of what stands in for the truth."""
 Row = tuple[str, str, float, str]
@@ -116,6 +119,21 @@ def errors(estimator: Estimator[Any], estimate: Estimate, trajectory: Trajectory
         degrees = (np.asarray(estimate.innovation) != 0.0).sum(axis=-1)
         rows.append(("innovation", "nis", consistency(estimate.nis, degrees, trajectory.mask).ratio, "1"))
     return rows
+
+
+def heading_offset(estimate: Estimate, trajectory: Trajectory) -> float | None:
+    """Constant heading in deg between an estimate and a truth that otherwise agree; None if they differ in more.
+
+    A reference whose x axis points anywhere (a laboratory's) gives such an offset: it is no error of the estimate.
+    """
+    if ORIENTATION.name not in trajectory.truth or ORIENTATION.name not in estimate.pose:
+        return None
+    r = rotation.multiply(estimate.pose[ORIENTATION.name], rotation.conjugate(trajectory.truth[ORIENTATION.name]))
+    half = np.arctan2(r[:, 3], r[:, 0])[trajectory.mask]
+    mean = np.nanmean(np.exp(2j * half)) if np.isfinite(half).any() else 0.0
+    offset = float(np.degrees(np.angle(mean)))
+    # The length of the mean is 1 if all headings differ alike: 0.95 is a spread of 18°.
+    return offset if abs(mean) > 0.95 and abs(offset) > LARGEST_NORTH else None
 
 
 def scored_rows(quantity: Quantity, estimate: Any, truth: Any, mask: np.ndarray, suffix: str = "") -> list[Row]:

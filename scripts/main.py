@@ -47,6 +47,7 @@ COMMANDS: dict[str, Command] = {
     "train": Command(".train", "train a learned estimator"),
     "tune": Command(".tune", "fit the gains of a filter: constant ones, or a policy that sets them"),
     "inspect": Command(".recordings.inspect", "what a recording holds; whether units, signs and clock are plausible"),
+    "recommend": Command(".recordings.recommend", "which estimator suits a recording, by errors on similar ones"),
     "estimate": Command(".recordings.estimate", "angles, quaternions, standard deviations of a recording, as a file"),
     "evaluate": Command(".recordings.evaluate", "measure estimators on recorded trajectories"),
     "calibrate": Command(".calibrate", "scale, offset and axes of raw sensors, from rate-table and tumbling runs"),

@@ -1,0 +1,249 @@
+"""Which estimator for which recording: by its channels, and by the measured errors on recordings like it.
+
+The errors stand in a file that ``poise benchmark --save`` writes: every recording of the benchmarks with numbers that
+say what its motion was like, and what every estimator got on it. A recording is compared with those by the same
+numbers; nothing is a rule of thumb.
+"""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, get_args
+
+import numpy as np
+
+from ..envs.data.plausibility import vectors
+from ..envs.data.trajectory import Trajectory
+from .benchmark import NORTH, dataset_of
+from .registry import list_estimators
+
+if TYPE_CHECKING:
+    import pandas
+
+RESULTS = Path(__file__).parent / "weights" / "benchmark.json"
+"""Errors of the shipped benchmark."""
+Mounting = Literal["worn", "hand-held", "vehicle", "bicycle"]
+MOUNTINGS: dict[str, Mounting] = {
+    "BROAD": "hand-held",
+    "RepoIMU": "hand-held",
+    "phones": "worn",
+    "EuRoC": "vehicle",
+    "simulated hand": "hand-held",
+    "simulated rides": "bicycle",
+}
+"""Data set → where the sensor was."""
+NEIGHBOURS = 6
+"""Recordings that a recommendation rests on."""
+ERRORS = ("inclination", "heading", "total")
+CORRECTED = ", clock corrected"
+"""Behind the name of a data set: its reference was moved to the clock of the gyroscope."""
+SMOOTHING = 1.0
+"""s: means over it are acceleration that lasts, which no filter can tell from a tilt."""
+
+
+@dataclass(frozen=True)
+class Motion:
+    """What a motion was like, without any estimator.
+
+    Attributes:
+        rate: sampling rate, Hz.
+        turning: root mean square angular rate, deg/s.
+        shaking: root mean square of the length of the specific force about its median, m/s².
+        lasting: the same of means over a second: acceleration that lasts.
+    """
+
+    rate: float
+    turning: float
+    shaking: float
+    lasting: float
+
+    def distance(self, other: Motion) -> float:
+        """Distance of two motions in logarithms; the rate counts for less."""
+        floors = {"rate": 1.0, "turning": 1.0, "shaking": 0.05, "lasting": 0.02}
+        weights = {"rate": 0.3, "turning": 1.0, "shaking": 1.0, "lasting": 1.0}
+        mine, theirs = asdict(self), asdict(other)
+        ratios = [weights[key] * np.log((mine[key] + low) / (theirs[key] + low)) for key, low in floors.items()]
+        return float(np.linalg.norm(ratios))
+
+
+def motion_of(trajectory: Trajectory) -> Motion:
+    """Describe the motion of the sensor ``imu`` of a recording, over its evaluation mask.
+
+    Raises:
+        ValueError: it has no ``imu/gyr`` and ``imu/acc`` with samples.
+    """
+    gyr, acc = vectors(trajectory, "imu/gyr"), vectors(trajectory, "imu/acc")
+    if gyr is None or acc is None or not np.isfinite(gyr).any() or not np.isfinite(acc).any():
+        raise ValueError(f"{trajectory.name!r} needs the channels imu/gyr and imu/acc, with samples")
+    scored = trajectory.mask if trajectory.mask.any() else np.ones(len(trajectory), bool)
+    length = np.linalg.norm(acc, axis=1)
+    excess = length - np.nanmedian(length)
+    width = max(1, round(SMOOTHING / trajectory.dt))
+    means = np.convolve(np.nan_to_num(excess), np.ones(width) / width, mode="same")
+    rate = np.linalg.norm(gyr - np.nanmedian(gyr[~scored] if (~scored).any() else 0.0 * gyr, axis=0), axis=1)
+    rms = [float(np.sqrt(np.nanmean(np.square(values[scored])))) for values in (rate, excess, means)]
+    return Motion(1.0 / trajectory.dt, float(np.degrees(rms[0])), rms[1], rms[2])
+
+
+def results_of(trajectories: Sequence[Trajectory], table: pandas.DataFrame, suffix: str = "") -> list[dict[str, Any]]:
+    """What a benchmark found, a recording each, as JSON: name, data set, motion, errors of every estimator in deg.
+
+    Args:
+        trajectories: the recordings, with truth.
+        table: from :func:`poise.evaluate`, over these.
+        suffix: put behind the names of the data sets.
+    """
+    recordings = []
+    for trajectory in trajectories:
+        part = table[(table["trajectory"] == trajectory.name) & table["metric"].isin(ERRORS)]
+        errors: dict[str, dict[str, float]] = {}
+        for row in part.itertuples():
+            # A heading of the truth that is arbitrary tells nothing of that of an estimate.
+            told = row.metric == "inclination" or dataset_of(trajectory) in NORTH
+            if row.quantity in ("up", "orientation") and np.isfinite(row.value) and told:
+                errors.setdefault(row.estimator, {})[row.metric] = round(row.value, 4)
+        motion = {name: round(value, 3) for name, value in asdict(motion_of(trajectory)).items()}
+        dataset = f"{dataset_of(trajectory)}{suffix}"
+        recordings.append({"name": trajectory.name, "dataset": dataset, "motion": motion, "errors": errors})
+    return recordings
+
+
+def load_results(path: Path = RESULTS) -> dict[str, Any]:
+    """Errors of a benchmark.
+
+    Raises:
+        ValueError: the file holds none.
+    """
+    try:
+        found = json.loads(path.read_text(encoding="utf-8"))
+        found["recordings"][0]["errors"]
+    except (OSError, ValueError, KeyError, IndexError, TypeError) as reason:
+        raise ValueError(f"{path} holds no results of poise benchmark --save: {reason}") from None
+    return found
+
+
+@dataclass(frozen=True)
+class Recommendation:
+    """Estimators for one recording.
+
+    Attributes:
+        motion: what its motion is like.
+        nearest: names of the recordings that the errors are from.
+        sets: data set → how many of these.
+        ranking: a row an estimator, best first: estimator, kind, mean and largest inclination error, heading error
+            (deg), and the reason.
+        notes: what else matters about this recording.
+    """
+
+    motion: Motion
+    nearest: list[str]
+    sets: dict[str, int]
+    ranking: list[dict[str, Any]]
+    notes: list[str]
+
+
+def recommend(
+    trajectory: Trajectory, mounting: Mounting | None = None, results: Mapping[str, Any] | None = None
+) -> Recommendation:
+    """Rank the estimators that a recording can feed by their errors on the benchmark recordings nearest to it.
+
+    Args:
+        trajectory: a recording with ``imu/gyr`` and ``imu/acc``.
+        mounting: where the sensor is; by default recordings of all mountings are considered.
+        results: from :func:`load_results`; the shipped ones by default.
+
+    Raises:
+        ValueError: an unknown mounting, or a recording without rates and forces.
+    """
+    if mounting is not None and mounting not in get_args(Mounting):
+        raise ValueError(f"mounting must be one of {get_args(Mounting)}, got {mounting!r}")
+    motion = motion_of(trajectory)
+    results = load_results() if results is None else results
+    found = [one for one in results["recordings"] if not one["dataset"].endswith(CORRECTED)]
+    suited = [one for one in found if mounting is None or MOUNTINGS.get(one["dataset"]) == mounting]
+    near = sorted(suited or found, key=lambda one: motion.distance(Motion(**one["motion"])))[:NEIGHBOURS]
+    sets = dict(Counter(one["dataset"] for one in near))
+    alive = {name for name, values in trajectory.measurements.items() if np.nanmax(np.abs(values), initial=0.0) > 0.0}
+    ranking = [
+        row
+        for name, info in list_estimators().items()
+        if set(info.channels) <= alive and (row := ranked_row(name, info.kind, near)) is not None
+    ]
+    heading = "imu/mag" in alive
+    # With a magnetometer those that tell the heading come first: the others leave it drifting.
+    ranking.sort(key=lambda row: (heading and row["heading"] is None, row["inclination"]))
+    return Recommendation(motion, [one["name"] for one in near], sets, ranking, notes_on(trajectory, motion, near))
+
+
+def ranked_row(name: str, kind: str, near: Sequence[Mapping[str, Any]]) -> dict[str, Any] | None:
+    """Errors of one estimator on the nearest recordings; None if it was run on less than half of them."""
+    errors = [one["errors"][name] for one in near if name in one["errors"] and "inclination" in one["errors"][name]]
+    if not errors or 2 * len(errors) < len(near):
+        return None
+    inclinations = [each["inclination"] for each in errors]
+    headings = [each["heading"] for each in errors if "heading" in each]
+    best = sum(
+        name == min(one["errors"], key=lambda other: one["errors"][other].get("inclination", np.inf)) for one in near
+    )
+    reason = f"best of all on {best} of {len(near)}" if best else f"{len(errors)} of {len(near)} recordings"
+    return {
+        "estimator": name,
+        "kind": kind,
+        "inclination": float(np.mean(inclinations)),
+        "largest": float(max(inclinations)),
+        "heading": float(np.mean(headings)) if headings else None,
+        "reason": reason,
+    }
+
+
+def notes_on(trajectory: Trajectory, motion: Motion, near: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Conditions of this recording under which the measured errors may not hold."""
+    from ..envs.data.inspection import inspect_recording
+
+    notes = []
+    away = min(motion.distance(Motion(**one["motion"])) for one in near)
+    if away > 1.0:
+        notes.append(f"no benchmark recording moves like this one (the nearest differs {np.exp(away):.1f}-fold)")
+    bias = next((row.get("bias °/s") for row in inspect_recording(trajectory).sensors if row["sensor"] == "imu"), None)
+    if bias is not None and bias > 2.0:
+        notes.append(f"gyroscope bias {bias:.1f} °/s at rest: subtract it first, vqf follows no more than 2 °/s")
+    if motion.lasting > 1.0:
+        notes.append(
+            f"acceleration of {motion.lasting:.1f} m/s² lasts for seconds: any six-axis estimate leans with it; "
+            "speed or position aiding would help"
+        )
+    if motion.rate < 40.0:
+        notes.append(f"{motion.rate:.0f} Hz is slow: turning between samples is lost")
+    return notes
+
+
+def dataset_errors(recordings: Sequence[Mapping[str, Any]], metric: str = "inclination") -> dict[str, dict[str, float]]:
+    """Estimator → data set → mean error, deg; estimators in order of their mean ratio to the best of each data set.
+
+    An estimator has a mean where it ran on every recording of the data set; those with more of them come first.
+
+    Args:
+        recordings: from :func:`results_of`.
+        metric: one of :data:`ERRORS`.
+    """
+    sizes = Counter(one["dataset"] for one in recordings)
+    values: dict[str, dict[str, list[float]]] = {}
+    for one in recordings:
+        for name, errors in one["errors"].items():
+            if metric in errors:
+                values.setdefault(name, {}).setdefault(one["dataset"], []).append(errors[metric])
+    means = {
+        name: {each: float(np.mean(found)) for each, found in sets.items() if len(found) == sizes[each]}
+        for name, sets in values.items()
+    }
+    best = {each: min((sets[each] for sets in means.values() if each in sets), default=1.0) for each in sizes}
+
+    def rank(name: str) -> tuple[int, float]:
+        ratios = [np.log(max(error, 1e-6) / max(best[each], 1e-6)) for each, error in means[name].items()]
+        return -len(ratios), float(np.mean(ratios)) if ratios else np.inf
+
+    return {name: means[name] for name in sorted(means, key=rank) if means[name]}
