@@ -11,15 +11,19 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from ...filters.core import rotation
 from .checks import check_metadata, columns, first, real_array, unit_or_unknown
 from .clock import Clock, check_interval, fit_clock
+from .frames import trajectory_frame
 from .resampling import resampled_fields, shifted
 from .storage import read_trajectory_file, write_trajectory_file
+
+if TYPE_CHECKING:
+    import pandas
 
 DERIVED_FROM_ORIENTATION = {"up": rotation.up_in_body, "relative_orientation": lambda orientation: orientation}
 """Truth that an orientation contains: quantity name → function of the quaternions ``(T, 4)``."""
@@ -280,6 +284,13 @@ class Trajectory:
             truth["orientation"] = np.where(lost, turned, truth["orientation"])
         details = {name: value for name, value in self.metadata.items() if name != REFERENCE_CLOCK}
         return self.replace(truth=truth, metadata=details | {"reference_clock_corrected": offset})
+
+    def to_frame(self) -> pandas.DataFrame:
+        """A table with a row a sample: see :func:`~poise.envs.data.frames.trajectory_frame`."""
+        units = self.metadata.get("units")
+        return trajectory_frame(
+            self.time, self.measurements, self.truth, self.mask, units if isinstance(units, Mapping) else {}
+        )
 
     def save(self, path: str | Path) -> Path:
         """Write the trajectory to an HDF5 file, see :mod:`poise.envs.data.storage`.

@@ -1,0 +1,138 @@
+"""Recommendations rest on the recordings that move alike, and on nothing else."""
+
+import numpy as np
+import pytest
+
+from poise.baselines.benchmark import dataset_of, with_other_clocks
+from poise.baselines.evaluation import evaluate
+from poise.baselines.recommendation import (
+    CORRECTED,
+    Motion,
+    dataset_errors,
+    load_results,
+    motion_of,
+    recommend,
+    results_of,
+)
+from poise.envs.hand.sensing import simulate_hand
+
+
+@pytest.fixture(scope="module")
+def motions():
+    return {gesture: simulate_hand(gesture, seed=8, duration=20.0) for gesture in ("slow", "severe")}
+
+
+def results(slow, severe):
+    """Two kinds of recordings, calm and violent, on which different estimators win."""
+    calm = {"mekf": {"inclination": 0.2}, "tilt": {"inclination": 0.9}, "mekf-9": {"inclination": 0.3, "heading": 1.0}}
+    wild = {"mekf": {"inclination": 4.0}, "tilt": {"inclination": 2.0}, "mekf-9": {"inclination": 5.0, "heading": 2.0}}
+    sets = (("calm", slow, calm), ("wild", severe, wild))
+    return {
+        "recordings": [
+            {"name": f"{name}-{number}", "dataset": name, "motion": vars(motion), "errors": errors}
+            for name, motion, errors in sets
+            for number in range(8)
+        ]
+    }
+
+
+def test_the_nearest_recordings_decide(motions):
+    slow, severe = motion_of(motions["slow"]), motion_of(motions["severe"])
+    assert severe.turning > 1.5 * slow.turning
+    assert severe.shaking > 3.0 * slow.shaking
+    found = results(slow, severe)
+    six = {name: values for name, values in motions["slow"].measurements.items() if name != "imu/mag"}
+    calm = recommend(motions["slow"].replace(measurements=six), results=found)
+    assert calm.sets == {"calm": 6}
+    assert [row["estimator"] for row in calm.ranking] == ["mekf", "tilt"]
+    assert calm.ranking[0]["inclination"] == pytest.approx(0.2)
+    six = {name: values for name, values in motions["severe"].measurements.items() if name != "imu/mag"}
+    wild = recommend(motions["severe"].replace(measurements=six), results=found)
+    assert [row["estimator"] for row in wild.ranking] == ["tilt", "mekf"]
+    assert wild.ranking[0]["reason"] == "best of all on 6 of 6"
+
+
+def test_a_magnetometer_that_works_puts_headings_first(motions):
+    found = results(motion_of(motions["slow"]), motion_of(motions["severe"]))
+    nine = recommend(motions["slow"], results=found)
+    assert nine.ranking[0]["estimator"] == "mekf-9"
+    assert nine.ranking[0]["heading"] == pytest.approx(1.0)
+    dead = motions["slow"].measurements | {"imu/mag": np.zeros((len(motions["slow"]), 3))}
+    assert recommend(motions["slow"].replace(measurements=dead), results=found).ranking[0]["estimator"] == "mekf"
+
+
+def test_conditions_are_told(motions):
+    found = results(motion_of(motions["slow"]), motion_of(motions["severe"]))
+    still = motions["slow"]
+    rest = {
+        "imu/gyr": np.tile([0.08, 0.0, 0.0], (len(still), 1)),
+        "imu/acc": np.tile([0.0, 0.0, 9.81], (len(still), 1)),
+    }
+    notes = recommend(still.replace(measurements=rest), results=found).notes
+    assert any("gyroscope bias 4.6 °/s" in note for note in notes)
+    assert any("no benchmark recording moves like this one" in note for note in notes)
+    slow = still.resampled(20.0)
+    assert any("20 Hz is slow" in note for note in recommend(slow, results=found).notes)
+
+
+def test_bad_input_is_explained(motions, tmp_path):
+    with pytest.raises(ValueError, match="mounting must be one of"):
+        recommend(motions["slow"], mounting="boat")
+    only = {"imu/mag": motions["slow"].measurements["imu/mag"]}
+    with pytest.raises(ValueError, match="needs the channels imu/gyr and imu/acc"):
+        recommend(motions["slow"].replace(measurements=only))
+    (tmp_path / "other.json").write_text("{}")
+    with pytest.raises(ValueError, match="holds no results"):
+        load_results(tmp_path / "other.json")
+
+
+def test_a_benchmark_s_results_are_the_table_s_numbers(motions):
+    named = [
+        motion.replace(metadata={"name": name, "environment": {"id": "poise/HandMotion-v0"}})
+        for name, motion in motions.items()
+    ]
+    table = evaluate(["mekf", "mekf-9", "tilt"], named)
+    found = results_of(named, table) + results_of(named[:1], table, CORRECTED)
+    assert [one["dataset"] for one in found] == ["simulated hand"] * 2 + [f"simulated hand{CORRECTED}"]
+    chosen = table[(table.metric == "inclination") & (table.quantity == "up")]
+    for estimator, errors in dataset_errors(found).items():
+        assert errors["simulated hand"] == pytest.approx(chosen[chosen.estimator == estimator].value.mean(), abs=1e-4)
+    assert set(dataset_errors(found, "heading")) == {"mekf-9"}
+    # Those on the corrected clock are other numbers for the same motion: they are no neighbours.
+    assert CORRECTED not in str(recommend(named[0], results={"recordings": found}).sets)
+
+
+def test_an_estimator_that_missed_a_recording_has_no_mean_there():
+    motion = {"rate": 100.0, "turning": 50.0, "shaking": 1.0, "lasting": 0.2}
+    recordings = [
+        {
+            "name": "1",
+            "dataset": "a",
+            "motion": motion,
+            "errors": {"x": {"inclination": 1.0}, "y": {"inclination": 2.0}},
+        },
+        {"name": "2", "dataset": "a", "motion": motion, "errors": {"y": {"inclination": 2.0}}},
+        {
+            "name": "3",
+            "dataset": "b",
+            "motion": motion,
+            "errors": {"x": {"inclination": 1.0}, "y": {"inclination": 4.0}},
+        },
+    ]
+    assert dataset_errors(recordings) == {"y": {"a": 2.0, "b": 4.0}, "x": {"b": 1.0}}
+
+
+def test_a_distance_is_that_of_ratios():
+    motion = Motion(100.0, 99.0, 0.95, 0.98)
+    assert motion.distance(motion) == 0.0
+    assert motion.distance(Motion(100.0, 199.0, 0.95, 0.98)) == pytest.approx(np.log(2.0))
+
+
+def test_clocks_are_judged_by_data_set(motions):
+    def recording(dataset, offset):
+        metadata = {"name": f"{dataset} {offset}", "format": dataset, "reference_clock_offset": offset}
+        return motions["slow"].replace(metadata=metadata)
+
+    recordings = [recording("BROAD", 0.0023), recording("BROAD", 0.0024)]
+    recordings += [recording("EuRoC", offset) for offset in (0.0, 0.0001, -0.004)]
+    assert {dataset_of(one) for one in with_other_clocks(recordings)} == {"BROAD"}
