@@ -22,6 +22,8 @@ from typing import Any
 
 import numpy as np
 
+from ..support.files import write_text
+
 _LOCK = threading.RLock()
 _WARNED: set[Path] = set()
 PATIENCE = 1.0
@@ -110,10 +112,7 @@ def load(text: str, label: str) -> ModuleType:
 def _written(path: Path, text: str) -> Path:
     """The path, with exactly this text in it."""
     if not path.exists() or path.read_bytes() != text.encode():
-        handle, temporary = tempfile.mkstemp(dir=path.parent, suffix=".tmp")
-        with os.fdopen(handle, "w", encoding="utf-8") as file:
-            file.write(text)
-        os.replace(temporary, path)
+        write_text(path, text)
     return path
 
 

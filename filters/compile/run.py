@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 import warnings
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
@@ -13,6 +12,7 @@ import numpy as np
 from ..core.model import Equations, parameters_of, structure_of
 from ..core.quantity import Estimate, Measurement
 from ..core.sampling import FilterState, Gains, join, per_tick_gains
+from ..support.parallel import processors
 from .cache import compile_now, load
 from .printer import UntraceableError, print_model
 
@@ -40,16 +40,6 @@ def compiled_equations(model: Equations) -> CompiledEquations | None:
                 stacklevel=4,
             )
     return _COMPILED[key]
-
-
-def available_threads() -> int:
-    """Threads that this process may use: its processors, fewer if OMP_NUM_THREADS or NUMBA_NUM_THREADS says so."""
-    count = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    for name in ("OMP_NUM_THREADS", "NUMBA_NUM_THREADS"):
-        value = os.environ.get(name, "").split(",")[0].strip()
-        if value.isdigit() and int(value) > 0:
-            count = min(count, int(value))
-    return count
 
 
 class CompiledEquations:
@@ -124,7 +114,7 @@ class CompiledEquations:
 
     def _execute(self, states: list[np.ndarray], Z: np.ndarray, parameters: np.ndarray, outs: list[np.ndarray]) -> None:
         """Call the kernel, in threads where the work is worth it; sequences do not meet, so the numbers stay."""
-        threads = min(available_threads(), Z.shape[1])
+        threads = min(processors(), Z.shape[1])
         if threads < 2 or Z.shape[0] * Z.shape[1] < PARALLEL_WORK:
             self.kernel(*states, Z, parameters, *outs)
             return

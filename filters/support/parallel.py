@@ -8,10 +8,13 @@ from typing import Any
 
 
 def processors() -> int:
-    """Processors that this process may use: those of its affinity mask, at most ``OMP_NUM_THREADS`` of them."""
-    allowed = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    asked = os.environ.get("OMP_NUM_THREADS", "").split(",")[0]
-    return min(allowed, int(asked)) if asked.isdigit() and int(asked) > 0 else allowed
+    """Processors of this process's affinity mask, fewer if ``OMP_NUM_THREADS`` or ``NUMBA_NUM_THREADS`` says so."""
+    count = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    for name in ("OMP_NUM_THREADS", "NUMBA_NUM_THREADS"):
+        value = os.environ.get(name, "").split(",")[0].strip()
+        if value.isdigit() and int(value) > 0:
+            count = min(count, int(value))
+    return count
 
 
 def progress_bar(total: int | None, label: str, unit: str, *, show: bool = True) -> Any:

@@ -1,6 +1,5 @@
 """Printing and running of equations; equality with the array form is in test_contracts."""
 
-import os
 import pickle
 import subprocess
 import sys
@@ -43,7 +42,7 @@ def test_threads_do_not_change_the_numbers(measurements, monkeypatch):
     kalman = KalmanFilter(ExternalAcceleration())
     alone = kalman.run(measurements)
     monkeypatch.setattr(compiled, "PARALLEL_WORK", 1)
-    monkeypatch.setattr(compiled, "available_threads", lambda: 3)
+    monkeypatch.setattr(compiled, "processors", lambda: 3)
     shared = kalman.run(measurements, {"measurement": np.zeros((50, 4))})
     for one, other in zip((alone.pose["up"], *alone[1:]), (shared.pose["up"], *shared[1:]), strict=True):
         np.testing.assert_array_equal(one, other)
@@ -87,19 +86,6 @@ def test_zeros_that_are_skipped_change_nothing():
     lists = np.arange(e), np.empty(e + 1, np.int64), np.empty(e * e, np.int64)
     kernel.propagate(F, moved, Q, np.empty((e, e)), *lists)
     np.testing.assert_allclose(moved, F @ P @ F.T + Q, rtol=0, atol=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("environment", "expected"),
-    [({}, 2), ({"OMP_NUM_THREADS": "1"}, 1), ({"NUMBA_NUM_THREADS": "1"}, 1), ({"OMP_NUM_THREADS": "8"}, 2)],
-)
-def test_threads_are_those_that_the_process_may_use(environment, expected, monkeypatch):
-    monkeypatch.setattr(os, "sched_getaffinity", lambda process: {3, 5}, raising=False)
-    for name in ("OMP_NUM_THREADS", "NUMBA_NUM_THREADS"):
-        monkeypatch.delenv(name, raising=False)
-    for name, value in environment.items():
-        monkeypatch.setenv(name, value)
-    assert compiled.available_threads() == expected
 
 
 @dataclass(frozen=True)

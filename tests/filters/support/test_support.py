@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -105,13 +106,27 @@ def test_bars_appear_on_terminals_only(monkeypatch: pytest.MonkeyPatch) -> None:
         assert ("powers" in stream.getvalue()) is shown
 
 
-def test_processors_respect_the_thread_limit(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delenv("OMP_NUM_THREADS", raising=False)
-    allowed = parallel.processors()
-    assert allowed >= 1
-    for asked, given in (("1", 1), ("1,2", 1), ("10000", allowed), ("0", allowed), ("many", allowed)):
-        monkeypatch.setenv("OMP_NUM_THREADS", asked)
-        assert parallel.processors() == given
+@pytest.mark.parametrize(
+    ("environment", "expected"),
+    [
+        ({}, 2),
+        ({"OMP_NUM_THREADS": "1"}, 1),
+        ({"OMP_NUM_THREADS": "1,2"}, 1),
+        ({"NUMBA_NUM_THREADS": "1"}, 1),
+        ({"OMP_NUM_THREADS": "8"}, 2),
+        ({"OMP_NUM_THREADS": "0"}, 2),
+        ({"OMP_NUM_THREADS": "many"}, 2),
+    ],
+)
+def test_processors_are_those_that_the_process_may_use(
+    environment: dict[str, str], expected: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(os, "sched_getaffinity", lambda process: {3, 5}, raising=False)
+    for name in ("OMP_NUM_THREADS", "NUMBA_NUM_THREADS"):
+        monkeypatch.delenv(name, raising=False)
+    for name, value in environment.items():
+        monkeypatch.setenv(name, value)
+    assert parallel.processors() == expected
 
 
 @pytest.mark.parametrize(("name", "module"), [("sim", "pybullet"), ("learn", "torch"), ("rl", "stable_baselines3")])
