@@ -54,7 +54,7 @@ def run(args: Args) -> int:
             work.checks(study, report)
             return 0
         found = work.rides(study, report, scenarios, args.fidelity)
-        upright = sum(each.upright for each in found)
+        upright = sum(each["upright"] for each in found)
         out.say(f"{upright} of {len(found)} rides upright")
     return 0 if upright == len(found) else 1
 

@@ -66,16 +66,6 @@ class Study:
         """A seed below 2³² that depends on the root seed and on the names only."""
         return named_seed(self.seed, *names)
 
-    def rides(self, scenario: str, suite: str | Sequence[str], **settings: Any) -> list[Trajectory]:
-        """The rides of :meth:`ride_files`, which lists the settings.
-
-        Returns:
-            Trajectories named ``<scenario>-<subject>-<index>``, subjects first, with ``metadata`` ``group`` (the
-            scenario), ``subject``, ``index`` and ``geometry``. One that ended in a fall is as long as the rider was
-            up, and its ``metadata["ended"]`` is ``terminated``.
-        """
-        return [load_ride(path) for path in self.ride_files(scenario, suite, **settings)]
-
     def ride_files(
         self,
         scenario: str,
@@ -104,7 +94,9 @@ class Study:
             options: further arguments of the environment.
 
         Returns:
-            Their files, for :func:`load_ride`: :meth:`map` should get them rather than long trajectories.
+            Their files, for :func:`load_ride`: :meth:`map` should get them rather than long trajectories. Rides are
+            named ``<scenario>-<subject>-<index>``, subjects first. One that ended in a fall is as long as the rider was
+            up, and its ``metadata["ended"]`` is ``terminated``.
         """
         settings = {
             "scenario": scenario,

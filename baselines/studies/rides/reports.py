@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from ..claims import Claim
 from ..ride_study import mean
-from .statistics import RideStatistics
 
 
 class Reported(NamedTuple):
@@ -18,7 +17,7 @@ class Reported(NamedTuple):
     reported: str
     source: str
     field: str
-    """field of :class:`RideStatistics` that compares"""
+    """statistic of :func:`.ride_statistics` that compares"""
     unit: str
     low: float
     high: float
@@ -71,12 +70,12 @@ REPORTED = (
 """Figures of the papers; forces they show in no number. Speeds depend on how long one rides."""
 
 
-def comparison(rides: Iterable[RideStatistics]) -> list[Claim]:
+def comparison(rides: Iterable[dict[str, Any]]) -> list[Claim]:
     """What each paper reports and whether the mean over the riders here agrees, for scenarios that were ridden."""
     found = list(rides)
     claims = []
     for line in REPORTED:
-        values = [getattr(each, line.field) for each in found if each.scenario == line.scenario]
+        values = [each[line.field] for each in found if each["scenario"] == line.scenario]
         if values:
             text = f"{line.scenario}: {line.what}, {line.reported} ({line.source})"
             here = f"{min(values):.3g} to {max(values):.3g} {line.unit}"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -15,51 +15,23 @@ SUITE = ("bicycle_imu/acc", "trunk_imu/acc")
 """Channels that are recorded, without errors: what the papers' accelerometers would have to measure."""
 
 
-@dataclass(frozen=True)
-class RideStatistics:
-    """One ride. Angles in deg, ``sd``: standard deviation over the ride."""
-
-    scenario: str
-    subject: int
-    seed: int
-    duration: float
-    """s that were ridden"""
-    upright: bool
-    """whether the rider got to the end"""
-    speed_mean: float
-    """m/s"""
-    speed_min: float
-    """m/s"""
-    speed_max: float
-    """m/s"""
-    roll_mean: float
-    """deg, to the right positive"""
-    roll_sd: float
-    """deg"""
-    roll_max: float
-    """deg, largest magnitude"""
-    pitch_max: float
-    """deg, largest magnitude"""
-    lean_mean: float
-    """deg: the trunk's lean to the side against the vertical, towards the middle of the turn on the whole positive"""
-    lean_sd: float
-    """deg"""
-    yaw_rate_mean: float
-    """deg/s, mean of the magnitude"""
-    yaw_rate_max: float
-    """deg/s"""
-    acceleration_max: float
-    """m/s²: largest specific force on an axis of the bicycle's IMU"""
-    seat_force_mean: float
-    """N, magnitude of the rider's force on the saddle"""
-    seat_force_max: float
-    """N"""
-    handlebar_force_mean: float
-    """N, magnitude of each hand's force on the handlebar, mean of both hands"""
-    handlebar_force_max: float
-    """N, largest of both hands"""
-    gap_max: float | None
-    """mm, largest distance of a hand from its grip or of a foot from its pedal; None for a lumped rider"""
+UNITS = {
+    "speed": "m/s",
+    "roll": "deg",
+    "pitch": "deg",
+    "lean": "deg",
+    "yaw_rate": "deg/s",
+    "acceleration": "m/s²",
+    "seat_force": "N",
+    "handlebar_force": "N",
+    "gap": "mm",
+}
+"""Quantity → unit. Roll is positive to the right; the trunk's lean is against the vertical, towards the middle of the
+turn; the yaw rate is without sign; the acceleration is the specific force on the axes of the bicycle's IMU; forces are
+magnitudes, of the rider on the saddle and of each hand; a gap is the distance of a hand from its grip or of a foot from
+its pedal."""
+KINDS = {"mean": np.nanmean, "sd": np.nanstd, "min": np.nanmin, "max": lambda values: np.nanmax(np.abs(values))}
+"""Statistic → what it is of the samples of a ride; ``max`` is the largest magnitude."""
 
 
 def trunk_lean(truth: Mapping[str, np.ndarray]) -> np.ndarray:
@@ -75,14 +47,18 @@ def trunk_lean(truth: Mapping[str, np.ndarray]) -> np.ndarray:
 
 def ride_statistics(
     trajectory: Trajectory, *, scenario: str, subject: int, gaps: np.ndarray | None = None
-) -> RideStatistics:
-    """Numbers of one recorded ride.
+) -> dict[str, Any]:
+    """Numbers of one recorded ride, of JSON's types.
 
     Args:
         trajectory: of ``poise/RiderBicycle-v0`` with the channel ``bicycle_imu/acc``.
         scenario: its name.
         subject: number of the rider.
         gaps: ``(T, 4)`` m, see :func:`.loop_closure_error`; None if they are not known.
+
+    Returns:
+        ``scenario``, ``subject``, ``seed``, ``duration`` (s that were ridden), ``upright`` (whether the rider got to
+        the end), and ``<quantity>_<statistic>`` of :data:`UNITS` and :data:`KINDS`; no gaps if they are not known.
     """
     truth = trajectory.truth
     speed, roll, pitch = (truth[f"bicycle/{name}"][:, 0] for name in ("speed", "roll", "pitch"))
@@ -92,34 +68,27 @@ def ride_statistics(
     inwards = -math.copysign(1.0, float(turning.mean()))
     seat = np.linalg.norm(truth["seat/force"], axis=1)
     hands = np.stack([np.linalg.norm(truth[f"handlebar/force_{side}"], axis=1) for side in ("left", "right")])
-    return RideStatistics(
-        scenario=scenario,
-        subject=subject,
-        seed=int(trajectory.metadata["seed"]),
-        duration=float(trajectory.time[-1] - trajectory.time[0]),
-        upright=trajectory.metadata.get("ended") != "terminated",
-        speed_mean=float(speed.mean()),
-        speed_min=float(speed.min()),
-        speed_max=float(speed.max()),
-        roll_mean=math.degrees(roll.mean()),
-        roll_sd=math.degrees(roll.std()),
-        roll_max=math.degrees(np.abs(roll).max()),
-        pitch_max=math.degrees(np.abs(pitch).max()),
-        lean_mean=inwards * math.degrees(lean.mean()),
-        lean_sd=math.degrees(lean.std()),
-        yaw_rate_mean=math.degrees(np.abs(turning).mean()),
-        yaw_rate_max=math.degrees(np.abs(turning).max()),
-        acceleration_max=float(np.nanmax(np.abs(trajectory.measurements["bicycle_imu/acc"]))),
-        seat_force_mean=float(seat.mean()),
-        seat_force_max=float(seat.max()),
-        handlebar_force_mean=float(hands.mean()),
-        handlebar_force_max=float(hands.max()),
-        gap_max=None if gaps is None else 1e3 * float(gaps.max()),
-    )
+    series = {
+        "speed": (speed, ("mean", "min", "max")),
+        "roll": (np.degrees(roll), ("mean", "sd", "max")),
+        "pitch": (np.degrees(pitch), ("max",)),
+        "lean": (inwards * np.degrees(lean), ("mean", "sd")),
+        "yaw_rate": (np.degrees(np.abs(turning)), ("mean", "max")),
+        "acceleration": (trajectory.measurements["bicycle_imu/acc"], ("max",)),
+        "seat_force": (seat, ("mean", "max")),
+        "handlebar_force": (hands, ("mean", "max")),
+    } | ({} if gaps is None else {"gap": (1e3 * gaps, ("max",))})
+    return {
+        "scenario": scenario,
+        "subject": subject,
+        "seed": int(trajectory.metadata["seed"]),
+        "duration": float(trajectory.time[-1] - trajectory.time[0]),
+        "upright": trajectory.metadata.get("ended") != "terminated",
+    } | {f"{name}_{kind}": float(KINDS[kind](values)) for name, (values, kinds) in series.items() for kind in kinds}
 
 
-def ride(scenario: str, subject: int, duration: float, fidelity: str, seed: int) -> RideStatistics:
-    """Ride once and summarise what happened.
+def ride(scenario: str, subject: int, duration: float, fidelity: str, seed: int) -> dict[str, Any]:
+    """Ride once; :func:`ride_statistics` of it.
 
     Args:
         scenario: name of a scenario.

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
 from itertools import product
 from typing import Any
 
@@ -17,7 +16,7 @@ from .checks import all_checks
 from .inclinations import inclination_rows
 from .plots import example_ride, ride_signals
 from .reports import comparison
-from .statistics import RideStatistics, ride
+from .statistics import KINDS, UNITS, ride
 
 SHOWN = {
     "scenario": "scenario",
@@ -40,23 +39,6 @@ SHOWN = {
 """Field → column of the table."""
 DRAWN = 20.0
 """s of a ride at most in the figure"""
-UNITS = {
-    "speed": "m/s",
-    "roll": "deg",
-    "pitch": "deg",
-    "lean": "deg",
-    "yaw_rate": "deg/s",
-    "acceleration": "m/s²",
-    "seat_force": "N",
-    "handlebar_force": "N",
-    "gap": "mm",
-}
-"""Quantity → unit."""
-
-
-def ride_numbers(scenario: str, subject: int, duration: float, fidelity: str, seed: int) -> dict[str, Any]:
-    """:func:`.ride` as JSON knows it."""
-    return asdict(ride(scenario, subject, duration, fidelity, seed))
 
 
 def ride_seeds(seed: int) -> dict[tuple[str, int], int]:
@@ -65,16 +47,16 @@ def ride_seeds(seed: int) -> dict[tuple[str, int], int]:
     return dict(zip(pairs, child_seeds(seed, len(pairs)), strict=True))
 
 
-def rides(study: Study, report: Report, scenarios: Sequence[str], fidelity: str) -> list[RideStatistics]:
+def rides(study: Study, report: Report, scenarios: Sequence[str], fidelity: str) -> list[dict[str, Any]]:
     """Ride, and report the numbers of every ride, what agrees with the papers, and the signals of one ride."""
     seeds, which = ride_seeds(study.seed), list(product(scenarios, study.subjects))
     jobs = [(*pair, study.duration, fidelity, seeds[pair]) for pair in which]
-    found = [RideStatistics(**numbers) for numbers in study.map("rides", ride_numbers, jobs)]
+    found = study.map("rides", ride, jobs)
     report.numbers(results(found))
-    shown = {field: title for field, title in SHOWN.items() if fidelity == "full" or field != "gap_max"}
+    shown = {field: title for field, title in SHOWN.items() if field in found[0]}
     report.table(
         f"{len(found)} rides of {study.duration:g} s, {fidelity} rider",
-        [{title: asdict(each)[field] for field, title in shown.items()} for each in found],
+        [{title: each[field] for field, title in shown.items()} for each in found],
     )
     report.claims("Beside the papers, range over riders", comparison(found))
     draw(study, report, scenarios, fidelity, seeds)
@@ -98,15 +80,17 @@ def checks(study: Study, report: Report) -> None:
     report.table("RMS errors of inclination, deg, of filters of one IMU", list(inclination_rows()))
 
 
-def results(found: Sequence[RideStatistics]) -> list[dict[str, Any]]:
+def results(found: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
     """Rows of ``results.csv``; what is true of a ride has the estimator ``truth``."""
     rows = []
     for each in found:
-        name = f"{each.scenario}-{each.subject}"
-        rows.append(dict(zip(COLUMNS, ("truth", name, "ride", "upright", float(each.upright), "1"), strict=True)))
-        for quantity, unit in UNITS.items():
-            for metric in ("mean", "sd", "min", "max"):
-                value = getattr(each, f"{quantity}_{metric}", None)
-                if value is not None:
-                    rows.append(dict(zip(COLUMNS, ("truth", name, quantity, metric, value, unit), strict=True)))
+        name = f"{each['scenario']}-{each['subject']}"
+        numbers = [("ride", "upright", float(each["upright"]), "1")]
+        numbers += [
+            (quantity, kind, each[f"{quantity}_{kind}"], unit)
+            for quantity, unit in UNITS.items()
+            for kind in KINDS
+            if f"{quantity}_{kind}" in each
+        ]
+        rows += [dict(zip(COLUMNS, ("truth", name, *number), strict=True)) for number in numbers]
     return rows

@@ -191,18 +191,11 @@ def observability(study: Study, report: Report) -> None:
             {
                 "motion of 40 s": label,
                 "model": "Σ2" if model == "sigma2" else "Σ1",
-                "rank": (rank := seen.rank()),
+                "rank": seen.rank(),
                 "other": other,
                 "of": equations.error_size,
                 "σ of φ without prior, deg": round(float(deviation), 2) if np.isfinite(deviation) else "unobservable",
             }
-        )
-        claims.append(
-            Claim(
-                f"{label}: {'Σ2' if model == 'sigma2' else 'Σ1'} observes φ",
-                f"rank {rank} of {equations.error_size}",
-                bool(np.isfinite(deviation)),
-            )
         )
     report.table(
         "Rank along a trajectory",

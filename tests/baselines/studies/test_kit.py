@@ -52,8 +52,13 @@ def test_seeds_depend_on_root_and_names_only(tmp_path):
 
 def test_rides_of_one_name_share_the_motion_whatever_the_sensors(study):
     settings = {"fidelity": "lumped"}
-    paper = study.rides("straight", "two-gyro", **settings)
-    ideal = study.rides("straight", ["bicycle_imu/acc", "bicycle_imu/gyr"], sensors="ideal", rate=50.0, **settings)
+    paper, ideal = (
+        [load_ride(path) for path in study.ride_files("straight", suite, **settings, **more)]
+        for suite, more in (
+            ("two-gyro", {}),
+            (["bicycle_imu/acc", "bicycle_imu/gyr"], {"sensors": "ideal", "rate": 50.0}),
+        )
+    )
     assert [ride.name for ride in paper] == ["straight-0-0", "straight-0-1", "straight-2-0", "straight-2-1"]
     assert [(ride.metadata["subject"], ride.metadata["index"]) for ride in ideal] == [(0, 0), (0, 1), (2, 0), (2, 1)]
     assert paper[0].metadata["group"] == "straight"
