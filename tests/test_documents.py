@@ -10,19 +10,23 @@ import pytest
 from poise.envs.sensors.kinds import KINDS
 from poise.scripts.list import LISTS, PLACED
 
+from .envs.data.formats.examples import write_examples
+
 ROOT = Path(__file__).resolve().parents[1]
 DOCUMENTS = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
 EXAMPLES = [
-    pytest.param(code, id=f"{path.name}-{number}")
+    pytest.param(path, code, id=f"{path.name}-{number}")
     for path in DOCUMENTS
     for number, code in enumerate(re.findall(r"```python\n(.*?)```", path.read_text(encoding="utf-8"), re.DOTALL))
     if "import " in code and "run_command" not in code
 ]
 
 
-@pytest.mark.parametrize("code", EXAMPLES)
-def test_examples_run(code, tmp_path, monkeypatch):
+@pytest.mark.parametrize(("path", "code"), EXAMPLES)
+def test_examples_run(path, code, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
+    if path.name == "recordings.md":
+        write_examples(tmp_path)
     kinds = dict(KINDS)
     exec(compile(code, "example", "exec"), {"__name__": "example"})
     for name in set(KINDS) - set(kinds):  # registered by the example, nobody else's business

@@ -6,6 +6,7 @@ the same names give a draft of a mapping.
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -40,9 +41,13 @@ def mapping_of(table: Table, details: dict[str, object] | None = None) -> Record
                 if chosen.unit:
                     units[f"{label}/{kind}"] = chosen.unit
         onboard = [group for group in found if group.kind in ("quaternion", "matrix") and group.sensor == sensor]
+        if len(sensors) == 1 and not onboard:
+            onboard = [group for group in found if group.kind in ("quaternion", "matrix")]
         if onboard:
             references.append(Reference(tuple(onboard[0].columns), role="onboard", sensor=label))
     time = time_column(table)
+    if time is not None and plain(time) in UNITS["time"] and time not in table.units:
+        units["time"] = plain(time)
     rate = table.rate_in_header("Update Rate", "Sample Rate", "Sampling Rate", "OutputRate", "Rate", "Frequency")
     return RecordingMap(
         columns,
@@ -109,6 +114,12 @@ def with_checked_orientation(trajectory: Trajectory) -> Trajectory:
     best = min(angles, key=lambda name: angles[name])
     # Where several fit alike, as with a sensor that lies level, what is written stands.
     chosen = best if angles["as written"] > max(FITS, 2.0 * angles[best]) else "as written"
+    if chosen != "as written":
+        warnings.warn(
+            f"{trajectory.name}: the device's orientation is {angles['as written']:.0f}° from gravity as written and "
+            f"{angles[best]:.1f}° as {chosen}, which is taken; or is the accelerometer's sign reversed?",
+            stacklevel=2,
+        )
     return trajectory.replace(
         measurements=trajectory.measurements | {key: variants[chosen]},
         metadata=trajectory.metadata

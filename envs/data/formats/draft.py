@@ -85,8 +85,8 @@ def time_unit(table: Table, mapping: RecordingMap) -> str:
     import warnings
 
     name = str(mapping.time)
-    if table.units.get(name):
-        return table.units[name]
+    if mapping.units.get("time") or table.units.get(name):
+        return mapping.units.get("time") or table.units[name]
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         try:

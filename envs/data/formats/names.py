@@ -88,6 +88,7 @@ def groups(table: Table) -> list[Group]:
         one = classify(name.replace("linear_acceleration", "acceleration") if ros else name)
         if one is not None:
             found.setdefault(one[:3], {}).setdefault(one[3], name)
+    add_unnamed_quaternions(table, found)
     result = []
     # Where the name of the sensor comes last, ``gyro_x_chest``, it looks like a variant of the gyroscope.
     sensors = {variant for (sensor, kind, variant) in found if kind == "gyr" and not sensor}
@@ -100,6 +101,18 @@ def groups(table: Table) -> list[Group]:
             label = spelled(columns[0], sensor)
             result.append(Group(label, kind, variant, columns, units.pop() if len(units) == 1 else ""))
     return result
+
+
+def add_unnamed_quaternions(table: Table, found: dict[tuple[str, str, str], dict[str, str]]) -> None:
+    """Columns that differ in w, x, y and z only, such as ``vicon_w``, are a quaternion whatever they are called."""
+    by_stem: dict[str, dict[str, str]] = {}
+    for name in table.arrays:
+        match = re.fullmatch(r"(.+?)[_. ]?([wxyz])", name, re.IGNORECASE)
+        if match and classify(name) is None:
+            by_stem.setdefault(match[1], {})[match[2].lower()] = name
+    for stem, axes in by_stem.items():
+        if set(axes) == set("wxyz"):
+            found[" ".join(words(stem)), "quaternion", ""] = axes
 
 
 def spelled(column: str, sensor: str) -> str:
@@ -136,7 +149,7 @@ def time_column(table: Table) -> str | None:
         said = plain(table.units.get(name, "")) in UNITS["time"]
         if flat in ("sampletimefine", "secondselapsed"):
             return 4
-        if flat in TIME or (words(name) and words(name)[-1] in ("timestamp", "time")):
+        if flat in TIME or flat in UNITS["time"] or (words(name) and words(name)[-1] in ("timestamp", "time")):
             return 3 + said
         return 2 if said and {"time", "timestamp"} & set(words(name)) else int(bool(TIME & set(words(name))))
 

@@ -163,7 +163,8 @@ def test_an_orientation_that_gravity_contradicts_is_turned(tmp_path, written):
     flip = np.array([0.0, 1.0, 0.0, 0.0])
     q = rotation.multiply(flip, Q) if "z down" in written else Q
     q = rotation.conjugate(q) if "conjugate" in written else q
-    recording = poise.load_recording(apdm(tmp_path / "walk.csv", {"Lumbar": 1.0}, q))
+    with pytest.warns(UserWarning, match=f"from gravity as written .* as {written}, which is taken"):
+        recording = poise.load_recording(apdm(tmp_path / "walk.csv", {"Lumbar": 1.0}, q))
     up = rotation.up_in_body(recording.onboard_orientation)
     np.testing.assert_allclose(up, rotation.up_in_body(Q), atol=1e-6)
     assert recording.metadata["onboard_orientation"]["read"] == written

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 import scipy.io
 
-from poise.envs.data.formats.load import find_recordings, load_recording
+import poise
+from poise.envs.data.formats.load import find_recordings, load_recording, load_recordings
 from poise.envs.data.trajectory import Trajectory
 from poise.filters.core import rotation
 
@@ -55,6 +56,49 @@ def data() -> Path:
     if "POISE_DATA" not in os.environ:
         pytest.skip("POISE_DATA names no folder of recordings")
     return Path(os.environ["POISE_DATA"])
+
+
+REFUSED = {"fusion_mode_quaternion_only.csv": "a gyroscope .* and an accelerometer .* are needed"}
+"""Real files that hold no inertial measurements, and what is said about them."""
+ONBOARD = {"mtw_manager4": 0.25, "ximu3": 0.45, "moveo_csv-Static": 0.6, "moveo_csv-Upper": 0.7}
+"""Root mean square inclination in deg of bounded-motion to the device's own, measured outside this package or here."""
+RATES = {
+    "mtw_manager4": 100.0,
+    "ximu3": 49.915,
+    "fusion_sensor_data": 100.0,
+    "made_20hz": 20.0,
+    "with_mag_60hz": 60.0,
+    "made_without_mag_60hz": 60.0,
+    "consensys_calibrated": 73.143,
+    "phyphox": 99.87,
+    "sensor_logger_ios": 99.75,
+    "senslogs_android": 198.6,
+    "TStick_Test11_Trial2": 100.0,
+    "euroc": 200.0,
+}
+
+
+def test_every_real_file_loads_or_says_why_not(recordings_folder):
+    """Rate and gravity are those of the device, and its own orientation agrees with an estimate from its readings."""
+    seen = set()
+    for path in find_recordings(recordings_folder / "field_files"):
+        if path.name in REFUSED:
+            with pytest.raises(ValueError, match=REFUSED[path.name]):
+                load_recording(path)
+            continue
+        for recording in load_recordings(path):
+            seen.add(recording.name)
+            rate = RATES.get(recording.name, 128.0)
+            assert 1 / recording.dt == pytest.approx(rate, rel=1e-3), recording.name
+            size = np.nanmedian(np.linalg.norm(recording.measurements["imu/acc"], axis=1))
+            assert 9.6 < size < 10.2, recording.name
+            if recording.name in ONBOARD:
+                estimate = poise.run("bounded-motion", recording)
+                up = rotation.up_in_body(recording.onboard_orientation)
+                cosine = np.clip((up * estimate.pose["up"]).sum(axis=1), -1.0, 1.0)[int(2 * rate) :]
+                error = np.degrees(np.sqrt(np.nanmean(np.arccos(cosine) ** 2)))
+                assert error < ONBOARD[recording.name], recording.name
+    assert seen >= set(RATES) | set(ONBOARD)
 
 
 @pytest.mark.recordings
