@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ....envs.data.trajectory import Trajectory
-from ...plots import new_figure
+from ...plots import TRUTH_COLOR, new_figure
 from .statistics import trunk_lean
 
 if TYPE_CHECKING:
@@ -54,7 +54,7 @@ def ride_signals(trajectory: Trajectory, title: str = "") -> Figure:
     time, truth = trajectory.time - trajectory.time[0], trajectory.truth
     speed, angles, *inertial, hands = axes
     speed.plot(time, trajectory.measurements["wheel/speed"], color="#b9bec6", linewidth=0.7, label="wheel/speed")
-    speed.plot(time, truth["bicycle/speed"], color="#1f5fa8", linewidth=1.0, label="true")
+    speed.plot(time, truth["bicycle/speed"], color=TRUTH_COLOR, linewidth=1.0, label="true")
     speed.set_ylabel("speed, m/s")
     for name, values in (
         ("roll", truth["bicycle/roll"][:, 0]),
