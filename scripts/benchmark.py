@@ -100,10 +100,10 @@ def run(args: Args) -> int:
             out.say(f"results: {write_json(args.save, {'source': source, 'recordings': results}, indent=None)}")
         if args.trials:
             out.say(f"the three tests of the external-acceleration paper, {args.trials} trials each")
-            rows = compare_modes(range(args.trials))
+            modes = compare_modes(range(args.trials))
             title = "external-acceleration, tests A to C of the paper, RMS in deg (levels in m/s²)"
-            sections[title] = markdown_table(rows)
-            out.table(rows, title)
+            sections[title] = markdown_table(modes)
+            out.table(modes, title)
         if passed_over:
             sections["Passed over"] = passed_over_text(passed_over, most=1000)
             out.say(f"passed over:\n{passed_over_text(passed_over)}")

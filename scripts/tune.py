@@ -111,7 +111,7 @@ def training_config(args: Args) -> TrainingConfig:
         config = shipped_config(args.filter)
     else:
         config = replace(shipped_config(args.filter), total_timesteps=QUICK_STEPS, trajectories=48, warm_start=24)
-    given = {"total_timesteps": args.steps, "trajectories": args.trajectories}
+    given: dict[str, Any] = {"total_timesteps": args.steps, "trajectories": args.trajectories}
     return replace(config, seed=args.seed, **{name: value for name, value in given.items() if value is not None})
 
 

@@ -138,7 +138,7 @@ class LearnedDataset:
         """Letters that tell data sets apart."""
         content = hashlib.sha256()
         for array in (self.features, self.up, self.mask):
-            content.update(np.ascontiguousarray(array))
+            content.update(np.ascontiguousarray(array).data)
         return content.hexdigest()[:16]
 
     def windows(

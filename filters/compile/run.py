@@ -132,6 +132,6 @@ class CompiledEquations:
         with ThreadPoolExecutor(threads) as pool:
             list(pool.map(work, bounds[:-1], bounds[1:]))
 
-    def _estimate(self, model: Equations, poses: np.ndarray, *rest: np.ndarray | None) -> Estimate:
+    def _estimate(self, model: Equations, poses: np.ndarray, *rest: Any) -> Estimate:
         pose = {name: poses[..., part] for name, part in self.columns.items()}
         return Estimate(pose, *rest) if model.error_size else Estimate(pose)

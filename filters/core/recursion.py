@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, Self
+from typing import Any, Self, cast
 
 import numpy as np
 
@@ -156,7 +156,10 @@ class Recursion:
         joined = FilterState(*(part.reshape((*batch, *part.shape[1:])) for part in parts))
         estimate = stack_estimates(estimates)
         pose = {name: array.reshape((*batch, *array.shape[1:])) for name, array in estimate.pose.items()}
-        rest = (None if part is None else part.reshape((*batch, *part.shape[1:])) for part in estimate[1:])
+        rest = (
+            None if part is None else part.reshape((*batch, *part.shape[1:]))
+            for part in cast(tuple[Any, ...], estimate[1:])
+        )
         return joined, Estimate(pose, *rest)
 
     def _step_arrays(

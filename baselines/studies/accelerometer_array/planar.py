@@ -148,7 +148,7 @@ def unscented_difference(seed: int, motion: str, duration: float = 20.0) -> floa
 
 def planar_table(rows: list[Row], key: str = "method") -> list[Row]:
     """Means over the seeds, a row for each motion and each method (or another ``key`` of the rows)."""
-    columns = {
+    columns: dict[str, tuple[str, Any]] = {
         "rms (°)": ("rms", np.mean),
         "largest rms of a seed (°)": ("rms", max),
         "largest error (°)": ("largest", np.mean),

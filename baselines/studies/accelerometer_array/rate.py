@@ -109,7 +109,7 @@ def weights_by_speed(weights: np.ndarray, truth: np.ndarray) -> dict[str, float 
 
 def rate_table(rows: list[Row]) -> list[Row]:
     """Mean, smallest and largest error over the seeds (rad/s), a row for each kind of errors and each method."""
-    columns = {"mean": ("rms", np.mean), "least": ("rms", min), "largest": ("rms", max)}
+    columns: dict[str, tuple[str, Any]] = {"mean": ("rms", np.mean), "least": ("rms", min), "largest": ("rms", max)}
     return grouped(rows, {"errors": "errors", "method": "method"}, columns)
 
 

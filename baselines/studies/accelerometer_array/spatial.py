@@ -173,7 +173,7 @@ def attitude_errors(
 
 def attitude_table(rows: list[Row]) -> list[Row]:
     """Means over the seeds (of the largest errors: the largest), a row for each device and method, degrees."""
-    columns = {
+    columns: dict[str, tuple[str, Any]] = {
         "pitch, rms": ("pitch", np.mean),
         "pitch, max": ("pitch_max", max),
         "azimuth, rms": ("azimuth", np.mean),

@@ -138,7 +138,11 @@ def compare_modes(seeds: Sequence[int]) -> list[dict[str, float | str | int]]:
     for test in TESTS:
         trial = simulate(test, seeds)
         size = np.linalg.norm(trial.acceleration, axis=-1)
-        level = {"test": test, "mean a": float(size.mean()), "peak a": float(size.max(axis=0).mean())}
+        level: dict[str, float | str | int] = {
+            "test": test,
+            "mean a": float(size.mean()),
+            "peak a": float(size.max(axis=0).mean()),
+        }
         for rotated, exact in (("printed", False), ("exact", True)):
             for mode in MODES:
                 found = errors(trial, ExternalAcceleration(mode=mode, exact_rotation=exact))

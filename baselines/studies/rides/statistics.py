@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -30,7 +30,12 @@ UNITS = {
 turn; the yaw rate is without sign; the acceleration is the specific force on the axes of the bicycle's IMU; forces are
 magnitudes, of the rider on the saddle and of each hand; a gap is the distance of a hand from its grip or of a foot from
 its pedal."""
-KINDS = {"mean": np.nanmean, "sd": np.nanstd, "min": np.nanmin, "max": lambda values: np.nanmax(np.abs(values))}
+KINDS: dict[str, Callable[[Any], Any]] = {
+    "mean": np.nanmean,
+    "sd": np.nanstd,
+    "min": np.nanmin,
+    "max": lambda values: np.nanmax(np.abs(values)),
+}
 """Statistic → what it is of the samples of a ride; ``max`` is the largest magnitude."""
 
 
