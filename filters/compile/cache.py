@@ -98,7 +98,8 @@ def load(text: str, label: str) -> ModuleType:
     import numba
 
     versions = f"{numba.__version__} {np.__version__} {sys.version}"
-    foundation = Path(__file__).with_name("kernel.py").read_text(encoding="utf-8")
+    here = Path(__file__)
+    foundation = "".join(here.with_name(f"{name}.py").read_text(encoding="utf-8") for name in ("kernel", "smoothing"))
     name = f"{label}_{hashlib.sha256(f'{versions}{foundation}{text}'.encode()).hexdigest()[:20]}"
     folder = cache_folder()
     path = f"<{name}>" if folder is None else str(_written(folder / f"{name}.py", text))

@@ -26,6 +26,13 @@ def copy(source, target):  # type: ignore[no-untyped-def]
 
 
 @jit
+def copy_matrix(source, target):  # type: ignore[no-untyped-def]
+    """A matrix into another."""
+    for i in range(source.shape[0]):
+        copy(source[i], target[i])
+
+
+@jit
 def finite(array):  # type: ignore[no-untyped-def]
     """Whether every element of a vector is finite."""
     for i in range(array.shape[0]):

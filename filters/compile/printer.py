@@ -1,4 +1,4 @@
-"""Equations → text of a module with one function, ``run``, that runs them over time.
+"""Equations → text of a module whose function ``run`` runs them over time, and ``record`` and ``smooth`` back again.
 
 A model runs once on recorded scalars (:mod:`.trace`); its floats stay parameters, so one printed module serves every
 tuning, sampling interval and gain. What is the same for every model is imported from :mod:`.kernel`. A method without
@@ -23,7 +23,8 @@ import numpy as np
 from numba import njit
 
 from poise.filters.compile.cache import jit
-from poise.filters.compile.kernel import begin, correct, fill, keep, propagate, scratch, take
+from poise.filters.compile.kernel import begin, copy, copy_matrix, correct, fill, keep, propagate, scratch, take, zeros
+from poise.filters.compile.smoothing import smooth_step
 
 inf, nan = np.inf, np.nan
 
@@ -49,18 +50,65 @@ def run(x, P, held, started, Z, parameters, poses, covariances, whites, nis):
                 predict(state, present, before, p, x1, F, Q)
                 if P1.shape[0] > 0:
                     propagate(F, P1, Q, work, every, first, column)
+                    # predicted
                     residual(x1, z, p, r, H, R)
                     nis[t, b] = correct(r, H, R, P1, dx, white, rows, S, HP, K, first, column)
                 retract(x1, dx, p, x0)
+                # updated
                 finish(x0, z, p, state)
             else:
                 prior(current, p, x0, P0)
                 nis[t, b] = 0.0
                 fill(white, 0.0)
                 started[b] = begin(x0, P0, state, P1)
+                # begun
             pose(state, p, poses[t, b])
             if covariances.shape[0] > 0 or not started[b]:
                 keep(started[b], P1, poses[t, b], covariances, t, b)
+'''
+
+# ``record`` is ``run`` with further lines in place of the comments: it keeps what the way back needs.
+_RECORDED = {
+    "def run(": "def record(",
+    "whites, nis):": "whites, nis, stage, updated, corrections, transitions, predictions):",
+    "# predicted": "copy_matrix(F, transitions[t, b])\n                    copy_matrix(P1, predictions[t, b])",
+    "# updated": "copy(x0, updated[t, b])\n                copy(dx, corrections[t, b])\n                stage[t, b] = 2",
+    "# begun": "stage[t, b] = 1 if started[b] else 0\n                copy(x0, updated[t, b])",
+}
+
+_SMOOTH = '''
+@jit
+def smooth(Z, parameters, stage, updated, corrections, transitions, predictions, later, covariances, poses):
+    """Backward over a recorded stretch; covariances (in: those of the filter) and ``later`` are changed in place."""
+    linked, error, smoothed, F, predicted = later
+    n, e = updated.shape[2], error.shape[1]
+    x0, x1, gain, work, scale = np.empty(n), np.empty(n), zeros(e, e), zeros(e, e), np.empty(e)
+    for back in range(Z.shape[0]):
+        t = Z.shape[0] - 1 - back
+        for b in range(Z.shape[1]):
+            if stage[t, b] == 0:
+                fill(poses[t, b], np.nan)
+                linked[b] = False
+                continue
+            p = parameters[t if parameters.shape[0] > 1 else 0, b if parameters.shape[1] > 1 else 0]
+            if linked[b]:
+                smooth_step(covariances[t, b], F[b], predicted[b], error[b], smoothed[b], gain, work, scale)
+            else:
+                fill(error[b], 0.0)
+                copy_matrix(covariances[t, b], smoothed[b])
+            retract(updated[t, b], error[b], p, x1)
+            if stage[t, b] == 2:
+                finish(x1, Z[t, b], p, x0)
+            else:
+                copy(x1, x0)
+            pose(x0, p, poses[t, b])
+            copy_matrix(smoothed[b], covariances[t, b])
+            linked[b] = stage[t, b] == 2
+            if linked[b]:
+                for i in range(e):
+                    error[b, i] += corrections[t, b, i]
+                copy_matrix(transitions[t, b], F[b])
+                copy_matrix(predictions[t, b], predicted[b])
 '''
 
 
@@ -123,4 +171,10 @@ def print_model(model: Equations) -> str:
         # Zeros are not printed; matrices keep theirs between calls, vectors share their memory and are cleared.
         clear = [f"    fill({name}, 0.0)" for name in outputs if name in ("xn", "out", "r")]
         text += [_INNER, f"def {signature}:", *clear, *print_code(arrays), "    return", "", ""]
-    return "\n".join([*text, _RUN.lstrip("\n")])
+    text.append(_RUN.lstrip("\n"))
+    if isinstance(traced, Model):
+        recorded = _RUN
+        for mark, line in _RECORDED.items():
+            recorded = recorded.replace(mark, line)
+        text += [recorded, _SMOOTH]
+    return "\n".join(text)

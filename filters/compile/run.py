@@ -11,7 +11,7 @@ import numpy as np
 
 from ..core.model import Equations, parameters_of, structure_of
 from ..core.quantity import Estimate, Measurement
-from ..core.sampling import FilterState, Gains, join, per_tick_gains
+from ..core.sampling import FilterState, Gains, empty_state, join, per_tick_gains
 from ..support.parallel import processors
 from .cache import compile_now, load
 from .printer import UntraceableError, print_model
@@ -19,6 +19,8 @@ from .printer import UntraceableError, print_model
 _COMPILED: dict[tuple[Any, ...], CompiledEquations | None] = {}
 PARALLEL_WORK = 200_000
 """ticks × batch above which a batch is shared among threads"""
+RECORDED = 4_000_000
+"""numbers that a smoother keeps at a time (32 MB)"""
 
 
 def compiled_equations(model: Equations) -> CompiledEquations | None:
@@ -46,7 +48,8 @@ class CompiledEquations:
     """The compiled recursion of one class of equations; parameters are passed at every call."""
 
     def __init__(self, model: Equations) -> None:
-        self.kernel = load(print_model(model), type(model).__name__).run
+        self.module = load(print_model(model), type(model).__name__)
+        self.kernel = self.module.run
         self.names = tuple(parameters_of(model))
         self.columns: dict[str, slice] = {}
         start = 0
@@ -111,6 +114,49 @@ class CompiledEquations:
         poses, covariances, whites, nis = (array.reshape((len(array), *batch, *array.shape[2:])) for array in outputs)
         estimate = self._estimate(model, poses, covariances if keep_covariance else None, whites, nis)
         return estimate, FilterState(*(array.reshape((*batch, *array.shape[1:])) for array in states))
+
+    def smooth(self, model: Equations, arrays: Measurement, gains: Gains | None, keep_covariance: bool) -> Estimate:
+        """A whole sequence in the light of all its samples; see :meth:`poise.filters.core.kalman.KalmanFilter.smooth`.
+
+        Records of the way forward are kept for a stretch at a time; the filter runs over each a second time.
+        """
+        Z = np.asarray(join(arrays, model.channels), dtype=float)
+        length, batch, n, e = Z.shape[0], Z.shape[1:-1], model.state_size, model.error_size
+        count = math.prod(batch)
+        Z = np.require(Z.reshape(length, count, Z.shape[-1]), requirements=["C", "W"])
+        parameters = self._parameters(model, gains, length, batch)
+        each = max(64, RECORDED // (count * (n + e + 4 * e * e)))
+        stretches = [slice(start, min(start + each, length)) for start in range(0, length, each)]
+        states = [np.array(part) for part in empty_state(model, Z[0])]
+        poses, covariances, whites, nis = self._outputs(model, length, count, length if keep_covariance else 0)
+        starts = []
+        for stretch in stretches:
+            starts.append([part.copy() for part in states])
+            if len(stretches) > 1:
+                own = parameters if len(parameters) == 1 else parameters[stretch]
+                size = stretch.stop - stretch.start
+                self.kernel(*states, Z[stretch], own, *self._outputs(model, size, count, 0))
+        later = np.zeros(count, bool), *(np.zeros((count, *shape)) for shape in ((e,), (e, e), (e, e), (e, e)))
+        for stretch, start in zip(reversed(stretches), reversed(starts), strict=True):
+            size, own = stretch.stop - stretch.start, parameters if len(parameters) == 1 else parameters[stretch]
+            pose, covariance, white, single = self._outputs(model, size, count, size)
+            records = [np.zeros((size, count), np.int64)]
+            records += [np.empty((size, count, *shape)) for shape in ((n,), (e,), (e, e), (e, e))]
+            compile_now(
+                self.module.record,
+                (*start, Z[stretch], own, pose, covariance, white, single, *records),
+                f"{type(model).__name__} (smoother)",
+            )
+            compile_now(
+                self.module.smooth,
+                (Z[stretch], own, *records, later, covariance, pose),
+                f"{type(model).__name__} (smoother)",
+            )
+            poses[stretch], whites[stretch], nis[stretch] = pose, white, single
+            if keep_covariance:
+                covariances[stretch] = covariance
+        shaped = [array.reshape((len(array), *batch, *array.shape[2:])) for array in (poses, covariances, whites, nis)]
+        return self._estimate(model, shaped[0], shaped[1] if keep_covariance else None, *shaped[2:])
 
     def _execute(self, states: list[np.ndarray], Z: np.ndarray, parameters: np.ndarray, outs: list[np.ndarray]) -> None:
         """Call the kernel, in threads where the work is worth it; sequences do not meet, so the numbers stay."""

@@ -5,11 +5,17 @@ The recursion, which handles missing samples and the start, is in :mod:`.recursi
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
+from ..compile.run import compiled_equations
+from .backend import is_torch
+from .estimator import check_measurements
 from .model import Gain, Model
+from .quantity import Estimate
 from .recursion import Recursion, correct
-from .sampling import FilterState, Gains, scaled
+from .sampling import FilterState, Gains, check_gains, scaled
 
 
 @dataclass(frozen=True)
@@ -29,6 +35,33 @@ class KalmanFilter(Recursion):
     @property
     def _keeps_covariance(self) -> bool:
         return self.keep_covariance
+
+    def smooth(self, measurements: Mapping[str, Any], gains: Gains | None = None) -> Estimate:
+        """Estimates of a whole sequence in the light of all its samples: fixed-interval (error-state RTS) smoothing.
+
+        After H. E. Rauch, F. Tung, C. T. Striebel, "Maximum likelihood estimates of linear dynamic systems", AIAA
+        Journal 3(8), 1965, on the error state. Exact for linear models, first-order for others. Missing samples are
+        bridged from both sides; samples before the start keep NaN.
+
+        Args:
+            measurements: channel → ``(T, *batch, size)``; NaN where there is no sample.
+            gains: log factors, constant or per time step.
+
+        Returns:
+            Pose and covariance of the smoother; innovations and NIS are those of the filter.
+
+        Raises:
+            ValueError: a channel is missing or has a wrong shape, a gain is unknown, or data are torch tensors.
+            TypeError: the model cannot be compiled.
+        """
+        arrays = check_measurements(self.channels, measurements, time_axis=True)
+        check_gains(self.gains, gains, type(self.model).__name__)
+        if any(is_torch(array) for array in arrays.values()):
+            raise ValueError("smoothing takes NumPy arrays, got torch tensors")
+        form = compiled_equations(self.model)
+        if form is None:
+            raise TypeError(f"{type(self.model).__name__} cannot be compiled, which smoothing needs")
+        return form.smooth(self.model, arrays, gains, self.keep_covariance)
 
 
 __all__ = ["FilterState", "Gain", "Gains", "KalmanFilter", "Model", "correct", "scaled"]
