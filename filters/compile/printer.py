@@ -72,7 +72,11 @@ _RECORDED = {
     "def run(": "def record(",
     "whites, nis):": "whites, nis, stage, updated, corrections, transitions, predictions):",
     "# predicted": "copy_matrix(F, transitions[t, b])\n                    copy_matrix(P1, predictions[t, b])",
-    "# updated": "copy(x0, updated[t, b])\n                copy(dx, corrections[t, b])\n                stage[t, b] = 2",
+    "# updated": "stage[t, b] = 2\n"
+    + " " * 16
+    + "copy(x0, updated[t, b])\n"
+    + " " * 16
+    + "copy(dx, corrections[t, b])",
     "# begun": "stage[t, b] = 1 if started[b] else 0\n                copy(x0, updated[t, b])",
 }
 
