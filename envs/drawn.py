@@ -124,8 +124,10 @@ class DrawnEnv(gymnasium.Env[Any, np.ndarray]):
 
     def _show(self, step: int) -> None:
         """Keep a window up to date, at most fifty times a second and not faster than time passes."""
+        if self.render_mode != "human":
+            return
         stride = max(1, round(self._steps_a_second / 50.0))
-        if self.render_mode != "human" or step % stride:
+        if step % stride:
             return
         if step == 0:
             self._drawn = -math.inf

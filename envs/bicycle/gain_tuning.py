@@ -33,8 +33,8 @@ class RiderBicycleGainEnv(GainTuningEnv):
 
     ## Action Space
 
-    ``Box(-1, 1, (k,), float32)``, one number for each gain; 0 is the published tuning exactly, and between 0 and ±1
-    the logarithm of the constant is changed linearly (:mod:`poise.filters.adaptation.gains` has the ranges).
+    ``Box(-1, 1, (k,), float32)``, one number for each gain, as of :class:`poise.envs.gain_tuning.HandMotionGainEnv`
+    (:mod:`poise.filters.adaptation.gains` has the ranges).
 
     | filter | gains (constant that is scaled) |
     |---|---|
@@ -45,16 +45,9 @@ class RiderBicycleGainEnv(GainTuningEnv):
     A filter of one IMU reads ``imu/gyr`` and ``imu/acc`` of the chosen ``site``. A filter of rides reads the channels
     of the ride that it needs, and is configured with rider and bicycle of every episode.
 
-    ## Observation Space
+    ## Observation Space, Rewards
 
-    ``Box(-1, 1, (n,), float32)``: statistics of the whitened innovations, the sensors and the estimated external
-    acceleration over five time scales up to 16 s, the time since the start, and the last action
-    (:class:`poise.filters.adaptation.features.InnovationFeatures`; ``env.unwrapped.tuned.features.names``).
-
-    ## Rewards
-
-    ``error``: minus the mean error of ``quantity`` over the interval, rad. ``improvement``: that of the published
-    tuning, run beside it, minus the agent's. With ``consistency`` w, minus w·|ln(mean NIS / m)| of the m innovations.
+    As of :class:`poise.envs.gain_tuning.HandMotionGainEnv`.
 
     ## Starting State
 
@@ -68,12 +61,9 @@ class RiderBicycleGainEnv(GainTuningEnv):
 
     ## Info
 
-    The same at reset and at every step, as of the last sample taken: ``time`` (s), ``pose`` (true ``quantity``),
-    ``truth`` (name → array: ``orientation`` of the sensor to the world, ``up``, ``angular_rate`` in rad/s,
-    ``position`` in m, ``gyroscope_bias``, ``accelerometer_bias``; mounting included, see
-    :func:`poise.envs.bicycle.sensors.single_imu.imu_of`), ``estimate`` (outputs of the filter; NaN before it started),
-    ``error_deg`` (mean over the interval; NaN at reset), ``gains`` (name → scaled constant). With a filter of rides
-    ``truth`` is all that ``poise/RiderBicycle-v0`` knows.
+    As of :class:`poise.envs.gain_tuning.HandMotionGainEnv`; ``truth`` is that of the sensor, mounting included
+    (:func:`poise.envs.bicycle.sensors.single_imu.imu_of`), with a filter of rides all that ``poise/RiderBicycle-v0``
+    knows.
 
     ## Cost
 
