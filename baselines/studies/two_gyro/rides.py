@@ -105,6 +105,7 @@ RIDES = RideStudy(
         Less("θ1 does not drift as integration does", "θ1", "Σ2", INTEGRATED, 0.5, "last 20 s"),
         Less("Σ2 beats the platform's gyroscope alone", "φ", "Σ2", ALONE),
         Less("Process noise for pitch lowers the error of φ", "φ", "Σ2, inflated", "Σ2"),
+        Less("Trusting the camera ten times less lowers the error of φ", "φ", "Σ2, camera 20°", "Σ2"),
         Less("The camera's alignment error makes more than half of φ's", "φ", "camera: white noise only", "Σ2", 0.5),
     ),
     drawn=(ALONE, INTEGRATED, "Σ1", "Σ2"),
