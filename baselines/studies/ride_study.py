@@ -290,8 +290,8 @@ class RideStudy:
         report.figure(title, figure, title, "Scales are those of truth and filter; what drifts leaves the picture.")
 
 
-DRAWN = ("#2c8c5a", "#b08d1a", "#c2571a", "#1f5fa8")
-"""Colours of the methods of a figure; the last is that of the study's filter."""
+DRAWN = ("#2c8c5a", "#c2571a", "#b08d1a", "#1f5fa8")
+"""Colours of the methods of a figure; the last is that of the study's filter, the one before that of integration."""
 
 
 def assessed(study: RideStudy, path: Path) -> dict[str, Any]:

@@ -101,7 +101,7 @@ def figure(push: Trajectory) -> Any:
     truth, every = true_angles(push.truth, "disk"), estimates(push, push.measurements)
     errors = {name: RIDES.errors(each.pose, truth) for name, each in every.items()}
     drawn, axes = new_figure(7.5, 7.5, 4)
-    for name, color in zip((ALONE, "Σ1, distances", "Σ2, distances"), (DRAWN[0], *DRAWN[2:]), strict=True):
+    for name, color in zip((ALONE, "Σ1, distances", "Σ2, distances"), (*DRAWN[:2], DRAWN[-1]), strict=True):
         with_band(axes[0], push.time, errors[name]["φ"], every[name], color, name)
     axes[0].set(ylabel="error of φ, deg", ylim=(-15.0, 15.0))
     for i, ax in enumerate(axes[1:]):

@@ -108,7 +108,7 @@ RIDES = RideStudy(
         Less("Trusting the camera ten times less lowers the error of φ", "φ", "Σ2, camera 20°", "Σ2"),
         Less("The camera's alignment error makes more than half of φ's", "φ", "camera: white noise only", "Σ2", 0.5),
     ),
-    drawn=(ALONE, INTEGRATED, "Σ1", "Σ2"),
+    drawn=(ALONE, "Σ1", INTEGRATED, "Σ2"),
     sampled="relative/orientation",
     windows=_windows,
     extra=_bound,

@@ -312,7 +312,7 @@ def roll_figure() -> Any:
         ("20° of pitch at 15 s", {"Σ2, inflated": replace(bump, inflation=(ROUGH, ROUGH)), "Σ2": bump}, 30.0),
     )
     for ax, (title, cases, limit) in zip(axes, shown, strict=True):
-        for (label, case), color in zip(cases.items(), DRAWN[-2:], strict=True):
+        for (label, case), color in zip(cases.items(), DRAWN[1::2], strict=True):
             ride, estimate, _ = case.run(1)
             error = angle_errors(estimate, true_angles(ride.truth))[:, 3]
             with_band(ax, ride.time[ride.time <= 60.0], error, estimate, color, label)
