@@ -89,6 +89,8 @@ def evaluate(
 
     if reference_clock not in get_args(ReferenceClock):
         raise ValueError(f"reference_clock must be one of {get_args(ReferenceClock)}, got {reference_clock!r}")
+    if not isinstance(reference, str | Estimator | None):
+        raise ValueError(f"reference must be a name or an estimator, got {reference!r}")
     contenders = named_estimators(estimators)
     loaded = named_trajectories(trajectories)
     if not contenders or not loaded:
@@ -219,7 +221,10 @@ def named_trajectories(trajectories: Trajectories) -> list[Trajectory]:
         ValueError: two that were given as objects have one name.
         FileNotFoundError: a recording that is not there.
     """
-    items = [trajectories] if isinstance(trajectories, Trajectory | str | Path) else list(trajectories)
+    single = isinstance(trajectories, Trajectory | str | Path)
+    if not single and (isinstance(trajectories, bytes | Mapping) or not isinstance(trajectories, Iterable)):
+        raise ValueError(f"trajectories must be trajectories or paths of recordings, got {trajectories!r}")
+    items: list[Any] = [trajectories] if single else list(trajectories)  # type: ignore[arg-type]
     loaded: list[Trajectory] = []
     sources: list[Path | None] = []
     for item in items:
@@ -262,9 +267,12 @@ def named_estimators(estimators: Estimators) -> dict[str, str | Estimator[Any]]:
     Raises:
         ValueError: two of one label.
     """
+    items = list(estimators) if isinstance(estimators, list | tuple) else [estimators]
+    for item in estimators.values() if isinstance(estimators, Mapping) else items:
+        if not isinstance(item, str | Estimator):
+            raise ValueError(f"estimators must be names (poise.list_estimators) or estimators, got {item!r}")
     if isinstance(estimators, Mapping):
         return dict(estimators)
-    items = list(estimators) if isinstance(estimators, list | tuple) else [estimators]
     labels = [item if isinstance(item, str) else label_of(item) for item in items]  # type: ignore[arg-type]
     twice = sorted({label for label in labels if labels.count(label) > 1})
     if twice:

@@ -48,6 +48,8 @@ def run(
             channels; a clock that is no uniform sampling (:meth:`Trajectory.on_grid`).
     """
     interval = checked_interval(dt)
+    if not isinstance(estimator, str | Estimator):
+        raise ValueError(f"estimator must be a name (poise.list_estimators) or an estimator, got {estimator!r}")
     if isinstance(data, Trajectory):
         on_grid = data.on_grid()
         if interval is not None and not same_interval(interval, on_grid.dt):

@@ -76,10 +76,7 @@ def check_measurements(
     for channel in channels:
         array = measurements[channel.name]
         if not is_torch(array):
-            array = np.asarray(array)
-            if array.dtype.kind not in "fiub":
-                raise ValueError(f"channel {channel.name!r} must hold real numbers, got dtype {array.dtype}")
-            array = array.astype(float, copy=False)
+            array = real_numbers(array, f"channel {channel.name!r}")
         least = 2 if time_axis else 1
         shape = tuple(array.shape)
         if len(shape) < least or shape[-1] != channel.size:
@@ -89,12 +86,30 @@ def check_measurements(
             leading = shape[:-1]
         elif shape[:-1] != leading:
             raise ValueError(
-                f"channel {channel.name!r} has leading shape {shape[:-1]}, but {channels[0].name!r} has {leading}"
+                f"channel {channel.name!r} must have the leading shape {leading} of {channels[0].name!r}, "
+                f"got {shape[:-1]}"
             )
         arrays[channel.name] = array
     if time_axis and leading is not None and leading[0] == 0:
         raise ValueError("measurements are empty: at least one sample is needed")
     return arrays
+
+
+def real_numbers(values: Any, what: str) -> np.ndarray:
+    """Values as an array of floats, NaN where an array is masked.
+
+    Raises:
+        ValueError: they are not an array of real numbers; the message begins with ``what``.
+    """
+    try:
+        array = np.asanyarray(values)
+    except ValueError:
+        raise ValueError(f"{what} must be an array of real numbers, got rows of different lengths") from None
+    if array.dtype.kind not in "fiu":
+        raise ValueError(f"{what} must hold real numbers, got dtype {array.dtype}")
+    if isinstance(array, np.ma.MaskedArray):
+        return array.astype(float).filled(np.nan)
+    return np.asarray(array).astype(float, copy=False)
 
 
 def stack_estimates(estimates: list[Estimate]) -> Estimate:

@@ -11,6 +11,17 @@ from pathlib import Path
 from typing import Any
 
 
+def as_path(value: Any, name: str = "path") -> Path:
+    """A path that a user gave.
+
+    Raises:
+        ValueError: it is neither text nor a path; the message begins with ``name``.
+    """
+    if not isinstance(value, str | os.PathLike) or "\0" in os.fspath(value):
+        raise ValueError(f"{name} must be a path (a text or pathlib.Path), got {value!r}")
+    return Path(value)
+
+
 @contextmanager
 def replacing(path: str | Path) -> Iterator[Path]:
     """Give a path to write to; it takes the place of ``path`` at the end, and is removed after an exception.

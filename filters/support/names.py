@@ -23,6 +23,6 @@ def look_up(kind: str, name: str, known: Mapping[str, T]) -> T:
     Raises:
         ValueError: there is none; the message names the nearest one and lists all.
     """
-    if name not in known:
+    if not isinstance(name, str) or name not in known:
         raise ValueError(unknown(kind, name, known))
     return known[name]

@@ -23,8 +23,8 @@ NOT_NEGATIVE = re.compile(
 """Names of numbers that are zero or above: standard deviations, limits, gains."""
 MEASURED = re.compile(r"(accelerometer|magnetometer|array|orientation|distance)_(noise|std|variance)$")
 """Noises of measurements: without any, an innovation has no covariance."""
-LARGEST = 1e100
-"""Magnitude up to which squares and products of parameters stay finite."""
+LARGEST, SMALLEST = 1e12, 1e-12
+"""Magnitudes between which covariances made of parameters can be inverted; anything physical lies between."""
 
 
 def check_parameters(maker: Callable[..., Any], given: Mapping[str, Any]) -> None:
@@ -66,7 +66,7 @@ def refused(name: str, value: Any, kind: Any, default: Any = None) -> str:
         reasons = [refused(name, value, each, default) for each in typing.get_args(kind)]
         return "" if "" in reasons else " or ".join(reasons)
     if kind is float:
-        return "" if is_array(value) else number_refused(name, value)
+        return number_refused(name, value)
     if kind is int:
         return "" if isinstance(value, int | np.integer) and not isinstance(value, bool) else "an integer"
     if kind is bool:
@@ -85,13 +85,13 @@ def number_refused(name: str, value: Any) -> str:
     if isinstance(value, bool | np.bool_) or not isinstance(value, Real) or not abs(float(value)) <= LARGEST:
         return f"a finite number (at most {LARGEST:g} in magnitude)"
     if POSITIVE.search(name) or MEASURED.match(name):
-        return "" if float(value) > 0.0 else "above 0"
+        return "" if float(value) >= SMALLEST else f"above 0 (at least {SMALLEST:g})"
     return "" if float(value) >= 0.0 or not NOT_NEGATIVE.search(name) else "0 or above"
 
 
 def tuple_refused(name: str, value: Any, parts: tuple[Any, ...], default: Any) -> str:
     """See :func:`refused`, for a sequence of numbers, names or sequences of numbers."""
-    if not isinstance(value, tuple | list | np.ndarray):
+    if not isinstance(value, tuple | list | np.ndarray) or (isinstance(value, np.ndarray) and value.ndim == 0):
         return "a sequence" + (f" like {default}" if isinstance(default, tuple) else "")
     size = len(default) if isinstance(default, tuple) and parts[-1] is Ellipsis and parts[0] is float else None
     kinds = parts if parts[-1] is not Ellipsis else parts[:1] * len(value)
@@ -99,14 +99,6 @@ def tuple_refused(name: str, value: Any, parts: tuple[Any, ...], default: Any) -
         return f"a sequence of {size or len(kinds)}"
     reasons = [refused(name, each, kind) for each, kind in zip(value, kinds, strict=True)]
     return next((f"a sequence, each {reason}" for reason in reasons if reason), "")
-
-
-def is_array(value: Any) -> bool:
-    """Whether a value is an array of numbers, one for each sequence of a batch: finite, and checked no further."""
-    if not hasattr(value, "dtype") or not getattr(value, "ndim", 0):
-        return False
-    kind = np.asarray(value).dtype.kind
-    return kind in "fiu" and bool(np.isfinite(np.asarray(value)).all())
 
 
 def shown(value: Any) -> str:

@@ -10,7 +10,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from ....filters.support.files import write_json
+from ....filters.support.files import as_path, write_json
 from ..trajectory import Trajectory
 
 FORMAT = "poise-calibration"
@@ -119,7 +119,9 @@ def load_calibration(path: str | Path) -> CalibrationRecord:
 
 def as_record(calibration: CalibrationRecord | str | Path) -> CalibrationRecord:
     """The record of a file, or the record itself."""
-    return calibration if isinstance(calibration, CalibrationRecord) else load_calibration(calibration)
+    if isinstance(calibration, CalibrationRecord):
+        return calibration
+    return load_calibration(as_path(calibration, "calibration"))
 
 
 def apply_calibration(trajectory: Trajectory, calibration: CalibrationRecord | str | Path) -> Trajectory:

@@ -8,8 +8,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from ....filters.support.files import as_path
 from ....filters.support.names import unknown
-from ..calibration.records import CalibrationRecord, apply_calibration
+from ..calibration.records import CalibrationRecord, apply_calibration, as_record
 from ..reference_clock import measured
 from ..storage import FORMAT, is_trajectory_file
 from ..trajectory import Trajectory, load_trajectory
@@ -190,7 +191,9 @@ def load_recordings(
         FileNotFoundError: there is no such path.
         ValueError: see :func:`load_recording`.
     """
-    path = Path(path)
+    path = as_path(path, "path of a recording")
+    if calibration is not None:
+        calibration = as_record(calibration)
     if not path.exists():
         raise FileNotFoundError(f"no recording at {path}: there is no such file")
     if mapping:
@@ -249,7 +252,11 @@ def unknown_file(path: Path) -> str:
         return f"{path} is one stream of a device that writes a file a sensor: load its folder, {path.parent}"
     accepted = ", ".join(known.name for known in FORMATS)
     state = "is empty" if path.stat().st_size == 0 else "is of no known format, or truncated"
-    return f"{path} {state}; accepted are {accepted}. Seen: {explanation(path)}"
+    try:
+        seen = explanation(path)
+    except ValueError as reason:
+        seen = str(reason)
+    return f"{path} {state}; accepted are {accepted}. Seen: {seen}"
 
 
 def recognise(path: Path) -> RecordingFormat | None:
