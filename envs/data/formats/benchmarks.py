@@ -39,7 +39,7 @@ def is_repoimu(head: Head) -> bool:
 
 
 def load_repoimu(path: Path) -> list[Trajectory]:
-    """Read a trial: ``gyr`` rad/s, ``acc`` m/s², ``mag`` (arbitrary unit), truth ``orientation`` of the sensor."""
+    """Read a trial: Xsens with Vicon's orientation, aligned to the sensor, as truth."""
     table = read_table(path)
     found = {group.kind: group.columns for group in groups(table)}
     missing = {"gyr", "acc", "quaternion"} - set(found)

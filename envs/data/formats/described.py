@@ -45,6 +45,8 @@ def mapping_of(table: Table, details: dict[str, object] | None = None) -> Record
             onboard = [group for group in found if group.kind in ("quaternion", "matrix")]
         if onboard:
             references.append(Reference(tuple(onboard[0].columns), role="onboard", sensor=label))
+    # Names of Apple's Core Motion: g, and -1 g on an axis that points up.
+    apple = any(name.startswith(("accelerometerAcceleration", "motionRotationRate")) for name in table.arrays)
     time = time_column(table)
     if time is not None and plain(time) in UNITS["time"] and time not in table.units:
         units["time"] = plain(time)
@@ -52,6 +54,7 @@ def mapping_of(table: Table, details: dict[str, object] | None = None) -> Record
     return RecordingMap(
         columns,
         units,
+        {"acc": -1.0} if apple else {},
         time=time,
         rate=rate,
         reference=tuple(references),

@@ -7,6 +7,7 @@ and ``dv[*]`` are increments of one sampling interval, all in sensor axes.
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -19,9 +20,12 @@ from .head import Head
 from .mapping import trajectory_of
 from .stamps import as_seconds
 from .table import Table
+from .text import table_of
 
 DEVICE_KEYS = ("DeviceTag", "DeviceId", "OutputRate", "FilterProfile", "Measurement Mode", "SyncStatus", "Measurement")
 UNITS = {"gyr": "rad/s", "acc": "m/s²", "mag": "calibration field", "onboard_orientation": "1"}
+SLOWEST_COUNT = 2000
+"""Counts of SampleTimeFine between samples: a DOT at 120 Hz has 8333, an MT at 10 Hz 1000."""
 LONGEST_GAP = 60.0
 """s; more between two rows is no drop-out but a sensor that was started again."""
 
@@ -32,16 +36,27 @@ def axes(stem: str, names: str = "XYZ") -> list[str]:
 
 
 def is_dot(head: Head) -> bool:
-    """Whether a file is a DOT export: text, a key of the device's header, and the column of its clock.
+    """Whether a file is a DOT export: the column of its clock, and a key of the device's header or µs in the clock.
 
-    The header matters: MT Manager exports have the same columns in other units.
+    MT Manager exports have the same columns in other units.
     """
+    if "sampletimefine" not in head.text.lower():
+        return False
     lines = [line.lstrip('"') for line in head.text.splitlines()]
-    return "sampletimefine" in head.text.lower() and any(line.startswith(DEVICE_KEYS) for line in lines)
+    if any(line.startswith(DEVICE_KEYS) for line in lines):
+        return True
+    # Without a header the clock tells: a DOT counts microseconds, an MT tenths of milliseconds.
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            clock = table_of(head.text, head.path.name).renamed(spelled).arrays.get("SampleTimeFine")
+    except ValueError:
+        return False
+    return clock is not None and len(clock) > 2 and bool(np.median(np.abs(np.diff(clock))) >= SLOWEST_COUNT)
 
 
 def load_dot(path: Path) -> list[Trajectory]:
-    """Read an export of one DOT sensor.
+    """Read an export of one DOT sensor, in any dialect, on the grid of its clock.
 
     The ticks lie on the sensor's uniform grid, that of ``OutputRate`` where rows are lost or their stamps are
     irregular; packets that were lost are ticks of NaN.
@@ -56,13 +71,7 @@ def load_dot(path: Path) -> list[Trajectory]:
         ValueError: no samples, an unreadable cell, missing columns, or a clock that runs backwards, stands still or
             was started again.
     """
-    table = read_table(path)
-    table = Table(
-        {spelled(name): values for name, values in table.arrays.items()},
-        preamble=table.preamble,
-        kind=table.kind,
-        unreadable={spelled(name): cell for name, cell in table.unreadable.items()},
-    )
+    table = read_table(path).renamed(spelled)
     header = {
         key: table.value_of(key)
         for key in (*DEVICE_KEYS, "FirmwareVersion", "AppVersion", "StartTime")

@@ -68,7 +68,7 @@ def is_member(head: Head) -> bool:
 
 
 def load_member(path: Path) -> list[Trajectory]:
-    """The device whose file this is."""
+    """Read the folder of an x-IMU3 or NGIMU, with its quaternion as onboard orientation."""
     return load_streams(path.parent, {stem_words(path): path})
 
 

@@ -56,7 +56,7 @@ def is_own(head: Head) -> bool:
 
 
 def load_own(path: Path) -> list[Trajectory]:
-    """What this package wrote."""
+    """Read what this package wrote, whole."""
     return [load_trajectory(path)]
 
 
@@ -66,7 +66,7 @@ def is_map(head: Head) -> bool:
 
 
 def load_map(path: Path) -> list[Trajectory]:
-    """The data of a mapping."""
+    """Read the table that a mapping beside it describes; drafts are made by ``poise inspect --write-map``."""
     data, mapping = read_map(path)
     return mapped(data, mapping)
 
@@ -85,7 +85,7 @@ def is_described(head: Head) -> bool:
 
 
 def load_any_described(path: Path) -> list[Trajectory]:
-    """A table that names its columns and their units."""
+    """Read a table whose header names columns and units; several sensors, quaternions as onboard orientation."""
     table = read_table(path)
     header = " ".join((*table.preamble, *list(table.arrays)[:3]))
     makers = {"Test Name": "APDM Moveo", "Shimmer": "Shimmer Consensys", "Accelerometer X": "x-io"}
@@ -155,6 +155,11 @@ def load_recording(
         ValueError: the file is empty, truncated, of another format, or has contents that contradict its format; the
             message names the file and what is accepted. Or an argument is none of those above.
     """
+    path = Path(path)
+    if path.is_dir() and recognise(path) is None:
+        raise FileNotFoundError(
+            f"no recording at {path}: it is a folder; poise.load_recordings reads all that are in it"
+        )
     given = {"columns": columns, "units": units, "signs": signs, "rate": rate, "time": time, "reference": reference}
     trajectories = load_recordings(
         path, calibration, **{name: value for name, value in given.items() if value is not None}
@@ -204,12 +209,25 @@ def load_recordings(
             files = find_recordings(path)
             if not files:
                 raise FileNotFoundError(f"no recording at {path}: it is a folder without recordings")
-            return [one for file in files for one in load_recordings(file, calibration)]
+            return all_of(path, files, calibration)
         if known is None:
             raise ValueError(unknown_file(path))
         trajectories = with_path(path, lambda: known.load(path))
     if calibration is not None:
         return [apply_calibration(one, calibration) for one in trajectories]
+    return trajectories
+
+
+def all_of(folder: Path, files: list[Path], calibration: CalibrationRecord | str | Path | None) -> list[Trajectory]:
+    """Trajectories of the files of a folder; those that cannot be read are named in warnings."""
+    trajectories: list[Trajectory] = []
+    for file in files:
+        try:
+            trajectories += load_recordings(file, calibration)
+        except ValueError as reason:
+            warnings.warn(f"passed over: {reason}", stacklevel=3)
+    if not trajectories:
+        raise ValueError(f"none of the {len(files)} recordings in {folder} can be read")
     return trajectories
 
 
@@ -291,7 +309,8 @@ def find_recordings(folder: str | Path) -> list[Path]:
         if path.name.startswith("."):
             continue
         if path.is_dir():
-            found += find_recordings(path)
+            # A link may lead upwards.
+            found += [] if path.is_symlink() else find_recordings(path)
         elif recognise(path) is not None:
             found.append(path)
             if is_map(Head(path)):

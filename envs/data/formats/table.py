@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -165,6 +165,15 @@ class Table:
         text = self.value_of(*keys)
         number = None if text is None else re.search(r"\d+(?:[.,]\d+)?", text)
         return float(number[0].replace(",", ".")) if number and float(number[0].replace(",", ".")) > 0.0 else None
+
+    def renamed(self, spelling: Callable[[str], str]) -> Table:
+        """The table with other names of columns."""
+        return replace(
+            self,
+            arrays={spelling(name): values for name, values in self.arrays.items()},
+            units={spelling(name): unit for name, unit in self.units.items()},
+            unreadable={spelling(name): cell for name, cell in self.unreadable.items()},
+        )
 
     def seen(self) -> str:
         """What the file holds, in one sentence."""

@@ -11,6 +11,7 @@ from pathlib import Path
 from ..trajectory import Trajectory
 from .arrays import read_table
 from .described import with_checked_orientation
+from .dot import is_dot, spelled
 from .head import Head
 from .mapping import Columns, RecordingMap, Reference, apply_map
 from .names import groups
@@ -22,10 +23,10 @@ FINE_TICK = 1e-4
 
 def is_xsens(head: Head) -> bool:
     """Whether a file is an export of MT Manager: its names of columns, and its comments or its packet counter."""
-    names = head.text
-    if "Acc_X" not in names or "Gyr_X" not in names or ("PacketCounter" not in names and "SampleTimeFine" not in names):
+    names = head.text.lower()
+    if "acc_x" not in names or "gyr_x" not in names or ("packetcounter" not in names and "sampletimefine" not in names):
         return False
-    return "OutputRate" not in names and "DeviceTag" not in names
+    return not is_dot(head)
 
 
 def load_xsens(path: Path) -> list[Trajectory]:
@@ -34,7 +35,7 @@ def load_xsens(path: Path) -> list[Trajectory]:
     Raises:
         ValueError: the rate is not in the header, or a column is missing or unreadable.
     """
-    table = read_table(path)
+    table = read_table(path).renamed(spelled)
     found = {group.kind: group for group in groups(table)}
     missing = {"gyr", "acc"} - set(found)
     if missing:

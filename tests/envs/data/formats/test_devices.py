@@ -77,6 +77,27 @@ def test_rows_that_end_in_a_delimiter_and_a_missing_rate(tmp_path):
         poise.load_recording(xsens(tmp_path / "few.txt", **axes("Acc_{}", ACC)))
 
 
+@pytest.mark.parametrize("change", [str.lower, str.upper])
+def test_the_case_of_names_does_not_matter(tmp_path, change):
+    path = xsens(tmp_path / "mt.txt", **CHANNELS, **{f"Quat_q{i}": Q[:, i] for i in range(4)})
+    lines = path.read_text().split("\n")
+    path.write_text("\n".join([*lines[:2], change(lines[2]), *lines[3:]]))
+    recording = poise.load_recording(path)
+    same(recording.measurements["imu/gyr"], GYR)
+    assert angles(recording.onboard_orientation, Q).max() < 1e-5
+
+
+def test_core_motion_reports_minus_g_on_an_axis_that_points_up(tmp_path):
+    table = {"loggingSample(N)": np.arange(T), "motionTimestamp_sinceReboot(s)": 5.0 + TIME}
+    table |= axes("accelerometerAcceleration{}(G)", -ACC / G) | axes("motionRotationRate{}(rad/s)", GYR)
+    table |= axes("motionUserAcceleration{}(G)", ACC / G) | axes("motionGravity{}(G)", ACC / G)
+    table |= axes("motionQuaternion{}(R)", Q, "WXYZ")
+    recording = poise.load_recording(write_table(tmp_path / "log.csv", table))
+    same(recording.measurements["imu/acc"], ACC)
+    same(recording.measurements["imu/gyr"], GYR)
+    assert angles(recording.onboard_orientation, Q).max() < 1e-5
+
+
 def x_io(gyr_unit="deg/s", acc_unit="g"):
     table = {"Time (s)": TIME}
     table |= axes(f"Gyroscope {{}} ({gyr_unit})", GYR * {"deg/s": 180 / np.pi, "rad/s": 1.0}[gyr_unit])

@@ -144,3 +144,14 @@ def test_wrong_dot_tables_are_refused(tmp_path, columns):
         load_recording(tmp_path / "text.csv")
     single = load_recording(write_dot(tmp_path / "one.csv", clock[:1], {k: v[:1] for k, v in columns.items()}))
     assert single.dt == pytest.approx(1 / 60)
+
+
+@pytest.mark.parametrize("change", [str.lower, str.upper])
+def test_the_case_of_names_does_not_matter_and_the_clock_tells_the_device_without_a_header(tmp_path, columns, change):
+    text = write_dot(tmp_path / "ride.csv", clock_of(range(N)), columns).read_text(encoding="utf-8")
+    table = text[text.index("PacketCounter") :]
+    names, rows = table.split("\n", 1)
+    (tmp_path / "bare.csv").write_text(change(names) + "\n" + rows)
+    ride = load_recording(tmp_path / "bare.csv")
+    assert ride.metadata["format"] == "Movella DOT"
+    np.testing.assert_allclose(ride.measurements["imu/gyr"][:, 0], np.radians(columns["Gyr_X"]))

@@ -58,6 +58,20 @@ def data() -> Path:
     return Path(os.environ["POISE_DATA"])
 
 
+def test_a_folder_is_read_without_what_cannot_be(tmp_path):
+    columns = {name: np.arange(N) / 10.0 for name in INERTIAL}
+    write_dot(tmp_path / "a.csv", clock_of(range(N)), columns)
+    (tmp_path / "sub").mkdir()
+    write_dot(tmp_path / "sub" / "b.csv", clock_of(range(N)), columns)
+    write_dot(tmp_path / "c.csv", clock_of(range(N)), {name: columns[name] for name in INERTIAL[:3]})
+    (tmp_path / "loop").symlink_to(tmp_path, target_is_directory=True)
+    with pytest.warns(UserWarning, match=r"passed over: .*c\.csv: a gyroscope"):
+        assert [one.name for one in load_recordings(tmp_path)] == ["a", "b"]
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(FileNotFoundError, match="a folder without recordings"):
+        load_recordings(tmp_path / "empty")
+
+
 REFUSED = {"fusion_mode_quaternion_only.csv": "a gyroscope .* and an accelerometer .* are needed"}
 """Real files that hold no inertial measurements, and what is said about them."""
 ONBOARD = {"mtw_manager4": 0.25, "ximu3": 0.45, "moveo_csv-Static": 0.6, "moveo_csv-Upper": 0.7}
