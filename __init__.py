@@ -26,7 +26,7 @@ from .filters.support.version import poise_version
 if TYPE_CHECKING:
     from .baselines.evaluation import evaluate
     from .baselines.registry import EstimatorInfo, list_estimators, make_estimator
-    from .baselines.run import run
+    from .baselines.run import run, smooth
     from .envs.data.calibration.records import apply_calibration, load_calibration
     from .envs.data.formats.load import load_recording, load_recordings
     from .envs.data.plausibility import Finding, check_recording
@@ -52,6 +52,7 @@ __all__ = [
     "make_estimator",
     "record",
     "run",
+    "smooth",
 ]
 
 _HOMES = {
@@ -70,6 +71,7 @@ _HOMES = {
     "make_estimator": ".baselines.registry",
     "record": ".envs.record",
     "run": ".baselines.run",
+    "smooth": ".baselines.run",
 }
 
 __version__ = poise_version()

@@ -14,6 +14,7 @@ from ..envs.data.plausibility import check_recording
 from ..envs.data.reference_clock import measured
 from ..envs.data.trajectory import REFERENCE_CLOCK, Trajectory
 from ..filters.core.estimator import Estimator
+from ..filters.core.offline import SUFFIX, Offline
 from ..filters.support.parallel import progress_bar
 from .registry import list_estimators, make_estimator
 from .run import fitted, run_on
@@ -50,6 +51,7 @@ def evaluate(
     *,
     reference: str | Estimator[Any] | None = None,
     reference_clock: ReferenceClock = "recorded",
+    offline: bool = False,
     check: bool = True,
     progress: bool = False,
 ) -> ErrorTable:
@@ -67,6 +69,7 @@ def evaluate(
             error. None or ``"auto"`` compares every estimator with every other (:func:`.error_table.agreement`).
         reference_clock: ``"recorded"`` takes the truth as it is; ``"corrected"`` moves it by the offset between its
             clock and the gyroscope's, which loaders measure (``metadata["reference_clock_offset"]``).
+        offline: run the smoother of every estimator that has one too, as ``<label> (offline)``.
         check: warn of implausible recordings (:func:`poise.check_recording`).
         progress: show a progress bar.
 
@@ -92,11 +95,14 @@ def evaluate(
     if not isinstance(reference, str | Estimator | None):
         raise ValueError(f"reference must be a name or an estimator, got {reference!r}")
     contenders = named_estimators(estimators)
+    if offline:
+        contenders |= smoothers(contenders)
     loaded = named_trajectories(trajectories)
     if not contenders or not loaded:
         raise ValueError(f"evaluate needs estimators and trajectories, got {len(contenders)} and {len(loaded)}")
     for name in (*contenders.values(), reference):
-        if isinstance(name, str) and name not in (AUTO, ONBOARD) and name not in list_estimators():
+        known = (AUTO, ONBOARD, *list_estimators())
+        if isinstance(name, str) and name.removesuffix(SUFFIX) not in known:
             make_estimator(name)  # raises, with the names that there are
     rows: list[tuple[Any, ...]] = []
     skipped: list[tuple[str, str, str]] = []
@@ -259,6 +265,19 @@ def distinct(trajectories: Sequence[Trajectory], paths: Sequence[Path | None]) -
             raise ValueError(f"two trajectories are named {trajectory.name!r}; give them different names")
         named.append(trajectory)
     return named
+
+
+def smoothers(contenders: Mapping[str, str | Estimator[Any]]) -> dict[str, str | Estimator[Any]]:
+    """Label → smoother of every estimator that has one."""
+    found: dict[str, str | Estimator[Any]] = {}
+    for label, contender in contenders.items():
+        try:
+            made = make_estimator(contender) if isinstance(contender, str) else contender
+            if hasattr(made, "smooth"):
+                found[label + SUFFIX] = contender + SUFFIX if isinstance(contender, str) else Offline(made)
+        except (ImportError, ValueError):  # said when the estimator itself is run
+            continue
+    return found
 
 
 def named_estimators(estimators: Estimators) -> dict[str, str | Estimator[Any]]:

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..filters.core.estimator import Estimator
+from ..filters.core.offline import SUFFIX, Offline
 from ..filters.registry import FILTERS, Entry, Kind
 from ..filters.support.names import look_up
 
@@ -80,7 +81,7 @@ def make_estimator(name: str, *, metadata: Mapping[str, Any] | None = None, **pa
     """Make an estimator.
 
     Args:
-        name: see :func:`list_estimators`.
+        name: see :func:`list_estimators`; with `` (offline)`` behind it, the estimator's smoother.
         metadata: of the recording that it shall run on (``trajectory.metadata``): a filter that can be is configured
             with the rider's anthropometry, the bicycle's geometry or the device's array that they describe.
         parameters: ``dt``, the sampling interval in s (0.01 by default), and constants of the method, by the names of
@@ -94,4 +95,8 @@ def make_estimator(name: str, *, metadata: Mapping[str, Any] | None = None, **pa
         ValueError: an unknown name or parameter (the message lists the valid ones), or a value out of its range.
         ImportError: the package that an external estimator wraps is not installed.
     """
-    return look_up("estimator", name, {**FILTERS, **TRAINED}).make(name, parameters, metadata)
+    known = {**FILTERS, **TRAINED}
+    if isinstance(name, str) and name.endswith(SUFFIX):
+        name = name.removesuffix(SUFFIX)
+        return Offline(look_up("estimator", name, known).make(name, parameters, metadata))
+    return look_up("estimator", name, known).make(name, parameters, metadata)

@@ -1,4 +1,4 @@
-"""``poise.run``: an estimator over a recording, at the recording's own clock."""
+"""``poise.run`` and ``poise.smooth``: an estimator over a recording, at the recording's own clock."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from ..envs.data.trajectory import Trajectory
 from ..filters.core.estimator import Estimator
 from ..filters.core.estimator import run as run_sequence
 from ..filters.core.model import equations_of
+from ..filters.core.offline import Offline
 from ..filters.core.quantity import Estimate, Layout
 from .registry import make_estimator
 
@@ -75,6 +76,37 @@ def run(
     estimate = run_sequence(estimator, data)
     length = len(next(iter(estimate.pose.values())))
     return estimate._replace(time=interval * np.arange(length), layout=layout_of(estimator))
+
+
+def smooth(
+    estimator: str | Estimator[Any],
+    data: Trajectory | Mapping[str, Any],
+    dt: float | None = None,
+    *,
+    grid: bool = False,
+) -> Estimate:
+    """Estimate a recording in the light of all its samples: fixed-interval smoothing, for use after the fact.
+
+    Every Kalman filter of the package has a smoother (:meth:`.KalmanFilter.smooth`), with covariance; ``vqf`` has the
+    offline form of its own package.
+
+    Args:
+        estimator: as for :func:`run`.
+        data: as for :func:`run`.
+        dt: as for :func:`run`.
+        grid: as for :func:`run`.
+
+    Returns:
+        As :func:`run`; innovations and NIS are those of the filter.
+
+    Raises:
+        ValueError: as :func:`run`; or the estimator has no smoother.
+    """
+    if isinstance(estimator, str):
+        metadata = data.metadata if isinstance(data, Trajectory) else None
+        interval = data.on_grid().dt if isinstance(data, Trajectory) else checked_interval(dt)
+        estimator = make_estimator(estimator, metadata=metadata, **({} if interval is None else {"dt": interval}))
+    return run(estimator if isinstance(estimator, Offline) else Offline(estimator), data, dt, grid=grid)
 
 
 def checked_interval(dt: Any) -> float | None:

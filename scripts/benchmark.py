@@ -26,6 +26,8 @@ class Args:
     """names of estimators (default: all that are installed, except some slow loops)"""
     reference: str = "auto"
     """what stands in for the truth of recordings without one (agreement, not error), see `poise evaluate --help`"""
+    offline: bool = False
+    """run the smoother of every estimator that has one as well"""
     trials: int = 5
     """trials of each test of the external-acceleration paper; 0 leaves them out"""
     rides: bool = True
@@ -75,7 +77,7 @@ def run(args: Args) -> int:
         sections: dict[str, str] = {}
         tables, scored = [], {}
         for name, trajectories in data.items():
-            table = evaluate(chosen, trajectories, reference=args.reference, progress=True)
+            table = evaluate(chosen, trajectories, reference=args.reference, offline=args.offline, progress=True)
             tables.append(table)
             scored[name] = [trajectory for trajectory in trajectories if has_truth(trajectory)], table
             folder.write_results(pandas.concat(tables))
@@ -85,7 +87,8 @@ def run(args: Args) -> int:
         corrected = with_other_clocks(recorded)
         if corrected:
             out.say(f"{len(corrected)} recordings again, the clock of the reference corrected")
-            table = evaluate(chosen, corrected, reference_clock="corrected", check=False, progress=True)
+            clock = "corrected"
+            table = evaluate(chosen, corrected, reference_clock=clock, offline=args.offline, check=False, progress=True)
             results += results_of(corrected, table, CORRECTED)
         for metric in ERRORS:
             rows = [{"estimator": name, **errors} for name, errors in dataset_errors(results, metric).items()]

@@ -28,11 +28,16 @@ MOST_COLUMNS = 8
 
 
 def kinds_of(labels: Any) -> dict[str, str]:
-    """Label → kind, for labels that are names of estimators or begin with one (``name (variant)``)."""
+    """Label → kind, for labels that are names of estimators or begin with one (``name (variant)``).
+
+    Smoothers, whatever they smooth, are of the kind ``offline``.
+    """
     from ..baselines.registry import list_estimators
+    from ..filters.core.offline import SUFFIX
 
     known = list_estimators()
-    return {label: known[name].kind for label in map(str, labels) if (name := label.split(" (")[0]) in known}
+    kinds = {label: known[name].kind for label in map(str, labels) if (name := label.split(" (")[0]) in known}
+    return {label: "offline" if label.endswith(SUFFIX) else kind for label, kind in kinds.items()}
 
 
 def parts(table: pandas.DataFrame) -> Iterator[tuple[str, str, pandas.DataFrame]]:
@@ -200,7 +205,7 @@ def draw_example(
     table = table[table["trajectory"] == trajectory.name]
     kinds = kinds_of(contenders)
     best: dict[str, str] = {}
-    for label in summary(table).index:
+    for label in summary(table).index.intersection(list(contenders), sort=False):
         best.setdefault(kinds.get(str(label), ""), str(label))
     if not best:
         return {}

@@ -68,3 +68,39 @@ class VQF(ExternalPackage):
             outputs[:, index, :4] = result["quat9D" if self.axes == 9 else "quat6D"]
             outputs[:, index, 4:] = result["bias"]
         return self._estimate(outputs.reshape(shape), like)
+
+    def smooth(self, measurements: Mapping[str, Any]) -> Estimate:
+        """The package's offline form, which uses future samples too. ``(T, *batch, 3)`` in.
+
+        The package wants complete data: missing samples are interpolated linearly, before the first valid sample and
+        after the last one the nearest is taken. It has no covariance.
+
+        Raises:
+            ValueError: a channel is missing, has a wrong shape, or has no valid sample at all.
+        """
+        arrays = check_measurements(self.channels, measurements, time_axis=True)
+        like = arrays[GYROSCOPE.name]
+        samples = np.concatenate([to_numpy(array) for array in arrays.values()], axis=-1, dtype=float)
+        sequences = np.moveaxis(samples.reshape(len(samples), -1, self.axes), 1, 0)
+        outputs = np.empty((len(samples), len(sequences), 7))
+        for index, sequence in enumerate(sequences):
+            whole = [complete(sequence[:, start : start + 3]) for start in range(0, self.axes, 3)]
+            result = self.load().offlineVQF(
+                *whole, *(() if self.axes == 9 else (None,)), self.dt, {"tauAcc": self.tau_acc, "tauMag": self.tau_mag}
+            )
+            outputs[:, index, :4] = result["quat9D" if self.axes == 9 else "quat6D"]
+            outputs[:, index, 4:] = result["bias"]
+        return self._estimate(outputs.reshape((*tuple(like.shape[:-1]), 7)), like)
+
+
+def complete(samples: np.ndarray) -> np.ndarray:
+    """Samples ``(T, 3)`` with linear interpolation where rows are not finite.
+
+    Raises:
+        ValueError: no row is finite.
+    """
+    known = np.isfinite(samples).all(axis=1)
+    if not known.any():
+        raise ValueError("VQF needs at least one valid sample of every channel")
+    time = np.arange(len(samples))
+    return np.stack([np.interp(time, time[known], column[known]) for column in samples.T], axis=1)

@@ -23,6 +23,8 @@ class Args:
     """files, or folders that are searched for recordings; several sensors are written together"""
     estimator: str = "bounded-motion"
     """name of the estimator, see `poise list estimators`"""
+    offline: bool = False
+    """use the whole recording for every estimate: the smoother instead of the filter"""
     output: Path | None = None
     """file to write, .csv, .parquet, .h5, .npz, or .sto for OpenSim"""
     plot: Path | None = None
@@ -40,7 +42,8 @@ def run(args: Args) -> int:
     import warnings
 
     from ...baselines.export import WRITERS, write_estimates
-    from ...baselines.run import run as run_estimator
+    from ...baselines.run import run as run_filter
+    from ...baselines.run import smooth
     from ...envs.data.plausibility import check_recording
     from .load import load_all, passed_over_text, plain_warnings, sensors_of
 
@@ -50,6 +53,7 @@ def run(args: Args) -> int:
         loaded, passed_over = load_all(args.recordings, args.calibration, args.site)
         sensors = {sensor.name: sensor for one in loaded for sensor in sensors_of(one)}
         estimates: dict[str, Estimate] = {}
+        run_estimator = smooth if args.offline else run_filter
         for name, sensor in sensors.items():
             for finding in check_recording(sensor):
                 if finding.severity == "warning":

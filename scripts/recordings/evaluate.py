@@ -25,6 +25,8 @@ class Args:
     orientation that the device computed, or `auto`: mekf-9, or bounded-motion where there is no magnetometer"""
     reference_clock: Literal["recorded", "corrected"] = "recorded"
     """take the truth as recorded, or corrected by the measured offset between its clock and that of the gyroscope"""
+    offline: bool = False
+    """run the smoother of every estimator that has one as well: estimates that use the whole recording"""
     site: Annotated[str | None, tyro.conf.arg(aliases=["--place"])] = None
     """in recordings of several sensors, the one to look at, such as bicycle_imu or trunk_imu of a ride"""
     calibration: Path | None = None
@@ -50,7 +52,14 @@ def run(args: Args) -> int:
     with plain_warnings():
         trajectories, passed_over = load_all(args.recordings, args.calibration, args.site)
         clock = args.reference_clock
-        table = evaluate(list(names), trajectories, reference=args.reference, reference_clock=clock, progress=True)
+        table = evaluate(
+            list(names),
+            trajectories,
+            reference=args.reference,
+            reference_clock=clock,
+            offline=args.offline,
+            progress=True,
+        )
     folder = start_run("evaluate", args, args.seed, args.runs)
     folder.write_results(table)
     with Output("evaluate", args) as out:

@@ -1,0 +1,74 @@
+"""An estimator that sees the whole recording before it answers: smoothing with the interface of an estimator."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, NoReturn, Self
+
+from .estimator import Estimator
+from .quantity import Channel, Estimate, Measurement, Quantity
+
+SUFFIX = " (offline)"
+"""What the name of an estimator has behind it where its smoother is meant."""
+
+
+@dataclass(frozen=True)
+class Offline:
+    """The fixed-interval smoother of an estimator.
+
+    Attributes:
+        filter: what is smoothed; it has a method ``smooth``.
+
+    Raises:
+        ValueError: it has none.
+    """
+
+    filter: Estimator[Any]
+
+    def __post_init__(self) -> None:
+        if not callable(getattr(self.filter, "smooth", None)):
+            kind = type(getattr(self.filter, "model", self.filter)).__name__
+            raise ValueError(
+                f"{kind} has no smoother: smoothing needs a Kalman filter of this package, such as bounded-motion or "
+                "mekf, or vqf"
+            )
+
+    @property
+    def dt(self) -> float:
+        """Sampling interval, s."""
+        return self.filter.dt
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        """Channels that it reads."""
+        return self.filter.channels
+
+    @property
+    def outputs(self) -> tuple[Quantity, ...]:
+        """Quantities that it estimates."""
+        return self.filter.outputs
+
+    def with_dt(self, dt: float) -> Self:
+        """The same smoother for samples ``dt`` seconds apart."""
+        return type(self)(self.filter.with_dt(dt))
+
+    def run(self, measurements: Mapping[str, Any]) -> Estimate:
+        """Smoothed estimates of a whole sequence, ``(T, *batch, size)`` in and out."""
+        return self.filter.smooth(measurements)  # type: ignore[attr-defined]
+
+    def init(self, measurement: Measurement) -> NoReturn:
+        """Refuse: there is no memory between samples.
+
+        Raises:
+            TypeError: always.
+        """
+        raise TypeError("a smoother needs the whole recording: use run, not init and step")
+
+    def step(self, state: Any, measurement: Measurement) -> NoReturn:
+        """Refuse, as :meth:`init`.
+
+        Raises:
+            TypeError: always.
+        """
+        self.init(measurement)
