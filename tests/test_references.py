@@ -51,12 +51,20 @@ def names_in(body: list[ast.stmt], prefix: str) -> Iterator[str]:
 def defined() -> frozenset[str]:
     """Every dotted name of the package, and every suffix of one (``.KalmanFilter.step``), which Sphinx resolves too."""
     found: set[str] = set()
+    inherits: list[tuple[str, str]] = []
     for path in FILES:
-        module = module_name(path)
-        for name in (module, *names_in(ast.parse(path.read_text(encoding="utf-8")).body, module)):
-            parts = name.split(".")
-            found.update(".".join(parts[start:]) for start in range(len(parts)))
-    return frozenset(found)
+        module, tree = module_name(path), ast.parse(path.read_text(encoding="utf-8"))
+        found.update((module, *names_in(tree.body, module)))
+        classes = [node for node in tree.body if isinstance(node, ast.ClassDef)]
+        inherits += [
+            (f"{module}.{node.name}", ast.unparse(base).split(".")[-1]) for node in classes for base in node.bases
+        ]
+    for _ in range(3):  # generations
+        members = [name.split(".") for name in found if name.count(".") > 1]
+        for child, parent in inherits:
+            found.update(f"{child}.{parts[-1]}" for parts in members if parts[-2] == parent)
+    every = [name.split(".") for name in found]
+    return frozenset(".".join(parts[start:]) for parts in every for start in range(len(parts)))
 
 
 def unresolved(source: str) -> list[str]:
