@@ -132,10 +132,10 @@ class RideStudy:
             if name in pose
         }
 
-    def baselines(self, ride: Trajectory, truth: Mapping[str, np.ndarray]) -> dict[str, dict[str, np.ndarray]]:
-        """Errors of the two baselines."""
+    def baselines(self, time: np.ndarray, truth: Mapping[str, np.ndarray]) -> dict[str, dict[str, np.ndarray]]:
+        """Errors of the two baselines; ``truth`` may hold several rides of the same time, ``(T, rides, size)``."""
         zero = self.errors({name: np.zeros_like(truth[name]) for name, _ in self.angles.values()}, truth)
-        part = ride.time >= (SETTLED if ride.time[-1] >= SETTLED else 0.0)
+        part = time >= (SETTLED if time[-1] >= SETTLED else 0.0)
         mean = {
             angle: np.degrees(rotation.wrap(np.radians(error) - _circular_mean(np.radians(error[part]))))
             for angle, error in zero.items()
@@ -152,7 +152,9 @@ class RideStudy:
         """
         truth, spans = self.truth(ride.truth), self.windows(ride.time)
         estimates = {name: self.estimate(ride, variant) for name, variant in self.variants.items()}
-        errors = {name: self.errors(each.pose, truth) for name, each in estimates.items()} | self.baselines(ride, truth)
+        errors = {name: self.errors(each.pose, truth) for name, each in estimates.items()} | self.baselines(
+            ride.time, truth
+        )
         for name, variant in self.ablations.items():
             errors[name] = self.errors(self.estimate(ride, variant).pose, truth)
         found: dict[str, Any] = {
@@ -321,8 +323,8 @@ def largest(values: np.ndarray) -> float:
     return float(np.abs(values).max())
 
 
-def _circular_mean(angles: np.ndarray) -> float:
-    return float(np.arctan2(np.sin(angles).mean(), np.cos(angles).mean()))
+def _circular_mean(angles: np.ndarray) -> np.ndarray:
+    return np.arctan2(np.sin(angles).mean(axis=0), np.cos(angles).mean(axis=0))
 
 
 def mean_of(rows: Iterable[Mapping[str, float]]) -> dict[str, float]:

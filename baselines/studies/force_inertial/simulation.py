@@ -142,6 +142,12 @@ def simulations(study: Study, report: Report) -> None:
         for course, other, values in zip(COURSES, others, found[2 * index : 2 * index + 2], strict=True):
             ours = means[name, course] = dict(zip(ANGLES, values, strict=True))
             rows.append({"formulation": name, "course": course, **rounded(ours), "independent simulation": other})
+    for course in COURSES:
+        samples, truth = synthetic(course, seeds, duration, study.seed, Errors())
+        time = 0.02 * np.arange(len(samples["wheel/speed"]))
+        for name, errors in RIDES.baselines(time, truth).items():
+            row = {angle: float(rms(error[time >= SETTLED]).mean()) for angle, error in errors.items()}
+            rows.append({"formulation": name, "course": course, **rounded(row)})
     report.table(
         "Exact synthetic data, RMS in deg",
         rows,

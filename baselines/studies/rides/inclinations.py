@@ -8,6 +8,7 @@ from typing import Any
 from ....envs.bicycle.environment import RiderBicycleEnv
 from ....envs.bicycle.sensors.single_imu import imu_of
 from ....envs.record import record
+from ....filters.core.metrics import DEGREES, direction_error, rms
 from ...evaluation import evaluate
 
 ESTIMATORS = ("vqf", "mekf", "bounded-motion", "external-acceleration", "mahony", "tilt")
@@ -30,7 +31,8 @@ def inclination_rows(
     seed: int = 7,
     duration: float = 40.0,
 ) -> Iterator[dict[str, Any]]:
-    """Rows: scenario and site of the IMU, then the RMS error of inclination (deg) of each estimator.
+    """Rows: scenario and site of the IMU, then the RMS error of inclination (deg) of each estimator,
+    and of the mean of the true vertical, which only hindsight knows.
 
     Args:
         estimators: names of estimators.
@@ -48,6 +50,10 @@ def inclination_rows(
                 ridden[scenario] = record(env, seed=seed)
             finally:
                 env.close()
-        table = evaluate(list(estimators), imu_of(ridden[scenario], site))
+        recording = imu_of(ridden[scenario], site)
+        table = evaluate(list(estimators), recording)
         errors = table[(table["metric"] == "inclination")].set_index("estimator")["value"]
-        yield {"scenario": scenario, "IMU": site} | {name: f"{errors[name]:.1f}" for name in estimators}
+        up = recording.truth_of("up")
+        constant = float(rms(direction_error(up.mean(axis=0), up), recording.mask)) * DEGREES
+        row = {name: f"{errors[name]:.1f}" for name in estimators}
+        yield {"scenario": scenario, "IMU": site, **row, "best constant": f"{constant:.1f}"}

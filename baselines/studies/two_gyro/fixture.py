@@ -61,7 +61,7 @@ def fixture(study: Study, report: Report) -> None:
             every = estimates(push, without_errors(push, **changes))
             errors = {name: RIDES.errors(each.pose, truth) for name, each in every.items()}
             if sensors == "paper":
-                errors |= RIDES.baselines(push, truth)
+                errors |= RIDES.baselines(push.time, truth)
             for name, each in errors.items():
                 late = windowed({"φ, last 20 s": each["φ"]}, push.time, max(SETTLED, push.time[-1] - 20.0))
                 found.setdefault(name, []).append(windowed(each, push.time, SETTLED) | late)

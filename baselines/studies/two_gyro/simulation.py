@@ -19,7 +19,7 @@ from ...plots import legend_above, new_figure
 from ..claims import Claim
 from ..kit import Study
 from ..report import Report
-from ..ride_study import DRAWN
+from ..ride_study import DRAWN, rounded, windowed
 from ..signals import DEG
 from .motion import MOTIONS, Errors, filter_of, simulate
 from .rides import RIDES
@@ -149,6 +149,12 @@ def simulations(study: Study, report: Report) -> None:
                 "error / σ of φ": round(result["ratio"], 2),
             }
         )
+    for motion in dict.fromkeys(case.motion for case in cases):
+        ride = simulate(MOTIONS[motion], 120.0, 1.0 / RATE)
+        for name, errors in RIDES.baselines(ride.time, true_angles(ride.truth)).items():
+            late = windowed(errors, ride.time, 60.0)["φ"]
+            row = rounded({**windowed(errors, ride.time, 0.0, 60.0), "φ 60 to 120 s": late})
+            rows.append({"motion": motion, "model": name, **row})
     report.table(
         "Simulated motions",
         rows,

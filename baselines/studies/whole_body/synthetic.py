@@ -79,6 +79,7 @@ def case_scores(course: str, seed: int, duration: float) -> dict[str, dict[str, 
         "lengths ±2 %, places ±1 cm, full biases": errors_of(hard, wrong),
         "(3), (9), C7, C8 as published": errors_of(ride, **PUBLISHED_FORMS),
     }
+    cases |= RIDES.baselines(ride.time, true_angles(ride.truth))
     integrated = RIDES.errors(RIDES.estimate(ride, RIDES.variants["integration"]).pose, true_angles(ride.truth))
     return {name: windowed(errors, ride.time, 5.0) for name, errors in cases.items()} | {
         "integration, to 25 s": windowed(integrated, ride.time, 15.0, 25.0),

@@ -28,7 +28,7 @@ def verdicts(found):
 def test_baselines_are_the_truth_and_what_is_left_of_it_without_its_mean():
     ride = simulate(MOTIONS["circle"], 30.0, 0.05, Errors(), np.random.default_rng(0))
     truth = true_angles(ride.truth)
-    found = RIDES.baselines(ride, truth)
+    found = RIDES.baselines(ride.time, truth)
     roll = np.degrees(truth["bicycle/roll"][:, 0])
     np.testing.assert_allclose(found[ZERO]["φ"], -roll, atol=1e-9)
     settled = roll[ride.time >= 10.0]
@@ -65,7 +65,7 @@ def test_numbers_decide_claims():
 def test_a_course_is_reported(tmp_path):
     ride = simulate(MOTIONS["circle"], 12.0, 0.05, Errors(), np.random.default_rng(0))
     report, methods = Report(tmp_path), (*RIDES.variants, *RIDES.ablations, ZERO, MEAN)
-    errors = RIDES.baselines(ride, true_angles(ride.truth))[ZERO]
+    errors = RIDES.baselines(ride.time, true_angles(ride.truth))[ZERO]
     row = windowed(errors, ride.time, 10.0)
     results = fabricated(dict.fromkeys(methods, 1.0))
     results[0]["rms"] = {name: {"settled": row, "last 20 s": row} for name in methods}
