@@ -31,8 +31,9 @@ def inclination_rows(
     seed: int = 7,
     duration: float = 40.0,
 ) -> Iterator[dict[str, Any]]:
-    """Rows: scenario and site of the IMU, then the RMS error of inclination (deg) of each estimator,
-    and of the mean of the true vertical, which only hindsight knows.
+    """Rows: scenario and site of the IMU, then the RMS error of inclination (deg) of each estimator.
+
+    The last column is that of the mean of the true vertical, which only hindsight knows.
 
     Args:
         estimators: names of estimators.
