@@ -228,9 +228,13 @@ def named_trajectories(trajectories: Trajectories) -> list[Trajectory]:
         FileNotFoundError: a recording that is not there.
     """
     single = isinstance(trajectories, Trajectory | str | Path)
-    if not single and (isinstance(trajectories, bytes | Mapping) or not isinstance(trajectories, Iterable)):
-        raise ValueError(f"trajectories must be trajectories or paths of recordings, got {trajectories!r}")
-    items: list[Any] = [trajectories] if single else list(trajectories)  # type: ignore[arg-type]
+    try:
+        items: list[Any] = [trajectories] if single else list(trajectories)  # type: ignore[arg-type]
+    except TypeError:
+        items = [None]
+    for item in items:
+        if not isinstance(item, Trajectory | str | Path):
+            raise ValueError(f"trajectories must be trajectories or paths of recordings, got {trajectories!r}")
     loaded: list[Trajectory] = []
     sources: list[Path | None] = []
     for item in items:
