@@ -33,9 +33,9 @@ EUROC_TRUTH = ("state_groundtruth_estimate0", "vicon0", "mocap0")
 
 
 def is_repoimu(head: Head) -> bool:
-    """Whether a file is a trial of RepoIMU: its first line of names."""
-    first = head.text.partition("\n")[0]
-    return "Vicon Orientation" in first and "IMU Gyroscope" in first
+    """Whether a file is a trial of RepoIMU: its line of groups."""
+    lines = head.text.lower().splitlines()[:10]
+    return any("vicon orientation" in line and "imu gyroscope" in line for line in lines)
 
 
 def load_repoimu(path: Path) -> list[Trajectory]:

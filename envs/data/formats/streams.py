@@ -44,8 +44,10 @@ def joined(streams: Mapping[str, Stream], base: str = "imu/gyr") -> tuple[np.nda
     ordered = {name: in_order(stream) for name, stream in streams.items() if len(stream.time)}
     if base not in ordered:
         raise ValueError(f"the stream {base} is empty")
-    time = streams[base].time
-    kept = np.ones(len(time), bool)
+    own_time, own_values = streams[base]
+    time = own_time
+    # A row that repeats the one before was written twice.
+    kept = ~np.append(False, (np.diff(time) == 0.0) & (own_values[1:] == own_values[:-1]).all(axis=1))
     for name in ("imu/gyr", "imu/acc"):
         if name in ordered:
             own = ordered[name].time
@@ -55,7 +57,7 @@ def joined(streams: Mapping[str, Stream], base: str = "imu/gyr") -> tuple[np.nda
         raise ValueError(f"gyroscope and accelerometer share no time: {spans}")
     time = time[kept]
     measurements = {name: at(stream, time, name) for name, stream in ordered.items() if name != base}
-    measurements[base] = streams[base].values[kept]
+    measurements[base] = own_values[kept]
     return time, {name: measurements[name] for name in streams if name in measurements}
 
 

@@ -128,9 +128,8 @@ def table_of(text: str, name: str) -> Table:
     data = [line for line in lines[begin:] if line.strip() and not line.lstrip().startswith(COMMENT)]
     widths = [len(fields_of(line, delimiter)) for line in data[:SAMPLE]]
     width = max(set(widths), key=widths.count)
-    last = len(fields_of(data[-1], delimiter))
-    if last < width and len(data) > 1:
-        warnings.warn(f"{name}: the last row is cut off ({last} of {width} fields) and left out", stacklevel=4)
+    if len(data) > 1 and cut_off([fields_of(line, delimiter) for line in data[-30:]], width, text.endswith("\n")):
+        warnings.warn(f"{name}: the last row is cut off ({data[-1][-40:]!r}) and left out", stacklevel=4)
         del data[-1]
     frame = parse(data, delimiter, width)
     above = lines[:begin]
@@ -147,6 +146,12 @@ def table_of(text: str, name: str) -> Table:
             units[name or str(column)] = "ns"
         if wrong is not None:
             unreadable[name or str(column)] = wrong
+    # Rows of texts for missing values alone are blank lines.
+    blank = np.all(
+        [np.isnan(values) if values.dtype.kind == "f" else values != values for values in arrays.values()], 0
+    )
+    if blank.any():
+        arrays = {name: values[~blank] for name, values in arrays.items()}
     return Table(
         arrays=arrays,
         units=units,
@@ -155,6 +160,16 @@ def table_of(text: str, name: str) -> Table:
         named=bool(heads),
         unreadable=unreadable,
     )
+
+
+def cut_off(rows: list[list[str]], width: int, ended: bool) -> bool:
+    """Whether the last of some rows lacks fields, or (in a file that does not end with its line) digits of the last."""
+    *before, last = rows
+    if len(last) < width:
+        return True
+    digits = {len(row[width - 1]) - row[width - 1].replace(",", ".").rfind(".") for row in before if len(row) >= width}
+    own = last[width - 1]
+    return not ended and bool(digits) and len(own) - own.replace(",", ".").rfind(".") < min(digits)
 
 
 def parse(data: list[str], delimiter: str, width: int) -> pandas.DataFrame:
@@ -192,8 +207,6 @@ def header_lines(above: list[str], delimiter: str, width: int) -> list[tuple[int
     for number in range(len(above) - 1, -1, -1):
         line = above[number].strip(" ")
         if not line.strip():
-            if found:
-                break
             continue
         fields = fields_of(re.sub(r"^\s*(#|//|%)\s*", "", line), delimiter)
         content = [field for field in fields if field]
