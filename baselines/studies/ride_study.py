@@ -18,6 +18,7 @@ from ...filters.core.observer import Observer
 from ...filters.core.quantity import Estimate
 from ..evaluation import COLUMNS
 from ..plots import TRUTH_COLOR, legend_above, new_figure
+from .averages import largest, mean_of, mean_rms, rounded, windowed
 from .claims import Claim
 from .kit import Study, load_ride
 from .report import STD, Report
@@ -301,52 +302,5 @@ def assessed(study: RideStudy, path: Path) -> dict[str, Any]:
     return study.assess(study.load(path))
 
 
-def windowed(
-    errors: Mapping[str, np.ndarray],
-    time: np.ndarray,
-    begin: float,
-    end: float = np.inf,
-    statistic: Callable[[np.ndarray], float] | None = None,
-) -> dict[str, float]:
-    """RMS (or another statistic) of each column between two times, both included; NaN where a ride is too short."""
-    part = (time >= begin) & (time <= end)
-    statistic = statistic or _rms
-    return {name: float(statistic(error[part])) if part.any() else float("nan") for name, error in errors.items()}
-
-
-def _rms(values: np.ndarray) -> float:
-    return float(np.sqrt(np.mean(values**2)))
-
-
-def largest(values: np.ndarray) -> float:
-    """Largest size."""
-    return float(np.abs(values).max())
-
-
 def _circular_mean(angles: np.ndarray) -> np.ndarray:
     return np.arctan2(np.sin(angles).mean(axis=0), np.cos(angles).mean(axis=0))
-
-
-def mean_of(rows: Iterable[Mapping[str, float]]) -> dict[str, float]:
-    """Mean of every column over rides; NaN is left out, and stays where nothing else is."""
-    columns: dict[str, list[float]] = {}
-    for row in rows:
-        for name, value in row.items():
-            columns.setdefault(name, []).append(float(value))
-    return {name: mean(values) for name, values in columns.items()}
-
-
-def mean(values: Iterable[float]) -> float:
-    """Mean of what is known."""
-    known = [value for value in values if np.isfinite(value)]
-    return float(np.mean(known)) if known else float("nan")
-
-
-def rounded(row: Mapping[str, float], digits: int = 2) -> dict[str, float]:
-    """Cells of a table."""
-    return {name: round(value, digits) for name, value in row.items()}
-
-
-def mean_rms(results: Iterable[Mapping[str, Any]], method: str, window: str = "settled") -> dict[str, float]:
-    """Angle → mean over rides of a method's RMS error, deg."""
-    return mean_of(each["rms"][method][window] for each in results)

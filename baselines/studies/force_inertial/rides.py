@@ -18,10 +18,11 @@ from ....filters.bicycle.force_inertial.integration import ForceInertialIntegrat
 from ....filters.bicycle.force_inertial.kinematics import true_angles
 from ....filters.bicycle.geometry import RiderGeometry
 from ....filters.core.quantity import Estimate
+from ..averages import mean_of, mean_rms, rounded
 from ..claims import Claim
 from ..kit import Study
 from ..report import Report
-from ..ride_study import MEAN, SETTLED, ZERO, Less, RideStudy, Variant, mean_of, mean_rms, rounded
+from ..ride_study import MEAN, SETTLED, ZERO, Less, RideStudy, Variant
 from ..sensors import without_errors
 from ..signals import DEG
 from .states import from_the_truth, torques, true_states

@@ -11,10 +11,11 @@ from ....filters.bicycle.force_inertial.filter import ForceInertial
 from ....filters.core import rotation
 from ....filters.core.kalman import KalmanFilter
 from ....filters.core.metrics import rms
+from ..averages import rounded
 from ..claims import Claim
 from ..kit import Study
 from ..report import Report
-from ..ride_study import SETTLED, rounded
+from ..ride_study import SETTLED
 from ..signals import DEG
 from .motion import Course, Errors, draw_motion, simulate
 from .rides import ANGLES, RIDES

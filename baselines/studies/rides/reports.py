@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any, NamedTuple
 
+from ..averages import mean
 from ..claims import Claim
-from ..ride_study import mean
 
 
 class Reported(NamedTuple):

@@ -13,10 +13,11 @@ from ....filters.bicycle.two_gyro.truth import true_angles
 from ....filters.core.kalman import KalmanFilter
 from ....filters.core.quantity import Estimate
 from ...plots import TRUTH_COLOR, legend_above, new_figure
+from ..averages import mean_of, rounded, windowed
 from ..claims import Claim
 from ..kit import Study
 from ..report import Report
-from ..ride_study import DRAWN, MEAN, SETTLED, ZERO, mean_of, rounded, windowed
+from ..ride_study import DRAWN, MEAN, SETTLED, ZERO
 from ..sensors import without_errors
 from ..signals import DEG
 from .rides import ALONE, RIDES

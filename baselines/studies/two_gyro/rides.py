@@ -15,10 +15,11 @@ from ....filters.bicycle.platform_gyro import PlatformGyro, TwoGyroIntegration
 from ....filters.bicycle.two_gyro.filter import TwoGyro
 from ....filters.bicycle.two_gyro.truth import true_angles, true_states
 from ....filters.core.quantity import Estimate
+from ..averages import mean_of, mean_rms
 from ..claims import Claim
 from ..kit import Study
 from ..report import Report
-from ..ride_study import MEAN, SETTLED, ZERO, Less, RideStudy, Variant, mean_of, mean_rms
+from ..ride_study import MEAN, SETTLED, ZERO, Less, RideStudy, Variant
 from ..sensors import without_errors
 from ..signals import DEG
 

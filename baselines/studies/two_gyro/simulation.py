@@ -16,10 +16,11 @@ from ....filters.core.consistency import consistency, nees
 from ....filters.core.kalman import KalmanFilter
 from ....filters.core.quantity import Estimate
 from ...plots import legend_above, new_figure
+from ..averages import rounded, windowed
 from ..claims import Claim
 from ..kit import Study
 from ..report import Report
-from ..ride_study import DRAWN, rounded, windowed
+from ..ride_study import DRAWN
 from ..signals import DEG
 from .motion import MOTIONS, Errors, filter_of, simulate
 from .rides import RIDES

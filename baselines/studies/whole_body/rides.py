@@ -18,10 +18,11 @@ from ....filters.bicycle.whole_body.integration import WholeBodyIntegration
 from ....filters.bicycle.whole_body.linkage import SHOULDER, SIDES, TRUNK, true_angles
 from ....filters.core import rotation
 from ....filters.core.quantity import Estimate
+from ..averages import largest, mean_of, windowed
 from ..claims import Claim
 from ..kit import Study
 from ..report import Report
-from ..ride_study import SETTLED, Less, RideStudy, Variant, largest, mean_of, windowed
+from ..ride_study import SETTLED, Less, RideStudy, Variant
 from ..sensors import without_errors
 from .angles import ANGLES, STATES, TABLE_III, short
 

@@ -16,11 +16,12 @@ from ....filters.bicycle.whole_body.constraints import limb_frame, shoulder_angl
 from ....filters.bicycle.whole_body.filter import WholeBody
 from ....filters.bicycle.whole_body.linkage import ERROR_SIZE, ROLL, SHOULDER, SIDES, SIGNS, TRUNK, true_angles
 from ....filters.core import rotation
+from ..averages import mean_of, windowed
 from ..claims import Claim
 from ..kit import Study
 from ..model_draws import within_bounds
 from ..report import Report
-from ..ride_study import Variant, mean_of, windowed
+from ..ride_study import Variant
 from .angles import ANGLES, STATES, short
 from .consistency import consistencies
 from .motion import IDEAL, ExactRide, SensorErrors

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from poise.baselines.studies.averages import windowed
 from poise.baselines.studies.kit import Study
 from poise.baselines.studies.report import Report
-from poise.baselines.studies.ride_study import windowed
 from poise.baselines.studies.sensors import without_errors
 from poise.baselines.studies.two_gyro.bounds import bound
 from poise.baselines.studies.two_gyro.motion import DEG, IDEAL, MOTIONS, Errors, simulate

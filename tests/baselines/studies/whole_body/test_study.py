@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from poise.baselines.studies import find_paper
-from poise.baselines.studies.ride_study import windowed
+from poise.baselines.studies.averages import windowed
 from poise.baselines.studies.sensors import without_errors
 from poise.baselines.studies.whole_body.angles import ANGLES, TABLE_III, short
 from poise.baselines.studies.whole_body.motion import IDEAL, ExactRide, SensorErrors
