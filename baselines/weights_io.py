@@ -95,7 +95,7 @@ def load_weights(path_or_name: str | Path) -> tuple[dict[str, np.ndarray], dict[
     try:
         return load(data), card
     except SafetensorError as reason:
-        raise ValueError(f"{path} is no safetensors file: {reason}") from None
+        raise ValueError(f"{path} is not a safetensors file: {reason}") from None
 
 
 def list_weights() -> list[str]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Annotated
 
 import tyro
 
@@ -18,7 +19,7 @@ class Args:
     array: tyro.conf.Positional[str]
     """octa, controller, planar or triaxial; or a JSON file with positions (m) and axes (unit vectors), a row for each
     accelerometer, and if wanted name and reference (the point whose acceleration is meant)"""
-    deviation: float = 1.0
+    std: Annotated[float, tyro.conf.arg(aliases=["--deviation"])] = 1.0
     """σ_a of one accelerometer, m/s² per sample; gains are multiplied by it"""
     json: bool = False
     """print one JSON document instead of tables"""
@@ -28,10 +29,10 @@ def run(args: Args) -> int:
     """Print the report."""
     from ..filters.arrays.files import describe_array, load_array
 
-    if not 0.0 < args.deviation < math.inf:
-        raise ValueError(f"deviation must be positive and finite (m/s²), got {args.deviation}")
+    if not 0.0 < args.std < math.inf:
+        raise ValueError(f"std must be positive and finite (m/s²), got {args.std}")
     array = load_array(args.array)
-    rows = describe_array(array, args.deviation)
+    rows = describe_array(array, args.std)
     condition = array.condition_number
     summary = {
         "array": array.name,
@@ -44,12 +45,12 @@ def run(args: Args) -> int:
     with Output("array", args) as out:
         out.add(summary=summary | {"condition number": condition})
         out.show([summary], f"{array.name}: {array.size} accelerometers", digits=4)
-        out.show(rows, f"standard deviations for {args.deviation:g} m/s² of noise a sample")
+        out.show(rows, f"standard deviations for {args.std:g} m/s² of noise a sample")
         out.rows(rows)
         if array.rank < array.A.shape[1]:
             out.say("What is not determined needs other sensors (a gyroscope) or a model of the motion.")
         if array.redundancy == 0:
-            out.say("No redundancy: the fault of an accelerometer cannot be told from motion.")
+            out.say("No redundancy: the fault of an accelerometer looks like motion.")
     return 0
 
 

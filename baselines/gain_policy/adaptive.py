@@ -92,8 +92,8 @@ class AdaptiveEstimator:
             ValueError: see :func:`poise.filters.core.estimator.check_measurements`.
         """
         arrays = check_measurements(self.channels, measurement, time_axis=False)
-        ticks = {name: np.asarray(array)[None] for name, array in arrays.items()}
-        estimate, state = self._advance(state, ticks)
+        samples = {name: np.asarray(array)[None] for name, array in arrays.items()}
+        estimate, state = self._advance(state, samples)
         pose = {name: value[0] for name, value in estimate.pose.items()}
         return state, Estimate(pose, *(None if part is None else part[0] for part in estimate[1:4]))
 
@@ -109,7 +109,7 @@ class AdaptiveEstimator:
     def run_with_actions(
         self, state: TunedState | None, measurements: Mapping[str, Any]
     ) -> tuple[Estimate, TunedState, np.ndarray]:
-        """As :meth:`run_from`, and the action ``(T, *batch, k)`` that was in force at every tick."""
+        """As :meth:`run_from`, and the action ``(T, *batch, k)`` that was in force at every sample."""
         arrays = check_measurements(self.channels, measurements, time_axis=True)
         arrays = {name: np.asarray(array) for name, array in arrays.items()}
         length = len(next(iter(arrays.values())))
@@ -124,14 +124,14 @@ class AdaptiveEstimator:
             start = stop
         return joined(parts), state, np.concatenate(actions)
 
-    def _advance(self, state: TunedState, ticks: Mapping[str, np.ndarray]) -> tuple[Estimate, TunedState]:
+    def _advance(self, state: TunedState, samples: Mapping[str, np.ndarray]) -> tuple[Estimate, TunedState]:
         if int(state.memory.samples) == 0:
             state = self.tuned.decide(state, self.policy(self.tuned.observe(state)))
-        return self.tuned.advance(state, ticks)
+        return self.tuned.advance(state, samples)
 
 
 def joined(parts: list[Estimate]) -> Estimate:
-    """Estimates of consecutive ticks as one, time first."""
+    """Estimates of consecutive samples as one, time first."""
 
     def join(pieces: list[Any]) -> Any:
         return None if pieces[0] is None else np.concatenate(pieces)

@@ -67,15 +67,15 @@ class RateGroup:
 
         The gyroscope's bias, and over each of :data:`AHEAD` the mean cost of the reference and the mean acceleration.
         """
-        ticks, length = self.tuned.interval_samples, len(self.reference)
+        samples, length = self.tuned.interval_samples, len(self.reference)
         absent = np.zeros((length, 3))
         bias, force = (
             np.stack([np.linalg.norm(t.truth.get(name, absent)[:length], axis=-1) for t in self.stack.trajectories])
             for name in ("gyroscope_bias", "external_acceleration")
         )
-        columns = [np.log1p(np.degrees(bias[:, ::ticks]))]
+        columns = [np.log1p(np.degrees(bias[:, ::samples]))]
         for values in (np.degrees(np.ascontiguousarray(self.reference.T)), force):
-            means = np.nan_to_num(values).reshape(len(values), self.stack.decisions, ticks).mean(axis=-1)
+            means = np.nan_to_num(values).reshape(len(values), self.stack.decisions, samples).mean(axis=-1)
             columns += [np.log1p(mean_ahead(means, ahead)) for ahead in AHEAD]
         table = np.stack(columns, axis=-1)
         return np.concatenate([table, table[:, -1:]], axis=1)

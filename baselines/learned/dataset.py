@@ -183,7 +183,7 @@ def sequence_of(trajectory: Trajectory, frame: GravityAlignedFrame) -> tuple[np.
     seen = run(Observer(frame.with_dt(trajectory.dt)), trajectory.measurements).pose
     due = seen["due"][:, 0] == 1.0
     if not due.any():
-        raise ValueError(f"{trajectory.name} is too short: {len(trajectory)} ticks hold no interval of the network")
+        raise ValueError(f"{trajectory.name} is too short: {len(trajectory)} samples hold no interval of the network")
     up = rotation.rotate(seen["relative_orientation"], truth)[due]
     known = np.isfinite(up).all(axis=-1)
     up[~known] = (0.0, 0.0, 1.0)

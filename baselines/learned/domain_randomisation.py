@@ -53,7 +53,7 @@ class VariedMotion:
     """rad/s, root mean square likewise"""
     single_share: float = 0.1
     """probability that an episode hardly turns, and that it hardly translates"""
-    spread: float = 0.6
+    strength_std: float = 0.6
     """largest standard deviation of the logarithm of a segment's strength within an episode"""
     position_band: tuple[Range, Range] = ((0.2, 1.0), (0.8, 4.0))
     """Hz, ranges of the lower and the upper end"""
@@ -67,7 +67,7 @@ class VariedMotion:
         start = 0.0 if moving else log_uniform(generator, self.first_rest)
         rest_share, longest = generator.choice(self.rest_shares), log_uniform(generator, self.longest)
         acceleration, rate = log_uniform(generator, self.acceleration), log_uniform(generator, self.rate)
-        choice, spread = generator.random(), generator.uniform(0.0, self.spread)
+        choice, std = generator.random(), generator.uniform(0.0, self.strength_std)
         if choice < 2.0 * self.single_share:
             acceleration, rate = (
                 (acceleration, 0.1 * rate) if choice < self.single_share else (0.1 * acceleration, rate)
@@ -75,7 +75,7 @@ class VariedMotion:
         segments = []
         while start < duration:
             end = start + log_uniform(generator, (self.shortest, longest))
-            strengths = np.exp(generator.normal(0.0, spread, 2)) * (acceleration, rate)
+            strengths = np.exp(generator.normal(0.0, std, 2)) * (acceleration, rate)
             if generator.random() >= rest_share:
                 segments.append(self._segment(generator, start, end, *np.minimum(strengths, (15.0, 9.0))))
             start = end

@@ -21,7 +21,7 @@ SCALARS = 4
 FEATURES = Quantity("features", "vector", 3 * VECTORS + SCALARS, "1")
 """Input of the network for an interval: first the vectors, then the scalars, all of the order of one."""
 DUE = Quantity("due", "vector", 1, "1")
-"""1 at the tick that ends an interval of the network, else 0."""
+"""1 at the sample that ends an interval of the network, else 0."""
 VERTICAL = [0.0, 0.0, 1.0]
 
 
@@ -44,7 +44,7 @@ class GravityAlignedFrame(Recurrence):
     """
 
     interval: float = 0.04
-    """s between the ticks of the network; the last sample before a tick ends at most half a sample from it"""
+    """s between updates of the network; an interval ends at the sample nearest to its end"""
     tilt_gain: float = 0.025
     """k_θ, rad/m"""
     velocity_gain: float = 0.74
@@ -73,7 +73,7 @@ class GravityAlignedFrame(Recurrence):
         return namespace(f).concat([level(f), *[0.0 * f] * 8, 0.0 * f[..., :2], one, 0.0 * one], axis=-1)
 
     def predict(self, x: Array, z: Measurement, previous: Measurement) -> Array:
-        """Turn by the gyroscope; a new interval begins where the last tick ended one."""
+        """Turn by the gyroscope; a new interval begins where the last sample ended one."""
         xp = namespace(x)
         dt = expand(self.dt, 1)
         q, b = x[..., :4], x[..., 4:7]
@@ -111,12 +111,12 @@ class GravityAlignedFrame(Recurrence):
         fast = known * (x[..., 13:16] + dt * (a - x[..., 13:16] / expand(self.fast_leak, 1)))
         slow = known * (x[..., 16:19] + dt * (a - x[..., 16:19] / expand(self.slow_leak, 1)))
         squares = x[..., 25:26] + dt * xp.sum(a * a, axis=-1, keepdims=True)
-        deviations = x[..., 27:28] + dt * known * xp.abs(size - g)
-        sums = [x[..., 19:22] + dt * a, x[..., 22:25], squares, x[..., 26:27], deviations]
+        excesses = x[..., 27:28] + dt * known * xp.abs(size - g)
+        sums = [x[..., 19:22] + dt * a, x[..., 22:25], squares, x[..., 26:27], excesses]
         return xp.concat([q, b, v, x[..., 10:13], fast, slow, *sums, x[..., 28:31], age], axis=-1)
 
     def pose(self, x: Array) -> dict[str, Array]:
-        """Attitude of the frame; features of the interval so far; whether this tick ends it."""
+        """Attitude of the frame; features of the interval so far; whether this sample ends it."""
         xp = namespace(x)
         q, b, v = x[..., :4], x[..., 4:7], x[..., 7:10]
         length = xp.where(xp.greater(x[..., 28:29], 0.0), x[..., 28:29], 1.0 + 0.0 * x[..., 28:29])
@@ -137,5 +137,5 @@ class GravityAlignedFrame(Recurrence):
         return {"relative_orientation": q, "features": xp.concat(features, axis=-1), "due": due}
 
     def _due(self, x: Array) -> Array:
-        """Whether the interval ends at this tick ``(..., 1)``: of all ticks it is the nearest to its end."""
+        """Whether the interval ends at this sample ``(..., 1)``: of all samples it is the nearest to its end."""
         return namespace(x).greater(x[..., 29:30], expand(self.interval - 0.5 * self.dt, 1))

@@ -1,4 +1,4 @@
-"""Training of the recurrent estimator: reproducible bit by bit on one machine, and it goes on where it was stopped."""
+"""Training of the recurrent estimator: reproducible bit by bit on one machine, also after an interruption."""
 
 from __future__ import annotations
 
@@ -125,7 +125,7 @@ def train(
         dataset: what to train on, instead of simulated episodes.
         validation: what to choose the best epoch on, instead of simulated episodes.
         resume: continue from the checkpoint in ``folder``, bit by bit as if there had been no interruption.
-        say: told a line an epoch, and progress bars are shown; None for a silent training.
+        say: called with a line an epoch, and progress bars are shown; None for a silent training.
 
     Raises:
         ValueError: there is nothing to resume, or it was started with another configuration, other data or another

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from ...envs.bicycle.ride.ride import Ride
 
 STEPS = 500
-PHYSICS_PER_TICK = 10
+PHYSICS_PER_STEP = 10
 """1 kHz of physics under 100 Hz of observations."""
 RIDER = "poise/RiderBicycle-v0"
 RIDER_RATE, RIDER_PHYSICS = 100.0, 500.0
@@ -25,8 +25,8 @@ RIDER_RATE, RIDER_PHYSICS = 100.0, 500.0
 def environment_speeds() -> Iterator[Speed]:
     """Steps per CPU second of hand motion, replay and gain tuning; simulation without steps; riders on bicycles."""
     group = "environments at 100 Hz"
-    bare = measure(bare_steps(STEPS * PHYSICS_PER_TICK), STEPS * PHYSICS_PER_TICK)
-    yield Speed(group, "bare stepSimulation of one free body, 10 a tick", bare / PHYSICS_PER_TICK, "ticks/s", 1.0)
+    bare = measure(bare_steps(STEPS * PHYSICS_PER_STEP), STEPS * PHYSICS_PER_STEP)
+    yield Speed(group, "bare stepSimulation of one free body, 10 a step", bare / PHYSICS_PER_STEP, "steps/s", 1.0)
     for what, identity, options in (
         ("HandMotion, dynamic", "poise/HandMotion-v0", {"gesture": "fast"}),
         ("HandMotion, kinematic", "poise/HandMotion-v0", {"gesture": "fast", "drive": "kinematic"}),
@@ -34,9 +34,9 @@ def environment_speeds() -> Iterator[Speed]:
         ("HandMotionGain, 100 ms a step", "poise/HandMotionGain-v0", {}),
     ):
         rate = environment_rate(identity, options)
-        yield Speed(group, what, rate, "steps/s", rate / (bare / PHYSICS_PER_TICK))
+        yield Speed(group, what, rate, "steps/s", rate / (bare / PHYSICS_PER_STEP))
     rate = bulk_rate()
-    yield Speed(group, "simulate_hand, whole episode at once", rate, "ticks/s", rate / (bare / PHYSICS_PER_TICK))
+    yield Speed(group, "simulate_hand, whole episode at once", rate, "steps/s", rate / (bare / PHYSICS_PER_STEP))
     yield from rider_speeds("full")
     yield from rider_speeds("lumped")
 
@@ -44,7 +44,7 @@ def environment_speeds() -> Iterator[Speed]:
 def rider_speeds(fidelity: Literal["full", "lumped"]) -> Iterator[Speed]:
     """Bare physics of rider and bicycle, the environment with all sensors, how much faster than life, and resets."""
     group = f"rider on a bicycle, {fidelity}, at {RIDER_RATE:.0f} Hz"
-    per_tick = round(RIDER_PHYSICS / RIDER_RATE)
+    per_step = round(RIDER_PHYSICS / RIDER_RATE)
     with standing_ride(fidelity) as ride:
         start = ride.save()
 
@@ -53,8 +53,8 @@ def rider_speeds(fidelity: Literal["full", "lumped"]) -> Iterator[Speed]:
             for _ in range(STEPS):
                 ride.physics.step()
 
-        bare = measure(fall, STEPS) / per_tick
-    yield Speed(group, f"bare stepSimulation of the same bodies, {per_tick} a tick", bare, "ticks/s", 1.0)
+        bare = measure(fall, STEPS) / per_step
+    yield Speed(group, f"bare stepSimulation of the same bodies, {per_step} a step", bare, "steps/s", 1.0)
     options = {"fidelity": fidelity, "suite": "all", "rate": RIDER_RATE, "physics_rate": RIDER_PHYSICS}
     rate = environment_rate(RIDER, options)
     yield Speed(group, "RiderBicycle", rate, "steps/s", rate / bare)
@@ -131,7 +131,7 @@ def environment_rate(identity: str, options: dict[str, Any]) -> float:
 
 
 def bulk_rate() -> float:
-    """Ticks a CPU second of recording a kinematic episode without an environment."""
+    """Steps per CPU second of recording a kinematic episode without an environment."""
     from ...envs.hand.sensing import simulate_hand
 
     return measure(lambda: simulate_hand("mixed", seed=0, duration=60.0), 6001)

@@ -85,17 +85,17 @@ def repeated(data: Mapping[str, np.ndarray], length: int) -> dict[str, np.ndarra
 def filterpy_run(model: Model, measurements: Mapping[str, np.ndarray]) -> np.ndarray:
     """A model driven by filterpy's extended Kalman filter, as its user would; states ``(T, n)``.
 
-    The error state is what filterpy filters: zero before every tick, then put into the state by ``retract``. Samples
+    The error state is what filterpy filters: zero before every sample, then put into the state by ``retract``. Samples
     must not be missing; rows of the residual may be.
     """
     from filterpy.kalman import ExtendedKalmanFilter
 
     size = model.error_size
     other = ExtendedKalmanFilter(dim_x=size, dim_z=model.residual_size)
-    ticks = [dict(zip(measurements, values, strict=True)) for values in zip(*measurements.values(), strict=True)]
-    x, other.P = model.prior(ticks[0])
+    samples = [dict(zip(measurements, values, strict=True)) for values in zip(*measurements.values(), strict=True)]
+    x, other.P = model.prior(samples[0])
     states = [x]
-    for before, z in pairwise(ticks):
+    for before, z in pairwise(samples):
         x, other.F, other.Q = model.predict(x, z, before)
         other.x = np.zeros((size, 1))
         other.predict()

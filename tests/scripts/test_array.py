@@ -39,8 +39,8 @@ def test_report_of_a_file_as_json(tmp_path, capsys):
 def test_wrong_words_are_explained(capsys):
     assert main(["array", "okta"]) == 2
     assert "octa, controller, planar, triaxial or a JSON file" in capsys.readouterr().err
-    assert main(["array", "octa", "--deviation", "0"]) == 2
-    assert "deviation must be positive" in capsys.readouterr().err
+    assert main(["array", "octa", "--std", "0"]) == 2
+    assert "std must be positive" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("details", [[1], {"x": 5}, {"imu/acc": {"array": 3}}, None])

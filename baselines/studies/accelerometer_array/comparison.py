@@ -39,7 +39,7 @@ METRICS = ("total", "inclination", "heading")
 QUICK_SECONDS, QUICK_RECORDINGS = 30.0, 2
 
 
-def held(gesture: str, sensors: str, seed: int, duration: float) -> Trajectory:
+def carried(gesture: str, sensors: str, seed: int, duration: float) -> Trajectory:
     """A controller in a hand, with the channel ``imu/acc`` of the equivalent IMU beside ``array/acc``."""
     device = DEVICES["controller"]
     trajectory = simulate_hand(gesture, seed, array_preset(sensors), RATE, duration, device=device)
@@ -67,7 +67,7 @@ def contenders(array: str, noise: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def noise_of(sensors: str) -> dict[str, float]:
-    """Standard deviations of one sample at :data:`RATE`, as the filters want them; the field is taken for 50 µT."""
+    """Standard deviations of one sample at :data:`RATE`, as the filters take them, for a field of 50 µT."""
     preset, root = array_preset(sensors), math.sqrt(RATE)
     assert preset.magnetometer is not None
     return {
@@ -83,7 +83,7 @@ def gesture_errors(gesture: str, sensors: str, seed: int, duration: float) -> li
     Returns:
         A row for each: ``estimator``, ``gesture``, ``sensors``, ``seed``, and the metrics it has.
     """
-    trajectory = held(gesture, sensors, seed, duration)
+    trajectory = carried(gesture, sensors, seed, duration)
     rows = scores(trajectory, contenders("controller", noise_of(sensors)))
     return [{"gesture": gesture, "sensors": sensors, "seed": seed, **row} for row in rows]
 

@@ -97,7 +97,7 @@ def along(one: AxisCalibration, data: RateTableData, axis: np.ndarray, nominal: 
     """eᵀr, m: the coordinate of a sensor along its axis, from the array's reference point.
 
     With u up and that point at one distance d outwards (o) a mounting gives ρ = (e − u uᵀe)ᵀr + d eᵀo. Of r only the
-    part along e can be told; the rest is taken from the nominal position.
+    part along e is determined; the rest comes from the nominal position.
 
     Args:
         one: with the positions ρ.
@@ -165,7 +165,7 @@ def magnetometer_record(data: MagnetometerData, channel: str = "imu/mag") -> Cal
         channel: name for the record.
 
     Raises:
-        ValueError: readings that are no ellipsoid, or attitudes that do not suffice.
+        ValueError: readings that do not lie on an ellipsoid, or attitudes that do not suffice.
     """
     ellipsoid = fit_ellipsoid(data.raw)
     matrix = ellipsoid.root

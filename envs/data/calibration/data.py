@@ -203,7 +203,7 @@ def read_csv(path: Path, needed: tuple[str, ...]) -> dict[str, np.ndarray]:
     try:
         table = pandas.read_csv(path, comment="#", skipinitialspace=True)
     except (pandas.errors.ParserError, pandas.errors.EmptyDataError, UnicodeDecodeError) as reason:
-        raise ValueError(f"{path} is no table of comma-separated values: {reason}") from None
+        raise ValueError(f"{path} is not a table of comma-separated values: {reason}") from None
     missing = [name for name in needed if name not in table.columns]
     if missing:
         hint = " (columns must be separated by commas)" if len(table.columns) == 1 else ""

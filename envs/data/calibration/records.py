@@ -91,7 +91,7 @@ def load_calibration(path: str | Path) -> CalibrationRecord:
 
     Raises:
         FileNotFoundError: there is no such file.
-        ValueError: it is no calibration record, or of a newer version.
+        ValueError: it is not a calibration record, or of a newer version.
     """
     path = Path(path)
     if not path.is_file():
@@ -99,9 +99,9 @@ def load_calibration(path: str | Path) -> CalibrationRecord:
     try:
         described = json.loads(path.read_text(encoding="utf-8"))
     except (json.JSONDecodeError, UnicodeDecodeError) as reason:
-        raise ValueError(f"{path} is no calibration record: {reason}") from None
+        raise ValueError(f"{path} is not a calibration record: {reason}") from None
     if not isinstance(described, dict) or described.get("format") != FORMAT:
-        raise ValueError(f"{path} is no calibration record: its format is not {FORMAT!r}")
+        raise ValueError(f"{path} is not a calibration record: its format is not {FORMAT!r}")
     version, details = described.get("version"), described.get("details", {})
     if not isinstance(version, int) or version > FORMAT_VERSION:
         raise ValueError(f"{path} has version {version!r}, this package reads up to {FORMAT_VERSION}")

@@ -103,7 +103,7 @@ def test_the_section_has_its_tables_and_figures(study, monkeypatch, tmp_path):
 
 
 def test_the_array_of_a_controller_stands_in_for_an_imu():
-    trajectory = array_comparison.held("slow", "array-data-sheet", 1, 5.0)
+    trajectory = array_comparison.carried("slow", "array-data-sheet", 1, 5.0)
     truth = trajectory.truth
     force = rotation.rotate_back(truth["orientation"], np.array([0.0, 0.0, 9.80665])) + truth["external_acceleration"]
     error = metrics.vector_error(trajectory.measurements["imu/acc"], force)
@@ -117,7 +117,7 @@ def test_the_array_of_a_controller_stands_in_for_an_imu():
 
 
 def test_scores_join_what_an_estimator_tells(monkeypatch):
-    trajectory = array_comparison.held("slow", "array-data-sheet", 1, 3.0)
+    trajectory = array_comparison.carried("slow", "array-data-sheet", 1, 3.0)
     rows = array_comparison.scores(trajectory, {"six": "external-acceleration", "nine": "mekf-9"})
     assert [row["estimator"] for row in rows] == ["six", "nine"]
     assert rows[0]["total"] is None

@@ -159,7 +159,7 @@ def test_records_that_do_not_fit_are_refused(tmp_path):
     with pytest.raises(FileNotFoundError, match="no calibration record at"):
         load_calibration(tmp_path / "none.json")
     for text, message in (
-        ("{", "is no calibration record"),
+        ("{", "is not a calibration record"),
         ('{"format": "other"}', "its format is not 'poise-calibration'"),
         ('{"format": "poise-calibration", "version": 9}', "has version 9"),
         ('{"format": "poise-calibration", "version": 1, "channels": {"a": {"matrix": [[1]]}}}', "unusable calibration"),
@@ -221,7 +221,7 @@ def test_a_table_in_degrees_with_names_of_ones_own(tmp_path):
         ("time,up,rate,a\n0,+z,,3\n", "the rate must be known in every row"),
         ("time,up,rate,a\n", "has no rows"),
         ("time;up;rate;a\n0;+z;1;3\n", "columns must be separated by commas"),
-        ("", "is no table of comma-separated values"),
+        ("", "is not a table of comma-separated values"),
     ],
 )
 def test_unusable_files_are_refused(text, message, tmp_path):
