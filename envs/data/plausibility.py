@@ -6,6 +6,7 @@ other channels allow, and names the mistake that explains the number best.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
@@ -76,6 +77,10 @@ def check_recording(trajectory: Trajectory) -> list[Finding]:
     """
     findings = list(check_clock(trajectory))
     wrong_clock = any(finding.severity == "warning" for finding in findings)
+    if not wrong_clock:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            trajectory = trajectory.on_grid()
     for site in sites(trajectory):
         findings += check_site(trajectory, site, wrong_clock)
     findings += check_reference(trajectory)
@@ -99,7 +104,12 @@ def check_clock(trajectory: Trajectory) -> Iterator[Finding]:
     if len(trajectory) < 2:
         return
     step = np.diff(trajectory.time)
-    interval = float(np.median(step))
+    try:
+        interval = trajectory.dt
+    except ValueError as reason:
+        remedy = "Name the device's nominal rate, or cut the recording."
+        yield Finding("warning", "time", str(reason), "stamps of arrival, or of several recordings", remedy)
+        return
     rate = 1.0 / interval
     if rate < PLAUSIBLE_RATES[0]:
         whole = bool(np.all(np.abs(step - np.round(step)) < 1e-6 * interval))
