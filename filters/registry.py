@@ -1,7 +1,7 @@
-"""Every filter by name: which class it is, and what the class cannot know of itself.
+"""Registry of filters: the class behind each name, and descriptions that the class does not contain.
 
-Channels, outputs and parameters are read from the classes. Listing them imports modules of this layer (NumPy only);
-packages that are wrapped are loaded when an estimator is made. A layer above adds entries of the same type
+Channels, outputs and parameters are read from the classes. Listing them imports modules of this layer only (NumPy).
+Wrapped packages are loaded when an estimator is made. A layer above adds entries of the same type
 (:mod:`poise.baselines.registry`).
 """
 
@@ -29,13 +29,13 @@ class Entry:
     """One estimator.
 
     Attributes:
-        factory: a class of equations, a class of estimators, or a function that makes an estimator; or where it is,
+        factory: a class of equations, a class of estimators, or a function that makes an estimator; or its location,
             ``.module:name`` relative to this package.
         description: what it estimates and how, in one line.
         source: where it was published.
         kind: ``filter`` (published or this package's), ``adaptive`` (a filter whose gains a policy sets), ``learned``,
             ``baseline`` (a classical reference without tuning), ``external`` (another package's).
-        fixed: parameters that the name stands for; they cannot be given.
+        fixed: parameters that the name implies; they cannot be passed.
         describes: the class whose channels and outputs are those of the estimator, where ``factory`` is a function.
     """
 
@@ -60,12 +60,12 @@ class Entry:
 
     @cached_property
     def channels(self) -> tuple[str, ...]:
-        """Names of the channels that it needs."""
+        """Names of the required channels."""
         return self._names("channels")
 
     @cached_property
     def outputs(self) -> tuple[str, ...]:
-        """Names of the quantities that it estimates."""
+        """Names of the estimated quantities."""
         return self._names("outputs")
 
     def _names(self, attribute: str) -> tuple[str, ...]:
@@ -83,13 +83,13 @@ class Entry:
             outer = {item.name for item in fields(self.runner)} - {"model"}
         unknown = sorted(set(parameters) - own - outer)
         if unknown and not any(each.kind is each.VAR_KEYWORD for each in signature.values()):
-            raise ValueError(f"unknown parameters {unknown} of {name!r}; there are {sorted(own | outer)}")
+            raise ValueError(f"unknown parameters {unknown} of {name!r}; accepted are {sorted(own | outer)}")
         given = {key: value for key, value in parameters.items() if key not in outer}
         for owner in filter(None, (_load(self.describes), self.made_by, self.runner)):
             check_parameters(owner, parameters)
         if metadata and isinstance(self.made_by, type) and issubclass(self.made_by, Equations):
             found = self.made_by.parameters_from(metadata)
-            # a name that fixes the device stands for another one than that of the recording
+            # a name that fixes the device overrides the device of the recording
             given = given if set(found) & set(self.fixed) else found | given
         made = self.made_by(**given, **self.fixed)
         if self.kind == "external":
@@ -131,7 +131,7 @@ FILTERS: dict[str, Entry] = {
     "mekf-9": Entry(".imu.mekf:MEKF9", WITH_HEADING, HERE),
     "bounded-motion": Entry(
         ".imu.bounded_motion:BoundedMotion",
-        "accelerates, but does not go anywhere: velocity near zero as pseudo-measurement",
+        "for bodies that accelerate but stay in one place: velocity near zero as pseudo-measurement",
         HERE,
     ),
     "bounded-motion-9": Entry(".imu.bounded_motion:BoundedMotion9", WITH_HEADING, HERE),
@@ -237,7 +237,7 @@ FILTERS: dict[str, Entry] = {
         for suffix, axes, text in (("", 6, description), ("-9", 9, "the same with a magnetometer"))
     },
 }
-"""Name → filter. A new one is an entry here; its class says the rest."""
+"""Name → filter. A new filter needs one entry here; its class provides the rest."""
 
 
 def make(name: str, *, metadata: Mapping[str, Any] | None = None, **parameters: Any) -> Estimator[Any]:
@@ -245,23 +245,22 @@ def make(name: str, *, metadata: Mapping[str, Any] | None = None, **parameters: 
 
     Args:
         name: a key of :data:`FILTERS`.
-        metadata: of a recording; the filter is configured with the person, vehicle or device that they describe.
+        metadata: of a recording; the filter is configured with the person, vehicle or device described there.
         parameters: fields of the equations (``dt``, noises …) and of what runs them (``compiled``,
-            ``keep_covariance``); they win over ``metadata``.
+            ``keep_covariance``); they take precedence over ``metadata``.
 
     Returns:
         The estimator.
 
     Raises:
-        ValueError: an unknown name, an unknown parameter (the message lists those that there are), or a value that is
-            refused.
-        ImportError: the package that is wrapped is not installed.
+        ValueError: an unknown name, an unknown parameter (the message lists the accepted ones), or an invalid value.
+        ImportError: the wrapped package is not installed.
     """
     return look_up("estimator", name, FILTERS).make(name, parameters, metadata)
 
 
 def name_of(equations: Equations) -> str | None:
-    """The name under which equations are registered; None if they are not."""
+    """The name under which equations are registered; None if they are not registered."""
     kind = type(equations)
     place = f"{kind.__module__.removeprefix(__package__)}:{kind.__qualname__}"
     return next((name for name, entry in FILTERS.items() if entry.factory in (kind, place)), None)

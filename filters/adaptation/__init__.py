@@ -1,1 +1,1 @@
-"""Gains that a policy may set, the innovation features that it sees, and the filter around it."""
+"""Gains that a policy sets, the innovation features that it observes, and the filter that combines both."""

@@ -1,25 +1,25 @@
-r"""What a gain policy sees: statistics of innovations and sensors over several times, no truth.
+r"""Observation of a gain policy: statistics of innovations and sensors over several time scales, without the truth.
 
-Five streams of vectors are watched sample by sample: the whitened innovation of the filter, the gyroscope, the
-accelerometer (nothing for a filter that reads none), the external acceleration a that the filter believes in, and the
-lean u × a / g with its vertical u (both zero where a filter gives none). A steady tilt error τ (b × u), which a
-gyroscope bias b leaves at a time constant τ, is a lean whose mean in sensor axes points along b whatever the attitude,
-while true accelerations of a hand average out. Of each stream, running means of
+Five streams of vectors are monitored: the whitened innovation of the filter, the gyroscope, the accelerometer (if the
+filter has one), the external acceleration a that the filter estimates, and the apparent tilt u × a / g with its
+inclination vector u (both zero where a filter estimates no acceleration). A gyroscope bias b causes a steady tilt error
+τ (b × u) at a time constant τ. The mean of the apparent tilt in sensor axes then points along b at any attitude, while
+true accelerations of a hand average out. Of each stream, running means of
 
     1,  v,  |v|²,  |v − v_previous|²        and, of the accelerometer,  ‖f‖ − g  and its square
 
-are kept over each time scale; a missing sample adds nothing. An interval of samples ends with a decision; there the
-means over the interval m enter
+are computed over each time scale, without missing samples. At the end of each interval there is a decision, and the
+means m over the interval enter
 
     average ← average + (1 − exp(−interval / τ)) (m − average)
 
-and the features are their invariants, independent of how the sensor is mounted: for every stream and scale the
-logarithms of its root mean square, of its deviation from its mean, of the length of its mean, and of its change from
-sample to sample. A consistent filter has innovations of rms √m without a mean; a mean or slow changes show a gain that
-is too small (R. K. Mehra, "On the identification of variances and adaptive Kalman filtering", IEEE Trans. Automatic
-Control 15(2), 1970).
+The features are invariants of these averages that do not depend on the mounting of the sensor. For every stream and
+scale they are the logarithms of the root mean square, the standard deviation, the length of the mean, and the change
+from sample to sample. A consistent filter has innovations of rms √m and zero mean; a nonzero mean or slow changes show
+that a gain is too small (R. K. Mehra, "On the identification of variances and adaptive Kalman filtering", IEEE Trans.
+Automatic Control 15(2), 1970).
 
-All is squashed to [−1, 1]. One memory serves a batch of sequences.
+All features are compressed to [−1, 1]. One memory holds a batch of sequences.
 """
 
 from __future__ import annotations
@@ -44,24 +44,24 @@ CENTRES = {
     "external": (0.0, 0.0, -0.5, -0.5),
     "lean": (-1.0, -1.0, -1.5, -1.5),
 }
-"""Stream → decimal logarithm of each statistic that is mapped to 0: about the middle of what a hand does."""
+"""Stream → decimal logarithm of the value of each statistic that maps to 0: typical of hand motion."""
 FLOOR = 1e-5
 """Smallest statistic that is distinguished from zero."""
 CHANGE_TIME = 0.01
-"""s: changes of the sensors from sample to sample are given per this time, so that they mean the same at any rate"""
+"""s: changes of the sensors from sample to sample are scaled to this time, so that they do not depend on the rate"""
 START_TIME = 20.0
-"""s: time constant of the feature that distinguishes a young filter from an old one."""
+"""s: time constant of the feature for the time since the start."""
 
 
 class FeatureMemory(NamedTuple):
-    """All memory of the features; arrays only.
+    """State of the features; arrays only.
 
     Attributes:
         averages: ``(*batch, scales, moments)`` running means.
-        sums: ``(*batch, moments)`` over the samples of the interval that is not over.
+        sums: ``(*batch, moments)`` over the samples of the current interval.
         previous: ``(*batch, streams, width)`` last sample of every stream; NaN if there was none.
-        samples: ``()`` int, samples of the interval that is not over; 0 asks for a decision.
-        decisions: ``(*batch,)`` int, intervals that are over.
+        samples: ``()`` int, samples of the current interval so far; at 0 a decision is due.
+        decisions: ``(*batch,)`` int, number of completed intervals.
     """
 
     averages: np.ndarray
@@ -76,7 +76,7 @@ class InnovationFeatures:
     """Statistics over several time scales, computed while a filter runs.
 
     Attributes:
-        interval: time from decision to decision, s; rounded to samples of the filter, one at least.
+        interval: time between decisions, s; rounded to samples of the filter, at least one.
         scales: time constants of the running means, s; 0 for the last interval alone.
 
     Raises:
@@ -127,10 +127,10 @@ class InnovationFeatures:
     def update(
         self, memory: FeatureMemory, kalman: KalmanFilter, measurements: Mapping[str, np.ndarray], estimate: Estimate
     ) -> FeatureMemory:
-        """Take the samples that a filter has just run over.
+        """Update with the samples that a filter has just processed.
 
         Args:
-            memory: from :meth:`init` or the update before; it is not changed.
+            memory: from :meth:`init` or the previous update; it is not changed.
             kalman: the filter.
             measurements: channel → ``(T, *batch, size)``.
             estimate: of the filter, ``(T, *batch, …)``.
@@ -144,7 +144,7 @@ class InnovationFeatures:
         if taken > whole:
             beyond = f"{len(moments)} samples after {memory.samples}"
             raise ValueError(f"{beyond} reach beyond the interval of {whole} samples")
-        # The first axis is added up row by row, so samples one by one and together give the same sums.
+        # The first axis is summed row by row, so that single samples and blocks give the same sums.
         sums = np.concatenate([memory.sums[None], moments]).sum(axis=0)
         if taken < whole:
             return memory._replace(sums=sums, previous=previous, samples=np.array(taken))
@@ -168,7 +168,7 @@ class InnovationFeatures:
             excess = memory.averages[..., -2:] / block[..., STREAMS.index("acc"), :1]
         mean, square, change = means[..., :-2], means[..., -2], means[..., -1]
         mean_square = np.sum(mean * mean, axis=-1)
-        # Innovations come at a pace of their own; the change of all else is given per time.
+        # The change of innovations is per sample; the change of all other streams is per unit of time.
         pace = np.where(np.array(STREAMS) == "innovation", 1.0, (CHANGE_TIME / kalman.dt) ** 2)
         sizes = np.stack([square, square - mean_square, mean_square, change * pace], axis=-1)
         logarithms = 0.5 * np.log10(np.fmax(sizes, FLOOR**2)) - np.array([CENTRES[stream] for stream in STREAMS])
@@ -188,7 +188,7 @@ class InnovationFeatures:
         acc = np.full_like(gyr, np.nan) if accelerometer is None else np.asarray(measurements[accelerometer], float)
         gravity = getattr(kalman.model, "gravity", GRAVITY)
         innovation = np.asarray(estimate.innovation)
-        # A whitened innovation is exactly 0 where there was nothing to compare.
+        # A whitened innovation is exactly 0 where there was no measurement.
         innovation = np.where((innovation != 0.0).any(axis=-1, keepdims=True), innovation, np.nan)
         external = np.asarray(estimate.pose.get("external_acceleration", np.zeros_like(gyr)))
         lean = cross(np.asarray(estimate.pose.get("up", np.zeros_like(gyr))), external) / gravity

@@ -1,8 +1,8 @@
-"""What an agent may choose: bounded actions, one for each gain of a filter, that are log factors on its constants.
+"""Actions of an agent: one bounded log factor on each gain of a filter.
 
-An action lies in [−1, 1]; 0 is the published tuning, exactly. Between 0 and ±1 the log factor is linear, with a slope
-of its own on each side (:class:`GainRange`). Variances may change by 10^±1.5 unless a gain declares ``bounds``; a model
-may limit gains further where together they would be unsafe (:meth:`poise.filters.core.model.Equations.limited`).
+An action lies in [−1, 1]; 0 is exactly the published tuning. The log factor is linear between 0 and ±1, with a separate
+slope on each side (:class:`GainRange`). Variances may change by 10^±1.5 unless a gain declares ``bounds``; a model may
+limit gains further where a combination would be unsafe (:meth:`poise.filters.core.model.Equations.limited`).
 """
 
 from __future__ import annotations
@@ -18,15 +18,15 @@ from ..core.model import Model, parameters_of
 from ..registry import make, name_of
 
 DECADES = 1.5
-"""Powers of ten by which a variance may change either way.
+"""Powers of ten by which a variance may change in either direction.
 
 In the external-acceleration filter the ratio of its two variances sets the time constant, 0.1 s as published: it can
-change from 3 ms to 3 s, beyond which a biased gyroscope costs more than any acceleration."""
+change from 3 ms to 3 s. Beyond that a gyroscope bias causes larger errors than any acceleration."""
 
 
 @dataclass(frozen=True)
 class GainRange:
-    """How far one gain may be changed.
+    """Range within which one gain may be changed.
 
     Attributes:
         gain: name in ``model.gains``.
@@ -47,7 +47,7 @@ class GainRange:
 
 
 def tunable_filter(filter: str | KalmanFilter) -> KalmanFilter:
-    """The filter of a name, without covariances, or the filter itself.
+    """The filter of this name, without covariances, or the filter itself.
 
     Args:
         filter: a Kalman filter with gains, or the name of one in :data:`poise.filters.registry.FILTERS`.
@@ -57,7 +57,7 @@ def tunable_filter(filter: str | KalmanFilter) -> KalmanFilter:
     """
     made = make(filter) if isinstance(filter, str) else filter
     if not isinstance(made, KalmanFilter) or not made.gains:
-        raise ValueError(f"filter must be a Kalman filter with gains, made or by name, got {filter!r}")
+        raise ValueError(f"filter must be a Kalman filter with gains, or the name of one, got {filter!r}")
     return replace(made, keep_covariance=False) if isinstance(filter, str) else made
 
 
@@ -71,7 +71,7 @@ def gain_ranges(kalman: KalmanFilter, gains: Sequence[str] | None = None) -> tup
 
     Args:
         kalman: the filter.
-        gains: names in the order of the action; None for all of the filter.
+        gains: names in the order of the action; None for all gains of the filter.
 
     Raises:
         ValueError: a gain is unknown or named twice, or there is none.
@@ -79,12 +79,12 @@ def gain_ranges(kalman: KalmanFilter, gains: Sequence[str] | None = None) -> tup
     names = tuple(kalman.gains) if gains is None else tuple(gains)
     unknown = [name for name in names if name not in kalman.gains]
     if unknown or not names or len(set(names)) < len(names):
-        raise ValueError(f"gains must be different ones of {sorted(kalman.gains)}, got {list(names)}")
+        raise ValueError(f"gains must be distinct names from {sorted(kalman.gains)}, got {list(names)}")
     return tuple(_range(kalman.model, name) for name in names)
 
 
 def _range(model: Model, name: str) -> GainRange:
-    """Between the bounds that the gain declares, which reach to the published value at least; else :data:`DECADES`."""
+    """The bounds that the gain declares, extended to include the published value; else :data:`DECADES`."""
     gain = model.gains[name]
     if gain.bounds is not None and (value := parameters_of(model)[gain.parameter]) > 0.0:
         lower, upper = (math.log(bound / value) / gain.power for bound in gain.bounds)
@@ -99,7 +99,7 @@ def log_gains(model: Model, ranges: Sequence[GainRange], action: np.ndarray) -> 
     Args:
         model: the published tuning.
         ranges: one for each entry of the action.
-        action: ``(*batch, k)``; values beyond [−1, 1] count as these.
+        action: ``(*batch, k)``; values beyond [−1, 1] are clipped.
 
     Returns:
         Gain name → log factor ``(*batch,)``; zeros for a zero action.
@@ -117,7 +117,7 @@ def log_gains(model: Model, ranges: Sequence[GainRange], action: np.ndarray) -> 
 
 
 def gain_sizes(model: Model, gains: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """The scaled constants themselves: gain name → value in the parameter's unit, as the filter uses them."""
+    """The scaled constants: gain name → value in the unit of the parameter, as used by the filter."""
     base = parameters_of(model)
     sizes = {}
     for name, factor in gains.items():

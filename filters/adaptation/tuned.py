@@ -1,4 +1,4 @@
-"""A Kalman filter whose gains somebody chooses while it runs: what environments and adaptive estimators share."""
+"""A Kalman filter with gains that change while it runs; shared by environments and adaptive estimators."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from .gains import GainRange, filter_name, gain_ranges, log_gains
 
 
 class TunedState(NamedTuple):
-    """All memory of a tuned filter; arrays only, so copying them is saving it.
+    """Complete state of a tuned filter; arrays only, so a copy of them saves it.
 
     Attributes:
-        filter: of the filter.
-        memory: of the features.
-        action: ``(*batch, k)`` in force since the last decision.
+        filter: state of the filter.
+        memory: state of the features.
+        action: ``(*batch, k)`` of the last decision.
     """
 
     filter: FilterState
@@ -30,12 +30,12 @@ class TunedState(NamedTuple):
 
 @dataclass(frozen=True)
 class TunedFilter:
-    """A filter, what may be chosen of it, and what is seen of it.
+    """A filter with the actions that change its gains and the features that are observed.
 
     Attributes:
         kalman: the filter in its published tuning.
-        ranges: of the actions, in their order.
-        features: what is seen, and how often there is a decision.
+        ranges: of the actions, in order.
+        features: observed features, and the interval between decisions.
     """
 
     kalman: KalmanFilter
@@ -56,7 +56,7 @@ class TunedFilter:
 
     @property
     def actions(self) -> int:
-        """Number k of gains that are chosen."""
+        """Number k of tunable gains."""
         return len(self.ranges)
 
     @property
@@ -66,15 +66,15 @@ class TunedFilter:
 
     @property
     def interval_samples(self) -> int:
-        """Samples from decision to decision."""
+        """Number of samples between decisions."""
         return self.features.interval_samples(self.kalman.dt)
 
     def with_dt(self, dt: float) -> TunedFilter:
-        """The same for another sampling interval; decisions stay as many seconds apart, to a sample."""
+        """The same for another sampling interval; the time between decisions is kept, rounded to samples."""
         return replace(self, kalman=self.kalman.with_dt(dt))
 
     def init(self, measurement: Mapping[str, Any]) -> TunedState:
-        """Empty memory with the batch shape of ``measurement``; the action is neutral.
+        """Initial state with the batch shape of ``measurement``; the action is neutral.
 
         Raises:
             ValueError: the filter reads no gyroscope, or a channel is missing.
@@ -92,12 +92,12 @@ class TunedFilter:
         return log_gains(self.kalman.model, self.ranges, action)
 
     def decide(self, state: TunedState, action: np.ndarray) -> TunedState:
-        """Put an action ``(*batch, k)`` in force; values beyond [−1, 1] count as these."""
+        """Apply an action ``(*batch, k)``; values beyond [−1, 1] are clipped."""
         bounded = np.minimum(np.maximum(np.asarray(action, dtype=float), -1.0), 1.0)
         return state._replace(action=np.broadcast_to(bounded, state.action.shape))
 
     def advance(self, state: TunedState, measurements: Mapping[str, Any]) -> tuple[Estimate, TunedState]:
-        """Run over samples ``(T, *batch, size)`` of one interval, not beyond its end, with the action in force."""
+        """Process samples ``(T, *batch, size)`` of one interval, not beyond its end, with the current action."""
         length = len(next(iter(measurements.values())))
         gains = {
             name: np.broadcast_to(factor, (length, *factor.shape)) for name, factor in self.gains(state.action).items()

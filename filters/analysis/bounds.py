@@ -1,4 +1,4 @@
-r"""How well any filter could do along one true trajectory: the posterior Cramér–Rao bound, for every model here.
+r"""Posterior Cramér–Rao bound along one true trajectory, for every model of the package.
 
 P. Tichavský, C. H. Muravchik, A. Nehorai, "Posterior Cramér–Rao bounds for discrete-time nonlinear filtering", IEEE
 Transactions on Signal Processing 46(5), 1998. With the information matrix J and
@@ -6,14 +6,15 @@ Transactions on Signal Processing 46(5), 1998. With the information matrix J and
     D¹¹ = Fᵀ Q⁻¹ F,   D¹² = −Fᵀ Q⁻¹,   D²² = Q⁻¹ + Hᵀ R⁻¹ H,
     J(k+1) = D²² − D²¹ (J(k) + D¹¹)⁻¹ D¹²
 
-no estimator has a smaller covariance than J⁻¹, on average over what the expectation is taken of. Here F, Q, H and R are
-those at the true states of one trajectory, as the two-gyroscope paper (27)–(29) has it: the bound of the linearised
-problem, not an average. It then equals the Riccati recursion, which needs no Q⁻¹:
+no estimator has a smaller covariance than J⁻¹, where the expectation is over trajectories and measurements. Here F, Q,
+H and R are those at the true states of one trajectory, as in (27)–(29) of the two-gyroscope paper. The result is the
+bound of the linearised problem and not an average. It equals the Riccati recursion, which needs no Q⁻¹:
 
     P(k+1)⁻ = F P(k) Fᵀ + Q,   P(k+1) = (P(k+1)⁻ ⁻¹ + Hᵀ R⁻¹ H)⁻¹
 
-Left out is ½ tr(Q⁻¹ ∂ᵢQ Q⁻¹ ∂ⱼQ), which D¹¹ also has where Q depends on the state: what the size of the noise tells. No
-Kalman filter uses it, and the paper leaves it out (with it the bound of a platform that does not turn would not grow).
+If Q depends on the state, D¹¹ has the further term ½ tr(Q⁻¹ ∂ᵢQ Q⁻¹ ∂ⱼQ), the information in the size of the noise. It
+is omitted, as in the paper, because no Kalman filter uses it. (With it the bound of a platform that does not turn would
+not grow.)
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ class Linearisation(NamedTuple):
     """A model along a trajectory of T states: T − 1 steps, T measurements.
 
     Attributes:
-        F: ``(T − 1, e, e)`` Jacobian of the error from tick k to k + 1.
+        F: ``(T − 1, e, e)`` Jacobian of the error from sample k to k + 1.
         Q: ``(T − 1, e, e)`` process covariance.
         H: ``(T, m, e)`` Jacobian of the measurement.
         R: ``(T, m, m)`` its covariance.
@@ -53,9 +54,10 @@ def linearise(model: Model, states: np.ndarray, measurements: Mapping[str, Any])
     Args:
         model: the equations.
         states: ``(T, n)`` true states.
-        measurements: channel → ``(T, size)`` of the same ticks, without errors for the bound (samples of an ideal
-            sensor plus the biases in ``states``, see :func:`with_gaps`); NaN where there is no sample: missing inputs
-            are held, missing measurements tell nothing, as in :class:`poise.filters.core.kalman.KalmanFilter`.
+        measurements: channel → ``(T, size)`` at the same times, without errors for the bound (samples of an ideal
+            sensor plus the biases in ``states``, see :func:`with_gaps`); NaN where there is no sample. Missing inputs
+            are replaced by the last valid ones, and updates of missing measurements are skipped, as in
+            :class:`poise.filters.core.kalman.KalmanFilter`.
 
     Raises:
         ValueError: shapes do not fit.
@@ -76,7 +78,7 @@ def linearise(model: Model, states: np.ndarray, measurements: Mapping[str, Any])
 
 
 def samples_of(model: Model, measurements: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray]:
-    """All channels of a model side by side ``(T, d)``: as they are, and with missing samples held."""
+    """All channels of a model side by side ``(T, d)``: as recorded, and with the last valid sample held."""
     arrays = check_measurements(model.channels, measurements, time_axis=True)
     samples = np.asarray(join(arrays, model.channels), dtype=float)
     held = [samples[0]]
@@ -86,10 +88,10 @@ def samples_of(model: Model, measurements: Mapping[str, Any]) -> tuple[np.ndarra
 
 
 def start_of(model: Model, measurements: Mapping[str, Any]) -> tuple[int, np.ndarray]:
-    """First tick at which a filter of this model can start, and the covariance ``(e, e)`` with which it does.
+    """First sample at which a filter of this model can start, and its initial covariance ``(e, e)``.
 
     Raises:
-        ValueError: it never can.
+        ValueError: the samples never suffice for a start.
     """
     _, held = samples_of(model, measurements)
     x, P = (np.asarray(part, dtype=float) for part in model.prior(split(held, model.channels)))
@@ -104,14 +106,14 @@ def start_of(model: Model, measurements: Mapping[str, Any]) -> tuple[int, np.nda
 def posterior_bound(
     model: Model, states: np.ndarray, measurements: Mapping[str, Any], prior: np.ndarray | None = None
 ) -> np.ndarray:
-    """Bound ``(T, e, e)`` on the covariance of any estimate at each tick, by the Riccati form; NaN before the start.
+    """Bound ``(T, e, e)`` on the covariance of any estimate at each sample, in Riccati form; NaN before the start.
 
     Args:
-        model: the equations, with the noises that the sensors truly have.
+        model: the equations, with the true noises of the sensors.
         states: ``(T, n)`` true states.
         measurements: as for :func:`linearise`.
-        prior: ``(e, e)`` covariance at the first tick, whose measurement is counted in it; None for the model's, at the
-            tick at which a filter can start.
+        prior: ``(e, e)`` covariance at the first sample, including its measurement; None for that of the model at the
+            sample at which a filter can start.
 
     Raises:
         ValueError: shapes do not fit, or the samples never suffice for the model's prior.
@@ -131,10 +133,10 @@ def information_step(J: np.ndarray, F: np.ndarray, Q: np.ndarray, H: np.ndarray,
     """One step of the information recursion as published; Q must not be singular.
 
     Args:
-        J: ``(e, e)`` information at tick k.
+        J: ``(e, e)`` information at sample k.
         F: ``(e, e)`` Jacobian from k to k + 1.
         Q: ``(e, e)`` process covariance.
-        H: ``(m, e)`` rows that are measured at k + 1.
+        H: ``(m, e)`` rows measured at k + 1.
         R: ``(m, m)`` their covariance.
     """
     weighted = np.linalg.solve(Q, F)  # Q⁻¹ F
@@ -146,8 +148,8 @@ def with_gaps(ideal: Mapping[str, Any], recorded: Mapping[str, Any]) -> dict[str
     """Error-free samples where a recording has samples, NaN where it has none.
 
     Args:
-        ideal: channel → ``(T, size)`` of ideal sensors that saw the same motion (same seed, ``sensors="ideal"``).
-        recorded: channel → ``(T, size)``, whose pattern counts.
+        ideal: channel → ``(T, size)`` of ideal sensors for the same motion (same seed, ``sensors="ideal"``).
+        recorded: channel → ``(T, size)``, whose missing samples are copied.
 
     Raises:
         ValueError: a channel is missing or has another shape.

@@ -1,8 +1,8 @@
-"""Derivatives alongside values: a scalar that carries its gradient (forward-mode differentiation, dual numbers).
+"""Forward-mode differentiation with dual numbers: scalars that carry their gradient.
 
-For formulas whose chain rule by hand would fill pages. A :class:`Dual` holds a value ``(...)`` and its derivatives
-``(..., n)`` with respect to n variables; arithmetic and the functions below keep both exact. The values may be NumPy
-arrays, torch tensors or traced expressions, so that a model written with them is compiled like any other, and zeros in
+This is for formulas whose derivatives by hand would be long. A :class:`Dual` holds a value ``(...)`` and its
+derivatives ``(..., n)`` with respect to n variables; arithmetic and the functions below keep both exact. The values may
+be NumPy arrays, torch tensors or traced expressions. A model written with them is compiled like any other, and zeros in
 a gradient cost nothing there.
 
 A. Griewank, A. Walther, "Evaluating Derivatives", SIAM 2008, chapter 3.
@@ -20,7 +20,7 @@ Scalar = Any
 
 
 def _column(value: Any) -> Any:
-    """A factor ``(...)`` made to scale a gradient ``(..., n)``."""
+    """A factor ``(...)``, reshaped to scale a gradient ``(..., n)``."""
     return value[..., None] if getattr(value, "ndim", 0) > 0 else value
 
 
@@ -28,7 +28,7 @@ class Dual:
     """A scalar ``(...)`` with its gradient ``(..., n)``."""
 
     __slots__ = ("gradient", "value")
-    # NumPy arrays on the left leave the operation to this class
+    # NumPy arrays on the left defer to this class
     __array_ufunc__ = None
 
     def __init__(self, value: Array, gradient: Array) -> None:
@@ -71,7 +71,7 @@ class Dual:
 
 
 def variables(x: Array) -> list[Dual]:
-    """The elements of ``x`` ``(..., n)`` as n scalars, each with itself as variable."""
+    """The elements of ``x`` ``(..., n)`` as n scalars, each an independent variable."""
     n = x.shape[-1]
     zero = 0.0 * x
     return [
@@ -85,7 +85,7 @@ def value(x: Scalar) -> Scalar:
 
 
 def gradient(x: Scalar, like: Array) -> Array:
-    """The gradient ``(..., n)``; zeros shaped as ``like`` ``(..., n)`` for what depends on no variable."""
+    """The gradient ``(..., n)``; zeros shaped as ``like`` ``(..., n)`` for a constant."""
     return x.gradient if isinstance(x, Dual) else 0.0 * like
 
 

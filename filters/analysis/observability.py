@@ -1,12 +1,12 @@
-r"""What a model can know at all: rank along a trajectory, and rank of nonlinear equations by Lie derivatives.
+r"""Observability of a model: rank along a trajectory, and rank of nonlinear equations by Lie derivatives.
 
-Along a trajectory the initial error is seen through O = [H(0); H(1) F(0); H(2) F(1) F(0); …]; the observability
+Along a trajectory the initial error is measured through O = [H(0); H(1) F(0); H(2) F(1) F(0); …]; the observability
 Gramian is Oᵀ R⁻¹ O. Ranks come from the singular values of R^(−½) O, whose squares are the Gramian's eigenvalues:
-squaring would lose half of the digits. Every error is measured in units of its prior standard deviation, so that rad
-and rad/s compare.
+squaring would lose half of the digits. Every error is in units of its prior standard deviation, so that rad and rad/s
+are comparable.
 
-Lie derivatives decide whether *some* inputs tell states apart (R. Hermann, A. J. Krener, "Nonlinear controllability and
-observability", IEEE Transactions on Automatic Control 22(5), 1977). They hide that the inputs at hand may not.
+Lie derivatives decide whether *some* inputs distinguish states (R. Hermann, A. J. Krener, "Nonlinear controllability
+and observability", IEEE Transactions on Automatic Control 22(5), 1977). The inputs of a given trajectory may not.
 """
 
 from __future__ import annotations
@@ -24,16 +24,16 @@ if TYPE_CHECKING:
     import sympy
 
 BLOCK = 200
-"""ticks whose rows are gathered before they are reduced"""
+"""number of samples whose rows are stacked before each reduction"""
 
 
 @dataclass(frozen=True)
 class Observability:
-    """What the measurements of a trajectory tell of the first tick's error.
+    """Information of the measurements of a trajectory on the initial error.
 
     Attributes:
         values: ``(e,)`` singular values, largest first; their squares are the eigenvalues of the Gramian.
-        directions: ``(e, e)``, rows are the directions that belong to them, in units of ``scale``.
+        directions: ``(e, e)``, rows are the corresponding directions, in units of ``scale``.
         scale: ``(e,)`` units of the error.
     """
 
@@ -46,7 +46,7 @@ class Observability:
         return int(np.sum(self.values > tolerance * self.values[0]))
 
     def deviations(self) -> np.ndarray:
-        """Standard deviation ``(e,)`` of each error by these measurements alone; infinite where one is unobservable."""
+        """Standard deviation ``(e,)`` of each error from these measurements alone; infinite where unobservable."""
         with np.errstate(divide="ignore", invalid="ignore"):
             inverse = np.where(self.values > 1e-9 * self.values[0], 1.0 / self.values, np.inf)
             parts = np.where(np.abs(self.directions) > 1e-6, self.directions * inverse[:, None], 0.0)
@@ -56,7 +56,7 @@ class Observability:
 def trajectory_observability(
     model: Model, states: np.ndarray, measurements: Mapping[str, Any], scale: np.ndarray | None = None
 ) -> Observability:
-    """Singular values of a model's measurements along a trajectory, process noise left out.
+    """Singular values of a model's observability matrix along a trajectory, without process noise.
 
     Args:
         model: the equations.
@@ -99,7 +99,7 @@ def lie_gradients(
         fields: name → vector field (n rows) of control-affine equations, functions of the state.
         output: h, m rows.
         state: n symbols.
-        words: each a sequence of field names, first taken first: ``("f0", "f5")`` is ∇(L_f0 h) f5; ``()`` is h.
+        words: each a sequence of field names, applied in order: ``("f0", "f5")`` is ∇(L_f0 h) f5; ``()`` is h.
 
     Returns:
         Matrix of ``m · len(words)`` rows and n columns. Needs the package sympy.
@@ -113,7 +113,7 @@ def lie_gradients(
     for word in words:
         unknown = [name for name in word if name not in fields]
         if unknown:
-            raise ValueError(f"words must be made of {list(fields)}, got {unknown}")
+            raise ValueError(f"words must consist of {list(fields)}, got {unknown}")
         derivative = output
         for name in word:
             derivative = derivative.jacobian(state) * fields[name]
@@ -127,7 +127,7 @@ def exact_rank(
     """Rank of a matrix of trigonometric functions at a rational point, without rounding.
 
     Args:
-        matrix: entries are rational in sines and cosines (of single symbols) and in the other symbols.
+        matrix: its entries are rational in sines and cosines (of single symbols) and in the other symbols.
         angles: symbol → rational tangent of half the angle, which makes sine and cosine rational.
         values: symbol → rational, for all other symbols.
 
@@ -146,5 +146,5 @@ def exact_rank(
     numbers = matrix.xreplace(table).xreplace(others)
     left = numbers.free_symbols
     if left:
-        raise ValueError(f"angles and values must set every symbol, but {sorted(map(str, left))} are left")
+        raise ValueError(f"angles and values must set every symbol; {sorted(map(str, left))} are missing")
     return numbers.rank(), numbers

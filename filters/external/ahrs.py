@@ -1,9 +1,9 @@
 """The classical filters of the package ``ahrs`` with the interface of this one: Madgwick, Mahony, extended Kalman.
 
-See :mod:`poise.filters.external.wrapper` for what all wrappers do alike. The package's filters start from an attitude
-in frames that differ from filter to filter; here all start from the first complete sample: inclination from the
-accelerometer, heading from the magnetometer (zero without). Their memory is explicit. They are written in plain Python:
-expect 0.1 ms a sample.
+See :mod:`poise.filters.external.wrapper` for what all wrappers have in common. The filters of the package expect an
+initial attitude in frames that differ between filters. Here all start from the first complete sample: inclination from
+the accelerometer, heading from the magnetometer (zero without one). Their state is explicit. They are written in plain
+Python and need about 0.1 ms per sample.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from .wrapper import QUARTER_TURN, ExternalPackage
 
 @dataclass(frozen=True)
 class AHRSFilter(ExternalPackage):
-    """What the three share: the start, and a prediction where a sample is missing."""
+    """Initialisation, and prediction where a sample is missing; shared by the three filters."""
 
     package: ClassVar[str] = "ahrs"
 
@@ -51,7 +51,7 @@ class AHRSMadgwick(AHRSFilter):
     """Madgwick's gradient descent.
 
     S. O. H. Madgwick, "An efficient orientation filter for inertial and inertial/magnetic sensor arrays", report,
-    University of Bristol, 2010. The world of its nine-axis form is x north, y west, z up.
+    University of Bristol, 2010. The world frame of its nine-axis form is x north, y west, z up.
     """
 
     gain_imu: float = 0.033
@@ -99,7 +99,7 @@ class AHRSMahony(AHRSFilter):
         """Memory: quaternion and bias."""
         gyroscope, f, field = self._parts(sample)
         if not f.any():
-            # Without a sample the package leaves its bias out, too; here the prediction is that of the filter.
+            # Without a sample the package also omits the bias; here the prediction uses it.
             gyroscope = gyroscope - memory[4:]
         engine = self._filters().Mahony(Dt=self.dt, k_P=self.k_p, k_I=self.k_i, b0=memory[4:].copy())
         if field is None:
@@ -114,8 +114,9 @@ class AHRSMahony(AHRSFilter):
 class AHRSEKF(AHRSFilter):
     """Extended Kalman filter on the quaternion.
 
-    Of the package (see its documentation of ``ahrs.filters.ekf``). Its default reference field is that of Munich; here
-    the dip is that of the first sample. Noises are per sample, so the filter changes with the rate.
+    Implemented by the package (see the documentation of ``ahrs.filters.ekf``). The default reference field of the
+    package is that of Munich; here the dip is that of the first sample. Noises are per sample, so the filter depends on
+    the rate.
     """
 
     gyroscope_variance: float = 0.09
@@ -143,13 +144,13 @@ class AHRSEKF(AHRSFilter):
             noises=[self.gyroscope_variance, self.accelerometer_variance, self.magnetometer_variance],
         )
         if not f.any():
-            # The package would not even predict.
+            # The package would skip the prediction too.
             F = engine.dfdq(gyroscope, self.dt)
             W = _rate_jacobian(q, self.dt)
             covariance = F @ covariance @ F.T + self.gyroscope_variance * W @ W.T
             q = np.asarray(normalize(engine.f(q, gyroscope, self.dt)))
             return (q, covariance, dip), q
-        engine.mag = field  # decides how many rows its measurement has
+        engine.mag = field  # determines the number of rows of its measurement
         # Its accelerometer points down in east-north-up.
         q = np.asarray(engine.update(q, gyroscope, -f, field), dtype=float)
         return (q, engine.P, dip), q

@@ -14,10 +14,10 @@ from .wrapper import QUARTER_TURN, ExternalPackage
 
 
 class Log(NamedTuple):
-    """Memory of a package that hides its own: the samples since the start, of which the first ``length`` are its own.
+    """State of a package that hides its own: the samples since the start, of which the first ``length`` count.
 
-    ``engine`` is the package's object, with the number of samples that it has taken; it is shared by the memories of
-    one sequence and rebuilt from the samples for whoever goes on from an earlier one.
+    ``engine`` is the package's object, with the number of samples that it has processed. The states of one sequence
+    share it; it is rebuilt from the samples when an earlier state is resumed.
     """
 
     samples: list[np.ndarray]
@@ -37,29 +37,29 @@ class IMUFusion(ExternalPackage):
     PhD thesis, University of Bristol, 2014, chapter 7. During its first three seconds the gain falls from 10 to
     ``gain``.
 
-    The package neither shows nor copies its memory. A state is therefore the list of the samples so far; going on from
-    the latest one is immediate, going back to an earlier one (or to a saved one) computes the sequence anew.
+    The package neither exposes nor copies its state. A state here is therefore the list of the samples so far. Resuming
+    from the latest one is immediate; resuming from an earlier or a saved one recomputes the sequence.
     """
 
     gain: float = 0.5
     """weight of accelerometer and magnetometer"""
     gyroscope_range: float = 0.0
-    """rad/s: readings near it restart the filter; 0 is off"""
+    """rad/s: readings near this range restart the filter; 0 is off"""
     acceleration_rejection: float = 0.0
-    """rad: accelerometer samples further off are left out; 0 is off"""
+    """rad: accelerometer samples that deviate further are rejected; 0 is off"""
     magnetic_rejection: float = 0.0
-    """rad: magnetometer samples further off are left out; 0 is off"""
+    """rad: magnetometer samples that deviate further are rejected; 0 is off"""
     rejection_time: float = 5.0
-    """s: after which rejected samples are taken again"""
+    """s: time after which rejected samples are accepted again"""
 
     package: ClassVar[str] = "imufusion"
 
     def begin(self, sample: np.ndarray) -> tuple[Any, np.ndarray]:
-        """The first sample is taken like every other."""
+        """The first sample is processed like every other."""
         return self.advance(Log([], 0, []), sample)
 
     def advance(self, memory: Any, sample: np.ndarray) -> tuple[Any, np.ndarray]:
-        """Update the engine if it stands where the memory ends, else a new one from the start."""
+        """Update the engine if it is at the end of this state, else a new one from the start."""
         samples, length, engine = memory
         if len(samples) != length or not engine or engine[1] != length:
             samples, engine = samples[:length], [self._engine(), 0]
@@ -85,7 +85,7 @@ class IMUFusion(ExternalPackage):
         return package.Ahrs().set_settings(settings)
 
     def _update(self, engine: Any, sample: np.ndarray) -> None:
-        # The package skips the update of a vector of zeros, which therefore stands for a missing sample.
+        # The package skips the update for a vector of zeros, which therefore represents a missing sample.
         parts = sample.reshape(-1, 3)
         parts = np.where(np.isfinite(parts).all(axis=1, keepdims=True), parts, 0.0)
         degrees, gravities = np.degrees(parts[0]), parts[1] / STANDARD_GRAVITY

@@ -19,13 +19,13 @@ class VQF(ExternalPackage):
     """VQF in its causal form, with bias estimation, rest detection and rejection of magnetic disturbances.
 
     D. Laidig, T. Seel, "VQF: Highly accurate IMU orientation estimation with bias estimation and magnetic disturbance
-    rejection", Information Fusion 91, 2023, doi 10.1016/j.inffus.2022.10.014. Its memory is explicit: a dictionary.
+    rejection", Information Fusion 91, 2023, doi 10.1016/j.inffus.2022.10.014. Its state is an explicit dictionary.
     """
 
     tau_acc: float = 3.0
-    """s: time constant of the low-pass that finds the vertical"""
+    """s: time constant of the low-pass for the inclination"""
     tau_mag: float = 9.0
-    """s: time constant of the correction of the heading"""
+    """s: time constant of the heading correction"""
 
     package: ClassVar[str] = "vqf"
     gives_bias: ClassVar[bool] = True
@@ -34,11 +34,11 @@ class VQF(ExternalPackage):
         return self.load().VQF(self.dt, tauAcc=self.tau_acc, tauMag=self.tau_mag)
 
     def begin(self, sample: np.ndarray) -> tuple[Any, np.ndarray]:
-        """The first sample is taken like every other."""
+        """The first sample is processed like every other."""
         return self.advance(self._engine().state, sample)
 
     def advance(self, memory: Any, sample: np.ndarray) -> tuple[Any, np.ndarray]:
-        """Restore, update by what is there, save."""
+        """Restore the state, update with the valid samples, save the state."""
         engine = self._engine()
         engine.state = memory
         output = self._update(engine, sample)
@@ -53,7 +53,7 @@ class VQF(ExternalPackage):
         return np.concatenate([q, engine.getBiasEstimate()[0]])
 
     def run(self, measurements: Mapping[str, Any]) -> Estimate:
-        """As stepping, with the package's loop over whole sequences where every sample is there."""
+        """As stepping, but with the package's loop over whole sequences where no sample is missing."""
         arrays = check_measurements(self.channels, measurements, time_axis=True)
         like = arrays[GYROSCOPE.name]
         samples = np.concatenate([to_numpy(array) for array in arrays.values()], axis=-1, dtype=float)
@@ -72,8 +72,8 @@ class VQF(ExternalPackage):
     def smooth(self, measurements: Mapping[str, Any]) -> Estimate:
         """The package's offline form, which uses future samples too. ``(T, *batch, 3)`` in.
 
-        The package wants complete data: missing samples are interpolated linearly, before the first valid sample and
-        after the last one the nearest is taken. It has no covariance.
+        The package requires complete data: missing samples are interpolated linearly, and the nearest valid sample is
+        used before the first and after the last one. It provides no covariance.
 
         Raises:
             ValueError: a channel is missing, has a wrong shape, or has no valid sample at all.

@@ -1,10 +1,10 @@
-"""Filters of other packages with the interface of this one, so that they can stand in the same table.
+"""Filters of other packages with the interface of this one, so that the same tables compare them.
 
-Each wrapper converts units, frames and axes to what the package wants, and gives back sensor-to-world quaternions,
-world x east, y north, z up. What holds for all: a gyroscope sample that is missing is replaced by the last valid one;
+Each wrapper converts units, frames and axes to those of the package, and returns sensor-to-world quaternions, world x
+east, y north, z up. For all of them, a gyroscope sample that is missing is replaced by the last valid one;
 where a sample of accelerometer or magnetometer is missing, its measurement update is skipped; estimates are NaN until
-every channel has had a valid sample; batches are looped over; computation is NumPy's, whatever the arrays are.
-Constants are the packages' own defaults. ``pip install 'poise[compare]'`` brings them all.
+every channel has had a valid sample; batches are processed one sequence at a time, in NumPy for any array type.
+Constants are the packages' own defaults. ``pip install 'poise[compare]'`` installs them all.
 """
 
 from __future__ import annotations
@@ -36,14 +36,14 @@ from ..core.rotation import from_euler_zyx, up_in_body
 from ..support.optional import extra
 
 QUARTER_TURN = np.asarray(from_euler_zyx(np.array(0.5 * np.pi), np.array(0.0), np.array(0.0)))
-"""From north-west-up, the world of several packages, to east-north-up."""
+"""From north-west-up, the world frame of several packages, to east-north-up."""
 
 
 class WrapperState(NamedTuple):
-    """All memory of a wrapper.
+    """Complete state of a wrapper.
 
     Attributes:
-        memories: what the package remembers of each sequence of the batch, flattened; None before the start.
+        memories: state of the package for each sequence of the batch, flattened; None before the start.
         held: ``(sequences, d)`` last finite sample of every channel element, NaN if there was none.
     """
 
@@ -53,15 +53,15 @@ class WrapperState(NamedTuple):
 
 @dataclass(frozen=True)
 class ExternalPackage:
-    """What the wrappers share; the package is loaded on first use.
+    """Base class of the wrappers; the package is loaded on first use.
 
-    Subclasses write ``begin`` and ``advance`` for one sequence.
+    Subclasses implement ``begin`` and ``advance`` for one sequence.
     """
 
     dt: float = 0.01
     """sampling interval, s"""
     axes: Literal[6, 9] = 6
-    """9 reads the magnetometer and gives the orientation in the world"""
+    """9 uses the magnetometer and estimates the orientation in the world"""
 
     package: ClassVar[str]
     gives_bias: ClassVar[bool] = False

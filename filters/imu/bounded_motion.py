@@ -1,31 +1,32 @@
-r"""Attitude of something that accelerates hard but does not go anywhere: a hand, a head, a trunk.
+r"""Attitude of a body that accelerates hard but stays in one place: a hand, a head, a trunk.
 
-A filter of this package, not of a paper. As in the external-acceleration filter the accelerometer is taken to see
-gravity plus an acceleration, but what is assumed of it is physical, in the world and over time: the velocity to which
-it integrates stays bounded. A tilt error δ makes the integrated velocity grow by g δ t, which the pseudo-measurement
-"velocity = 0" sees. No threshold, no acceleration model in sensor axes; the gyroscope bias is estimated.
+A filter of this package, not of a paper. As in the external-acceleration filter, the accelerometer measures gravity
+plus an acceleration of the motion. The assumption about this acceleration is physical and holds in the world frame:
+its integral, the velocity, stays bounded. A tilt error δ makes the integrated velocity grow by g δ t, and the
+pseudo-measurement "velocity = 0" corrects it. There is no threshold and no acceleration model in sensor axes. The
+gyroscope bias is estimated.
 
-The state is q (sensor to world), gyroscope bias b, velocity v (world); with ω the gyroscope's and f the accelerometer's
-sample, which describe the interval that they end,
+The state is the attitude q (sensor to world), the gyroscope bias b and the velocity v (world). With the samples ω of
+the gyroscope and f of the accelerometer, which describe the interval that they end,
 
     q ← q ⊗ exp((ω − b) Δt),   v ← v + Δt (q_mid f q_mid* − g e₃)
 
-where q_mid is the attitude in the middle of the interval: integrating with that of its end instead costs half a degree
-at 48 Hz. ``accelerometer_lag`` moves it to where the accelerometer's own filter has the force. F and Q are those of
-:mod:`.strapdown`; what is measured is
+where q_mid is the attitude in the middle of the interval; using the attitude at its end adds an error of half a degree
+at 48 Hz. ``accelerometer_lag`` compensates the delay of the accelerometer's internal filter. F and Q are those of
+:mod:`.strapdown`. The pseudo-measurement is
 
     0 = v + n,   var n = σ_V² / τ   at every ``correction_interval`` τ
 
-Dividing by τ makes σ_V the same for every rate and interval; as velocity is correlated over time, σ_V is a tuning
-constant and no sensor noise. Pseudo-measurements of this kind are known from pedestrian navigation (E. Foxlin,
-"Pedestrian tracking with shoe-mounted inertial sensors", IEEE Computer Graphics and Applications 25(6), 2005), there
-only while the foot stands.
+Dividing by τ makes σ_V independent of rate and interval. Since the velocity is correlated over time, σ_V is a tuning
+constant rather than a sensor noise. Pedestrian navigation uses such pseudo-measurements while the foot is at rest
+(E. Foxlin, "Pedestrian tracking with shoe-mounted inertial sensors", IEEE Computer Graphics and Applications 25(6),
+2005).
 
-Mean inclination error of ten BROAD trials, constants below, none fitted to a trial: 0.76° at 286 Hz and 0.83° at 48 Hz
-(VQF 0.84° at 286 Hz); a lag of 3 ms, chosen on these trials, gives 0.71° and 0.77°.
+Mean inclination error of ten BROAD trials with the constants below, which are not fitted per trial: 0.76° at 286 Hz
+and 0.83° at 48 Hz (VQF 0.84° at 286 Hz). A lag of 3 ms, chosen on these trials, gives 0.71° and 0.77°.
 
-Not estimated: position; velocity is a means, not an output. Sustained motion in one direction (a car, a lift) violates
-the assumption and shows as growing innovations.
+The position is not estimated, and the velocity is not an output. Sustained motion in one direction (a car, a lift)
+violates the assumption and appears as growing innovations.
 """
 
 from __future__ import annotations
@@ -64,31 +65,31 @@ from .strapdown import (
 
 @dataclass(frozen=True)
 class BoundedMotion(Model):
-    """Six axes: inclination, gyroscope bias and external acceleration; the heading is that of the start, drifting.
+    """Six axes: inclination, gyroscope bias and external acceleration. The heading starts at zero and drifts.
 
     State: q (4), b (3), v (3), external acceleration in sensor axes (3, remembered), seconds since the last correction,
     seconds since the last accelerometer sample.
 
-    Without accelerometer samples for longer than ``hold`` the velocity is unknown: it is set to zero with its prior
-    variance and corrected no more until samples return, so a drop-out leaves the pure integration of the gyroscope.
+    If accelerometer samples are missing for longer than ``hold``, the velocity is unknown. It is reset to zero with its
+    prior variance, and its updates are skipped until samples return. During the gap the gyroscope alone is integrated.
     """
 
     gyroscope_noise: float = 5e-3
-    """σ_g, rad/s/√Hz; larger than a data sheet's, since it stands for scale and alignment errors in motion too"""
+    """σ_g, rad/s/√Hz; larger than in a data sheet, to cover scale and alignment errors in motion"""
     bias_noise: float = 2e-5
     """σ_b, rad/s²/√Hz"""
     acceleration_noise: float = 0.05
     """σ_a, m/s²/√Hz"""
     velocity_bound: float = 0.2
-    """σ_V, m/s·√s: how far from zero the velocity is expected"""
+    """σ_V, m/s·√s: expected magnitude of the velocity"""
     correction_interval: float = 0.0175
-    """τ, s: five samples at 286 Hz; in seconds, so that it holds at any rate"""
+    """τ, s: five samples at 286 Hz; in seconds, so that it is independent of the rate"""
     accelerometer_range: float = 156.0
-    """m/s²: samples with a component beyond this are taken as clipped"""
+    """m/s²: samples with a component beyond this count as saturated"""
     clipped_inflation: float = 100.0
-    """factor on σ_a for clipped samples"""
+    """factor on σ_a for saturated samples"""
     accelerometer_lag: float = 0.0
-    """s: by how much the accelerometer's samples are older than the gyroscope's (filters inside the sensor)"""
+    """s: delay of the accelerometer relative to the gyroscope (filters inside the sensor)"""
     tilt_prior: float = 0.05
     """rad"""
     bias_prior: float = 8.727e-3
@@ -96,7 +97,7 @@ class BoundedMotion(Model):
     velocity_prior: float = 0.5
     """m/s"""
     hold: float = 0.05
-    """s: for how long the last accelerometer sample stands in for missing ones"""
+    """s: longest time for which the last accelerometer sample replaces missing ones"""
     gravity: float = GRAVITY
     """g, m/s²"""
 
@@ -148,7 +149,7 @@ class BoundedMotion(Model):
         return r, H, unit * (expand(self.velocity_bound**2, 1) / self._elapsed(x))[..., None]
 
     def retract(self, x: Array, dx: Array) -> Array:
-        """The attitude is corrected by a turn in the world, the rest by sums."""
+        """The attitude is corrected by a rotation in the world frame, the rest additively."""
         return corrected(x, dx)
 
     def finish(self, x: Array, z: Measurement) -> Array:
@@ -166,7 +167,7 @@ class BoundedMotion(Model):
         return xp.concat([q, x[..., 4:10], acceleration, elapsed, age, x[..., 15:]], axis=-1)
 
     def pose(self, x: Array) -> dict[str, Array]:
-        """Upward vertical, orientation, bias (rad/s) and external acceleration (m/s²), all in sensor coordinates."""
+        """Inclination vector, orientation, bias (rad/s) and external acceleration (m/s²), in sensor axes."""
         q = x[..., :4]
         return {
             "up": up_in_body(q),

@@ -1,7 +1,6 @@
-r"""Methods without covariance for every comparison: gyroscope alone, accelerometer alone, and Mahony's.
+r"""Classical references without covariance: gyroscope integration, accelerometer tilt, and Mahony's filter.
 
-None of them is tuned to the data at hand: integration and tilt have no constant, Mahony's filters keep the published
-gains.
+None of them is tuned to data. Integration and tilt have no parameters, and Mahony's filters keep the published gains.
 """
 
 from __future__ import annotations
@@ -29,10 +28,10 @@ from .magnetic_heading import align, known
 
 @dataclass(frozen=True)
 class GyroscopeIntegration(Recurrence):
-    """The gyroscope alone, from an inclination that the first accelerometer sample gives; heading zero at the start.
+    """Integration of the gyroscope from the inclination of the first accelerometer sample; the heading starts at zero.
 
-    Each sample is taken as the mean rate of the interval that it ends, which one rotation vector integrates exactly if
-    the axis stays. The error is that of the first sample, plus what bias and noise of the gyroscope add up to.
+    Each sample is the mean rate of the interval that it ends. One rotation vector integrates it exactly if the axis is
+    constant. The error consists of that of the first sample and of the integrated bias and noise of the gyroscope.
 
     State: q (4).
     """
@@ -46,21 +45,21 @@ class GyroscopeIntegration(Recurrence):
         return level(z["imu/acc"])
 
     def predict(self, x: Array, z: Measurement, previous: Measurement) -> Array:
-        """Turn by the rotation vector of the interval."""
+        """Rotate by the rotation vector of the interval."""
         return normalize(multiply(x, exp(expand(self.dt, 1) * z["imu/gyr"])))
 
     def pose(self, x: Array) -> dict[str, Array]:
-        """Upward vertical and orientation."""
+        """Inclination vector and orientation."""
         return {"up": up_in_body(x), "relative_orientation": x}
 
 
 @dataclass(frozen=True)
 class Tilt(Recurrence):
-    """The direction of each accelerometer sample: right at rest, and wrong by the acceleration in motion.
+    """The direction of each accelerometer sample: exact at rest, in error by the acceleration of the motion.
 
     A missing sample is replaced by the last one.
 
-    State: the upward vertical in sensor coordinates (3).
+    State: inclination vector in the sensor frame (3).
     """
 
     channels: ClassVar[tuple[Channel, ...]] = (ACCELEROMETER,)
@@ -72,7 +71,7 @@ class Tilt(Recurrence):
         return normalize(z["imu/acc"])
 
     def predict(self, x: Array, z: Measurement, previous: Measurement) -> Array:
-        """Nothing is known of the motion."""
+        """No motion model: the state stays."""
         return x
 
     def finish(self, x: Array, z: Measurement) -> Array:
@@ -82,7 +81,7 @@ class Tilt(Recurrence):
         return xp.where(xp.isfinite(up), up, x)
 
     def pose(self, x: Array) -> dict[str, Array]:
-        """The upward vertical."""
+        """Inclination vector."""
         return {"up": x}
 
 
@@ -96,8 +95,8 @@ class Mahony(Recurrence):
 
         e = v × v̂,   q̇ = ½ q ⊗ (ω − b + k_P e),   ḃ = −k_I e
 
-    in two steps a sample, the rotation by the gyroscope and the correction; gains are those of continuous time, so the
-    filter is the same at any rate. Where an accelerometer sample is missing, the correction is skipped.
+    in two steps per sample, rotation by the gyroscope and correction. Gains are those of continuous time, so the filter
+    does not depend on the rate. Where an accelerometer sample is missing, the correction is skipped.
 
     State: q (4), b (3). Not estimated: heading, external acceleration.
     """
@@ -117,12 +116,12 @@ class Mahony(Recurrence):
         return namespace(f).concat([level(f), 0.0 * f], axis=-1)
 
     def predict(self, x: Array, z: Measurement, previous: Measurement) -> Array:
-        """Turn by the gyroscope less its bias."""
+        """Rotate by the bias-corrected gyroscope sample."""
         q, b = x[..., :4], x[..., 4:]
         return namespace(x).concat([multiply(q, exp(expand(self.dt, 1) * (z["imu/gyr"] - b))), b], axis=-1)
 
     def finish(self, x: Array, z: Measurement) -> Array:
-        """Correct attitude and bias by the error of the directions, as far as there are samples."""
+        """Correct attitude and bias by the errors of the directions for which there are valid samples."""
         xp = namespace(x)
         q, b = x[..., :4], x[..., 4:]
         e = self._error(q, z)
@@ -130,7 +129,7 @@ class Mahony(Recurrence):
         return xp.concat([normalize(q), b - expand(self.integral_gain * self.dt, 1) * e], axis=-1)
 
     def pose(self, x: Array) -> dict[str, Array]:
-        """Upward vertical, orientation and bias (rad/s), in sensor coordinates."""
+        """Inclination vector, orientation and bias (rad/s), in sensor axes."""
         q = x[..., :4]
         return {"up": up_in_body(q), "relative_orientation": q, "gyroscope_bias": x[..., 4:]}
 
@@ -144,15 +143,15 @@ class Mahony(Recurrence):
 class Mahony9(Mahony):
     """The same with a magnetometer; orientation in the world.
 
-    The expected field is the measured one, turned in the world to magnetic north (S. O. H. Madgwick, "An efficient
-    orientation filter for inertial and inertial/magnetic sensor arrays", report, 2010, section 3.4, as in most programs
-    that bear Mahony's name). It enters like the vertical, so a magnetic disturbance also tilts the estimate.
+    The expected field is the measured one, rotated in the world to magnetic north (S. O. H. Madgwick, "An efficient
+    orientation filter for inertial and inertial/magnetic sensor arrays", report, 2010, section 3.4, as in most
+    implementations of Mahony's filter). Its error acts on all axes, so a magnetic disturbance also tilts the estimate.
 
     State: q (4), b (3).
     """
 
     declination: float = 0.0
-    """of the magnetic field, rad, positive east; 0 takes magnetic for geographic north"""
+    """of the magnetic field, rad, positive east; with 0 the heading refers to magnetic north"""
 
     channels: ClassVar[tuple[Channel, ...]] = (GYROSCOPE, ACCELEROMETER, MAGNETOMETER)
     outputs: ClassVar[tuple[Quantity, ...]] = (ORIENTATION, UP, GYROSCOPE_BIAS)
@@ -163,7 +162,7 @@ class Mahony9(Mahony):
         return namespace(f).concat([align(f, z["imu/mag"], self.declination), 0.0 * f], axis=-1)
 
     def pose(self, x: Array) -> dict[str, Array]:
-        """Orientation, upward vertical and bias (rad/s)."""
+        """Orientation, inclination vector and bias (rad/s)."""
         q = x[..., :4]
         return {"orientation": q, "up": up_in_body(q), "gyroscope_bias": x[..., 4:]}
 

@@ -4,35 +4,37 @@ J. K. Lee, E. J. Park, S. N. Robinovitch, "Estimation of Attitude and External A
 Measurement During Various Dynamic Conditions", IEEE Transactions on Instrumentation and Measurement 61(8), 2012,
 doi 10.1109/TIM.2012.2187245. Equation numbers are the paper's.
 
-The state is Z, the upward vertical in sensor coordinates. The accelerometer sees gravity and the external
-acceleration a,
+The state is Z, the gravity direction in the sensor frame (a unit vector that points up, also called inclination
+vector). The accelerometer measures gravity and the external acceleration a,
 
     y_A = g Z + a + n_A                                                   (6b)
     a_t = c_a a_{t−1} + ε_t                                               (7)
 
-and the filter subtracts what it expects of a, and trusts the rest the less the larger the last a was:
+The filter subtracts the predicted a from the measurement. The measurement variance grows with the last estimate of a:
 
     a⁻ = c_a a⁺_{t−1},   z = y_A − a⁻,   H = g I                          (16–19)
     M = (c_a² ‖a⁺_{t−1}‖² / 3) I + σ_A² I                                 (20–23)
 
-Differs from print: (31) has a transposed ω̃ that would turn the wrong way, (14) an index k for t, and (4) a
-single-argument arctangent that is 0/0 at zero roll (:func:`poise.filters.core.rotation.roll_pitch` is its well-defined
-form). c_a acts as a covariance gain more than as the correlation that (7) calls it: under (7) the variance of (23)
-would be that of ε, which falls as c_a grows. The printed first-order rotation (12) loses 1.9 °/s at 10 rad/s and
-100 Hz; ``exact_rotation`` replaces it by the exponential. The paper gives no initial state: here Z₀ = y_A/‖y_A‖,
-P₀ = 10⁻² I, sensor at rest.
+Errata: (31) has a transposed ω̃ that rotates in the wrong direction, (14) has an index k for t, and (4) has a
+single-argument arctangent that is 0/0 at zero roll (:func:`poise.filters.core.rotation.roll_pitch` is the well-defined
+form). c_a acts as a gain on the covariance rather than as the correlation of (7): under (7) the variance of (23) would
+be that of ε, which falls as c_a grows.
 
-c_a is what a gain policy must not choose freely. A steady tilt error e looks like an acceleration g e: it shrinks the
-innovation to (1 − c_a) g e and raises the variance M to at least c_a² g² e² / 3. With the steady covariance
-P = Δt σ_G √M / g of small gains, the correction that results,
+Differences from the paper: the first-order rotation (12) loses 1.9 °/s at 10 rad/s and 100 Hz; ``exact_rotation``
+replaces it by the exponential. The paper gives no initial state. Here the sensor starts at rest, with Z₀ = y_A/‖y_A‖
+and P₀ = 10⁻² I.
 
-    (1 − c_a) g e · Δt σ_G / √M  ≤  Δt · √3 σ_G (1 − c_a) / c_a,
+A gain policy must not choose c_a freely. A steady tilt error e appears as an acceleration g e. It reduces the
+innovation to (1 − c_a) g e and increases the variance M to at least c_a² g² e² / 3. With the steady-state covariance
+P = Δt σ_G √M / g of small gains, the resulting correction
 
-does not grow with e. A gyroscope that drifts faster than √3 σ_G (1 − c_a) / c_a carries the attitude away for good: the
-filter is locked out. :meth:`ExternalAcceleration.limited` therefore keeps c_a so low that a drift of
-:data:`FOLLOWED_DRIFT` can be followed at the σ_G of the same action, and below :data:`LARGEST_C_A` in any case.
+    (1 − c_a) g e · Δt σ_G / √M  ≤  Δt · √3 σ_G (1 − c_a) / c_a
 
-Not estimated: heading, gyroscope bias. Sustained acceleration cannot be distinguished from tilt.
+does not grow with e. If the gyroscope drifts faster than √3 σ_G (1 − c_a) / c_a, the attitude error grows without
+bound. :meth:`ExternalAcceleration.limited` therefore limits c_a so that the filter can follow a drift of
+:data:`FOLLOWED_DRIFT` at the σ_G of the same action, and to :data:`LARGEST_C_A` at most.
+
+Heading and gyroscope bias are not estimated. Sustained acceleration cannot be distinguished from tilt.
 """
 
 from __future__ import annotations
@@ -49,9 +51,9 @@ from ..core.quantity import ACCELEROMETER, EXTERNAL_ACCELERATION, GYROSCOPE, UP,
 from ..core.rotation import exp_matrix, norm, normalize, skew
 
 LARGEST_C_A = 0.5
-"""Highest c_a that a gain policy reaches; from 0.7 any bias of the gyroscope can lock the filter out."""
+"""Largest c_a that a gain policy can choose; from 0.7 any gyroscope bias can make the error grow without bound."""
 SMALLEST_C_A = 1e-3
-"""Lowest c_a that a gain policy reaches; as good as none."""
+"""Smallest c_a that a gain policy can choose; practically zero."""
 FOLLOWED_DRIFT = math.radians(1.0)
 """rad/s: gyroscope error that the filter must be able to follow whatever a gain policy chooses."""
 
@@ -62,7 +64,7 @@ class ExternalAcceleration(Model):
 
     * Mode 1: acceleration model, equations (16)–(29).
     * Mode 2: static assumption, M = σ_A² I; the same as mode 1 with c_a = 0.
-    * Mode 3: threshold, mode 2 that corrects only while | ‖y_A‖ − g | ≤ ε_A held for all of the last n Δt seconds (30).
+    * Mode 3: threshold, mode 2 with updates only if | ‖y_A‖ − g | ≤ ε_A held for all of the last n Δt seconds (30).
 
     State: Z (3), a⁺ (3, remembered), number of samples for which the threshold has held.
     """
@@ -70,10 +72,10 @@ class ExternalAcceleration(Model):
     mode: Literal[1, 2, 3] = 1
     """which of the paper's modes"""
     exact_rotation: bool = True
-    """propagate by the exponential instead of the printed first order (12)"""
+    """propagate by the exponential instead of the first-order rotation (12)"""
     gyroscope_sample: Literal["current", "previous"] = "current"
-    """which sample turns t−1 into t: ``previous`` is printed (12), right for samples that hold until the next one;
-    ``current`` is right for samples that describe the interval that they end"""
+    """which sample propagates t−1 to t: ``previous`` as published (12), for samples that hold until the next one;
+    ``current`` for samples that describe the interval that they end"""
     gyroscope_noise: float = 1e-2
     """σ_G, rad/s per sample (section IV: σ_G² = 10⁻⁴)"""
     accelerometer_noise: float = 1e-2
@@ -85,7 +87,7 @@ class ExternalAcceleration(Model):
     window: float = 0.04
     """n Δt of mode 3, s: the paper's n = 4 at 100 Hz; kept in seconds at any rate"""
     gravity: float = 9.8
-    """g, m/s² (the paper's experiments; its introduction says 9.81)"""
+    """g, m/s² (the paper's experiments; its introduction has 9.81)"""
 
     channels: ClassVar = (GYROSCOPE, ACCELEROMETER)
     outputs: ClassVar = (UP, EXTERNAL_ACCELERATION)
@@ -100,7 +102,7 @@ class ExternalAcceleration(Model):
     }
 
     def __post_init__(self) -> None:
-        """Refuse a c_a out of its range."""
+        """Check the range of c_a."""
         super().__post_init__()
         if not 0.0 <= self.c_a <= 1.0:
             raise ValueError(f"c_a must lie in [0, 1], got {self.c_a}")
@@ -127,7 +129,7 @@ class ExternalAcceleration(Model):
         return xp.concat([(phi @ up[..., None])[..., 0], x[..., 3:]], axis=-1), phi, Q
 
     def residual(self, x: Array, z: Measurement) -> tuple[Array, Array, Array]:
-        """Equations (16)–(23), or the threshold (30): rows that it shuts out are NaN, and their update is skipped."""
+        """Equations (16)–(23), or the threshold (30): rows beyond it are NaN, and their update is skipped."""
         xp = namespace(x)
         y, up, last = z["imu/acc"], x[..., :3], x[..., 3:6]
         identity = constant([[1, 0, 0], [0, 1, 0], [0, 0, 1]], x) + 0.0 * x[..., :3, None]
@@ -143,7 +145,7 @@ class ExternalAcceleration(Model):
         return r, expand(self.gravity, 2) * identity, variance * identity
 
     def retract(self, x: Array, dx: Array) -> Array:
-        """Z is corrected by a sum, as printed (27)."""
+        """Z is corrected additively, as published (27)."""
         return namespace(x).concat([x[..., :3] + dx, x[..., 3:]], axis=-1)
 
     def finish(self, x: Array, z: Measurement) -> Array:
@@ -157,17 +159,17 @@ class ExternalAcceleration(Model):
         return xp.concat([up, acceleration, self._static_samples(x, y)], axis=-1)
 
     def pose(self, x: Array) -> dict[str, Array]:
-        """The upward vertical and the external acceleration, both in sensor coordinates."""
+        """Inclination vector and external acceleration, in sensor axes."""
         return {"up": x[..., :3], "external_acceleration": x[..., 3:6]}
 
     def limited(self, gains: dict[str, Any]) -> dict[str, Any]:
-        """c_a so low that a drift of the gyroscope can be followed, as derived in the head of this file."""
+        """c_a low enough to follow a drift of the gyroscope, as derived in the module docstring."""
         if "c_a" not in gains or self.c_a <= 0.0:
             return gains
         noise = self.gyroscope_noise * np.exp(self.gains["process"].power * np.asarray(gains.get("process", 0.0)))
         safe = np.minimum(followable_c_a(noise), LARGEST_C_A)
         published = min(followable_c_a(self.gyroscope_noise), LARGEST_C_A)
-        # A tuning that was published beyond the limit stays reachable: the zero action changes nothing.
+        # A published tuning beyond the limit remains reachable, since the zero action must not change it.
         safe = safe * max(1.0, self.c_a / published)
         return gains | {"c_a": np.minimum(gains["c_a"], np.log(safe / self.c_a))}
 

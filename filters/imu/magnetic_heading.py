@@ -1,12 +1,12 @@
 """Heading from a magnetometer: what the nine-axis filters share.
 
-Only the horizontal part of the field is used, and only its direction: the unit of the magnetometer does not matter, and
-an error of the field does not reach the inclination directly. Magnetic north lies ``declination`` radians east of
+Only the direction of the horizontal field component is used. The unit of the magnetometer therefore does not matter,
+and an error of the field does not affect the inclination directly. Magnetic north lies ``declination`` radians east of
 geographic north (+y of the world).
 
-Reference for the test of disturbances by norm and dip: D. Laidig, T. Seel, "VQF: Highly accurate IMU orientation
+Disturbances are detected by norm and dip as in D. Laidig, T. Seel, "VQF: Highly accurate IMU orientation
 estimation with bias estimation and magnetic disturbance rejection", Information Fusion 91, 2023,
-doi 10.1016/j.inffus.2022.10.014, section 3.4 (here with one slowly following reference instead of candidates).
+doi 10.1016/j.inffus.2022.10.014, section 3.4, here with one slowly adapting reference instead of candidates.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from ..core.rotation import from_axis_angle, level, multiply, norm, rotate, wrap
 
 
 def heading_error(q: Array, field: Array, declination: Array) -> Array:
-    """Angle ``(..., 1)`` about the upward vertical by which ``q`` must still be turned for the field to point north.
+    """Angle ``(..., 1)`` about the vertical by which ``q`` must be rotated for the field to point north.
 
     Args:
         q: orientation, sensor to world ``(..., 4)``.
@@ -33,7 +33,7 @@ def heading_error(q: Array, field: Array, declination: Array) -> Array:
 
 
 def turn_heading(q: Array, angle: Array) -> Array:
-    """The orientation ``q`` ``(..., 4)`` turned by ``angle`` ``(..., 1)`` about the upward vertical of the world."""
+    """The orientation ``q`` ``(..., 4)`` rotated by ``angle`` ``(..., 1)`` about the vertical (up) of the world."""
     xp = namespace(q)
     zero = 0.0 * angle
     return multiply(from_axis_angle(xp.concat([zero, zero, zero + 1.0], axis=-1), angle[..., 0]), q)
@@ -51,7 +51,7 @@ def field_direction(declination: Array, dip: Array, like: Array) -> Array:
     Args:
         declination: rad, positive east: number or ``(...)``.
         dip: below the horizontal, rad: number or ``(...)``.
-        like: an array ``(..., n)`` of the batch shape that is wanted.
+        like: an array ``(..., n)`` with the desired batch shape.
     """
     xp, zero = namespace(like), 0.0 * like[..., :1]
     east, below = zero + expand(declination, 1), zero + expand(dip, 1)
@@ -67,13 +67,13 @@ def norm_and_dip(q: Array, field: Array) -> Array:
 
 
 def is_disturbed(measured: Array, reference: Array, norm_tolerance: Array, dip_tolerance: Array) -> Array:
-    """Whether a field ``(..., 2)`` of :func:`norm_and_dip` is off the reference, ``(..., 1)``.
+    """Whether a field ``(..., 2)`` of :func:`norm_and_dip` deviates from the reference, ``(..., 1)``.
 
     Args:
         measured: norm and dip of the sample.
-        reference: norm and dip that are expected.
-        norm_tolerance: relative deviation of the norm that is still accepted.
-        dip_tolerance: deviation of the dip that is still accepted, rad.
+        reference: expected norm and dip.
+        norm_tolerance: largest accepted relative deviation of the norm.
+        dip_tolerance: largest accepted deviation of the dip, rad.
     """
     xp = namespace(measured, reference)
     deviation = xp.abs(measured - reference)
@@ -89,9 +89,9 @@ def follow(reference: Array, measured: Array, dt: Array, time: Array) -> Array:
 
 
 def known(sample: Array) -> tuple[Array, Array]:
-    """A sample ``(..., 3)`` with ones where it is missing, and whether it is there ``(..., 1)``.
+    """A sample ``(..., 3)`` with ones where it is missing, and whether it is valid ``(..., 1)``.
 
-    What is computed of a missing sample is thrown away afterwards; a NaN in it would still make gradients NaN.
+    Results from a missing sample are discarded later, but a NaN in them would make gradients NaN.
     """
     xp = namespace(sample)
     there = xp.all(xp.isfinite(sample), axis=-1)[..., None]
@@ -100,19 +100,18 @@ def known(sample: Array) -> tuple[Array, Array]:
 
 @dataclass(frozen=True)
 class MagneticHeading(Model):
-    """Adds the heading to a model of six axes: put it first among the bases.
+    """Mix-in that adds the heading to a six-axis model; it must be the first base class.
 
-    The other base keeps the orientation in the first four numbers of its state and the turn about world axes in the
-    first three of its error, and passes what follows its own numbers on. The state gains two numbers at its end: norm
-    and dip of the field that are expected. The residual gains one row at its end: the error of the heading. The filter
-    starts at the first sample at which the magnetometer, too, has had a valid one.
+    The other base has the orientation in the first four elements of its state and the rotation error in world axes in
+    the first three of its error, and passes on the elements after its own. The mix-in appends two elements to the state
+    (expected norm and dip of the field) and one row to the residual (heading error). The filter starts at the first
+    sample at which the magnetometer, too, has had a valid one.
 
-    The row has no entry for the inclination. Heading and gyroscope bias are correlated, so that the bias about the
-    vertical is found; a false field that is taken for true therefore harms the bias, and through it, slowly, the
-    inclination.
+    The row has no entry for the inclination. Heading and gyroscope bias are correlated, so the bias about the vertical
+    is estimated. An undetected disturbance of the field therefore affects the bias and, slowly, the inclination.
 
-    A sample whose norm or dip is off what is expected is left out. The expectation follows all samples, those left out
-    more slowly.
+    A sample whose norm or dip deviates too far from the expected one is rejected. The expected values follow all
+    samples, rejected ones more slowly.
     """
 
     magnetometer_noise: float = 0.1
@@ -120,18 +119,18 @@ class MagneticHeading(Model):
     heading_prior: float = 0.1
     """rad"""
     declination: float = 0.0
-    """of the magnetic field, rad, positive east; 0 takes magnetic for geographic north"""
+    """of the magnetic field, rad, positive east; with 0 the heading refers to magnetic north"""
     norm_tolerance: float = 0.1
-    """relative deviation from the expected norm beyond which a sample is left out; 1e3: never"""
+    """relative deviation from the expected norm beyond which a sample is rejected; 1e3: never"""
     dip_tolerance: float = 0.175
     """rad: the same for the dip (10°)"""
     field_time: float = 20.0
     """s: time constant with which the expected norm and dip follow accepted samples"""
     new_field_time: float = 100.0
-    """s: the same for samples that are left out, so that a new place is accepted in the end"""
+    """s: the same for rejected samples, so that the field of a new place is eventually accepted"""
 
     def prior(self, z: Measurement) -> tuple[Array, Array]:
-        """The prior of six axes, turned to magnetic north."""
+        """The prior of the six-axis model, rotated to magnetic north."""
         x, P = super().prior(z)
         q, field = x[..., :4], z["imu/mag"]
         q = turn_heading(q, heading_error(q, field, self.declination))
@@ -141,7 +140,7 @@ class MagneticHeading(Model):
         return namespace(x).concat([q, x[..., 4:], norm_and_dip(q, field)], axis=-1), P
 
     def residual(self, x: Array, z: Measurement) -> tuple[Array, Array, Array]:
-        """The rows of six axes, and the error of the heading unless the field is disturbed."""
+        """The rows of the six-axis model, and the heading error unless the field is disturbed."""
         xp = namespace(x)
         r, H, R = super().residual(x, z)
         q, (field, there) = x[..., :4], known(z["imu/mag"])
@@ -168,7 +167,7 @@ class MagneticHeading(Model):
         return xp.concat([x[..., :-2], xp.where(there, followed, expected)], axis=-1)
 
     def pose(self, x: Array) -> dict[str, Array]:
-        """The quantities of six axes; the orientation is that in the world."""
+        """The outputs of the six-axis model, with the orientation in the world."""
         pose = super().pose(x)
         pose["orientation"] = pose.pop("relative_orientation")
         return pose

@@ -9,26 +9,26 @@ quaternion of any length M(q) = (w² − u·u) 1 + 2 u uᵀ + 2 w [u]× (5.40), 
 
     ε = y_F − [M y_B1; M y_B2],   J = −∂[M y_B]/∂q,   q ← q − (JᵀJ)⁻¹ Jᵀ ε             (5.41)–(5.43)
 
-from the predicted quaternion, then normalised and given the sign of the prediction. Both vectors weigh the same, so an
-acceleration of the hand turns the result as much as the field does.
+from the predicted quaternion. The result is normalised and has the sign of the prediction. Both vectors have the same
+weight, so an acceleration of the hand affects the result as much as the field does.
 
 Second step: a Kalman filter with the state [ω; q] that measures both (5.47),
 
     ω̇ = (−ω + w) / τ,  w white noise,     q̇ = ½ q ⊗ [0; ω]                             (5.45), (5.46)
 
-discretised exactly for ω: φ = e^(−Δt/τ), variance σ_Ω² (1 − φ²) with the stationary deviation σ_Ω; q turns by the
-rotation vector Δt ω.
+discretised exactly for ω: φ = e^(−Δt/τ), variance σ_Ω² (1 − φ²) with the stationary standard deviation σ_Ω;
+q is rotated by the rotation vector Δt ω.
 
-Differs from print: (5.45) is driven by the angular rate itself instead of white noise, (5.46) multiplies by a
-scalar-first [0; ω] where q has its scalar last. The vertical is the *upward* one, as an accelerometer reads +g upwards.
+Errata: (5.45) is driven by the angular rate itself instead of white noise, and (5.46) multiplies by a scalar-first
+[0; ω] where q has its scalar last. The vertical points *up*, since an accelerometer at rest reads +g upwards.
 Quaternions are scalar-first here, and the world is x east, y north, z up.
 
-The thesis gives neither τ nor noises, and everything hangs on σ_q: at 0.01 the filter believes the first step and has
-the large errors that the thesis reports; at 0.5, about what an acceleration of 5 m/s² does to the first step, it rivals
-the filter of the thesis on a horizontal field. With a steep field the two vectors are nearly antiparallel, and their
-disagreement leaves a bias.
+The thesis gives neither τ nor noises. Accuracy depends strongly on σ_q. At 0.01 the filter trusts the first step and
+has the large errors that the thesis reports. At 0.5, which corresponds to the effect of an acceleration of 5 m/s² on
+the first step, it is comparable to the filter of the thesis in a horizontal field. In a steep field the two vectors are
+nearly antiparallel, and their inconsistency leaves a bias.
 
-Not estimated: gyroscope bias. Disturbed fields and sustained accelerations go straight into the estimate.
+The gyroscope bias is not estimated. Disturbed fields and sustained accelerations affect the estimate directly.
 """
 
 from __future__ import annotations
@@ -54,19 +54,19 @@ from ..core.rotation import cross, exp, multiply, normalize, rotate, rotate_back
 from .magnetic_heading import align, field_direction, known
 
 STEPS = 4
-"""Steps of Gauss and Newton; the thesis: 3 to 4."""
+"""Number of Gauss–Newton steps; the thesis uses 3 to 4."""
 
 
 @dataclass(frozen=True)
 class Marins(Model):
-    """The comparison of the thesis: two steps, quaternion from two vectors, then a linear measurement of the state.
+    """Reference method of the thesis: a quaternion from two vectors, then a Kalman filter with a linear measurement.
 
-    State: ω (3), q (4), unit field in the world (3). The error state is the first seven, additive. A sample of
-    accelerometer or magnetometer that is missing leaves the first step out.
+    State: ω (3), q (4), unit field in the world (3). The error state is the first seven, additive. The
+    first step is skipped where a sample of accelerometer or magnetometer is missing.
 
     Raises:
-        ValueError: an unknown start or field, a start that is no unit quaternion, or a deviation or time constant that
-            is not positive.
+        ValueError: an unknown start or field, a start that is not a unit quaternion, or a standard deviation or time
+            constant that is not positive.
     """
 
     start: Literal["samples", "given"] = "samples"
@@ -74,7 +74,7 @@ class Marins(Model):
     field: Literal["start", "given"] = "start"
     """``start``: the dip is that of the first samples; ``given``: :attr:`dip`"""
     quaternion_std: float = 0.5
-    """σ_q of each element of the first step's quaternion; 0.01 follows the first step, 0.5 is what 5 m/s² do to it"""
+    """σ_q of each element of the first step's quaternion; 0.01 trusts the first step, 0.5 covers 5 m/s²"""
     gyroscope_std: float = 0.1
     """σ_ω, rad/s per sample (section 5.3.2)"""
     rate_std: float = 3.0
@@ -84,11 +84,11 @@ class Marins(Model):
     orientation_prior: float = 0.05
     """standard deviation of each element of the quaternion at the start"""
     start_orientation: tuple[float, ...] = (1.0, 0.0, 0.0, 0.0)
-    """unit quaternion, sensor to world, of a given start"""
+    """unit quaternion, sensor to world, if the start is given"""
     declination: float = 0.0
     """of the magnetic field, rad, positive east"""
     dip: float = 0.0
-    """of a given magnetic field below the horizontal, rad"""
+    """below the horizontal, rad, if the field is given"""
 
     channels: ClassVar[tuple[Channel, ...]] = (GYROSCOPE, ACCELEROMETER, MAGNETOMETER)
     outputs: ClassVar[tuple[Quantity, ...]] = (ORIENTATION, UP, ANGULAR_RATE)
@@ -101,7 +101,7 @@ class Marins(Model):
     }
 
     def __post_init__(self) -> None:
-        """Refuse what is no start, and what must be positive and is not."""
+        """Check the start and the positive parameters."""
         super().__post_init__()
         object.__setattr__(self, "start_orientation", checked_quaternion("start_orientation", self.start_orientation))
         for name in ("quaternion_std", "gyroscope_std", "rate_std", "rate_time"):
@@ -129,7 +129,7 @@ class Marins(Model):
         turned = multiply(q, exp(turn))
         zero = 0.0 * x[..., :1]
         decay = xp.exp(zero - expand(self.dt / self.rate_time, 1))
-        # a change of ω acts in the middle of the turn: exact to second order in Δt ω
+        # a change of ω acts in the middle of the rotation: exact to second order in Δt ω
         half = exp(0.5 * turn)
         axes = (multiply(multiply(multiply(q, half), _basis(index, q)), half) for index in (1, 2, 3))
         lever = _columns([0.5 * expand(self.dt, 1) * axis for axis in axes])
@@ -146,7 +146,7 @@ class Marins(Model):
         up = constant([0.0, 0.0, 1.0], x) + 0.0 * world
         (force, there), (field, also) = known(z["imu/acc"]), known(z["imu/mag"])
         complete = xp.logical_and(there, also)
-        # what is expected stands in for missing samples: two vectors that are parallel have no solution
+        # expected vectors replace missing samples, because parallel vectors have no solution
         force = normalize(xp.where(complete, force, rotate_back(normalize(q), up)))
         field = normalize(xp.where(complete, field, rotate_back(normalize(q), world)))
         found = solve_orientation(normalize(q), (up, world), (force, field))
@@ -155,7 +155,7 @@ class Marins(Model):
         return r, identity(7, x), covariance_of(deviations, 0.0 * x[..., :1])
 
     def retract(self, x: Array, dx: Array) -> Array:
-        """A sum."""
+        """Additive."""
         return namespace(x).concat([x[..., :7] + dx, x[..., 7:]], axis=-1)
 
     def finish(self, x: Array, z: Measurement) -> Array:
@@ -163,17 +163,17 @@ class Marins(Model):
         return namespace(x).concat([x[..., :3], normalize(x[..., 3:7]), x[..., 7:]], axis=-1)
 
     def pose(self, x: Array) -> dict[str, Array]:
-        """Orientation, vertical and angular rate."""
+        """Orientation, inclination vector and angular rate."""
         return {"orientation": x[..., 3:7], "up": up_in_body(x[..., 3:7]), "angular_rate": x[..., :3]}
 
 
 def solve_orientation(q: Array, world: tuple[Array, Array], body: tuple[Array, Array]) -> Array:
-    """The unit quaternion that turns two body vectors onto two world vectors best, by four steps from ``q``.
+    """The unit quaternion that best rotates two body vectors onto two world vectors, by four steps from ``q``.
 
-    Equations (5.41)–(5.43). The quaternion is free in its length while the steps last.
+    Equations (5.41)–(5.43). The length of the quaternion is not constrained during the steps.
 
     Args:
-        q: where to start, ``(..., 4)``; near the solution, as the steps find the nearest one.
+        q: initial value, ``(..., 4)``; must be near the solution, as the steps converge to the nearest one.
         world: two vectors in the world, ``(..., 3)``.
         body: the same in the body's axes.
 
@@ -198,7 +198,7 @@ def solve_orientation(q: Array, world: tuple[Array, Array], body: tuple[Array, A
 
 
 def matrix_jacobian(q: Array, v: Array) -> Array:
-    """∂(M(q) v)/∂q ``(..., 3, 4)`` of the quaternion's matrix (5.40), whatever its length.
+    """∂(M(q) v)/∂q ``(..., 3, 4)`` of the quaternion's matrix (5.40), for any length.
 
     M v = (w² − u·u) v + 2 (u·v) u + 2 w u × v.
     """

@@ -11,20 +11,20 @@ samples that describe the interval that they end,
     q ← q ⊗ exp((ω − b) Δt),   F = [[1, −R Δt], [0, 1]],   Q = Δt blkdiag(σ_g² 1, σ_b² 1)
     f = Rᵀ g e₃ + n,   H = [g Rᵀ [e₃]×, 0],   var n = σ_a² / Δt + (κ (‖f‖ − g))²
 
-All noises are densities, so the filter means the same at any rate. The accelerometer is no inclinometer: σ_a stands for
-the acceleration of the motion, not for the noise of the sensor, which is a hundred times smaller. It is set for
-recorded hand motion (BROAD); the published idea of σ_a as sensor noise fails there.
+All noises are densities, so the filter does not depend on the sampling rate. σ_a represents the acceleration of the
+motion rather than the noise of the sensor, which is a hundred times smaller. It is set for recorded hand motion
+(BROAD), where the published choice of σ_a as sensor noise fails.
 
-κ > 0 (``norm_adaptation``) trusts samples less that cannot be gravity alone. It is an option and off: in vigorous
-motion the samples that it picks are those where acceleration and gravity happen to add up to g, which are biased, and
-the mean inclination error on ten BROAD trials grows from 1.2° to 2.2° at κ = 1.
+κ > 0 (``norm_adaptation``) increases the variance of samples whose norm differs from g. This option is off. In vigorous
+motion it selects those samples in which acceleration and gravity happen to add up to g. These are biased, and the mean
+inclination error on ten BROAD trials grows from 1.2° to 2.2° at κ = 1.
 
-The magnetometer corrects the heading and, through the covariance, the bias about the vertical: its residual is one
+The magnetometer corrects the heading and, through the covariance, the bias about the vertical. Its residual is one
 angle about the vertical, and its Jacobian has no entry for the inclination (:mod:`poise.filters.imu.magnetic_heading`).
 
-Nine axes on the same ten trials, total error with the heading: 3.2° (bounded motion 2.7°, VQF 3.2°).
+With nine axes the total error on the same ten trials, heading included, is 3.2° (bounded motion 2.7°, VQF 3.2°).
 
-Not estimated: external acceleration, magnetic field. Sustained acceleration cannot be distinguished from tilt.
+External acceleration and magnetic field are not estimated. Sustained acceleration cannot be distinguished from tilt.
 """
 
 from __future__ import annotations
@@ -62,13 +62,13 @@ class MEKF(Model):
     """
 
     gyroscope_noise: float = 5e-3
-    """σ_g, rad/s/√Hz; larger than a data sheet's, since it stands for scale and alignment errors in motion too"""
+    """σ_g, rad/s/√Hz; larger than in a data sheet, to cover scale and alignment errors in motion"""
     bias_noise: float = 2e-5
     """σ_b, rad/s²/√Hz"""
     accelerometer_noise: float = 0.5
     """σ_a, m/s²/√Hz: acceleration of the motion"""
     norm_adaptation: float = 0.0
-    """κ: share of | ‖f‖ − g | that is added as a standard deviation; 0 is the textbook filter"""
+    """κ: share of | ‖f‖ − g | added as a standard deviation; 0 is the textbook filter"""
     tilt_prior: float = 0.05
     """rad"""
     bias_prior: float = 8.727e-3
@@ -95,7 +95,7 @@ class MEKF(Model):
         return x, covariance_of([*[self.tilt_prior] * 3, *[self.bias_prior] * 3], 0.0 * f[..., :1])
 
     def predict(self, x: Array, z: Measurement, previous: Measurement) -> tuple[Array, Array, Array]:
-        """Integrate the gyroscope less its bias; F and Q as in the head of this file."""
+        """Integrate the bias-corrected gyroscope; F and Q as in the module docstring."""
         xp = namespace(x)
         q, b = x[..., :4], x[..., 4:7]
         unit = identity(3, x)
@@ -118,7 +118,7 @@ class MEKF(Model):
         return f - g * up_in_body(q), xp.concat([turn, 0.0 * unit], axis=-1), variance[..., None] * unit
 
     def retract(self, x: Array, dx: Array) -> Array:
-        """The attitude is corrected by a turn in the world, the bias by a sum."""
+        """The attitude is corrected by a rotation in the world frame, the bias additively."""
         q = multiply(exp(dx[..., :3]), x[..., :4])
         return namespace(x).concat([q, x[..., 4:7] + dx[..., 3:6], x[..., 7:]], axis=-1)
 
@@ -127,7 +127,7 @@ class MEKF(Model):
         return namespace(x).concat([normalize(x[..., :4]), x[..., 4:]], axis=-1)
 
     def pose(self, x: Array) -> dict[str, Array]:
-        """Upward vertical, orientation and bias (rad/s), in sensor coordinates."""
+        """Inclination vector, orientation and bias (rad/s), in sensor axes."""
         q = x[..., :4]
         return {"up": up_in_body(q), "relative_orientation": q, "gyroscope_bias": x[..., 4:7]}
 

@@ -1,6 +1,6 @@
-r"""Strapdown integration of attitude and velocity with its error: what filters of one moving IMU share.
+r"""Strapdown integration of attitude and velocity with its error model, shared by the filters of one moving IMU.
 
-With ω the gyroscope's and f the accelerometer's sample, which describe the interval that they end,
+With the samples ω of the gyroscope and f of the accelerometer, which describe the interval that they end,
 
     q ← q ⊗ exp((ω − b) Δt),   v ← v + Δt (q_mid f q_mid* − g e₃)
 
@@ -27,7 +27,7 @@ def advance(q: Array, turn: Array, f: Array, share: Any = 0.5) -> tuple[Array, A
         q: attitude before it, ``(..., 4)``, sensor to world.
         turn: rotation vector of the interval ``(..., 3)``, sensor axes, rad.
         f: accelerometer's sample ``(..., 3)``.
-        share: of the turn that has happened when the accelerometer samples, on average.
+        share: fraction of the rotation at the mean time of the accelerometer sample.
     """
     return normalize(multiply(q, exp(turn))), rotate(multiply(q, exp(share * turn)), f)
 
@@ -45,7 +45,7 @@ def transition(q: Array, force: Array, dt: Any, felt: Array, kept: Array) -> Arr
         force: specific force in the world, ``(..., 3)``.
         dt: s, with two trailing axes if it is an array.
         felt: ``(..., 1, 1)``, 1 where the velocity was integrated, else 0.
-        kept: ``(..., 1, 1)``, 1 where the velocity before counts, 0 where it was set anew.
+        kept: ``(..., 1, 1)``, 1 where the previous velocity is kept, 0 where it was reset.
     """
     unit = identity(3, q)
     none = 0.0 * unit
@@ -71,13 +71,13 @@ def process_noise(turn: Any, bias: Any, velocity: Array) -> Array:
 
 
 def corrected(x: Array, dx: Array) -> Array:
-    """The state [q, b, v, …] ⊞ [δθ, δb, δv]: the attitude is corrected by a turn in the world, the rest by sums."""
+    """The state [q, b, v, …] ⊞ [δθ, δb, δv]: the attitude is corrected by a rotation, the rest additively."""
     q = multiply(exp(dx[..., :3]), x[..., :4])
     return namespace(x).concat([q, x[..., 4:10] + dx[..., 3:9], x[..., 10:]], axis=-1)
 
 
 def clipped_inflation(f: Array, limit: Any, factor: Any) -> Array:
-    """Factor on the variance of a velocity increment ``(..., 1)``: ``factor²`` where a component of f is beyond."""
+    """Factor on the variance of a velocity increment ``(..., 1)``: ``factor²`` where f exceeds ``limit``."""
     xp = namespace(f)
     clipped = xp.any(xp.greater(xp.abs(f), expand(limit, 1)), axis=-1)[..., None]
     one = 1.0 + 0.0 * f[..., :1]

@@ -75,7 +75,7 @@ def test_the_registry_reads_channels_and_outputs_from_the_class():
 def test_it_is_made_with_its_parameters():
     made = poise.make_estimator("vertical", dt=0.02, spread=0.5, keep_covariance=False)
     assert made == KalmanFilter(Vertical(dt=0.02, spread=0.5), keep_covariance=False)
-    with pytest.raises(ValueError, match=r"unknown parameters \['nose'\] of 'vertical'; there are .*'spread'"):
+    with pytest.raises(ValueError, match=r"unknown parameters \['nose'\] of 'vertical'; accepted are .*'spread'"):
         make("vertical", nose=1.0)
     with pytest.raises(ValueError, match=r"start must be one of \('tilt',\), got 'level'"):
         make("vertical", start="level")
