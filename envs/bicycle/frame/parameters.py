@@ -1,6 +1,6 @@
 """What a bicycle is made of: geometry, masses and inertias, with units and source.
 
-All places are in the *bicycle frame* of the upright bicycle with straight steering: origin on the ground under the rear
+All positions are in the *bicycle frame* of the upright bicycle with straight steering: origin on the ground under the rear
 hub, x forward, y left, z up. Inertias are matrix elements about the part's own centre of mass along these axes; a
 bicycle is symmetric about its x-z plane, so (xx, yy, zz, xz) are complete.
 """
@@ -89,7 +89,7 @@ class DriveParameters:
     mass: float
     """kg: both cranks, chain ring and pedals"""
     inertia: Vector3
-    """kg·m²: moments about the axle's place along x, y, z"""
+    """kg·m²: moments about the axle along x, y, z"""
     gears: tuple[float, ...] = (0.6, 0.8, 1.05, 1.4, 1.85, 2.4, 3.1)
     """turns of the rear wheel a turn of the crank, rising"""
     chain_stiffness: float = 400.0

@@ -111,6 +111,7 @@ class Tyre:
         cx, cy, cz = centre
         ax, ay, az = axle
         height, slope_x, slope_y = self.ground.height_and_slope(cx, cy)
+        # normal of the ground, and sine of the wheel's lean against it
         length = 1.0 / math.sqrt(1.0 + slope_x * slope_x + slope_y * slope_y)
         nx, ny, nz = -slope_x * length, -slope_y * length, length
         lean = nx * ax + ny * ay + nz * az
@@ -123,6 +124,7 @@ class Tyre:
         px, py, pz = cx + rx, cy + ry, cz + rz
         if slope_x or slope_y or height != 0.0:
             height = self.ground.height_and_slope(px, py)[0]
+        # normal force: spring and damper along the normal, never pulling
         penetration = (height - pz) * nz
         if penetration <= 0.0:
             self.bristles = (0.0, 0.0)
@@ -134,6 +136,7 @@ class Tyre:
         # forward = axle × normal, sideways = normal × forward
         tx, ty, tz = (ay * nz - az * ny) / upright, (az * nx - ax * nz) / upright, (ax * ny - ay * nx) / upright
         sx, sy, sz = ny * tz - nz * ty, nz * tx - nx * tz, nx * ty - ny * tx
+        # velocities of the tread point and of the wheel's centre along these axes; lateral deflection by camber
         slip, side_slip = ux * tx + uy * ty + uz * tz, ux * sx + uy * sy + uz * sz
         rolling = vx * tx + vy * ty + vz * tz
         camber = lean / upright * load / tyre.shear_stiffness if tyre.camber_thrust else 0.0
@@ -141,6 +144,7 @@ class Tyre:
         rate = abs(rolling) / tyre.relaxation_length
         forward = (self.bristles[0] + dt * slip) / (1.0 + dt * rate)
         sideways = (self.bristles[1] + dt * (side_slip + rate * camber)) / (1.0 + dt * rate)
+        # shear force of the bristles, limited by Coulomb friction; beyond it they slide
         along = -(tyre.shear_stiffness * forward + tyre.shear_damping * slip)
         across = -(tyre.shear_stiffness * sideways + tyre.shear_damping * side_slip)
         shear, limit = math.hypot(along, across), tyre.friction * load

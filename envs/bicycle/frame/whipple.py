@@ -74,6 +74,7 @@ def whipple_model(bicycle: BicycleParameters, gravity: float = STANDARD_GRAVITY)
     IHxx, _, IHzz, IHxz = H.inertia
     IBxz, IHxz = -IBxz, -IHxz
 
+    # total system: mass, centre of mass, inertia about the rear contact
     mT = R.mass + B.mass + H.mass + F.mass
     xT = (xB * B.mass + xH * H.mass + w * F.mass) / mT
     zT = (-R.radius * R.mass + zB * B.mass + zH * H.mass - F.radius * F.mass) / mT
@@ -86,25 +87,30 @@ def whipple_model(bicycle: BicycleParameters, gravity: float = STANDARD_GRAVITY)
         R.inertia_diameter + IBzz + IHzz + F.inertia_diameter + B.mass * xB**2 + H.mass * xH**2 + F.mass * w**2
     )  # fmt: skip
 
+    # front assembly (fork and wheel): the same about its own centre
     mA = H.mass + F.mass
     xA = (xH * H.mass + w * F.mass) / mA
     zA = (zH * H.mass - F.radius * F.mass) / mA
     IAxx = IHxx + F.inertia_diameter + H.mass * (zH - zA) ** 2 + F.mass * (F.radius + zA) ** 2
     IAxz = IHxz - H.mass * (xH - xA) * (zH - zA) + F.mass * (w - xA) * (F.radius + zA)
     IAzz = IHzz + F.inertia_diameter + H.mass * (xH - xA) ** 2 + F.mass * (w - xA) ** 2
+    # its centre's distance ahead of the steering axis; inertia about that axis, and products with x and z
     uA = (xA - w - c) * cos - zA * sin
     IAll = mA * uA**2 + IAxx * sin**2 + 2.0 * IAxz * sin * cos + IAzz * cos**2
     IAlx = -mA * uA * zA + IAxx * sin + IAxz * cos
     IAlz = mA * uA * xA + IAxz * sin + IAzz * cos
 
+    # ratio of mechanical trail to wheelbase; spin angular momentum per speed of the wheels; static moment
     mu = c / w * cos
     SR, SF = R.inertia_axle / R.radius, F.inertia_axle / F.radius
     ST = SR + SF
     SA = mA * uA + mu * mT * xT
 
+    # mass matrix, and stiffness by gravity and by speed squared, in (roll, steer)
     M = np.array([[ITxx, IAlx + mu * ITxz], [IAlx + mu * ITxz, IAll + 2.0 * mu * IAlz + mu**2 * ITzz]])
     K0 = np.array([[mT * zT, -SA], [-SA, -SA * sin]])
     K2 = np.array([[0.0, (ST - mT * zT) / w * cos], [0.0, (SA + SF * sin) / w * cos]])
+    # damping by speed: gyroscopic moments and lateral acceleration of the contacts
     C1 = np.array(
         [
             [0.0, mu * ST + SF * cos + ITxz / w * cos - mu * mT * zT],

@@ -92,7 +92,7 @@ def contact(
         before: the rider's motion before the step.
         after: after it.
         saddle: ``(3,)`` saddle point before the step, world.
-        hands: forces ``(2, 3)`` on the handlebar in the step and their places before it, world.
+        hands: forces ``(2, 3)`` on the handlebar in the step and their points of action before it, world.
         feet: likewise on the pedals.
     """
     physics = rider.bicycle.physics

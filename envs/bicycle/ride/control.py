@@ -126,6 +126,7 @@ def regulator(
     """
     A, B = lateral_model(model, bicycle, speed)
     step = 1.0 / settings.rate
+    # exact discretisation with a zero-order hold of the torque
     block = expm(step * np.block([[A, B], [np.zeros((1, 8))]]))
     A, B = block[:7, :7], block[:7, 7:]
     s = settings
@@ -133,6 +134,7 @@ def regulator(
     solution = solve_discrete_are(A, B, cost, np.array([[s.effort * step]]))
     left = np.linalg.solve(s.effort * step + B.T @ solution @ B, B.T)
     gains = left @ solution @ A
+    # preview: the costate of a change of roll and steer, carried back from where it comes by the closed loop
     closed, effect = (A - B @ gains).T, -solution[:, :2]
     each = round(PREVIEW_BIN * settings.rate)
     kernel = np.zeros((2, PREVIEW_BINS))

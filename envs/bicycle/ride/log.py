@@ -156,7 +156,7 @@ class RideRecorder:
         swivel: np.ndarray,
         bounce: np.ndarray,
     ) -> LimbPosture:
-        """Posture of a limb by inverse kinematics; ``bounce``: height of the pelvis above its place at rest, m."""
+        """Posture of a limb by inverse kinematics; ``bounce``: height of the pelvis above its position at rest, m."""
         posture, side = self.ride.rider.posture, name[4:]
         up = bounce[:, None] * np.array([0.0, 0.0, 1.0])
         if name.startswith("leg"):

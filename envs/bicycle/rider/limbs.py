@@ -70,7 +70,7 @@ class LimbPosture(NamedTuple):
     angles: np.ndarray
     """(..., 4) joint angles y, x, z, hinge, rad"""
     hinge: np.ndarray
-    """(..., 3) place of the elbow or knee, from the root, m"""
+    """(..., 3) position of the elbow or knee, from the root, m"""
 
 
 def reach_to(limb: Limb, target: np.ndarray, outward: np.ndarray, swivel: np.ndarray | float = 0.0) -> LimbPosture:
@@ -92,6 +92,7 @@ def reach_to(limb: Limb, target: np.ndarray, outward: np.ndarray, swivel: np.nda
         raise ValueError(
             f"a limb of {a:.3f} + {b:.3f} m cannot reach points {distance.min():.3f}…{distance.max():.3f} m away"
         )
+    # axes of the line to the target; law of cosines for the angle at the root
     line = target / distance
     out = rotation.normalize(outward - line * np.sum(line * outward, axis=-1, keepdims=True))
     side = rotation.cross(line, out)
@@ -99,6 +100,7 @@ def reach_to(limb: Limb, target: np.ndarray, outward: np.ndarray, swivel: np.nda
     cosine = (a * a + distance**2 - b * b) / (2.0 * a * distance)
     sine = np.sqrt(1.0 - cosine**2)
     hinge = a * (cosine * line + sine * (np.cos(swivel) * out + np.sin(swivel) * side))
+    # upper segment: z from the hinge to the root, y along the hinge's axis; then the hinge's angle
     z = -hinge / a
     y = limb.bend * rotation.normalize(rotation.cross(hinge, target - hinge))
     x = rotation.cross(y, z)
@@ -110,7 +112,7 @@ def reach_to(limb: Limb, target: np.ndarray, outward: np.ndarray, swivel: np.nda
 
 
 def forward(limb: Limb, angles: np.ndarray) -> tuple[LimbPosture, np.ndarray]:
-    """Posture and place of the tip ``(..., 3)`` in the frame of the root, from joint angles ``(..., 4)``."""
+    """Posture and position of the tip ``(..., 3)`` in the frame of the root, from joint angles ``(..., 4)``."""
     upper = three_turns(angles[..., 0], angles[..., 1], angles[..., 2])
     lower = rotation.multiply(upper, half_turns(angles[..., 3], 1))
     hinge = rotation.rotate(upper, np.array([0.0, 0.0, -limb.upper]))
@@ -134,10 +136,12 @@ def tip_torques(limb: Limb) -> Callable[..., list[list[float]]]:
         turn_x = xp.stack([c[..., 1], s[..., 1], zero, zero], axis=-1)
         turn_z = xp.stack([c[..., 2], zero, zero, s[..., 2]], axis=-1)
         bend = xp.stack([c[..., 3], zero, s[..., 3], zero], axis=-1)
+        # attitudes after each joint; hinge and tip in root axes
         second = rotation.multiply(turn_y, turn_x)
         upper = rotation.multiply(second, turn_z)
         hinge = rotation.rotate(upper, np.array([0.0, 0.0, -limb.upper]))
         lower = rotation.rotate(rotation.multiply(upper, bend), np.array([limb.tip[0], 0.0, limb.tip[1]]))
+        # virtual work: a joint's torque is its axis times the moment of the forces about it
         root = rotation.cross(hinge + lower, force) + rotation.cross(hinge, lift)
         axis_x = rotation.rotate(turn_y, np.array([1.0, 0.0, 0.0]))
         axis_z = rotation.rotate(second, np.array([0.0, 0.0, 1.0]))

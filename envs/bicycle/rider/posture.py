@@ -44,7 +44,7 @@ def _root(function: Callable[[float], float], low: float, high: float, message: 
 
 @dataclass(frozen=True)
 class Posture:
-    """A person fitted to a bicycle; places in the bicycle frame unless said otherwise, m."""
+    """A person fitted to a bicycle; positions in the bicycle frame unless said otherwise, m."""
 
     body: RiderBody
     bicycle: BicycleParameters
@@ -80,7 +80,7 @@ class Posture:
         return np.array(drive.axle) + sign * np.stack([along, across, -down], axis=-1)
 
     def grip(self, side: str, steer: np.ndarray | float) -> np.ndarray:
-        """Hand's place ``(..., 3)`` at a steering angle (rad, left positive)."""
+        """Hand's position ``(..., 3)`` at a steering angle (rad, left positive)."""
         origin, axis = self.bicycle.steer_origin, self.bicycle.steer_axis
         zero = np.array(self.bicycle.grip) * (1.0, SIGNS[side], 1.0) - origin
         angle = np.asarray(steer, dtype=float)[..., None]

@@ -289,7 +289,7 @@ class Rider:
             body.push(self.trunk_links[2], [-part for part in force], point)
 
     def _pressing_lines(self) -> Callable[..., list[list[float]]]:
-        """Function of the front assembly's and the frame's principal axes: hands' places and forces in the world."""
+        """Function of the front assembly's and the frame's principal axes: hands' positions and forces in the world."""
         physics, body = self.bicycle.physics, self.bicycle.body.body
         centre, axes = physics.inertial_frame(body, self.bicycle.links["front_assembly"])
         _, frame_axes = physics.inertial_frame(body)

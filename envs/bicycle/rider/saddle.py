@@ -50,7 +50,7 @@ class Saddle:
         """Upward force on the pelvis, N, never negative: the contact is unilateral.
 
         Args:
-            height: of the pelvis above its place at rest, m.
+            height: of the pelvis above its position at rest, m.
             rate: of that height, m/s.
         """
         return max(0.0, self.load - self.parameters.stiffness * height - self.parameters.damping * rate)
