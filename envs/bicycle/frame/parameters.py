@@ -1,6 +1,6 @@
 """What a bicycle is made of: geometry, masses and inertias, with units and source.
 
-All positions are in the *bicycle frame* of the upright bicycle with straight steering: origin on the ground under the rear
+Positions are in the *bicycle frame* of the upright bicycle with straight steering: origin on the ground under the rear
 hub, x forward, y left, z up. Inertias are matrix elements about the part's own centre of mass along these axes; a
 bicycle is symmetric about its x-z plane, so (xx, yy, zz, xz) are complete.
 """
