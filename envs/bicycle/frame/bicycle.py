@@ -326,7 +326,7 @@ class Bicycle:
         )
 
     def _pose_lines(self) -> Callable[..., list[list[float]]]:
-        """Function of the base's motion at its centre of mass: position, speed, rates ``(7,)``; roll, pitch, yaw ``(3,)``."""
+        """Function of the centre-of-mass motion: position, speed, rates ``(7,)``; roll, pitch and yaw ``(3,)``."""
         centre, axes = self.physics.inertial_frame(self.body.body)
 
         def compute(position, orientation, velocity, turning):  # type: ignore[no-untyped-def]
