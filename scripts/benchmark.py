@@ -87,8 +87,13 @@ def run(args: Args) -> int:
         corrected = with_other_clocks(recorded)
         if corrected:
             out.say(f"{len(corrected)} recordings again, the clock of the reference corrected")
-            clock = "corrected"
-            table = evaluate(chosen, corrected, reference_clock=clock, offline=args.offline, check=False, progress=True)
+            table = evaluate(
+                *(chosen, corrected),
+                reference_clock="corrected",
+                offline=args.offline,
+                check=False,
+                progress=True,
+            )
             results += results_of(corrected, table, CORRECTED)
         for metric in ERRORS:
             rows = [{"estimator": name, **errors} for name, errors in dataset_errors(results, metric).items()]

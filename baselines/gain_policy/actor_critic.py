@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from gymnasium import spaces
 
 from ...filters.adaptation.tuned import TunedFilter
 from ...filters.support.optional import extra
@@ -116,7 +117,7 @@ def make_model(config: TrainingConfig, env: VecNormalize, start: np.ndarray, log
         sde_sample_freq=config.sde_sample_freq,
         ent_coef=0.0,
         policy_kwargs={
-            "seen": env.observation_space.shape[0] - PRIVILEGED,
+            "seen": spaces.flatdim(env.observation_space) - PRIVILEGED,
             "net_arch": list(config.net_arch),
             "activation_fn": torch.nn.Tanh,
             # The noise is a linear function of the last hidden layer, whose tanh units have a mean square of about 0.3.

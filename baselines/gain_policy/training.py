@@ -32,8 +32,6 @@ from .oracle_warm_start import fit_oracle
 from .policy import GainPolicy
 
 if TYPE_CHECKING:
-    from stable_baselines3.common.vec_env import VecNormalize
-
     from .actor_critic import GainPPO
     from .batch import TuningBatch
 
@@ -120,7 +118,7 @@ def training_key(config: TrainingConfig, tuned: TunedFilter, motions: Sequence[T
     for trajectory in motions:
         for name, values in sorted({**trajectory.measurements, **trajectory.truth, "mask": trajectory.mask}.items()):
             content.update(name.encode())
-            content.update(np.ascontiguousarray(values))
+            content.update(np.ascontiguousarray(values).data)
     return {
         "config": described,
         "filter": repr(tuned.kalman),
@@ -169,7 +167,8 @@ class PolicyTraining:
             error_scale=config.error_scale,
             relative=True,
         )
-        self.env: VecNormalize = VecNormalize(self.batch, gamma=config.gamma, clip_obs=1e6)
+        # Any, because its statistics are typed as those of observations in dictionaries too.
+        self.env: Any = VecNormalize(self.batch, gamma=config.gamma, clip_obs=1e6)
         self.model: GainPPO = make_model(config, self.env, start, home)
         self.best: GainPolicy | None = None
         self.best_score, self.best_steps, self.looked = np.inf, 0, 0
@@ -196,7 +195,7 @@ class PolicyTraining:
             warm_start(self.model, self.env, oracle, self.batch)
             self.look()
         # As the model itself would at the start of `learn`, but a checkpoint can be written before it.
-        self.model._last_obs = self.env.reset()  # type: ignore[assignment]
+        self.model._last_obs = self.env.reset()
         self.model._last_episode_starts = np.ones(config.n_envs, dtype=bool)
         self.save()
 
@@ -230,7 +229,7 @@ class PolicyTraining:
         if due and self.steps < self.config.total_timesteps:
             self.look()
         if self.report is not None:
-            finished = self.model.ep_info_buffer or []
+            finished: list[Any] = list(self.model.ep_info_buffer or ())
             gain = float(np.mean([episode["r"] for episode in finished])) if finished else float("nan")
             self.report({"steps": float(self.steps), "gain": gain, "seconds": self.seconds})
         self.save()
@@ -256,7 +255,8 @@ class PolicyTraining:
         model, env = self.model, self.env
         self.home.mkdir(parents=True, exist_ok=True)
         # The global generator, because stable-baselines3 shuffles its batches with it.
-        name, keys, *rest = np.random.get_state()  # noqa: NPY002
+        generator: Any = np.random.get_state()  # noqa: NPY002
+        name, keys, *rest = generator
         normalisation = [env.obs_rms.mean, env.obs_rms.var, env.ret_rms.mean, env.ret_rms.var, env.returns]
         state = {
             "start": self.start,
