@@ -125,6 +125,19 @@ def at_instants(name: str, values: np.ndarray, old: np.ndarray, new: np.ndarray)
     return np.where((outside | gap)[:, None], np.nan, between(name, values[left], values[right], weight))
 
 
+def fill_short_gaps(values: np.ndarray, longest: float) -> np.ndarray:
+    """Samples ``(T, size)`` with lines through missing ones whose neighbours are at most ``longest`` ticks apart."""
+    present = np.flatnonzero(np.isfinite(values).all(axis=1))
+    if len(present) < 2:
+        return values
+    ticks = np.arange(len(values))
+    right = np.clip(np.searchsorted(present, ticks), 1, len(present) - 1)
+    before, after = present[right - 1], present[right]
+    short = (after - before <= longest + 1e-6) & (ticks > before) & (ticks < after)
+    weight = ((ticks - before) / (after - before))[:, None]
+    return np.where(short[:, None], values[before] + weight * (values[after] - values[before]), values)
+
+
 def samples_of(values: np.ndarray, old: np.ndarray, dt: float, edges: np.ndarray) -> Samples:
     """Samples of one sensor and the intervals that they stand for, with holes between them where some are missing.
 

@@ -123,3 +123,18 @@ def test_a_rate_must_be_positive(wobble):
     for rate in (0.0, -1.0, np.nan, np.inf):
         with pytest.raises(ValueError, match="rate must be a positive"):
             wobble.resampled(rate)
+
+
+def test_short_gaps_are_interpolated_and_long_ones_stay(wobble):
+    kept = np.setdiff1d(np.arange(len(wobble)), [*range(50, 53), *range(200, 300)])
+    rows = {name: values[kept] for name, values in wobble.measurements.items()}
+    lossy = Trajectory(wobble.time[kept], rows, {"up": wobble.truth["up"][kept]})
+    filled = lossy.interpolated(0.02)
+    assert filled.metadata["interpolated"]["samples"] == {"imu/gyr": 3, "imu/acc": 3}
+    gyr = wobble.measurements["imu/gyr"]
+    np.testing.assert_allclose(filled.measurements["imu/gyr"][50:53], gyr[49] + np.c_[1:4] / 4 * (gyr[53] - gyr[49]))
+    assert np.isnan(filled.measurements["imu/gyr"][200:300]).all()
+    assert np.isnan(filled.measurements["imu/mag"][50:53]).all()
+    np.testing.assert_array_equal(np.flatnonzero(~filled.mask), [*range(50, 53), *range(200, 300)])
+    with pytest.raises(ValueError, match="longest must be a positive time in s, got -1"):
+        lossy.interpolated(-1)
