@@ -102,7 +102,7 @@ def real_numbers(values: Any, what: str) -> np.ndarray:
         ValueError: they are not an array of real numbers; the message begins with ``what``.
     """
     try:
-        array = np.asanyarray(values)
+        array: Any = np.asanyarray(values)
     except ValueError:
         raise ValueError(f"{what} must be an array of real numbers, got rows of different lengths") from None
     if array.dtype.kind not in "fiu":
