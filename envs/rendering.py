@@ -92,13 +92,15 @@ class DeviceScene:
         """Put the device and the estimate in place.
 
         Args:
-            pose: ``orientation`` ``(4,)``, or ``up`` ``(3,)``.
+            pose: ``orientation`` ``(4,)``, or ``up`` ``(3,)``, or the first orientation of a body.
             truth: ``position`` ``(3,)`` where known, m.
             estimate: ``(4,)`` orientation or ``(3,)`` upward vertical in sensor axes, of any length.
         """
         position = np.asarray(truth.get("position", np.full(3, np.nan)))
         self._target = position if np.isfinite(position).all() else np.array([0.0, 0.0, 0.5])
-        known = pose["orientation"] if "orientation" in pose else pose["up"]
+        names = ("orientation", "up", *(name for name in pose if name.endswith("/orientation")))
+        # where no attitude is known, the device is drawn level
+        known = next((pose[name] for name in names if name in pose), np.array([1.0, 0.0, 0.0, 0.0]))
         if len(known) == 4 and len(estimate) == 3 and np.any(estimate) and np.isfinite(estimate).all():
             # an inclination leaves the heading open: it is drawn with that of the device
             up, estimated = rotation.up_in_body(known), rotation.normalize(estimate)

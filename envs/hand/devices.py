@@ -23,7 +23,7 @@ from ...filters.arrays.planar.orientation import PLANAR_GYROSCOPE
 from ...filters.core import rotation
 from ...filters.core.quantity import GYROSCOPE, Channel
 from ..sensors.ideal import Mounting, Sampling, vector
-from ..sensors.kinds import SensorKind, SiteMotion
+from ..sensors.kinds import SensorKind, SiteMotion, sensor_kind
 from ..sensors.noise import NoiseModel
 from ..sensors.presets import SensorPreset, list_sensor_presets, sensor_preset
 from ..sensors.sensor import Sensor
@@ -283,6 +283,9 @@ def device_suite(
             raise ValueError(f"magnetometer must be False: the preset {preset.name!r} has none")
         its_rate = rate if wanted is True else float(wanted)
         chosen.append(sensor(Channel("imu/mag", 3, "µT"), "magnetometer", preset.magnetometer, its_rate))
+    for name, noise in preset.others.items():
+        kind = sensor_kind(name)
+        chosen.append(sensor(Channel(f"imu/{kind.suffix}", kind.size or 1, kind.unit), kind, noise, rate))
     return SensorSuite(chosen, rate, field=device.magnetic_field)
 
 

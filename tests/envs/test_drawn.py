@@ -14,6 +14,7 @@ from stable_baselines3.common.env_util import make_vec_env
 from poise.envs import list_environments
 from poise.envs.hand.environment import HandMotionEnv
 from poise.envs.physics.world import Physics
+from poise.envs.record import record
 from poise.envs.registration import make_environment
 
 SHORT = {
@@ -92,6 +93,19 @@ def test_a_copy_before_the_first_episode_draws_the_same_ones():
     other = copy.copy(fresh)
     assert same(fresh.reset()[0], other.reset()[0])
     assert same(fresh.reset()[1], other.reset()[1])
+
+
+def test_a_filter_of_rides_on_a_recorded_ride_is_drawn():
+    """A trajectory that knows orientations of bodies only, not that of a sensor."""
+    ride = make_environment("poise/RiderBicycle-v0", suite="two-gyro", fidelity="lumped", duration=1.0)
+    recorded = record(ride, seed=0)
+    ride.close()
+    env = gym.make("poise/ReplayGain-v0", trajectory=recorded, filter="two-gyro", render_mode="rgb_array")
+    env.reset(seed=0)
+    neutral_steps(env, 2)
+    first = env.render()
+    assert (np.ptp(first.astype(int), axis=2) > 60).mean() > 0.002
+    env.close()
 
 
 def test_a_world_is_not_copied():

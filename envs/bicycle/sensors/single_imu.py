@@ -9,10 +9,10 @@ import numpy as np
 
 from ....filters.core import rotation
 from ...data.trajectory import Trajectory
+from ...sensors.kinds import KINDS
 
 SITES = ("bicycle_imu", "trunk_imu")
 """Sensor sites with a gyroscope and an accelerometer."""
-KINDS = ("gyr", "acc", "mag")
 
 
 def imu_of(trajectory: Trajectory, site: str = "bicycle_imu") -> Trajectory:
@@ -27,7 +27,7 @@ def imu_of(trajectory: Trajectory, site: str = "bicycle_imu") -> Trajectory:
         The same samples, mask and metadata (``name`` gets the site appended), with
 
         * measurements ``imu/gyr`` (rad/s), ``imu/acc`` (m/s²) and, where the site has one, ``imu/mag`` (µT), each
-          ``(T, 3)`` in sensor axes;
+          ``(T, 3)`` in sensor axes, and further channels of the site;
         * truth ``orientation`` ``(T, 4)``, sensor to world: that of the body times the sensor's mounting; ``up``
           ``(T, 3)``, gravity direction (upward) in sensor axes; and where the ride knows them ``angular_rate`` (rad/s,
           sensor axes), ``position`` (m, world, of the sensor), ``gyroscope_bias``, ``accelerometer_bias`` and
@@ -39,12 +39,13 @@ def imu_of(trajectory: Trajectory, site: str = "bicycle_imu") -> Trajectory:
     """
     if site not in SITES:
         raise ValueError(f"site must be one of {list(SITES)}, got {site!r}")
+    prefix = f"{site}/"
     measurements = {
-        f"imu/{kind}": trajectory.measurements[f"{site}/{kind}"]
-        for kind in KINDS
-        if f"{site}/{kind}" in trajectory.measurements
+        f"imu/{name.removeprefix(prefix)}": values
+        for name, values in trajectory.measurements.items()
+        if name.startswith(prefix)
     }
-    missing = [f"{site}/{kind}" for kind in KINDS[:2] if f"imu/{kind}" not in measurements]
+    missing = [f"{site}/{kind}" for kind in ("gyr", "acc") if f"imu/{kind}" not in measurements]
     if missing:
         raise ValueError(f"trajectory {trajectory.name!r} lacks the channels {missing}")
     sensor = sensor_at(trajectory, f"{site}/gyr")
@@ -92,7 +93,8 @@ def sensor_truth(
         found["angular_rate"] = rotation.rotate_back(axes, truth[f"{body}/angular_rate"])
     if f"{body}/position" in truth:
         found["position"] = truth[f"{body}/position"] + rotation.rotate(carrier, lever)
-    for kind in ("gyroscope", "accelerometer", "magnetometer"):
-        if f"{site}/{kind}_bias" in truth:
-            found[f"{kind}_bias"] = truth[f"{site}/{kind}_bias"]
+    kinds = {f"{site}/{kind.bias_name}": kind.bias_name for kind in KINDS.values() if kind.bias_name}
+    for bias, values in truth.items():
+        if bias.startswith(f"{site}/") and bias.endswith("_bias"):
+            found[kinds.get(bias, f"imu/{bias.removeprefix(f'{site}/')}")] = values
     return found

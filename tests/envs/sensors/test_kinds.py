@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 
 import gymnasium
@@ -9,6 +10,11 @@ import numpy as np
 import pytest
 
 import poise
+from poise.envs.bicycle.environment import RiderBicycleEnv
+from poise.envs.bicycle.sensors.single_imu import imu_of
+from poise.envs.bicycle.sensors.sites import BICYCLE_IMU_SITE
+from poise.envs.hand.devices import array_preset
+from poise.envs.hand.sensing import simulate_hand
 from poise.envs.sensors.ideal import BodyState, Mounting
 from poise.envs.sensors.kinds import KINDS, SensorKind, register_sensor_kind, sensor_kind
 from poise.envs.sensors.noise import NoiseModel
@@ -79,6 +85,26 @@ def test_an_unregistered_kind_puts_two_barometers_on_the_bicycle():
     rise = (ride.measurements["frame/bar"] - ride.measurements["back/bar"])[frame, 0] / 0.12
     assert np.all((rise > 0.4) & (rise < 1.2))
     json.dumps(ride.metadata["sensors"], allow_nan=False)
+    assert "test_kinds.<lambda>" in ride.metadata["environment"]["kwargs"]["suite"][1]["kind"]["reading"]
+
+
+def test_a_device_with_an_array_and_an_imu_of_a_ride_keep_their_barometers(barometer):
+    array = array_preset("array-calibrated")
+    preset = dataclasses.replace(array, others={"barometer": NoiseModel(turn_on_bias=1.0, full_scale=1200.0)})
+    flight = simulate_hand("slow", 1, preset, duration=2.0, device="octa")
+    off = flight.measurements["imu/bar"] - flight.truth["imu/bar_bias"]
+    np.testing.assert_allclose(off, pressure(flight.truth["position"][:, 2:]), atol=1e-9)
+    where = Mounting(BICYCLE_IMU_SITE)
+    own = Sensor(Channel("bicycle_imu/bar", 1, "hPa"), barometer, 100.0, preset.others["barometer"], "bicycle", where)
+    env = RiderBicycleEnv(suite=["bicycle_imu/gyr", "bicycle_imu/acc", own], fidelity="lumped", duration=0.5)
+    try:
+        imu = imu_of(poise.record(env, seed=2))
+    finally:
+        env.close()
+    assert list(imu.measurements) == ["imu/gyr", "imu/acc", "imu/bar"]
+    assert {"gyroscope_bias", "accelerometer_bias", "imu/bar_bias"} < set(imu.truth)
+    height = imu.measurements["imu/bar"] - imu.truth["imu/bar_bias"]
+    np.testing.assert_allclose(height, pressure(imu.truth["position"][:, 2:]), atol=1e-9)
 
 
 def test_a_kind_of_contact_forces_reads_what_the_environment_knows():
