@@ -14,12 +14,15 @@ ROOT = Path(__file__).resolve().parents[1]
 LAYERS = ("scripts", "baselines", "envs", "filters")
 COLORS = {"scripts": "#f2e2c9", "baselines": "#d9e8d3", "envs": "#d4e4f1", "filters": "#e6dcee"}
 WIDTH, HEIGHT, GAP, BETWEEN = 130, 28, 10, 24
+TOGETHER = {"filters/core": "filters/core+compile", "filters/compile": "filters/core+compile"}
+"""Folders whose modules import each other in both directions, though no two of them do."""
 SHIPPED = ROOT / "docs" / "figures" / "layers.svg"
 
 
 def room(parts: tuple[str, ...]) -> str:
     """The box of a module: its folder, at most two levels deep; a module beside folders has a box of its own."""
-    return "scripts" if parts[0] == "scripts" else "/".join(parts[:2])
+    name = "scripts" if parts[0] == "scripts" else "/".join(parts[:2])
+    return TOGETHER.get(name, name)
 
 
 def imports(path: Path) -> Iterator[tuple[str, ...]]:
@@ -88,6 +91,7 @@ def rows(graph: dict[str, set[str]]) -> list[list[str]]:
 def draw() -> str:
     """The picture as SVG."""
     graph = edges()
+    lines_down = reduced(graph)
     levels = rows(graph)
     across = max(len(names) for names in levels)
     width, height = across * (WIDTH + GAP) + GAP, len(levels) * (HEIGHT + BETWEEN) + GAP
@@ -104,7 +108,7 @@ def draw() -> str:
                 left + place * (WIDTH + GAP) + 0.5 * WIDTH,
                 GAP + number * (HEIGHT + BETWEEN) + 0.5 * HEIGHT,
             )
-    for name, others in sorted(reduced(graph).items()):
+    for name, others in sorted(lines_down.items()):
         for other in sorted(others):
             (x0, y0), (x1, y1) = middle[name], middle[other]
             lines.append(f'<line x1="{x0:g}" y1="{y0:g}" x2="{x1:g}" y2="{y1 - 0.5 * HEIGHT:g}" stroke="#888"/>')
