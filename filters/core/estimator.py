@@ -102,13 +102,13 @@ def real_numbers(values: Any, what: str) -> np.ndarray:
         ValueError: they are not an array of real numbers; the message begins with ``what``.
     """
     try:
-        array: Any = np.asanyarray(values)
+        array = np.asanyarray(values)
     except ValueError:
         raise ValueError(f"{what} must be an array of real numbers, got rows of different lengths") from None
     if array.dtype.kind not in "fiu":
         raise ValueError(f"{what} must hold real numbers, got dtype {array.dtype}")
     if isinstance(array, np.ma.MaskedArray):
-        return array.astype(float).filled(np.nan)
+        return np.ma.filled(array.astype(float), np.nan)
     return np.asarray(array).astype(float, copy=False)
 
 
