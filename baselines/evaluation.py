@@ -14,12 +14,14 @@ from ..envs.data.plausibility import check_recording
 from ..envs.data.reference_clock import measured
 from ..envs.data.trajectory import REFERENCE_CLOCK, Trajectory
 from ..filters.core.estimator import Estimator
+from ..filters.core.quantity import ORIENTATION
 from ..filters.core.offline import SUFFIX, Offline
 from ..filters.support.parallel import progress_bar
 from .registry import list_estimators, make_estimator
 from .run import fitted, run_on
 from .scoring import (
     COLUMNS,
+    LARGEST_NORTH,
     ONBOARD,
     Row,
     StandIn,
@@ -190,19 +192,10 @@ class Evaluation:
             if self.everyone:
                 poses = {label: with_up(estimate.pose) for label, (_, estimate) in self.estimates.items()}
                 others += [(label, pose) for label, pose in poses.items() if label not in known]
-        found, told = {}, False
+        found = {}
         for label, (estimator, estimate) in self.estimates.items():
             # That an estimator agrees with itself says nothing.
             found[label] = errors(estimator, estimate, self.trajectory, [one for one in others if one[0] != label])
-            offset = heading_offset(estimate, self.trajectory)
-            if offset is not None and not told:
-                told = True
-                warnings.warn(
-                    f"{self.trajectory.name}: the heading of the truth differs from that of {label} by a constant "
-                    f"{offset:.0f}°; likely cause: the x axis of the reference does not point east. Its heading and "
-                    "total errors are this offset",
-                    stacklevel=3,
-                )
             nis = next((value for _, metric, value, _ in found[label] if metric == "nis"), 0.0)
             if nis > LARGEST_NIS.get(family(label), float("inf")):
                 warnings.warn(
@@ -210,7 +203,21 @@ class Evaluation:
                     "expects; likely causes: wrong units or signs, or a motion that goes far away (a vehicle)",
                     stacklevel=3,
                 )
+        self.check_north()
         return found
+
+    def check_north(self) -> None:
+        """Warn if the headings of all estimators differ from the truth's by one and the same angle."""
+        told = [label for label, (_, one) in self.estimates.items() if ORIENTATION.name in one.pose]
+        offsets = [heading_offset(self.estimates[label][1], self.trajectory) for label in told]
+        known = [offset for offset in offsets if offset is not None]
+        if known and len(known) == len(offsets) and max(known) - min(known) < LARGEST_NORTH:
+            warnings.warn(
+                f"{self.trajectory.name}: the heading of the truth differs from that of {', '.join(told)} by a constant "
+                f"{known[0]:.0f}°; likely cause: the x axis of the reference does not point east. Their heading and "
+                "total errors are this offset",
+                stacklevel=4,
+            )
 
 
 def report_findings(trajectory: Trajectory) -> None:

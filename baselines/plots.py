@@ -60,8 +60,8 @@ def save(figure: Figure, path: Path) -> Path:
 def rms_bars(table: pandas.DataFrame, kinds: Mapping[str, str], metric: str = "inclination", title: str = "") -> Figure:
     """Mean error of every estimator as bars, best on top, with each trajectory as a dot.
 
-    The scale is that of the better half of the estimators: what lies beyond is cut, the cut bar is open at its end,
-    and a triangle at the edge tells how many trajectories lie outside and the largest of them.
+    The scale is that of the better half of the estimators: what lies beyond is cut, and a triangle at the edge says
+    so, with the largest value.
 
     Args:
         table: from :func:`poise.evaluate`.
@@ -87,9 +87,10 @@ def rms_bars(table: pandas.DataFrame, kinds: Mapping[str, str], metric: str = "i
         text = f"{mean:.2f}"
         if len(outside):
             ax.plot(limit, position, ">", color="black", markersize=4.5, clip_on=False)
-            text += f"   ({len(outside)} beyond, up to {outside.max():.3g})"
+            text += f"  (largest {outside.max():.3g})"
         ax.text(1.03 * limit, position, text, va="center", fontsize=8.5)
     ax.set_yticks(positions, [str(name) for name in means.index])
+    ax.set_ylim(-0.6, len(means) - 0.4)
     ax.set_xlim(0.0, (1.45 if (chosen["value"] > limit).any() else 1.12) * limit)
     ax.set_xticks([tick for tick in ax.get_xticks() if tick <= 1.001 * limit])
     beyond = ", triangle: cut" if (chosen["value"] > limit).any() else ""

@@ -32,6 +32,10 @@ FORCE_UNITS = {
     "counts of ±16 g in 16 bits": 2048.0,
 }
 """Unit → what an accelerometer at rest reports in it."""
+FIELD_UNITS = {"nT": 1e3, "mG": 10.0, "G": 1e-2, "mT": 1e-3, "T": 1e-6}
+"""Unit → what a magnetometer reports in it for 1 µT."""
+FIELD = (22.0, 68.0)
+"""µT: the earth's field anywhere."""
 PLAUSIBLE_RATES = (5.0, 10_000.0)
 """Hz."""
 FASTEST_TURN = 70.0
@@ -148,6 +152,8 @@ def check_site(trajectory: Trajectory, site: str, wrong_clock: bool) -> list[Fin
         if not wrong_clock:
             findings += check_rates(trajectory, site, gyr, acc, mag if f"{site}/mag" not in dead else None)
         findings += check_rest(f"{site}/gyr", gyr, any(f.channel == f"{site}/gyr" for f in findings))
+    if mag is not None and f"{site}/mag" not in dead:
+        findings += check_field(f"{site}/mag", mag)
     removed = any(f.channel == f"{site}/acc" and f.severity == "warning" for f in findings)
     if acc is not None and not removed:
         findings += check_sign(trajectory, f"{site}/acc", acc, mag if f"{site}/mag" not in dead else None)
@@ -208,6 +214,15 @@ def check_force(channel: str, acc: np.ndarray) -> Iterator[Finding]:
     else:
         remedy = "Calibrate the sensor, or convert to m/s²."
         yield Finding("warning", channel, what, "a scale error, or a unit other than m/s²", remedy)
+
+
+def check_field(channel: str, mag: np.ndarray) -> Iterator[Finding]:
+    """Unit of the magnetometer."""
+    usual = float(np.nanmedian(np.linalg.norm(mag[mag.any(axis=1)], axis=1)))
+    unit = next((unit for unit, scale in FIELD_UNITS.items() if FIELD[0] <= usual / scale <= FIELD[1]), None)
+    if unit is not None and not FIELD[0] <= usual <= FIELD[1]:
+        remedy = "Nothing needs to be done: only the direction of the field is used."
+        yield Finding("note", channel, f"median length {usual:.4g}", f"readings in {unit} instead of µT", remedy)
 
 
 def check_rates(

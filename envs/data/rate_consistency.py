@@ -28,7 +28,9 @@ CLEARLY = 0.6
 
 SCALES: dict[str, float] = {
     "rev/s": 2.0 * np.pi,
+    "half rad/s (another full scale than assumed)": 2.0,
     "rad/s": 1.0,
+    "twice rad/s (another full scale than assumed)": 0.5,
     "rpm": 2.0 * np.pi / 60.0,
     "deg/s": np.pi / 180.0,
     "mrad/s": 1e-3,

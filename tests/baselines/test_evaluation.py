@@ -9,6 +9,7 @@ from poise.baselines.error_table import agreement, summary
 from poise.baselines.evaluation import evaluate
 from poise.baselines.scoring import COLUMNS
 from poise.envs.hand.sensing import simulate_hand
+from poise.filters.core import rotation
 from poise.filters.core.metrics import DEGREES, direction_error, rms
 
 
@@ -227,6 +228,14 @@ def test_a_printed_table_shows_metric_and_value_in_80_columns(trajectory, length
         text = f"{value(table, 'mekf', 'inclination'):.4g}"
         assert any(text in line and "inclination" in line for line in lines)
     assert "more rows" in str(table.loc[np.tile(table.index, 20)])
+
+
+@pytest.mark.parametrize("heading", [-120.0, 60.0])
+def test_a_reference_with_a_north_of_its_own_is_warned_of(trajectory, heading):
+    turn = rotation.from_euler_zyx(np.radians(heading), np.array(0.0), np.array(0.0))
+    truth = {"orientation": rotation.multiply(turn, trajectory.truth_of("orientation"))}
+    with pytest.warns(UserWarning, match=f"by a constant {-heading:.0f}°; likely cause: the x axis"):
+        evaluate(["mekf-9", "bounded-motion-9", "tilt"], trajectory.replace(truth=truth))
 
 
 def test_two_sessions_with_equal_sensor_names_get_their_paths(trajectory, tmp_path):

@@ -124,6 +124,26 @@ def test_dead_channels_are_named(motions, channel, kind):
     assert any(text.startswith(f"imu/{channel}: ") and "Leave" in text for text in found)
 
 
+@pytest.mark.parametrize("gesture", GESTURES)
+@pytest.mark.parametrize("factor", [0.5, 2.0])
+def test_another_full_scale_of_the_gyroscope_is_named(motions, gesture, factor):
+    (found,) = warnings_of(changed(motions[gesture], gyr=lambda values: factor * values))
+    assert "another full scale than assumed" in found
+
+
+@pytest.mark.parametrize(("unit", "scale"), [("nT", 1e3), ("mG", 10.0), ("G", 1e-2)])
+def test_units_of_the_magnetometer_are_noted(motions, unit, scale):
+    (finding,) = check_recording(changed(motions["slow"], mag=lambda values: scale * values))
+    assert finding.severity == "note"
+    assert f"readings in {unit} " in str(finding)
+
+
+@pytest.mark.parametrize("axes", [np.diag([-1.0, 1.0, 1.0]), np.eye(3)[[1, 0, 2]]])
+def test_axes_of_the_magnetometer_are_named(motions, axes):
+    found = warnings_of(changed(motions["slow"], mag=lambda values: values @ axes.T))
+    assert any(text.startswith("imu/mag: gyroscope and magnetometer do not turn together") for text in found)
+
+
 def test_saturation_gaps_and_clock_offsets_are_notes(motions):
     motion = motions["severe"]
     clipped = changed(motion, gyr=lambda values: np.clip(values, -2.0, 2.0))
