@@ -14,8 +14,8 @@ from ..envs.data.plausibility import check_recording
 from ..envs.data.reference_clock import measured
 from ..envs.data.trajectory import REFERENCE_CLOCK, Trajectory
 from ..filters.core.estimator import Estimator
-from ..filters.core.quantity import ORIENTATION
 from ..filters.core.offline import SUFFIX, Offline
+from ..filters.core.quantity import ORIENTATION
 from ..filters.support.parallel import progress_bar
 from .registry import list_estimators, make_estimator
 from .run import fitted, run_on
@@ -213,9 +213,9 @@ class Evaluation:
         known = [offset for offset in offsets if offset is not None]
         if known and len(known) == len(offsets) and max(known) - min(known) < LARGEST_NORTH:
             warnings.warn(
-                f"{self.trajectory.name}: the heading of the truth differs from that of {', '.join(told)} by a constant "
-                f"{known[0]:.0f}°; likely cause: the x axis of the reference does not point east. Their heading and "
-                "total errors are this offset",
+                f"{self.trajectory.name}: the heading of the truth differs from that of {', '.join(told)} by a "
+                f"constant {known[0]:.0f}°; likely cause: the x axis of the reference does not point east. Their "
+                "heading and total errors are this offset",
                 stacklevel=4,
             )
 
