@@ -19,6 +19,7 @@ from typing import Protocol
 import numpy as np
 
 from ...filters.core import rotation
+from ...filters.support.names import look_up
 from ..sensors.ideal import BodyState
 from .controller_gestures import Infinity, Pointing, RateTable, Shaking, Walk
 from .motion import Segment, SegmentedGesture, TurnGesture, match_levels
@@ -298,9 +299,7 @@ def gesture_config(gesture: str | GestureConfig) -> GestureConfig:
         ValueError: unknown name, or not a configuration.
     """
     if isinstance(gesture, str):
-        if gesture not in GESTURES:
-            raise ValueError(f"unknown gesture {gesture!r}; known are {', '.join(GESTURES)}")
-        return GESTURES[gesture]
+        return look_up("gesture", gesture, GESTURES)
     if not callable(getattr(gesture, "draw", None)):
         raise ValueError(
             f"a gesture must be one of {', '.join(GESTURES)} or a configuration with draw, got {gesture!r}"

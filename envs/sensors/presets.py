@@ -16,6 +16,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, Self
 
+from ...filters.support.names import look_up
 from .ideal import STANDARD_GRAVITY
 from .kinds import KINDS
 from .noise import NoiseModel
@@ -204,9 +205,6 @@ def sensor_preset(name: str) -> SensorPreset:
     """The preset of a device.
 
     Raises:
-        ValueError: there is none of that name; the message lists all.
+        ValueError: there is none of that name; the message names the nearest one and lists all.
     """
-    for preset in PRESETS:
-        if preset.name == name:
-            return preset
-    raise ValueError(f"name must be one of {list_sensor_presets()}, got {name!r}")
+    return look_up("sensor preset", name, {preset.name: preset for preset in PRESETS})

@@ -167,7 +167,7 @@ def test_recordings_are_read_from_files(tmp_path, trajectory):
         ({"reward": "fame"}, "reward must be"),
         ({"consistency": -1.0}, "consistency must be"),
         ({"gesture": "wave"}, "unknown gesture 'wave'"),
-        ({"sensors": "nose"}, "name must be one of"),
+        ({"sensors": "nose"}, "unknown sensor preset 'nose'"),
         ({"rate": 0.0}, "rate must be at least 1 Hz"),
         ({"rate": ()}, "rates must not be empty"),
         ({"noise_scale": (2.0, 1.0)}, "noise_scale must be"),

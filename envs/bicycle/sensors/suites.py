@@ -98,7 +98,7 @@ def suite_channels(name: str | Sequence[str | Sensor]) -> tuple[tuple[str, ...],
     """
     if isinstance(name, str):
         if name not in SUITES:
-            raise ValueError(f"name must be one of {list_bicycle_suites()} or a list of channels, got {name!r}")
+            raise ValueError(f"suite must be one of {list_bicycle_suites()} or a list of channels, got {name!r}")
         return SUITES[name][0], (), SUITES[name][1]
     own = tuple(each for each in name if isinstance(each, Sensor))
     names = tuple(each for each in name if not isinstance(each, Sensor))

@@ -272,7 +272,7 @@ def test_a_whole_suite_may_be_given():
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"gesture": "wave"}, "known are rest, slow"),
+        ({"gesture": "wave"}, r"\(gestures: rest, slow"),
         ({"drive": "magic"}, "drive must be"),
         ({"sensors": "nonsense"}, "nonsense"),
         ({"duration": -1.0}, "duration must be positive"),

@@ -149,7 +149,7 @@ def test_pieces_are_twice_continuously_differentiable():
 
 def test_bad_gestures_are_refused_by_name():
     generator = np.random.default_rng(0)
-    with pytest.raises(ValueError, match=r"unknown gesture 'wave'; known are rest, slow"):
+    with pytest.raises(ValueError, match=r"unknown gesture 'wave' \(gestures: rest, slow"):
         make_gesture("wave", generator)
     with pytest.raises(ValueError, match="duration must be positive"):
         make_gesture("slow", generator, 0.0)

@@ -202,5 +202,5 @@ def test_preset_units():
     paper = sensor_preset("paper-hand")
     measured, _ = NoiseProcess(paper.gyroscope, 1, 100.0, np.random.default_rng(0)).sequence(np.zeros((10_000, 1)))
     assert np.std(measured) == pytest.approx(0.01, rel=0.05)
-    with pytest.raises(ValueError, match=r"name must be one of .*'ideal'.*, got 'nothing'"):
+    with pytest.raises(ValueError, match=r"unknown sensor preset 'nothing' \(sensor presets: ideal, .*st-lsm6dsox"):
         sensor_preset("nothing")

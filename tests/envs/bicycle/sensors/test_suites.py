@@ -254,7 +254,7 @@ def test_fixture_has_a_disk_instead_of_a_rider():
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"name": "three-gyro"}, "name must be one of"),
+        ({"name": "three-gyro"}, "suite must be one of"),
         ({"name": ["wheel/sound"]}, "channels must be different ones"),
         ({"name": ["wheel/speed", "wheel/speed"]}, "channels must be different ones"),
         ({"name": []}, "channels must be different ones"),
