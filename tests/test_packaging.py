@@ -158,6 +158,7 @@ def test_the_citation_file_names_the_five_works() -> None:
     citation = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
     assert citation["cff-version"] == "1.2.0"
     assert str(citation["version"]) == PYPROJECT["project"]["version"]
+    assert PYPROJECT["project"]["authors"] == citation["authors"]
     assert {"message", "title", "authors"} <= set(citation)
     works = {
         work["doi"] if "doi" in work else work["title"]: work["authors"][0]["family-names"]
