@@ -1,4 +1,4 @@
-"""The thesis' arrays of accelerometers, by name; what an array is lies in :mod:`.arrays.geometry`.
+"""Registry of the accelerometer arrays of the thesis; :mod:`.arrays.geometry` defines what an array is.
 
 P. He, "Estimating the orientation of a game controller from inertial and magnetic measurements", thesis, Université
 Laval; sections 2.3 (OCTA), 3.1 (planar controller), 4.1 and 4.2 (controller).
@@ -19,8 +19,8 @@ from .geometry import AccelerometerArray, PlanarArray
 def controller(half_length: float = 0.12) -> AccelerometerArray:
     """The controller with a triaxial accelerometer at either end, ``half_length`` m from its middle along y.
 
-    The thesis gives 0.12 m (section 4.1) and 0.15 m (section 4.2, and half of the length of 0.3 m). Rank 6: it needs a
-    gyroscope.
+    The thesis gives 0.12 m (section 4.1) and 0.15 m (section 4.2, and half of the length of 0.3 m). The rank is 6, so a
+    gyroscope is needed.
     """
     e = ((1, 0, 0), (0, 1, 0), (0, 0, 1), (-1, 0, 0), (0, -1, 0), (0, 0, 1))
     r = (*((0, half_length, 0),) * 3, *((0, -half_length, 0),) * 3)
@@ -34,10 +34,10 @@ def planar_controller(half_length: float = 0.15) -> PlanarArray:
 
 
 def recorded_channel(array: AccelerometerArray) -> Channel:
-    """The channel in which recordings keep the readings: ``imu/acc`` for one triaxial accelerometer, else its own.
+    """Channel of the readings in recordings: ``imu/acc`` for one triaxial accelerometer, else that of the array.
 
-    One triaxial accelerometer is three axes along x, y, z at one place, as exactly as chips are built: within 5° and
-    2 cm, so that one whose axes were calibrated is the same still.
+    A triaxial accelerometer has three axes along x, y, z at one point, within the tolerances of a chip (5° and 2 cm).
+    One with calibrated axes therefore still counts.
     """
     if array.dimension != 3 or array.size != 3:
         return array.channel

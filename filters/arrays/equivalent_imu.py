@@ -1,4 +1,4 @@
-"""One triaxial accelerometer out of an array, for filters that know of nothing else."""
+"""Conversion of an array to one triaxial accelerometer, for filters of a single IMU."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from .array import AccelerometerArray
 def array_to_imu(array: AccelerometerArray, readings: Array) -> Array:
     """Specific force at the array's reference point ``(..., 3)``, m/s², body axes, by least squares.
 
-    An array of full rank separates it from angular acceleration and rates (ẑ = A⁺â). One of lower rank is taken as if
-    it did not turn (A_P⁺â), which is right where the contributions of turning cancel, as in the controller: its two
-    accelerometers sit opposite each other.
+    An array of full rank separates it from angular acceleration and rates (ẑ = A⁺â). For an array of lower rank the
+    rotation is neglected (A_P⁺â). This is exact where its contributions cancel, as in the controller, whose two
+    accelerometers are placed symmetrically.
 
     Args:
         array: a spatial one.

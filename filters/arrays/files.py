@@ -13,10 +13,10 @@ from .array import ARRAYS, AccelerometerArray, PlanarArray
 
 
 def read_array(described: Mapping[str, Any]) -> AccelerometerArray:
-    """An array from ``positions``, ``axes`` and, if wanted, ``name`` and ``reference``; planar if rows have 2 numbers.
+    """An array from ``positions``, ``axes`` and optionally ``name`` and ``reference``; planar if rows have 2 numbers.
 
     Raises:
-        ValueError: a name is missing or unknown, or what the constructor refuses.
+        ValueError: a key is missing or unknown, or the constructor rejects a value.
     """
     unknown = sorted(set(described) - {"name", "positions", "axes", "reference"})
     missing = sorted({"positions", "axes"} - set(described))
@@ -42,7 +42,7 @@ class ArrayEquations(Equations):
     def parameters_from(cls, metadata: Mapping[str, Any]) -> dict[str, Any]:
         """The array of ``metadata["device"]``, and whether it has a gyroscope, where the equations have that field."""
         device = metadata.get("device")
-        # recordings of one IMU may name their sensor here
+        # recordings of one IMU may have the name of their sensor here
         if not isinstance(device, Mapping) or device.get("array") is None:
             return {}
         parameters: dict[str, Any] = {"array": read_array(device["array"])}
@@ -52,7 +52,7 @@ class ArrayEquations(Equations):
 
 
 def load_array(source: str | Path) -> AccelerometerArray:
-    """The array of a name (:data:`ARRAYS`) or of a JSON file: what :func:`read_array` takes, or a calibration record.
+    """The array with a name of :data:`ARRAYS`, or from a JSON file as for :func:`read_array`, or a calibration record.
 
     Raises:
         ValueError: neither a known name nor a file, or a file that does not describe an array.
@@ -73,25 +73,25 @@ def load_array(source: str | Path) -> AccelerometerArray:
         parts = details.values() if isinstance(details, dict) else ()
         found = [part["array"] for part in parts if isinstance(part, dict) and isinstance(part.get("array"), dict)]
         if not found:
-            raise ValueError(f"{path} is a calibration record without accelerometers: it holds no array")
+            raise ValueError(f"{path} is a calibration record without accelerometers and contains no array")
         return read_array(found[0])
     return read_array({"name": path.stem} | described)
 
 
 UNITS = {"P": "m/s²", "T": "rad/s²", "C": "rad²/s²"}
-"""Of the entries of z, by block."""
+"""Units of the entries of z, by block."""
 
 
 def describe_array(array: AccelerometerArray, deviation: float = 1.0) -> list[dict[str, Any]]:
-    """What the readings of an array determine: a row for each entry of z.
+    """Quantities that the readings of an array determine: one row for each entry of z.
 
     Args:
-        array: which.
+        array: the array.
         deviation: σ_a of one accelerometer, m/s².
 
     Returns:
-        Rows with ``quantity``, ``determined``, ``deviation`` (of its estimate; None where it is not determined) and its
-        ``unit``.
+        Rows with ``quantity``, ``determined``, ``deviation`` (standard deviation of the estimate; None where the
+        quantity is not determined) and ``unit``.
     """
     unit_of = [UNITS[block] for block, part in array.blocks.items() for _ in range(part.stop - part.start)]
     columns = zip(array.components, array.determined, array.noise_gains, unit_of, strict=True)

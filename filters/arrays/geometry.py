@@ -1,17 +1,17 @@
-r"""Arrays of uniaxial accelerometers: where they sit, what they read, what can be computed from it, how noisily.
+r"""Arrays of uniaxial accelerometers: geometry, readings, the quantities they determine, and their noise.
 
 P. He, "Estimating the orientation of a game controller from inertial and magnetic measurements", thesis, Université
 Laval; chapters 2 (spatial) and 3 (planar). Sensor i at r_i from the reference point B, along the unit vector e_i, reads
 
     a_i = e_iᵀ(b̈ − Qᵀg) + (r_i × e_i)ᵀ α + (Σ_i e_i)ᵀ ξ(ω)               a = A z,   A = [A_P  A_T  A_C]
 
-with all vectors in body axes; b̈ − Qᵀg is the specific force at B (+9.81 m/s² on an axis that points up at rest). In the
-vertical plane (body axes x, y; angle φ counter-clockwise; E the quarter turn that carries x to y)
+with all vectors in body axes; b̈ − Qᵀg is the specific force at B (+9.81 m/s² on an axis that points up at rest). In
+the vertical plane (body axes x, y; angle φ counter-clockwise; E the quarter turn that carries x to y)
 
     a_i = e_iᵀ(b̈ − Qᵀg) + e_iᵀE r_i α − e_iᵀr_i ω²                        z = [(b̈ − Qᵀg)ᵀ, α, ω²]ᵀ
 
-Differs from print: (2.9), (2.10) index of r; Σ_i below (2.11) transposed; (3.9), (3.10) have the columns of α and ω²
-swapped and the sign of ω² lost, and (3.10) misses that b̈ is meant in body axes. ẑ = A⁺â has the covariance σ_a² B.
+Errata: (2.9), (2.10) have a wrong index of r; Σ_i below (2.11) is transposed; (3.9), (3.10) swap the columns of α and
+ω² and lose the sign of ω²; in (3.10) b̈ must be in body axes. ẑ = A⁺â has the covariance σ_a² B.
 """
 
 # ruff: noqa: N802 — matrices keep the letters of the source
@@ -43,20 +43,20 @@ def _frozen(matrix: np.ndarray) -> np.ndarray:
 class AccelerometerArray:
     """Uniaxial accelerometers on a rigid body that moves in space.
 
-    A frozen value: as a field of a filter it belongs to the filter's structure. Lists and arrays are accepted.
+    A frozen value: as a field of a filter it is part of the structure of the filter. Lists and arrays are accepted.
 
     Raises:
-        ValueError: rows of another length than 3, numbers that are not finite, an axis that is no unit vector, not as
-            many axes as positions, or no sensor at all.
+        ValueError: rows of another length than 3, numbers that are not finite, an axis that is not a unit vector,
+            different numbers of axes and positions, or no sensor at all.
     """
 
     positions: Rows
-    """one row a sensor, m, body axes, from any origin"""
+    """one row per sensor, m, body axes, from any origin"""
     axes: Rows
-    """one row a sensor: the unit vector along which it reads, body axes"""
+    """one row per sensor: unit vector of the sensitive axis, body axes"""
     name: str = "array"
     reference: tuple[float, ...] = ()
-    """the point B whose acceleration is spoken of, m, same origin as the positions; empty for the origin"""
+    """reference point B of the acceleration, m, same origin as the positions; empty for the origin"""
 
     dimension: ClassVar[int] = 3
     components: ClassVar[tuple[str, ...]] = (
@@ -81,12 +81,12 @@ class AccelerometerArray:
 
     @property
     def size(self) -> int:
-        """How many sensors, m."""
+        """Number of sensors, m."""
         return len(self.axes)
 
     @property
     def channel(self) -> Channel:
-        """The channel that holds the readings: ``array/acc``, m/s² along each axis."""
+        """Channel of the readings: ``array/acc``, m/s² along each axis."""
         return Channel("array/acc", self.size, "m/s²")
 
     @cached_property
@@ -121,7 +121,7 @@ class AccelerometerArray:
 
     @cached_property
     def pseudo_inverse(self) -> np.ndarray:
-        """A⁺, ``(12, m)``: gives the z of least length where the array leaves something open."""
+        """A⁺, ``(12, m)``: the minimum-norm z where the array does not determine all entries."""
         return _frozen(np.linalg.pinv(self.A))
 
     @cached_property
@@ -131,17 +131,17 @@ class AccelerometerArray:
 
     @property
     def B_P(self) -> np.ndarray:
-        """Block of :attr:`B` of the specific force."""
+        """Block of :attr:`B` for the specific force."""
         return self._block("P", "P")
 
     @property
     def B_T(self) -> np.ndarray:
-        """Block of :attr:`B` of the angular acceleration."""
+        """Block of :attr:`B` for the angular acceleration."""
         return self._block("T", "T")
 
     @property
     def B_C(self) -> np.ndarray:
-        """Block of :attr:`B` of the products of angular rates."""
+        """Block of :attr:`B` for the products of angular rates."""
         return self._block("C", "C")
 
     @property
@@ -154,18 +154,18 @@ class AccelerometerArray:
 
     @cached_property
     def rank(self) -> int:
-        """Rank of A: how many combinations of z the readings determine."""
+        """Rank of A: number of combinations of z that the readings determine."""
         return int(np.linalg.matrix_rank(self.A))
 
     @property
     def condition_number(self) -> float:
-        """Largest over smallest singular value of A; infinite where A leaves something open."""
+        """Largest over smallest singular value of A; infinite where A does not determine all of z."""
         values = np.linalg.svd(self.A, compute_uv=False)
         return float(values[0] / values[-1]) if self.rank == self.A.shape[1] else math.inf
 
     @property
     def redundancy(self) -> int:
-        """How many independent checks the readings allow: sensors minus rank; 0 means that a fault cannot be seen."""
+        """Number of independent consistency checks (sensors minus rank); with 0 a fault cannot be detected."""
         return self.size - self.rank
 
     @cached_property
@@ -199,13 +199,15 @@ class AccelerometerArray:
         """
         if self.rank < self.A.shape[1]:
             open_ = [name for name, known in zip(self.components, self.determined, strict=True) if not known]
-            raise ValueError(f"array {self.name!r} has rank {self.rank} of {self.A.shape[1]}: {open_} stay open")
+            raise ValueError(
+                f"array {self.name!r} has rank {self.rank} of {self.A.shape[1]}: {open_} are not determined"
+            )
         z = (constant(self.pseudo_inverse, readings) @ readings[..., None])[..., 0]
         return z[..., self.blocks["P"]], z[..., self.blocks["T"]], z[..., self.blocks["C"]]
 
     @staticmethod
     def square(angular_rate: Array) -> Array:
-        """What the array sees of the angular rate: ξ(ω) ``(..., 6)`` (planar: ω² ``(..., 1)``)."""
+        """Function of the angular rate in z: ξ(ω) ``(..., 6)`` (planar: ω² ``(..., 1)``)."""
         return products(angular_rate)
 
     def about(self, reference: Sequence[float]) -> Self:
@@ -213,7 +215,7 @@ class AccelerometerArray:
         return type(self)(self.positions, self.axes, self.name, tuple(map(float, reference)))
 
     def describe(self) -> dict[str, Any]:
-        """Everything about it, for JSON; :func:`.arrays.files.read_array` turns it back."""
+        """Complete description for JSON; the inverse is :func:`.arrays.files.read_array`."""
         return {
             "name": self.name,
             "positions": [list(row) for row in self.positions],
@@ -247,7 +249,7 @@ class PlanarArray(AccelerometerArray):
 
     @staticmethod
     def square(angular_rate: Array) -> Array:
-        """What the array sees of the angular rate: ω², ``(..., 1)``."""
+        """Function of the angular rate in z: ω², ``(..., 1)``."""
         return angular_rate * angular_rate
 
 

@@ -1,11 +1,11 @@
-r"""Products of angular rates ξ(ω): what an array of accelerometers sees as centripetal acceleration.
+r"""Products of angular rates ξ(ω), which determine the centripetal accelerations of an array.
 
 P. He, "Estimating the orientation of a game controller from inertial and magnetic measurements", thesis, Université
 Laval; chapter 2. ω × (ω × r) = Σᵀ ξ with
 
     ξ = [ω_x², ω_y², ω_z², ω_yω_z, ω_zω_x, ω_xω_y]ᵀ,   Σᵀ = [diag(r) − r 1ᵀ   sm(r)]
 
-Differs from print: below (2.11) Σᵀ is printed transposed. All functions broadcast over leading dimensions and work on
+Erratum: below (2.11) Σᵀ is transposed. All functions broadcast over leading dimensions and work on
 arrays and traced expressions.
 """
 

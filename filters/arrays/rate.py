@@ -5,34 +5,34 @@ Laval; chapter 2 and appendix A; equation numbers are the thesis'. The readings 
 the products ξ̂ of angular rates, ẑ = A⁺â, which determine the rate in two ways:
 
     ω_TI = ω̂_{k−1} + ½ Δt (α̂_{k−1} + α̂_k)                                   time integration (2.15): drifts
-    N = sm(ξ̂₂) + diag(ξ̂₁) + (1ᵀξ̂₁) 1,   ω_PR = ± √(λ_max(N)/2) v_max(N)      polynomial roots (2.17): blunt near rest
+    N = sm(ξ̂₂) + diag(ξ̂₁) + (1ᵀξ̂₁) 1,   ω_PR = ± √(λ_max(N)/2) v_max(N)      polynomial roots (2.17): imprecise at rest
 
-with the sign that agrees with ω_TI. The weighted method takes ω̂ = D ω_TI + (1 − D) ω_PR, D = diag(w), with the weights
-of least variance (2.48). With σ_a² taken out, J = ∂ω_PR/∂ξ and primes for the sample before,
+with the sign that agrees with ω_TI. The weighted method is ω̂ = D ω_TI + (1 − D) ω_PR, D = diag(w), with weights of
+minimum variance (2.48). With covariances divided by σ_a², J = ∂ω_PR/∂ξ and primes for the previous sample,
 
     J = |ω|⁻² (1 − ¾ ωωᵀ/|ω|²) Ψ,   Ψ = [ω1ᵀ + diag(ω)  sm(ω)],   C = J B_C Jᵀ,   M = Δt J B_TCᵀ
     S = (1 − D') J' B_TCᵀ,   T = ¼ Δt² (2 B_T + B_T D' + D' B_T) + ½ Δt (S + Sᵀ)
     w_i = (C − ½ M)_ii / (Σ' + T − M + C)_ii
     Σ = D (Σ' + T) D + ½ (1 − D) M D + ½ D Mᵀ (1 − D) + (1 − D) C (1 − D)                                        (2.44)
 
-Differs from print: J has the other sign (2.39), one ω throughout instead of ω_TI and ω_PR mixed in Ψ (2.41), and S is
-not lost (2.27, 2.32, 2.34): the error of the last estimate holds that of the last ξ̂ too. Only the first one, which is
-known, holds no error of α̂ (w₀ = 1 says it does). ``variant`` chooses where J is formed: ``sound`` at ω_TI,
-``corrected`` at ω_PR, as the thesis means it; ``printed`` is print with its slips. Near rest ω_PR never falls below
-√|δξ|, which makes J look small and the weight fall just when ω_PR is useless; ω_TI has no such floor. Weights are
-clipped to [0, 1]: above 1 do occur. Where J has no meaning (below :data:`SLOWEST`) the weight is 1.
+Errata: J has the opposite sign in (2.39); Ψ in (2.41) mixes ω_TI and ω_PR; (2.27), (2.32) and (2.34) omit S, the
+correlation of the last estimate with the last ξ̂. The first estimate is known and has no error of α̂, contrary to
+w₀ = 1. ``variant`` selects where J is evaluated: ``sound`` at ω_TI, ``corrected`` at ω_PR as the thesis intends;
+``printed`` is as published. Near rest the magnitude of ω_PR does not fall below √|δξ|. J at ω_PR is then too small, and
+the weight falls just where ω_PR carries no information; ω_TI has no such lower limit. Weights are clipped to [0, 1],
+since values above 1 occur. Where J is not defined (below :data:`SLOWEST`) the weight is 1.
 
-K. Parsa's method (appendix A) corrects ω_TI by one Gauss–Newton step to ξ̂ and feeds that back; its normal matrix is
-singular at ω = 0 only, not, as (2.55) has it, wherever one component vanishes.
+K. Parsa's method (appendix A) corrects ω_TI by one Gauss–Newton step towards ξ̂ and integrates from the result. Its
+normal matrix is singular only at ω = 0, not wherever one component vanishes (2.55).
 
-The thesis knows no biases, but they dominate real data: a constant error of α̂ is all that is integrated while the
-roots are blind. With ``bias_noise`` above 0 (ours, not the thesis') the weighted method estimates it too, by axis, as a
-Kalman filter of (ω, β) does whose variance of ω is that of Σ: with p = cov(ω, β), u = var β,
+The thesis does not model biases, but they dominate real data: near rest, where the roots carry no information, a
+constant error of α̂ is integrated. With ``bias_noise`` above 0 (an addition to the thesis) the weighted method also
+estimates it, axis by axis, like a Kalman filter of (ω, β) with Σ as the variance of ω. With p = cov(ω, β), u = var β,
 
     ω_TI ← ω_TI − Δt β̂,   Σ' ← Σ' + diag(Δt² u − 2 Δt p),   p ← p − Δt u,   u ← u + Δt u₀/τ
     β̂ ← β̂ + k (ω_PR − ω_TI),   k = p / (Σ' + T − M + C)_ii,   u ← u − k p,   p ← w p
 
-Scale and alignment errors remain. The first rate must be known.
+Scale and alignment errors are not estimated. The first rate must be known.
 """
 
 from __future__ import annotations
@@ -55,21 +55,21 @@ Method = Literal["weighted", "time-integration", "polynomial-roots", "parsa"]
 Variant = Literal["sound", "corrected", "printed"]
 
 COVARIANCE = Quantity("angular_rate_covariance", "vector", 9, "rad²/s²")
-"""Σ of the weighted method, row by row."""
+"""Σ of the weighted method, row-major."""
 WEIGHTS = Quantity("array-rate/weights", "vector", 3, "1")
 """w of the weighted method: 1 is time integration, 0 polynomial roots."""
 
 SLOWEST = 1e-4
-"""rad/s: below this |ω| polynomial roots are left out"""
+"""rad/s: below this |ω| polynomial roots are not used"""
 RIDGE = 1e-9
-"""rad²/s², on the normal matrix of Parsa's method, regular but for ω = 0"""
+"""rad²/s², added to the normal matrix of Parsa's method, which is singular at ω = 0 only"""
 UNIT = np.eye(3)
 
 
 def polynomial_roots(xi: Array) -> Array:
     """ω_PR ``(..., 3)`` from products ξ ``(..., 6)``, up to its sign: the ω that comes closest to ξ (2.17).
 
-    Of all eigenvectors that of the largest eigenvalue is the global minimum; where no eigenvalue is positive it is 0.
+    The eigenvector of the largest eigenvalue is the global minimum. Where no eigenvalue is positive, ω_PR is 0.
     """
     xp = namespace(xi)
     trace = xp.sum(xi[..., :3], axis=-1)[..., None, None]
@@ -89,7 +89,7 @@ def roots_jacobian(rate: Array) -> Array:
 
 
 def printed_jacobian(xi: Array, integrated: Array, roots: Array) -> Array:
-    """Z⁻¹ Ψ as (2.41) and (2.42) print it: of the wrong sign, at noisy ξ, with both rates in Ψ."""
+    """Z⁻¹ Ψ as published in (2.41) and (2.42): wrong sign, at noisy ξ, with both rates in Ψ."""
     xp = namespace(xi)
     square = xp.sum(xi[..., :3] ** 2, axis=-1) + 2.0 * xp.sum(xi[..., 3:] ** 2, axis=-1)
     square = xp.where(xp.greater(square, SLOWEST**4), square, SLOWEST**4 + 0.0 * square)[..., None, None]
@@ -99,7 +99,7 @@ def printed_jacobian(xi: Array, integrated: Array, roots: Array) -> Array:
 
 
 def _square_length(rate: Array) -> Array:
-    """|ω|² ``(..., 1, 1)``, not below that of :data:`SLOWEST`."""
+    """|ω|² ``(..., 1, 1)``, at least that of :data:`SLOWEST`."""
     xp = namespace(rate)
     square = xp.sum(rate * rate, axis=-1)[..., None, None]
     return xp.where(xp.greater(square, SLOWEST**2), square, SLOWEST**2 + 0.0 * square)
@@ -114,7 +114,7 @@ def parsa_step(rate: Array, xi: Array) -> Array:
 
 @dataclass(frozen=True)
 class ArrayRate(ArrayEquations, Recurrence):
-    """The weighted method, and the three that it is compared with.
+    """The weighted method and three others for comparison.
 
     State: ω (3); for the weighted method also Σ/σ_a² (9), w (3), (S + Sᵀ)/σ_a² (9), β̂ (3), p/σ_a² and u/σ_a² (3 each).
     Where a reading is missing, the last valid readings are integrated.
@@ -124,23 +124,23 @@ class ArrayRate(ArrayEquations, Recurrence):
     """
 
     array: AccelerometerArray = OCTA
-    """where the accelerometers sit; it must be of full rank (OCTA is), which takes twelve of them at least"""
+    """the accelerometer array; it must have full rank (as OCTA), which requires at least twelve accelerometers"""
     method: Method = "weighted"
-    """``polynomial-roots`` chooses its sign by its own last value, ``parsa`` and ``weighted`` by ω_TI"""
+    """``polynomial-roots`` takes the sign of its own last value, ``parsa`` and ``weighted`` that of ω_TI"""
     variant: Variant = "sound"
-    """of the weighted method: where J is formed, see the head of this file"""
+    """of the weighted method: where J is evaluated, see the module docstring"""
     start: Literal["known", "gyroscope"] = "known"
     """where the first rate comes from: ``initial_rate``, or the first sample of ``imu/gyr``"""
     initial_rate: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """ω₀, rad/s, body axes; from rest by default"""
     initial_noise: float = 0.0
-    """standard deviation of ω₀, rad/s; with 0 for it and for ``bias_noise`` σ_a does not matter for the rate"""
+    """standard deviation of ω₀, rad/s; if this and ``bias_noise`` are 0, the rate does not depend on σ_a"""
     accelerometer_noise: float = 0.1
-    """σ_a, m/s² per sample: scales the covariance; 0.022 is the data sheet's of OCTA, 0.1 covers calibration errors"""
+    """σ_a, m/s² per sample: scales the covariance; 0.022 is OCTA's data sheet, 0.1 covers calibration errors"""
     bias_noise: float = 0.1
     """standard deviation of the constant errors of the readings, m/s²; 0 is the thesis' method, without biases"""
     bias_time: float = 4e4
-    """s: in this time the biases may change by ``bias_noise``"""
+    """s: time in which the biases change by ``bias_noise``"""
 
     full_outputs: ClassVar[tuple[Quantity, ...]] = (ANGULAR_RATE, COVARIANCE, WEIGHTS)
 
@@ -149,27 +149,27 @@ class ArrayRate(ArrayEquations, Recurrence):
         check_positive(self, "accelerometer_noise", "bias_time")
         if self.array.dimension != 3 or self.array.rank < 12:
             raise ValueError(
-                f"array {self.array.name!r} must be spatial and of rank 12 to determine an angular rate by itself, "
+                f"array {self.array.name!r} must be spatial and of rank 12 to determine the angular rate alone, "
                 f"got dimension {self.array.dimension}, rank {self.array.rank}"
             )
 
     @property
     def channels(self) -> tuple[Channel, ...]:  # type: ignore[override]
-        """The readings of the array; the gyroscope too if it starts the method."""
+        """The readings of the array; the gyroscope too if it gives the first rate."""
         return (self.array.channel, GYROSCOPE) if self.start == "gyroscope" else (self.array.channel,)
 
     @property
     def outputs(self) -> tuple[Quantity, ...]:  # type: ignore[override]
-        """The rate; of the weighted method its covariance and the weights too."""
+        """The rate; for the weighted method also its covariance and the weights."""
         return self.full_outputs if self.method == "weighted" else self.full_outputs[:1]
 
     @property
     def state_size(self) -> int:  # type: ignore[override]
-        """Numbers in the state."""
+        """Size of the state."""
         return 33 if self.method == "weighted" else 3
 
     def prior(self, z: Measurement) -> Array:
-        """The known rate, w = 1, S = 0; nothing before the first complete readings."""
+        """The known rate, w = 1, S = 0; NaN before the first complete readings."""
         a = z[self.array.channel.name]
         xp, zero = namespace(a), 0.0 * a[..., :3]
         start = [zero[..., :1] + expand(value, 1) for value in self.initial_rate]
@@ -180,7 +180,7 @@ class ArrayRate(ArrayEquations, Recurrence):
         variance = zero[..., :1] + expand(self.initial_noise**2 / self.accelerometer_noise**2, 1)
         bias = zero + expand(self._bias_ratio(self.bias_noise), 1) * self._spread(a)
         covariance = variance * constant(UNIT.ravel(), a)
-        # (2.32) takes w₀ = 1 for an error of ω₀ that holds that of α̂₀, but ω₀ is known apart from it: S₀ undoes this
+        # with w₀ = 1, (2.32) assumes that ω₀ shares the error of α̂₀, but ω₀ is known independently: S₀ cancels this
         none = 0.0 if self.variant == "printed" else -expand(self.dt, 1)
         shared = zero[..., :1] + none * constant(self.array.B_T.ravel(), a)
         return xp.concat([rate, covariance, zero + 1.0, shared, zero, zero, bias], axis=-1)
@@ -200,7 +200,7 @@ class ArrayRate(ArrayEquations, Recurrence):
         return xp.concat([rate - dt * bias, known, x[..., 12:27], shared - dt * own, own + drift], axis=-1)
 
     def finish(self, x: Array, z: Measurement) -> Array:
-        """Polynomial roots join in; without readings the integrated rate stays."""
+        """Combine with polynomial roots; without readings keep the integrated rate."""
         if self.method == "time-integration":
             return x
         xp, a = namespace(x), z[self.array.channel.name]
@@ -230,10 +230,10 @@ class ArrayRate(ArrayEquations, Recurrence):
         at = rate if self.variant == "sound" else roots
         J = printed_jacobian(xi, rate, roots) if self.variant == "printed" else roots_jacobian(at)
         B_C, B_CT = constant(self.array.B_C, x), constant(self.array.B_TC.T, x)
-        # C = J B_C Jᵀ and M = Δt J B_TCᵀ of the head of this file; ``known`` is Σ' + T
+        # C = J B_C Jᵀ and M = Δt J B_TCᵀ of the module docstring; ``known`` is Σ' + T
         C, JB, known = J @ B_C @ J.mT, J @ B_CT, xp.reshape(x[..., 3:12], (*x.shape[:-1], 3, 3))
         M = dt * JB
-        # w_i (2.48): least variance by axis, clipped to [0, 1]
+        # w_i (2.48): minimum variance per axis, clipped to [0, 1]
         top = _diagonal_of(C) - 0.5 * _diagonal_of(M)
         bottom = _diagonal_of(known - M + C)
         moving = xp.greater(xp.sum(at * at, axis=-1)[..., None], SLOWEST**2)

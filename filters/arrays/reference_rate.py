@@ -1,11 +1,11 @@
-r"""Angular rate from tracked orientations, to compare estimates with.
+r"""Angular rate from tracked orientations, as a reference for estimates.
 
 P. He, thesis, Université Laval; sections 2.3.2 and 5.5. The entries of the rotation matrices Q (body to world) are
 smoothed by a first-order low-pass run forwards and backwards, then
 
     Q̇_k = (Q_{k+1} − Q_{k−1}) / (2 Δt),   [ω]× = ½ (QᵀQ̇ − (QᵀQ̇)ᵀ)  in body axes                  (2.50), (5.61)
 
-Differs from print: (2.51), (2.52) have Q Q̇ᵀ, which is −[ω]× in world axes; (5.61) agrees with the above.
+Errata: (2.51), (2.52) have Q Q̇ᵀ, which is −[ω]× in world axes; (5.61) agrees with the above.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from ..core.rotation import to_matrix
 
 
 def reference_rate(orientation: np.ndarray, dt: float, cutoff: float | None = 5.0) -> np.ndarray:
-    """Angular rate ``(T, 3)`` in body axes, rad/s; the first and the last are NaN.
+    """Angular rate ``(T, 3)`` in body axes, rad/s; the first and the last row are NaN.
 
     Args:
         orientation: ``(T, 4)`` unit quaternions w, x, y, z, body to world; signs may change.
         dt: interval, s.
-        cutoff: of the low-pass, Hz, as run one way (section 5.5: 5 Hz); None leaves the orientations as they are.
+        cutoff: of one pass of the low-pass, Hz (section 5.5: 5 Hz); None does not filter the orientations.
 
     Raises:
         ValueError: a wrong shape, fewer than three orientations, one that is not finite, or a ``dt`` or ``cutoff``

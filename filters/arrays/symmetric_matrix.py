@@ -1,8 +1,8 @@
 r"""Largest eigenvalue of a symmetric 3 × 3 matrix with its vector, without branches and for every array namespace.
 
-It comes from a fixed number of sweeps of Jacobi rotations: unlike the trigonometric formula, whose vectors are lost
-where two eigenvalues meet, these are exact to rounding for every matrix, and straight code all the same. Each rotation
-makes one element zero with
+A fixed number of sweeps of Jacobi rotations has no branches and is exact to rounding for every matrix. The
+trigonometric formula, in contrast, loses the vectors where two eigenvalues coincide. Each rotation eliminates one
+element with
 
     t = 2 a_pq / (d + sign(d) √(d² + 4 a_pq²)),   d = a_qq − a_pp,   c = 1/√(1 + t²),   s = t c
 
@@ -14,14 +14,14 @@ from __future__ import annotations
 from ..core.backend import Array, namespace
 
 SWEEPS = 4
-"""Each of three rotations; three leave up to 10⁻⁵ of the norm beside the diagonal, four no more than rounding."""
+"""Sweeps of three rotations; three sweeps leave up to 10⁻⁵ of the norm off the diagonal, four only rounding errors."""
 
 
 def largest_eigenpair(matrix: Array) -> tuple[Array, Array]:
     """Largest eigenvalue ``(...)`` and a unit eigenvector ``(..., 3)`` of symmetric matrices ``(..., 3, 3)``.
 
-    The sign of the vector is arbitrary; where the largest eigenvalue is multiple, it is one of its vectors. Only the
-    upper triangle is read. Not finite in, not finite out.
+    The sign of the vector is arbitrary; for a multiple eigenvalue it is one of its vectors. Only the upper
+    triangle is used. Non-finite input gives non-finite output.
     """
     xp = namespace(matrix)
     largest = 0.0 * matrix[..., 0, 0]
@@ -46,7 +46,7 @@ def largest_eigenpair(matrix: Array) -> tuple[Array, Array]:
 def _rotate(
     a: dict[tuple[int, int], Array], vectors: list[list[Array]], p: int, q: int
 ) -> tuple[dict[tuple[int, int], Array], list[list[Array]]]:
-    """The matrix (upper triangle) with element p, q made zero, and the vectors turned with it."""
+    """The matrix (upper triangle) with element p, q eliminated, and the rotated vectors."""
     xp = namespace(a[p, q])
     difference, off = a[q, q] - a[p, p], a[p, q]
     radicand = difference * difference + 4.0 * off * off

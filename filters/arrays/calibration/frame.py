@@ -3,8 +3,8 @@
 P. He, "Estimating the orientation of a game controller from inertial and magnetic measurements", thesis, Université
 Laval; appendix B. E_B = R_BO E_O; R_BOᵀ = U Vᵀ from the singular value decomposition of (E_Oᵀ)⁺ E_Bᵀ.
 
-Differs from print: (B.4) calls a matrix of determinant −1 a rotation. Here a fit that is a mirror is refused: one of
-the two frames (or a list of axes) is left-handed then.
+Erratum: (B.4) is a matrix of determinant −1 and not a rotation. Here a fit that is a reflection raises an error,
+because one of the two frames (or a list of axes) is then left-handed.
 """
 
 from __future__ import annotations
@@ -15,12 +15,12 @@ import numpy as np
 
 
 class FrameFit(NamedTuple):
-    """What :func:`align_axes` finds."""
+    """Result of :func:`align_axes`."""
 
     matrix: np.ndarray
     """``(3, 3)`` rotation R_BO: v_B = R_BO v_O"""
     singular_values: np.ndarray
-    """``(3,)``, 1 for axes that agree in their angles"""
+    """``(3,)`` singular values, 1 where the angles between axes agree"""
     residual: float
     """root mean square angle between E_B and R_BO E_O, rad"""
 
@@ -33,25 +33,25 @@ def procrustes(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
 
 
 def nearest_rotation(matrix: np.ndarray) -> np.ndarray:
-    """The rotation nearest to ``matrix`` ``(3, 3)``; where that is a mirror, its weakest axis is turned over."""
+    """The rotation nearest to ``matrix`` ``(3, 3)``; a reflection is made a rotation by reversing its weakest axis."""
     u, _, v = np.linalg.svd(matrix)
     u[:, -1] *= np.sign(np.linalg.det(u @ v))
     return u @ v
 
 
 def align_axes(axes_body: np.ndarray, axes_other: np.ndarray) -> FrameFit:
-    """Rotation from another frame to the body from the same directions seen in both.
+    """Rotation from another frame to the body, from directions given in both.
 
     Args:
         axes_body: ``(n, 3)`` unit vectors in body axes, rows of E_Bᵀ.
         axes_other: ``(n, 3)`` the same in the other frame.
 
     Raises:
-        ValueError: shapes that differ, a row of zeros, directions that lie in a plane, or a fit that is a mirror.
+        ValueError: different shapes, a row of zeros, directions that lie in a plane, or a fit that is a reflection.
     """
     body, other = np.asarray(axes_body, dtype=float), np.asarray(axes_other, dtype=float)
     if body.ndim != 2 or body.shape[1:] != (3,) or body.shape != other.shape:
-        raise ValueError(f"axes must be two lists of as many rows of three, got {body.shape} and {other.shape}")
+        raise ValueError(f"axes must be two arrays of shape (n, 3) with equal n, got {body.shape} and {other.shape}")
     if not (np.isfinite(body).all() and np.isfinite(other).all()):
         raise ValueError("axes must be finite numbers")
     for name, rows in (("axes_body", body), ("axes_other", other)):
@@ -61,13 +61,13 @@ def align_axes(axes_body: np.ndarray, axes_other: np.ndarray) -> FrameFit:
         spread = np.linalg.svd(rows, compute_uv=False)
         if len(spread) < 3 or spread[-1] < 1e-3 * spread[0]:
             raise ValueError(
-                f"{name} must span space (three directions that are not in one plane), got {rows.tolist()}"
+                f"{name} must span three dimensions (directions that are not in one plane), got {rows.tolist()}"
             )
     transposed, values, determinant = procrustes(np.linalg.pinv(other) @ body)
     if determinant < 0.0:
         raise ValueError(
-            "the best fit is a mirror (determinant -1): one of the two frames is left-handed, or an axis has the wrong "
-            "sign"
+            "the best fit is a reflection (determinant -1): one of the two frames is left-handed, or an axis has the "
+            "wrong sign"
         )
     matrix = transposed.T
     seen = other @ matrix.T

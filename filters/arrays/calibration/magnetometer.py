@@ -1,13 +1,13 @@
-r"""Hard and soft iron of a magnetometer from readings in many attitudes, and how it sits on the device.
+r"""Hard and soft iron of a magnetometer from readings in many attitudes, and its alignment with the device.
 
 P. He, "Estimating the orientation of a game controller from inertial and magnetic measurements", thesis, Université
 Laval; section 4.3. Raw readings v in a field of constant strength lie on an ellipsoid,
 
     (v − v₀)ᵀ E (v − v₀) = 1,    m̂ = √E (v − v₀)                                                       (4.11)–(4.15)
 
-√E is the symmetric root, which is right up to a rotation; the alignment takes it up: R_OM and the unit field m in the
-world minimise Σ |R_OM m̂_k − Q_kᵀ m|² (4.16)–(4.21) over reference attitudes Q_k. Closed forms in turn find them:
-m ∝ Σ Q_k R m̂_k, and R by Procrustes. |m| = 1 is a condition here, as the data are unit vectors.
+√E is the symmetric root, which is correct up to a rotation. The alignment determines this rotation: R_OM and the unit
+field m in the world minimise Σ |R_OM m̂_k − Q_kᵀ m|² (4.16)–(4.21) over reference attitudes Q_k. Alternating closed
+forms give m ∝ Σ Q_k R m̂_k, and R by Procrustes. |m| = 1 is imposed, since the data are unit vectors.
 """
 
 from __future__ import annotations
@@ -21,15 +21,15 @@ from ...core import rotation
 from .frame import nearest_rotation
 
 FEWEST = 30
-"""Samples from which an ellipsoid is fitted."""
+"""Smallest number of samples for a fit."""
 COVERAGE = 0.02
-"""Smallest mean square of the directions along any axis, 1/3 where they are spread evenly."""
+"""Smallest mean square of the directions along any axis; 1/3 for a uniform distribution."""
 TURNS = 200
 STARTS = 12
 
 
 class Ellipsoid(NamedTuple):
-    """What :func:`fit_ellipsoid` finds."""
+    """Result of :func:`fit_ellipsoid`."""
 
     centre: np.ndarray
     """``(3,)`` v₀, raw units: hard iron"""
@@ -40,7 +40,7 @@ class Ellipsoid(NamedTuple):
 
 
 class Alignment(NamedTuple):
-    """What :func:`align_magnetometer` finds."""
+    """Result of :func:`align_magnetometer`."""
 
     matrix: np.ndarray
     """``(3, 3)`` rotation R_OM: magnetometer to device"""
@@ -57,7 +57,8 @@ def fit_ellipsoid(raw: np.ndarray) -> Ellipsoid:
         raw: ``(T, 3)`` readings in many attitudes; rows with NaN are left out.
 
     Raises:
-        ValueError: a wrong shape, too few samples, attitudes that do not cover the sphere, or no ellipsoid.
+        ValueError: a wrong shape, too few samples, attitudes that do not cover the sphere, or readings not on an
+            ellipsoid.
     """
     raw = np.asarray(raw, dtype=float)
     if raw.ndim != 2 or raw.shape[1] != 3:
@@ -84,7 +85,7 @@ def fit_ellipsoid(raw: np.ndarray) -> Ellipsoid:
         )
     residual = float(np.sqrt(np.mean((length - 1.0) ** 2)))
     if residual > 0.2:
-        raise ValueError(f"the readings are not those of an ellipsoid: relative residual {residual:.2f}")
+        raise ValueError(f"the readings do not lie on an ellipsoid: relative residual {residual:.2f}")
     return Ellipsoid(middle + size * centre, root / size, residual)
 
 
@@ -98,12 +99,12 @@ def _linear_quadric(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     p = np.linalg.lstsq(columns, np.ones(len(x)), rcond=None)[0]
     A = np.array([[p[0], p[5], p[4]], [p[5], p[1], p[3]], [p[4], p[3], p[2]]])
     if abs(np.linalg.det(A)) < 1e-12:
-        raise ValueError("the readings are not those of an ellipsoid: the fitted quadric has no centre")
+        raise ValueError("the readings do not lie on an ellipsoid: the fitted quadric has no centre")
     centre = -np.linalg.solve(A, p[6:])
     E = A / (1.0 + centre @ A @ centre)
     values, vectors = np.linalg.eigh(E)
     if not values[0] > 0.0:
-        raise ValueError("the readings are not those of an ellipsoid: the fitted quadric is open (a hyperboloid)")
+        raise ValueError("the readings do not lie on an ellipsoid: the fitted quadric is open (a hyperboloid)")
     return centre, vectors @ np.diag(np.sqrt(values)) @ vectors.T
 
 
@@ -123,12 +124,12 @@ def _gauss_newton(x: np.ndarray, centre: np.ndarray, root: np.ndarray) -> tuple[
     fit = least_squares(left, np.concatenate([centre, root[upper]]), method="lm")
     centre, root = unpack(fit.x)
     if not np.linalg.eigvalsh(root)[0] > 0.0:
-        raise ValueError("the readings are not those of an ellipsoid: the refined fit is not positive")
+        raise ValueError("the readings do not lie on an ellipsoid: the refined fit is not positive")
     return centre, root
 
 
 def align_magnetometer(unit: np.ndarray, orientation: np.ndarray) -> Alignment:
-    """Find how the magnetometer sits on the device, and where the field points.
+    """Estimate the rotation from magnetometer to device, and the direction of the field.
 
     Args:
         unit: ``(T, 3)`` readings of length about one (:class:`Ellipsoid`), magnetometer axes.
@@ -136,7 +137,7 @@ def align_magnetometer(unit: np.ndarray, orientation: np.ndarray) -> Alignment:
             are left out.
 
     Raises:
-        ValueError: shapes that differ, a quaternion of zeros, too few samples, or attitudes that do not determine the
+        ValueError: different shapes, a quaternion of zeros, too few samples, or attitudes that do not determine the
             rotation.
     """
     unit, orientation = np.asarray(unit, dtype=float), np.asarray(orientation, dtype=float)
@@ -144,13 +145,13 @@ def align_magnetometer(unit: np.ndarray, orientation: np.ndarray) -> Alignment:
         raise ValueError(f"unit and orientation must be (T, 3) and (T, 4), got {unit.shape} and {orientation.shape}")
     good = np.isfinite(unit).all(axis=1) & np.isfinite(orientation).all(axis=1)
     if not rotation.norm(orientation[good]).all():
-        raise ValueError("orientation must hold unit quaternions, one is zero: leave its fields empty (NaN) if unknown")
+        raise ValueError("orientation must consist of unit quaternions, one is zero: use NaN if it is unknown")
     unit, orientation = unit[good], rotation.normalize(orientation[good])
     if len(unit) < FEWEST:
         raise ValueError(f"at least {FEWEST} samples with a reference attitude are needed, got {len(unit)}")
     unit = rotation.normalize(unit)
     Q = rotation.to_matrix(orientation)
-    # several starts: the closed forms in turn may end in a local minimum
+    # several starting points: the alternating closed forms may end in a local minimum
     generator = np.random.default_rng(0)
     best: tuple[float, np.ndarray, np.ndarray] | None = None
     for start in rotation.to_matrix(rotation.random(generator, (STARTS,))):
@@ -166,7 +167,7 @@ def align_magnetometer(unit: np.ndarray, orientation: np.ndarray) -> Alignment:
 
 
 def _alternate(unit: np.ndarray, Q: np.ndarray, R: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
-    """Cost, rotation and field after closed forms in turn from the rotation ``R``."""
+    """Cost, rotation and field after alternating closed forms from the rotation ``R``."""
     cost = np.inf
     for _ in range(TURNS):
         field = np.einsum("kij,kj->i", Q, unit @ R.T)
@@ -180,12 +181,12 @@ def _alternate(unit: np.ndarray, Q: np.ndarray, R: np.ndarray) -> tuple[float, n
 
 
 def _check_determined(turned: np.ndarray, Q: np.ndarray, field: np.ndarray) -> None:
-    """Refuse attitudes at which a small turn of R and one of m change nothing: residual R m̂ − Qᵀm, five unknowns."""
+    """Check that small rotations of R and m change the residual R m̂ − Qᵀm (five unknowns)."""
     tangent = np.linalg.svd(field[None])[2][1:]
     by_turn = -rotation.skew(turned)
     by_field = -np.einsum("kji,tj->kit", Q, tangent)
     values = np.linalg.svd(np.concatenate([by_turn, by_field], axis=-1).reshape(-1, 5), compute_uv=False)
     if values[-1] < 0.02 * values[0]:
         raise ValueError(
-            "the attitudes do not determine how the magnetometer sits: turn the device about at least two axes"
+            "the attitudes do not determine the alignment of the magnetometer: turn the device about at least two axes"
         )

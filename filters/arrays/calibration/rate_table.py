@@ -2,22 +2,22 @@ r"""Scale and offset of accelerometers and gyroscopes from a one-axis rate table
 
 P. He, "Estimating the orientation of a game controller from inertial and magnetic measurements", thesis, Université
 Laval; chapter 4. The table turns at constant rates ω about the vertical. An accelerometer with the raw reading v,
-sensitive axis e and place r from the axis of the table obeys
+sensitive axis e and position r from the axis of the table satisfies
 
     μ v + η = eᵀ Ω² r − eᵀ Qᵀ g,   Ω² = diag(−ω², −ω², 0)          ⇒          μ v + η + ω² ρ = g e_up
 
-e_up is the part of e that points up: 0 with a horizontal axis, 1 with an upright one. Of r only ρ, the coordinate along
-the horizontal part of e, can be observed. So the unknowns are μ, η and one ρ for each way of mounting the device: four
-with the thesis' two directions and one upright pose.
+e_up is the vertical component of e: 0 with a horizontal axis, 1 with an upright one. Of r only ρ, the coordinate along
+the horizontal component of e, is observable. The unknowns are therefore μ, η and one ρ for each mounting of the device:
+four with the thesis' two directions and one upright pose.
 
-Differs from print: (4.1), (4.2) have the sign of gravity of an axis that points down; (4.5) takes all of r for unknown,
-which makes the normal matrix singular (rank 3 of 5); in (4.6) the sign of the second position is that of the opposite
-coordinate. Without an upright pose only ratios are determined; the columns are scaled before they are solved for.
+Errata: (4.1), (4.2) have the sign of gravity for an axis that points down; (4.5) has all of r as unknowns, which makes
+the normal matrix singular (rank 3 of 5); in (4.6) the sign of the second position is that of the opposite coordinate.
+Without an upright pose only ratios are determined. The columns are scaled before the solution.
 
-:func:`calibrate_direction` is ours: with s = e/μ and f_k the upward directions of the poses the same relation is
-v = s·(g f_k) + b − ω² c_k, linear in s, b and one c_k a mounting, so that upward directions that span space (and one
-that is opposite to another) determine the sensitive axis as well. Half a degree left in an axis costs as much as
-0.09 m/s².
+:func:`calibrate_direction` is an addition to the thesis. With s = e/μ and the upward directions f_k of the poses, the
+same relation is v = s·(g f_k) + b − ω² c_k, linear in s, b and one c_k per mounting. Upward directions that span three
+dimensions and include one opposite pair therefore also determine the sensitive axis. A misalignment of half a degree
+causes an error of up to 0.09 m/s².
 """
 
 from __future__ import annotations
@@ -29,9 +29,9 @@ from typing import Any
 import numpy as np
 
 SINGULAR = 1e-5
-"""Smallest singular value, relative to the largest, of columns of unit length that are still distinguished."""
+"""Smallest accepted singular value of columns of unit length, relative to the largest."""
 UPRIGHT = 0.999
-"""An axis whose upward part is at least that is upright: it has no horizontal part, and no position is seen."""
+"""An axis with at least this vertical component counts as upright: it does not determine a position."""
 
 
 @dataclass(frozen=True)
@@ -45,15 +45,15 @@ class AxisCalibration:
     positions: Mapping[str, float]
     """mounting → ρ, m along the sensor's axis from the axis of the table, signed; empty for gyroscopes"""
     residual: float
-    """root mean square of what is left, m/s² (rad/s)"""
+    """root mean square residual, m/s² (rad/s)"""
     largest: float
-    """its largest value, m/s² (rad/s)"""
+    """largest residual, m/s² (rad/s)"""
     samples: int
-    """how many were used"""
+    """number of samples used"""
     discarded: int
-    """how many were saturated"""
+    """number of saturated samples"""
     axis: tuple[float, ...] | None = None
-    """``(3,)`` sensitive axis in device axes, where it was looked for"""
+    """``(3,)`` sensitive axis in device axes, if it was estimated"""
 
 
 def calibrate_accelerometer(
@@ -68,18 +68,17 @@ def calibrate_accelerometer(
     """Calibrate one accelerometer.
 
     Args:
-        raw: ``(T,)`` readings at constant rates, any unit; NaN is left out.
+        raw: ``(T,)`` readings at constant rates, any unit; NaN is ignored.
         rate: ``(T,)`` rate of the table, rad/s.
-        mounting: ``(T,)`` name of the way in which the device was fixed to the table.
-        upward: mounting → part of the sensitive axis that pointed up, −1 to 1.
+        mounting: ``(T,)`` name of the mounting of the device on the table.
+        upward: mounting → vertical component of the sensitive axis, −1 to 1.
         gravity: m/s², positive.
-        saturation: magnitude of raw readings from which on they are discarded; None: only those that stick to the end
-            of the range (constant, and equal at different rates) are.
+        saturation: magnitude from which raw readings are discarded; None: only those that stay at the end of the range
+            (constant, and equal at different rates).
 
     Raises:
-        ValueError: shapes that differ, a mounting that ``upward`` does not know, a gravity or saturation that cannot
-            be, too few samples, or poses that do not determine scale, offset and positions; the message says which are
-            missing.
+        ValueError: different shapes, a mounting that is missing in ``upward``, an invalid gravity or saturation, too
+            few samples, or poses that do not determine scale, offset and positions; the message lists what is missing.
     """
     _check_gravity(gravity)
     raw, rate, mounting, discarded = _usable(raw, rate, mounting, upward, saturation)
@@ -115,18 +114,18 @@ def calibrate_direction(
     gravity: float = 9.80665,
     saturation: float | None = None,
 ) -> AxisCalibration:
-    """Calibrate one accelerometer and find the direction of its sensitive axis.
+    """Calibrate one accelerometer and estimate the direction of its sensitive axis.
 
     Args:
-        raw: as of :func:`calibrate_accelerometer`, as are ``rate``, ``gravity`` and ``saturation``.
+        raw: as for :func:`calibrate_accelerometer`, as are ``rate``, ``gravity`` and ``saturation``.
         rate: rad/s.
-        mounting: ``(T,)`` name of the way in which the device was fixed to the table.
-        upward: mounting → ``(3,)`` the direction that pointed up, device axes.
+        mounting: ``(T,)`` name of the mounting of the device on the table.
+        upward: mounting → ``(3,)`` upward direction, device axes.
         gravity: m/s².
         saturation: raw.
 
     Raises:
-        ValueError: as :func:`calibrate_accelerometer`; four upward directions at least must not lie in one plane.
+        ValueError: as :func:`calibrate_accelerometer`; at least four upward directions must not lie in one plane.
     """
     _check_gravity(gravity)
     raw, rate, mounting, discarded = _usable(raw, rate, mounting, upward, saturation)
@@ -151,15 +150,15 @@ def calibrate_direction(
 
 
 def calibrate_gyroscope(raw: np.ndarray, rate: np.ndarray, *, saturation: float | None = None) -> AxisCalibration:
-    """Calibrate one axis of a gyroscope that stands upright on the table: ω = μ v + η by linear least squares.
+    """Calibrate one axis of a gyroscope that is vertical on the table: ω = μ v + η by linear least squares.
 
     Args:
         raw: ``(T,)`` readings at constant rates, any unit; NaN is left out.
         rate: ``(T,)`` rate of the table about the sensitive axis, rad/s.
-        saturation: as of :func:`calibrate_accelerometer`; the thesis discards what lies beyond ±275 °/s.
+        saturation: as for :func:`calibrate_accelerometer`; the thesis discards readings beyond ±275 °/s.
 
     Raises:
-        ValueError: shapes that differ, or fewer than three different rates that are not saturated.
+        ValueError: different shapes, or fewer than three different rates that are not saturated.
     """
     everywhere = np.full(np.shape(raw), "")
     raw, rate, everywhere = _columns(raw, rate, everywhere)
@@ -185,10 +184,10 @@ def calibrate_gyroscope(raw: np.ndarray, rate: np.ndarray, *, saturation: float 
 
 
 def saturated(raw: np.ndarray, rate: np.ndarray, mounting: np.ndarray, limit: float | None) -> np.ndarray:
-    """Which readings ``(T,)`` are at the end of the range: beyond ``limit``, or stuck.
+    """Mask ``(T,)`` of the readings at the end of the range: beyond ``limit``, or stuck.
 
-    Stuck is a rate of the table at which every reading is the largest (or smallest) one of the mounting, where another
-    rate gives that as well, or where the readings of other rates show noise.
+    Readings at one rate are stuck if all of them equal the largest (or smallest) one of the mounting, and another rate
+    has the same value or the readings at other rates show noise.
     """
     if limit is not None:
         if not limit >= 0.0:
@@ -205,7 +204,7 @@ def saturated(raw: np.ndarray, rate: np.ndarray, mounting: np.ndarray, limit: fl
             several = len(speeds) > 1 or (noisy and all(step.sum() >= 5 for step in stuck))
             if stuck and several and len(stuck) < len(steps):
                 limit_reached = end(raw[here])
-                # a rate that touches the end now and then has a mean that is cut off as well
+                # a rate that reaches the end only at times has a biased mean as well
                 result |= np.any([step for step in steps if (raw[step] == limit_reached).any()], axis=0)
     return result
 
@@ -213,11 +212,11 @@ def saturated(raw: np.ndarray, rate: np.ndarray, mounting: np.ndarray, limit: fl
 def _usable(
     raw: np.ndarray, rate: np.ndarray, mounting: np.ndarray, upward: Mapping[str, Any], saturation: float | None
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
-    """The samples that are there and not saturated, and how many were saturated."""
+    """The valid samples that are not saturated, and the number of saturated ones."""
     raw, rate, mounting = _columns(raw, rate, mounting)
     unknown = [name for name in sorted(set(mounting.tolist())) if name not in upward]
     if unknown:
-        raise ValueError(f"upward must name every mounting, it lacks {unknown}")
+        raise ValueError(f"upward must contain every mounting; {unknown} are missing")
     kept = np.isfinite(raw)
     lost = saturated(raw, rate, mounting, saturation) & kept
     kept &= ~lost
@@ -249,7 +248,7 @@ def _columns(raw: np.ndarray, rate: np.ndarray, mounting: np.ndarray) -> tuple[n
 
 
 def _least_squares(columns: np.ndarray, right: np.ndarray, labels: list[str]) -> np.ndarray:
-    """Solve with columns of unit length; refuse what is not determined."""
+    """Solve with columns of unit length; raise an error for unknowns that are not determined."""
     if len(columns) < len(labels):
         raise ValueError(f"{len(labels)} unknowns need at least as many samples, got {len(columns)}")
     lengths = np.linalg.norm(columns, axis=0)

@@ -67,7 +67,7 @@ def test_degenerate_runs_are_refused_with_their_reason():
     one_rate = (mounting == "up") | (rate == rate[0])
     with pytest.raises(ValueError, match="'first' needs at least two different rates"):
         calibrate_accelerometer(raw[one_rate], rate[one_rate], mounting[one_rate], UPWARD)
-    with pytest.raises(ValueError, match=r"upward must name every mounting, it lacks \['up'\]"):
+    with pytest.raises(ValueError, match=r"upward must contain every mounting; \['up'\] are missing"):
         calibrate_accelerometer(raw, rate, mounting, {"first": 0.0, "second": 0.0})
     with pytest.raises(ValueError, match="every sample is saturated"):
         calibrate_accelerometer(raw, rate, mounting, UPWARD, saturation=0.0)
@@ -187,9 +187,9 @@ def test_readings_that_are_no_ellipsoid_are_refused():
     generator = np.random.default_rng(0)
     u, v = generator.uniform(-1.5, 1.5, 400), generator.uniform(0.0, 2 * math.pi, 400)
     hyperboloid = np.stack([np.cosh(u) * np.cos(v), np.cosh(u) * np.sin(v), np.sinh(u)], axis=-1)
-    with pytest.raises(ValueError, match="not those of an ellipsoid"):
+    with pytest.raises(ValueError, match="do not lie on an ellipsoid"):
         fit_ellipsoid(100.0 * hyperboloid)
-    with pytest.raises(ValueError, match=r"not those of an ellipsoid|cover too little|do not determine"):
+    with pytest.raises(ValueError, match=r"do not lie on an ellipsoid|cover too little|do not determine"):
         fit_ellipsoid(generator.uniform(-1.0, 1.0, (400, 3)) ** 3)
     quaternions = attitude.as_quat()[:, [3, 0, 1, 2]]
     unit = (raw - CENTRE) @ ROOT
@@ -213,13 +213,13 @@ def test_frames_are_aligned_and_mirrors_refused():
     assert np.degrees((Rotation.from_matrix(fit.matrix) * expected.inv()).magnitude()) < 0.05
     assert np.degrees((Rotation.from_matrix(fit.matrix) * truth.inv()).magnitude()) < 0.2
     assert fit.residual < 3e-3
-    with pytest.raises(ValueError, match="mirror"):
+    with pytest.raises(ValueError, match="reflection"):
         align_axes(body * [1, 1, -1], other)
-    with pytest.raises(ValueError, match="span space"):
+    with pytest.raises(ValueError, match="span three dimensions"):
         align_axes(body[:2], other[:2])
     with pytest.raises(ValueError, match="axes_other must be directions, row 4 is zero"):
         align_axes(body, other * [[1], [1], [1], [0]])
-    with pytest.raises(ValueError, match="as many rows of three"):
+    with pytest.raises(ValueError, match="shape \\(n, 3\\)"):
         align_axes(body, other[:3])
 
 
