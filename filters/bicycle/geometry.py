@@ -15,7 +15,7 @@ from ..core.model import Equations
 
 Point = tuple[float, float, float]
 ARM_MASS = 0.0494
-"""Of an arm with its hand, part of the rider's (P. de Leva, J. Biomechanics 29(9), 1996, table 4, men)."""
+"""Mass of an arm with its hand, share of the rider's (P. de Leva, J. Biomechanics 29(9), 1996, table 4, men)."""
 
 
 @dataclass(frozen=True)
@@ -23,23 +23,23 @@ class RiderGeometry:
     """Lengths in m, masses in kg, angles in rad. The defaults are a person of 1.76 m and 68 kg on the mountain bike.
 
     Raises:
-        ValueError: a number that is not finite, a length or mass that is not positive, or a ``steer_axis`` that is no
-            unit vector.
+        ValueError: a number that is not finite, a length or mass that is not positive, or a ``steer_axis`` that is not
+            a unit vector.
     """
 
     wheelbase: float = 1.05
     saddle: Point = (0.2593, 0.0, 0.8825)
     """point where post and saddle meet"""
     trunk_pivot: Point = (0.2593, 0.0, 1.037)
-    """lumbar joint: the trunk turns about it"""
+    """lumbar joint, about which the trunk rotates"""
     trunk_flexion: float = 0.5847
-    """usual forward lean of the trunk against the bicycle's upright"""
+    """usual forward lean of the trunk relative to the upright direction of the bicycle"""
     shoulder: Point = (0.0, 0.1896, 0.4287)
     """left shoulder joint, trunk frame"""
     hip: Point = (0.2593, 0.0859, 0.9634)
     """left hip joint"""
     grip: Point = (0.79, 0.27, 1.04)
-    """left hand's place at zero steer"""
+    """position of the left hand at zero steer"""
     steer_origin: Point = (0.8761, 0.0, 0.72)
     """a point of the steering axis"""
     steer_axis: Point = (-0.309017, 0.0, 0.951057)
@@ -47,7 +47,7 @@ class RiderGeometry:
     crank_axle: Point = (0.426, 0.0, 0.28)
     crank_length: float = 0.17
     pedal_offset: float = 0.12
-    """of a foot from the middle plane"""
+    """of a foot from the mid-plane"""
     upper_arm: float = 0.2848
     forearm: float = 0.2718
     """elbow to grip"""
@@ -58,7 +58,7 @@ class RiderGeometry:
     ankle_angle: float = math.radians(80.0)
     """exterior: 0 with the foot in line with the shank"""
     trunk_mass: float = 26.6764
-    """of all that turns about the lumbar joint without the arms: trunk above it and head"""
+    """of the parts that rotate about the lumbar joint, without the arms: trunk above it and head"""
     trunk_centre: Point = (0.0053, 0.0, 0.3648)
     """its centre of mass, trunk frame"""
     trunk_moments: Point = (1.0733, 0.9346, 0.2787)
@@ -104,15 +104,15 @@ class RiderGeometry:
         return math.sqrt(a * a + b * b + 2.0 * a * b * math.cos(self.ankle_angle))
 
     def describe(self) -> dict[str, Any]:
-        """All numbers, for JSON; :meth:`read` turns them back."""
+        """All numbers, for JSON; the inverse is :meth:`read`."""
         return {name: list(value) if isinstance(value, tuple) else value for name, value in asdict(self).items()}
 
     @classmethod
     def of(cls, metadata: Mapping[str, Any]) -> Self:
-        """The geometry that a recording's metadata hold; the default person's if they hold none.
+        """The geometry in a recording's metadata; the default person if there is none.
 
         Raises:
-            ValueError: they hold something that is not a geometry.
+            ValueError: the metadata contain an invalid geometry.
         """
         described = metadata.get("geometry")
         return cls() if described is None else cls.read(described)
@@ -122,12 +122,12 @@ class RiderGeometry:
         """From what :meth:`describe` gave (``trajectory.metadata["geometry"]``).
 
         Raises:
-            ValueError: a name that is unknown, or what the constructor refuses.
+            ValueError: an unknown name, or a value that the constructor rejects.
         """
         known = {field.name for field in fields(cls)}
         unknown = sorted(set(described) - known)
         if unknown:
-            raise ValueError(f"unknown geometry {unknown}; there are {sorted(known)}")
+            raise ValueError(f"unknown geometry {unknown}; accepted are {sorted(known)}")
         values: dict[str, Any] = {
             name: tuple(map(float, value)) if isinstance(value, list | tuple) else float(value)
             for name, value in described.items()
@@ -170,11 +170,11 @@ class RiderEquations(Equations):
 
         Args:
             geometry: of rider and bicycle.
-            parameters: other fields; they win over those of the geometry.
+            parameters: other fields; they take precedence over those of the geometry.
         """
         return cls(**(cls.rider_parameters(geometry) | parameters))
 
     @classmethod
     def parameters_from(cls, metadata: Mapping[str, Any]) -> dict[str, Any]:
-        """What ``metadata["geometry"]`` of a recorded ride determines."""
+        """The parameters that ``metadata["geometry"]`` of a recorded ride determines."""
         return {} if metadata.get("geometry") is None else cls.rider_parameters(RiderGeometry.of(metadata))

@@ -1,15 +1,15 @@
-r"""Roll and pitch of a bicycle from one IMU on its frame and the wheel's speed: the wheel neither slides nor lifts.
+r"""Roll and pitch of a bicycle from one IMU on its frame and the wheel speed, without slip and lift-off.
 
-A filter of this package, not of a paper. The accelerometer sees gravity plus whatever the bicycle does, and in a curve
-that is just what hides the roll. But the velocity of a bicycle is known: its rear wheel rolls. With the velocity v of
-the IMU and the rate ω of the frame (both as below), the point of the frame at the contact of the rear wheel, which is c
-from the IMU, moves as a wheel does that rolls without slip,
+A filter of this package, not of a paper. The accelerometer measures gravity plus the acceleration of the bicycle, which
+hides the roll in a curve. The velocity of a bicycle, however, is known, since its rear wheel rolls. With the velocity v
+of the IMU and the rate ω of the frame (both as below), the point of the frame at the contact of the rear wheel, at the
+lever c from the IMU, moves like a wheel that rolls without slip,
 
     Rᵀv + ω × c = [v_w, 0, 0] + n                                           (1)
 
-in bicycle axes, whatever the roll: a thin wheel that turns by Ω in its frame has v_hub = −(ω + Ω e₂) × (−r e₃), so that
-the frame's point −r e₃ below the hub moves by r Ω e₁. What v integrates to with a wrong tilt δ, g δ t, (1) does not
-bear; steady curves are no exception, since nothing of (1) refers to the accelerometer.
+in bicycle axes, at any roll. A thin wheel that rotates by Ω in its frame has v_hub = −(ω + Ω e₂) × (−r e₃), so the
+point −r e₃ of the frame, below the hub, moves with r Ω e₁. A tilt error δ makes the integrated velocity grow by g δ t,
+and (1) corrects it. This also holds in steady curves, since (1) does not involve the accelerometer.
 
 Bicycle axes are x forward, y left, z up; the sensor is mounted nose up by α, and its samples are rotated on input.
 The state is q (bicycle to a level frame), gyroscope bias b (bicycle axes), v (level frame), integrated as
@@ -17,12 +17,13 @@ The state is q (bicycle to a level frame), gyroscope bias b (bicycle axes), v (l
 
     H = [Rᵀ[v]×, [c]×, Rᵀ],   n: σ_w² = (s/Δt)²/12,  σ_y²/Δt,  σ_z²/Δt
 
-with s the way between two counts of the wheel's encoder. Slip and the bumps of the ground are correlated over time;
-dividing by Δt makes σ_y and σ_z the same at every rate, and tuning constants rather than noises. The start is not at
-rest: gravity is the first force less ω × v, that of steady riding.
+with s the distance between two counts of the wheel encoder. Slip and bumps are correlated over time. Dividing by Δt
+makes σ_y and σ_z independent of the rate; they are tuning constants rather than noises. The initial state is steady
+riding: gravity is the first specific force less ω × v.
 
-Not estimated: the heading (it starts at zero and drifts), the wheel's radius, the accelerometer's bias (5 mg across are
-0.3° of roll). Where the ground bends under the wheels (a kerb, the foot of a ramp), (1) fails upwards.
+Heading (which starts at zero and drifts), wheel radius and accelerometer bias are not estimated; a lateral bias of 5 mg
+causes 0.3° of roll. Where the ground changes slope under the wheel (a kerb, the foot of a ramp), the vertical row of
+(1) does not hold.
 """
 
 from __future__ import annotations
@@ -47,7 +48,7 @@ from ..imu.strapdown import (
 from .geometry import RiderEquations, RiderGeometry
 
 COUNTS = 1024
-"""a turn of the wheel's encoder (256 lines, quadrature)"""
+"""counts per turn of the wheel encoder (256 lines, quadrature)"""
 ROLL = Quantity("bicycle/roll", "angle", 1, "rad")
 PITCH = Quantity("bicycle/pitch", "angle", 1, "rad")
 BIAS = Quantity("bicycle_imu/gyroscope_bias", "vector", 3, "rad/s")
@@ -59,25 +60,25 @@ class OdometryAided(RiderEquations, Model):
 
     State: q (4), b (3), v (3), seconds since the last accelerometer sample.
 
-    Without accelerometer samples for longer than ``hold`` the velocity is taken as constant but for ``lost_noise``;
-    (1) then keeps it, and the attitude is that of the gyroscope. Without the wheel, the two other rows of (1) remain.
+    If accelerometer samples are missing for longer than ``hold``, the velocity is constant up to ``lost_noise`` and is
+    updated by (1), and the gyroscope alone gives the attitude. Without the wheel, the other two rows of (1) remain.
     """
 
     gyroscope_noise: float = 2e-3
-    """σ_g, rad/s/√Hz; larger than a data sheet's, since it stands for scale and alignment errors too"""
+    """σ_g, rad/s/√Hz; larger than in a data sheet, to cover scale and alignment errors"""
     bias_noise: float = 5e-5
     """σ_b, rad/s²/√Hz"""
     acceleration_noise: float = 0.02
     """σ_a, m/s²/√Hz"""
     wheel_step: float = 2.0 * math.pi * 0.335 / COUNTS
-    """s, m: way between two counts of the wheel's encoder"""
+    """s, m: distance between two counts of the wheel encoder"""
     lateral_slip: float = 0.01
     """σ_y, m/s·√s"""
     vertical_slip: float = 0.02
-    """σ_z, m/s·√s: bumps and bends of the ground"""
+    """σ_z, m/s·√s: bumps and changes of slope of the ground"""
     jump: float = 0.2
-    """m/s: residuals r beyond this (and a count of the wheel) count less, their variances times (1 + (r/jump)²)²: a
-    wheel in the air holds no information"""
+    """m/s: variances of residuals r grow by (1 + (r/jump)²)², so residuals beyond this (and one count of the wheel)
+    have little weight; a wheel off the ground carries no information"""
     imu_forward: float = 0.37
     """m, of the IMU from the rear contact"""
     imu_height: float = 0.71
@@ -85,9 +86,9 @@ class OdometryAided(RiderEquations, Model):
     imu_tilt: float = math.radians(10.0)
     """α, rad, nose up"""
     accelerometer_range: float = 19.5
-    """m/s²: samples with a component beyond this are taken as clipped (range 2 g)"""
+    """m/s²: samples with a component beyond this count as saturated (range 2 g)"""
     clipped_inflation: float = 300.0
-    """factor on σ_a for clipped samples"""
+    """factor on σ_a for saturated samples"""
     tilt_prior: float = 0.1
     """rad"""
     bias_prior: float = 5e-3
@@ -95,9 +96,9 @@ class OdometryAided(RiderEquations, Model):
     velocity_prior: float = 0.1
     """m/s, in bicycle axes"""
     hold: float = 0.05
-    """s: for how long the last accelerometer sample stands in for missing ones"""
+    """s: longest time for which the last accelerometer sample replaces missing ones"""
     lost_noise: float = 2.0
-    """m/s²/√Hz: of the velocity beyond that"""
+    """m/s²/√Hz: process noise of the velocity after that time"""
     gravity: float = GRAVITY
     """g, m/s²"""
 
@@ -119,13 +120,13 @@ class OdometryAided(RiderEquations, Model):
     }
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be divided by, and measurements without noise."""
+        """Check the parameters in denominators, and that measurements have noise."""
         super().__post_init__()
         check_positive(self, "wheel_step", "lateral_slip", "vertical_slip", "jump")
 
     @classmethod
     def rider_parameters(cls, geometry: RiderGeometry) -> dict[str, Any]:
-        """Where the IMU is mounted, and how far the wheel rolls between two counts of its encoder."""
+        """Mounting of the IMU, and the distance between two counts of the wheel encoder."""
         forward, _, height = geometry.bicycle_imu
         return {
             "imu_forward": forward,
@@ -135,7 +136,7 @@ class OdometryAided(RiderEquations, Model):
         }
 
     def prior(self, z: Measurement) -> tuple[Array, Array]:
-        """Steady riding along the wheel: what is felt less ω × v is gravity; heading and bias zero."""
+        """Steady riding along the wheel: specific force less ω × v is gravity; heading and bias zero."""
         xp = namespace(z["bicycle_imu/acc"])
         rate, f = self._bicycle_axes(z["bicycle_imu/gyr"]), self._bicycle_axes(z["bicycle_imu/acc"])
         wheel, zero = z["wheel/speed"], 0.0 * f
@@ -144,7 +145,7 @@ class OdometryAided(RiderEquations, Model):
         v = rotate(q, along)
         tilt = [self.tilt_prior, self.tilt_prior, 0.0 * self.tilt_prior]
         D = covariance_of([*tilt, *[self.bias_prior] * 3, *[self.velocity_prior] * 3], zero[..., :1])
-        # the velocity is known in bicycle axes, so an error of the tilt turns it
+        # the velocity is known in bicycle axes, so a tilt error rotates it
         unit, none = identity(3, f), zeros(f, 3, 3)
         J = block_matrix([[unit, none, none], [none, unit, none], [-skew(v), none, to_matrix(q)]])
         return xp.concat([q, zero, v, zero[..., :1]], axis=-1), J @ D @ J.mT
@@ -168,7 +169,7 @@ class OdometryAided(RiderEquations, Model):
         return xp.concat([after, b, v, x[..., 10:]], axis=-1), F, Q
 
     def residual(self, x: Array, z: Measurement) -> tuple[Array, Array, Array]:
-        """Equation (1): the wheel's speed and no slip, less those of the contact that the state predicts."""
+        """Equation (1): wheel speed and zero slip, less the predicted velocity of the contact point."""
         xp = namespace(x)
         q, b, v, wheel = x[..., :4], x[..., 4:7], x[..., 7:10], z["wheel/speed"]
         c = self._lever(x)
@@ -185,11 +186,11 @@ class OdometryAided(RiderEquations, Model):
         return r, H, diagonal_matrix(vector_of(variances, zero) * weight * weight)
 
     def retract(self, x: Array, dx: Array) -> Array:
-        """The attitude is corrected by a turn in the level frame, the rest by sums."""
+        """The attitude is corrected by a rotation in the level frame, the rest additively."""
         return corrected(x, dx)
 
     def finish(self, x: Array, z: Measurement) -> Array:
-        """Normalise; advance or reset the clock of the accelerometer."""
+        """Normalise; advance or reset the age of the accelerometer sample."""
         xp = namespace(x)
         present = xp.all(xp.isfinite(z["bicycle_imu/acc"]), axis=-1)[..., None]
         age = xp.where(present, 0.0 * x[..., 10:11], x[..., 10:11] + expand(self.dt, 1))

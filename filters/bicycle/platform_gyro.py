@@ -1,10 +1,10 @@
 r"""Baselines for the two-gyroscope filter: roll from the platform's gyroscope alone, and integration alone.
 
-While a bicycle does not pitch, (5) of the paper (:mod:`.two_gyro`) ties two rates of its own gyroscope to its roll,
+While a bicycle does not pitch, (5) of the paper (:mod:`.two_gyro`) relates two rates of its gyroscope to its roll,
 
     0 = cos φ δω_y − sin φ δω_z,    dφ/dt = δω_x
 
-The body and the camera are not needed for that: what the paper's filter gains by them shows against this one only.
+This needs neither the body nor the camera. The comparison with this filter shows what they contribute.
 """
 
 from __future__ import annotations
@@ -34,8 +34,8 @@ PLATFORM_GYROSCOPE = Channel("bicycle_imu/gyr", 3, "rad/s")
 class PlatformGyro(RiderEquations, Model):
     """Extended Kalman filter on (8) with (5) as pseudo-measurement: the platform's gyroscope alone.
 
-    State: φ, bias (3, paper's axes: x forward, y right, z down). The pseudo-measurement's noise is that of the
-    gyroscope and the pitch rate of the road; it is white here, so choose ``pitch_rate_noise`` large.
+    State: φ, bias (3, paper's axes: x forward, y right, z down). The noise of the pseudo-measurement covers
+    the gyroscope and the pitch rate of the road. It is modelled as white, so ``pitch_rate_noise`` must be large.
     """
 
     gyroscope_noise: float = 0.05 * DEG
@@ -45,9 +45,9 @@ class PlatformGyro(RiderEquations, Model):
     bias_time: float = 1800.0
     """s"""
     pitch_rate_noise: float = 1.0 * DEG
-    """rad/s/√Hz: pitch rate and what else violates (5)"""
+    """rad/s/√Hz: pitch rate and other violations of (5)"""
     roll_rate_noise: float = 0.0
-    """rad/s/√Hz on φ: the missing sin χ dψ/dt"""
+    """rad/s/√Hz on φ: the neglected term sin χ dψ/dt"""
     process_scale: float = 1.0
     """factor on all standard deviations of the process noise"""
     roll_prior: float = 10.0 * DEG
@@ -57,7 +57,7 @@ class PlatformGyro(RiderEquations, Model):
     bias_prior: float = 0.15 * DEG
     """rad/s: standard deviation at the start"""
     imu_tilt: float = 10.0 * DEG
-    """rad: how far nose up the gyroscope is mounted"""
+    """rad: tilt of the gyroscope, nose up"""
 
     channels: ClassVar[tuple[Channel, ...]] = (PLATFORM_GYROSCOPE,)
     outputs: ClassVar[tuple[Quantity, ...]] = (ROLL, Quantity("platform-gyro/bias", "vector", 3, "rad/s"))
@@ -70,13 +70,13 @@ class PlatformGyro(RiderEquations, Model):
     }
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be divided by."""
+        """Check the parameters in denominators."""
         super().__post_init__()
         check_positive(self, "gyroscope_noise", "bias_time")
 
     @classmethod
     def rider_parameters(cls, geometry: RiderGeometry) -> dict[str, Any]:
-        """How the sensor is mounted on the bicycle."""
+        """Mounting of the sensor on the bicycle."""
         return {"imu_tilt": geometry.bicycle_imu_tilt}
 
     def prior(self, z: Measurement) -> tuple[Array, Array]:
@@ -88,7 +88,7 @@ class PlatformGyro(RiderEquations, Model):
     def predict(self, x: Array, z: Measurement, previous: Measurement) -> tuple[Array, Array, Array]:
         """Equation (8); biases as in (2)."""
         xp, dt, zero = namespace(x), expand(self.dt, 1), 0.0 * x[..., :1]
-        # dφ/dt = δω_x (8); only the bias of x enters it
+        # dφ/dt = δω_x (8), which depends on the bias of x only
         rate = platform_rate(z["bicycle_imu/gyr"], self.imu_tilt)[..., :1] - x[..., 1:2]
         kept = 1.0 - self.dt / self.bias_time
         moved = xp.concat([x[..., :1] + dt * rate, expand(kept, 1) * x[..., 1:]], axis=-1)
@@ -117,7 +117,7 @@ class PlatformGyro(RiderEquations, Model):
 class TwoGyroIntegration(RiderEquations, Recurrence):
     """Both gyroscopes integrated, from the first frame of the camera and a given roll; there is no measurement update.
 
-    The rotation vector of each interval turns platform and body exactly if the axis stays within the interval.
+    The rotation vector of each interval is exact if the axis of rotation is constant within the interval.
 
     State: quaternion of the bicycle to a frame that is level at the start (4), of the body to the bicycle (4).
     """
@@ -125,7 +125,7 @@ class TwoGyroIntegration(RiderEquations, Recurrence):
     initial_roll: float = 0.0
     """rad: of the bicycle at the start"""
     imu_tilt: float = 10.0 * DEG
-    """rad: how far nose up the platform's gyroscope is mounted"""
+    """rad: tilt of the platform's gyroscope, nose up"""
 
     channels: ClassVar[tuple[Channel, ...]] = (
         PLATFORM_GYROSCOPE,
@@ -137,18 +137,18 @@ class TwoGyroIntegration(RiderEquations, Recurrence):
 
     @classmethod
     def rider_parameters(cls, geometry: RiderGeometry) -> dict[str, Any]:
-        """How the sensor is mounted on the bicycle."""
+        """Mounting of the sensor on the bicycle."""
         return {"imu_tilt": geometry.bicycle_imu_tilt}
 
     def prior(self, z: Measurement) -> Array:
-        """The given roll, no pitch, and what the camera sees."""
+        """The given roll, zero pitch, and the orientation from the camera."""
         camera = z["relative/orientation"]
         known = zero_where_known(*(z[channel.name] for channel in self.channels))
         roll = from_euler_xyz(expand(self.initial_roll, 0) + known[..., 0], known[..., 0], known[..., 0])
         return namespace(camera).concat([roll, camera + known], axis=-1)
 
     def predict(self, x: Array, z: Measurement, previous: Measurement) -> Array:
-        """Both turn by the rotation vectors of the interval."""
+        """Rotate both by the rotation vectors of the interval."""
         dt = expand(self.dt, 1)
         platform = platform_rate(z["bicycle_imu/gyr"], self.imu_tilt)
         turn = exp(dt * platform * constant(SIGNS, x))

@@ -1,7 +1,7 @@
-"""What a camera on a bicycle sees of a body on it: its orientation, or the distances of three markers.
+"""Measurements of a camera on a bicycle: the orientation of a body on it, or the distances of three markers.
 
 Relative angles are those of :mod:`.two_gyro.kinematics` (x forward, y right, z down). The sensors' axes are x forward,
-y left, z up: half a turn about x apart, so that θ₂ and θ₃ change their signs and θ₁ does not.
+y left, z up. The two differ by half a turn about x, which changes the signs of θ₂ and θ₃.
 """
 
 from __future__ import annotations
@@ -36,12 +36,12 @@ def relative_orientation(theta: Array) -> Array:
 
 @dataclass(frozen=True)
 class MarkerPlaces:
-    """Where three markers and the points that see them are; lengths in m.
+    """Positions of three markers and of the points that observe them; lengths in m.
 
     Attributes:
-        pivot: origin of the body's frame, about which it turns, in the bicycle frame.
+        pivot: origin of the body's frame, about which the body rotates, in the bicycle frame.
         markers: in the body's frame.
-        viewpoints: from which the distance of each marker is taken, bicycle frame.
+        viewpoints: points from which the distances are measured, one per marker, bicycle frame.
     """
 
     pivot: Point
@@ -50,14 +50,14 @@ class MarkerPlaces:
 
     @classmethod
     def of_trunk(cls, geometry: RiderGeometry) -> Self:
-        """Markers on a rider's back, seen by one camera behind."""
+        """Markers on a rider's back, observed by one camera behind."""
         x, y, z = geometry.trunk_imu
         left, right, low = ((x + dx, y + dy, z + dz) for dx, dy, dz in TRUNK_MARKERS)
         return cls(geometry.trunk_pivot, (left, right, low), (CAMERA, CAMERA, CAMERA))
 
     @classmethod
     def of_disk(cls, centre: Point = DISK_CENTRE, radius: float = 0.15) -> Self:
-        """Markers 120° apart on the rim of the disk of ``poise/BicycleFixture-v0``, seen from behind and above."""
+        """Markers 120° apart on the rim of the disk of ``poise/BicycleFixture-v0``, observed from behind and above."""
         half, height = 0.5 * radius, 0.75**0.5 * radius
         camera = (centre[0] - 0.35, centre[1] + 0.1, centre[2] + 0.35)
         markers = ((0.0, radius, 0.0), (-height, -half, 0.0), (height, -half, 0.0))
@@ -67,8 +67,8 @@ class MarkerPlaces:
 def marker_distances(theta: Array, places: MarkerPlaces) -> tuple[Array, Array]:
     """Distances h(θ) ``(*batch, 3)`` of (16), m, and their Jacobian ``(*batch, 3, 3)``.
 
-    A change of θ_j turns a marker about the j-th axis of the sequence, so dh = u · (axis_j × R m) with u the unit
-    vector from the viewpoint to the marker.
+    A change of θ_j rotates a marker about the j-th axis of the sequence, so dh = u · (axis_j × R m), where u is the
+    unit vector from the viewpoint to the marker.
     """
     xp = namespace(theta)
     orientation = relative_orientation(theta)

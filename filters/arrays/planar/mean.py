@@ -1,4 +1,4 @@
-r"""Orientation in a vertical plane without a Kalman filter: integration, tilt, and their mean of least variance.
+r"""Orientation in a vertical plane without a Kalman filter: integration, tilt, and their minimum-variance mean.
 
 P. He, thesis, Université Laval; sections 3.3.1 to 3.3.3 (see :mod:`.planar.orientation` for frames and symbols).
 
@@ -6,14 +6,14 @@ P. He, thesis, Université Laval; sections 3.3.1 to 3.3.3 (see :mod:`.planar.ori
     tilt         φ̄_k = atan2(c̈_x, c̈_y)                                                                     (3.20)
     weighted     φ̂_k = ρ φ̃_k + (1 − ρ) φ̄_k                                                                (3.22)
 
-(3.23) does not give ρ. With P̃ and R the variances of φ̃ and φ̄, whose errors are independent (b̈ white, gyroscope and
-accelerometers apart), the variance ρ² P̃ + (1 − ρ)² R is least for
+(3.23) does not give ρ. The errors of φ̃ and φ̄ are independent (b̈ is white, gyroscope and accelerometers are separate
+sensors). With their variances P̃ and R, the variance ρ² P̃ + (1 − ρ)² R is smallest for
 
     ρ = R / (P̃ + R),   P̃_k = P_{k−1} + ½ Δt² σ_ω² (1 + ρ_{k−1}),   P = ρ² P̃ + (1 − ρ)² R
 
-where 1 + ρ_{k−1} is 2 but for the part of the last gyroscope error that φ̂_{k−1} has already forgotten; with 2
-(``correlated=False``) this is the linear Kalman filter of :class:`.PlanarOrientation`. What is averaged is the wrapped
-difference φ̄ − φ̃: angles themselves (``wrapped=False``, print) cannot be averaged across half a turn.
+1 + ρ_{k−1} accounts for the error of the last gyroscope sample in φ̂_{k−1}. With 2 in its place (``correlated=False``)
+this is the linear Kalman filter of :class:`.PlanarOrientation`. The mean is formed with the wrapped difference φ̄ − φ̃,
+because angles (``wrapped=False``, as published) cannot be averaged across half a turn.
 """
 
 from __future__ import annotations
@@ -32,14 +32,14 @@ Method = Literal["weighted", "integration", "tilt"]
 
 @dataclass(frozen=True)
 class PlanarMean(PlanarEquations, Recurrence):
-    """The weighted mean, or one of the two that it is the mean of. State: φ, its variance P, ρ."""
+    """The weighted mean, or integration or tilt alone. State: φ, its variance P, ρ."""
 
     method: Method = "weighted"
-    """which of the three"""
+    """which of the three methods"""
     wrapped: bool = True
-    """the difference of angles is taken within half a turn"""
+    """wrap the difference of angles to half a turn"""
     correlated: bool = True
-    """the error of the last gyroscope sample is in the last estimate already"""
+    """account for the error of the last gyroscope sample in the last estimate"""
 
     state_size: ClassVar[int] = 3
 
@@ -54,7 +54,7 @@ class PlanarMean(PlanarEquations, Recurrence):
         return namespace(angle).concat([angle, variance, 1.0 + 0.0 * angle], axis=-1)
 
     def predict(self, x: Array, z: Measurement, previous: Measurement) -> Array:
-        """φ̃ and P̃; tilt keeps what it has."""
+        """φ̃ and P̃; no prediction for tilt."""
         if self.method == "tilt":
             return x
         share = 0.5 * (1.0 + x[..., 2:]) if self.correlated else 1.0
@@ -62,7 +62,7 @@ class PlanarMean(PlanarEquations, Recurrence):
         return namespace(x).concat([self.integrated(x, z, previous), variance, x[..., 2:]], axis=-1)
 
     def finish(self, x: Array, z: Measurement) -> Array:
-        """The tilt angle joins in; without readings what was predicted stays."""
+        """Combine with the tilt angle; without readings keep the prediction."""
         xp, angle, variance = namespace(x), x[..., :1], x[..., 1:2]
         one = 1.0 + 0.0 * angle
         if self.method == "integration":
@@ -78,5 +78,5 @@ class PlanarMean(PlanarEquations, Recurrence):
         return xp.concat([angle + (1.0 - rho) * difference, spread, rho], axis=-1)
 
     def pose(self, x: Array) -> dict[str, Array]:
-        """The angle; whole turns are counted."""
+        """The angle, unwrapped."""
         return {PLANAR_ANGLE.name: x[..., :1]}

@@ -1,22 +1,22 @@
-r"""Orientation in a vertical plane: what the planar methods share, and the Kalman filters on the angle alone.
+r"""Orientation in a vertical plane: common parts of the planar methods, and Kalman filters for the angle alone.
 
 P. He, "Estimating the orientation of a game controller from inertial and magnetic measurements", thesis, Université
 Laval; chapter 3; equation numbers are the thesis'. A controller with four accelerometers and a gyroscope moves in a
-plane, x to the right, y up; φ is the angle, counter-clockwise, by which its axes are turned. The array gives the
-specific force c̈ = b̈ − Qᵀg in body axes, of which the filters take b̈ for white noise:
+plane, x to the right, y up; φ is the counter-clockwise angle of its axes. The array measures the specific force
+c̈ = b̈ − Qᵀg in body axes, and the filters model b̈ as white noise:
 
     φ_k = φ_{k−1} + ½ Δt (ω_{k−1} + ω_k) + e,   var e = Δt² σ_ω²                                            (3.30)
     extended   c̈ = g [sin φ, cos φ]ᵀ + n,   R = σ_b̈² 1 + σ_a² B_P,   H = g [cos φ, −sin φ]ᵀ            (3.31), (3.35)
     linear     atan2(c̈_x, c̈_y) = φ + n,     R = min((σ_b̈² + σ_a²/2)/g², π²/3),   H = 1
 
-π²/3 is the variance of an angle that nothing is known of. As R is a multiple of 1, the extended filter's covariance
+π²/3 is the variance of a uniformly distributed angle. As R is a multiple of 1, the covariance of the extended filter
 does not depend on the data.
 
-Differs from print: (3.20), (3.61) have an arctangent of one argument; (3.31) adds b̈ in the wrong axes, which does not
-matter where its covariance is a multiple of 1. The linear filter takes the wrapped difference of the angles;
-``wrapped=False`` is print, which is lost after the first half-turn (and not, as the thesis says, for being linear).
+Errata: (3.20), (3.61) have an arctangent of one argument; (3.31) adds b̈ in the wrong axes, which has no effect where
+its covariance is a multiple of 1. The linear filter uses the wrapped difference of the angles. ``wrapped=False`` is as
+published and fails after the first half-turn, for this reason and not because it is linear.
 
-A hand does not accelerate like white noise: σ_b̈ wants to be about three times the acceleration it stands for.
+The acceleration of a hand is not white. σ_b̈ should therefore be about three times its standard deviation.
 """
 
 from __future__ import annotations
@@ -37,35 +37,35 @@ from ..files import ArrayEquations
 PLANAR_GYROSCOPE = Channel("planar/gyr", 1, "rad/s")
 """Angular rate about the normal of the plane, counter-clockwise."""
 PLANAR_ANGLE = Quantity("planar/angle", "angle", 1, "rad")
-"""Turn φ of the body's axes against x (right) and y (up) of the plane, counter-clockwise."""
+"""Angle φ of the body's axes relative to x (right) and y (up) of the plane, counter-clockwise."""
 
 UNKNOWN_ANGLE = math.pi**2 / 3.0
-"""rad²: variance of an angle that may be any"""
+"""rad²: variance of a uniformly distributed angle"""
 
 
 @dataclass(frozen=True)
 class PlanarEquations(ArrayEquations):
-    """Parameters and readings that the planar methods share.
+    """Common parameters and readings of the planar methods.
 
     Raises:
         ValueError: an unknown start, or an array that is not planar or does not determine the specific force.
     """
 
     array: AccelerometerArray = PLANAR
-    """where the accelerometers sit"""
+    """the accelerometer array"""
     start: Literal["tilt", "known"] = "tilt"
     """where the first angle comes from: the first readings, or ``initial_angle``"""
     initial_angle: float = 0.0
     """φ₀ of a known start, rad"""
     initial_noise: float = 0.1
-    """standard deviation of φ₀ of a known start, rad; the thesis' P₀ = 10³ rad² lets the first correction turn the
-    angle by whole turns"""
+    """standard deviation of φ₀ of a known start, rad; with the thesis' P₀ = 10³ rad² the first update can
+    shift the angle by whole turns"""
     gyroscope_noise: float = 0.6
     """σ_ω, rad/s per sample (section 3.4.1)"""
     accelerometer_noise: float = 0.3
     """σ_a, m/s² per sample (section 3.4.1)"""
     inertial_acceleration: float = 10.0
-    """σ_b̈, m/s² per axis: how hard the controller is accelerated, inflated as it is no white noise"""
+    """σ_b̈, m/s² per axis: acceleration of the controller, inflated because it is not white"""
     gravity: float = GRAVITY
     """g, m/s²"""
 
@@ -90,7 +90,7 @@ class PlanarEquations(ArrayEquations):
         return (constant(self.array.pseudo_inverse[:2], a) @ a[..., None])[..., 0]
 
     def tilt(self, z: Measurement) -> Array:
-        """φ̄ ``(..., 1)``: the angle if nothing but gravity is felt (3.20)."""
+        """φ̄ ``(..., 1)``: the angle if the specific force is gravity alone (3.20)."""
         force = self.specific_force(z)
         return namespace(force).atan2(force[..., :1], force[..., 1:])
 
@@ -102,7 +102,7 @@ class PlanarEquations(ArrayEquations):
         return xp.minimum(0.0 * like[..., :1] + variance, 0.0 * like[..., :1] + UNKNOWN_ANGLE)
 
     def first(self, z: Measurement) -> tuple[Array, Array]:
-        """φ₀ and its variance ``(..., 1)``; NaN while a channel has not spoken."""
+        """φ₀ and its variance ``(..., 1)``; NaN until every channel has had a valid sample."""
         xp = namespace(*z.values())
         spoken = xp.all(xp.isfinite(xp.concat([z[channel.name] for channel in self.channels], axis=-1)), axis=-1)
         angle = self.tilt(z)
@@ -123,9 +123,9 @@ class PlanarOrientation(PlanarEquations, Model):
     """Kalman filters on the angle, section 3.3: ``extended`` on the specific force, ``linear`` on the tilt angle."""
 
     method: Literal["extended", "linear"] = "extended"
-    """what is measured: c̈ or its angle"""
+    """the measurement: c̈ or its angle"""
     wrapped: bool = True
-    """of the linear one: the difference of angles is taken within half a turn"""
+    """of the linear filter: wrap the difference of angles to half a turn"""
 
     state_size: ClassVar[int] = 1
     error_size: ClassVar[int] = 1
@@ -136,7 +136,7 @@ class PlanarOrientation(PlanarEquations, Model):
 
     @property
     def residual_size(self) -> int:  # type: ignore[override]
-        """Numbers in the residual."""
+        """Size of the residual."""
         return 2 if self.method == "extended" else 1
 
     def prior(self, z: Measurement) -> tuple[Array, Array]:
@@ -175,5 +175,5 @@ class PlanarOrientation(PlanarEquations, Model):
         return expand(self.inertial_acceleration**2, 2) * unit + expand(self.accelerometer_noise**2, 2) * noise
 
     def pose(self, x: Array) -> dict[str, Array]:
-        """The angle; whole turns are counted."""
+        """The angle, unwrapped."""
         return {PLANAR_ANGLE.name: x}

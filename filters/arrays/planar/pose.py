@@ -8,14 +8,13 @@ x = [φ, ω, α, p, v, b̈] (p, v, b̈ in the plane's axes) is driven by white j
     â = A_P Qᵀ(b̈ − g) + A_T α + A_C ω² + δa,   R = σ_a² 1                                            (3.42)
     H = [A_P dQᵀ/dφ (b̈ − g)   2 A_C ω   A_T   0   0   A_P Qᵀ]
 
-Differs from print: R is printed as σ_a² (AᵀA)⁻¹ (3.44), the covariance of ẑ, though raw readings are compared; the last
-block of H as A_P (3.45). ``form`` brings either back: on smooth motion both are worse by far. p and v cannot be seen in
-accelerations; the sign of ω only through α and φ.
+Errata: (3.44) gives R as σ_a² (AᵀA)⁻¹, the covariance of ẑ, although raw readings are compared; (3.45) gives the last
+block of H as A_P. ``form`` selects either; on smooth motion both are far less accurate. p and v are not observable from
+accelerations, and the sign of ω only through α and φ.
 
-In the thesis' model b̈ walks at random, so that nothing ever separates gravity from it: after the start the angle is
-integrated, and drifts; white acceleration of 30 m/s² is no motion of that model at all. Here b̈ returns to zero,
-b̈ ← e^{−λΔt} b̈ (``acceleration_decay`` λ; 0 is the thesis'), which holds the angle. Its standard deviation is then
-σ_β Δt / √(1 − e^{−2λΔt}): 5 m/s² for the defaults.
+In the thesis' model b̈ is a random walk, which cannot be distinguished from gravity. After the start the angle is only
+integrated, and drifts. Here b̈ decays, b̈ ← e^{−λΔt} b̈ (``acceleration_decay`` λ; 0 is the thesis' model), which makes
+the angle observable. The standard deviation of b̈ is σ_β Δt / √(1 − e^{−2λΔt}), 5 m/s² for the defaults.
 """
 
 from __future__ import annotations
@@ -59,13 +58,13 @@ class PlanarPose(PlanarEquations, Model):
     jerk: float = 300.0
     """σ_β, m/s³ per axis and sample (the thesis gives none)"""
     acceleration_decay: float = 20.0
-    """λ, 1/s: how fast b̈ is expected to return to zero; 0 is the thesis' model, in which nothing holds the angle"""
+    """λ, 1/s: rate of decay of b̈; 0 is the thesis' model, in which the angle is not observable"""
     rate_prior: float = 1.0
     """standard deviation of the first ω, rad/s"""
     angular_acceleration_prior: float = 10.0
     """standard deviation of the first α, rad/s²"""
     acceleration_prior: float = 1.0
-    """standard deviation of the first b̈, m/s² per axis; the first tilt is as wrong"""
+    """standard deviation of the first b̈, m/s² per axis; it also determines that of the first tilt angle"""
 
     outputs: ClassVar[tuple[Quantity, ...]] = (PLANAR_ANGLE, PLANAR_RATE)
     state_size: ClassVar[int] = 9
@@ -91,11 +90,11 @@ class PlanarPose(PlanarEquations, Model):
 
     @property
     def residual_size(self) -> int:  # type: ignore[override]
-        """Numbers in the residual."""
+        """Size of the residual."""
         return self.array.size
 
     def prior(self, z: Measurement) -> tuple[Array, Array]:
-        """Angle of the start, everything else zero; position and velocity are known to 1 m and 1 m/s."""
+        """Angle of the start, everything else zero; standard deviations of position and velocity are 1 m and 1 m/s."""
         angle, variance = with_parameters(self, {"inertial_acceleration": self.acceleration_prior}).first(z)
         xp, zero = namespace(angle), 0.0 * angle
         rest = [self.rate_prior, self.angular_acceleration_prior, 1.0, 1.0, 1.0, 1.0, *(self.acceleration_prior,) * 2]
@@ -117,7 +116,7 @@ class PlanarPose(PlanarEquations, Model):
         return (F @ x[..., None])[..., 0], F, Q
 
     def residual(self, x: Array, z: Measurement) -> tuple[Array, Array, Array]:
-        """Readings less those that are expected (3.42), H and R."""
+        """Readings less the expected ones (3.42), H and R."""
         noise = (
             np.linalg.inv(self.array.A.T @ self.array.A) if self.form == "printed-noise" else np.eye(self.array.size)
         )

@@ -1,8 +1,8 @@
 r"""Orientation in a vertical plane by the unscented Kalman filter of the package filterpy.
 
 P. He, thesis, Université Laval; section 3.3.6: the model of the extended filter (:class:`.PlanarOrientation`) with
-sigma points (3.48), λ = α̃²(L + κ) − L, L = 1, κ = 3 − L. Near a mean
-that is this well known the tangent fits, and the two agree.
+sigma points (3.48), λ = α̃²(L + κ) − L, L = 1, κ = 3 − L. The variance of the angle is so small that the
+linearisation is accurate, and the two filters agree.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from .orientation import PLANAR_ANGLE, PlanarEquations, PlanarOrientation
 
 
 class UnscentedState(NamedTuple):
-    """Memory of the filter; NumPy arrays.
+    """State of the filter; NumPy arrays.
 
     Attributes:
         x: ``(*batch, 1)`` angle, rad; zero before the start.
@@ -39,14 +39,14 @@ class UnscentedState(NamedTuple):
 
 @dataclass(frozen=True)
 class PlanarUnscented(PlanarEquations):
-    """The unscented filter; batches are looped over, computation is NumPy's.
+    """The unscented filter; batches are processed one sequence at a time, in NumPy.
 
     Raises:
         ValueError: ``spread`` is not in (0, 1], or as :class:`.PlanarEquations`.
     """
 
     spread: float = 1e-3
-    """α̃: how far the sigma points lie from the mean, 10⁻⁴ to 1 (section 3.3.6)"""
+    """α̃: distance of the sigma points from the mean, 10⁻⁴ to 1 (section 3.3.6)"""
     weight: float = 2.0
     """β̃ of the scaled transform: 2 suits a normal distribution"""
 
@@ -62,7 +62,7 @@ class PlanarUnscented(PlanarEquations):
         return PlanarOrientation(**{item.name: getattr(self, item.name) for item in fields(PlanarEquations)})
 
     def _filter(self, model: PlanarOrientation) -> Any:
-        """The package's filter, to be given state and samples."""
+        """The filter of the package, without state."""
         from filterpy.kalman import MerweScaledSigmaPoints, UnscentedKalmanFilter
 
         points = MerweScaledSigmaPoints(1, alpha=self.spread, beta=self.weight, kappa=2.0)

@@ -1,42 +1,42 @@
-r"""Orientation from an array of accelerometers, a magnetometer and (where the array needs one) a gyroscope.
+r"""Orientation from an array of accelerometers, a magnetometer and, where the array requires it, a gyroscope.
 
 P. He, "Estimating the orientation of a game controller from inertial and magnetic measurements", thesis, Université
 Laval; chapter 5. Equation numbers are the thesis'.
 
 The state holds the rows q₁, q₂, q₃ of the rotation matrix Q (body to world), the angular acceleration α and the angular
-rate ω (body axes); the jerk of the turn is white noise γ:
+rate ω (body axes); the angular jerk is white noise γ:
 
     q_i ← Φ q_i,  Φ = exp(−Δt [ω]×),   α ← α + Δt γ,   ω ← ω + Δt α + ½ Δt² γ
 
 With G the magnitude of gravity, m the unit magnetic field in the world, R_BO the mounting of the magnetometer and
-A = [A_P A_T A_C] the array, what is expected of the readings is
+A = [A_P A_T A_C] the array, the expected readings are
 
     array          G A_P q₃ + A_T α + A_C ξ(ω)
     gyroscope      ω
     magnetometer   R_BOᵀ Qᵀ m
     zeros          q₁·q₁ − 1, q₂·q₂ − 1, q₃·q₃ − 1, q₂·q₃, q₃·q₁, q₁·q₂          (orthogonality as a measurement)
 
-and R = blkdiag(σ_b² A_P A_Pᵀ + σ_a² 1, σ_ω² 1, σ_m² 1, σ_s² 1). The idea is in σ_b: the acceleration of the hand is
-white noise that all accelerometers share, so the filter knows how little information on gravity they hold.
+and R = blkdiag(σ_b² A_P A_Pᵀ + σ_a² 1, σ_ω² 1, σ_m² 1, σ_s² 1). The essential parameter is σ_b: the acceleration of
+the hand is white noise common to all accelerometers, so R reflects how little information on gravity they contain.
 
-Differs from print:
+Differences from the thesis:
 
-* (5.17), (5.25), (5.30): gravity has the wrong sign there, unless g is the *upward* vector as in the thesis'
-  experiments; ``gravity_sign=-1`` is print, and tips over.
-* (5.29): the derivative of q_i⁺ by ω is +Δt [q_i]×, not −Δt [q_i]×; ``coupling_sign=-1`` is print, which a gyroscope
-  hides and which is fatal without.
-* (5.25): R_BOᵀ, as (5.23) and (5.30) have it.
-* ``exact_rotation`` and ``orthonormalise`` (both on by default) are ours: the printed first-order Φ = 1 − Δt [ω]×
-  stretches the rows at every step, and the zeros pull them back at shifting points of linearisation, which makes the
-  covariance overconfident and lets the error grow with time. The exponential, and the nearest rotation matrix after
-  every correction, more than halve the error over 100 s. Off and off is the thesis' filter.
+* (5.17), (5.25), (5.30): gravity has the wrong sign unless g is the *upward* vector, as in the thesis' experiments.
+  ``gravity_sign=-1`` is as published and diverges.
+* (5.29): the derivative of q_i⁺ by ω is +Δt [q_i]×, not −Δt [q_i]×. ``coupling_sign=-1`` is as published; the error has
+  little effect with a gyroscope, but the filter diverges without one.
+* (5.25): R_BOᵀ, as in (5.23) and (5.30).
+* ``exact_rotation`` and ``orthonormalise`` (both on by default) are additions. The first-order Φ = 1 − Δt [ω]× of the
+  thesis stretches the rows at every step, and the orthogonality measurements pull them back at changing points of
+  linearisation. The covariance becomes overconfident, and the error grows with time. The exponential, and the nearest
+  rotation matrix after every update, more than halve the error over 100 s. The thesis' filter has both options off.
 * (5.66), (5.67), the virtual controller: the thesis gives no K_d; 2 s⁻¹ is our choice.
 
-The thesis has its z axis down or its y axis up as suits; here the world is x east, y north, z up and a reading is +G on
-an axis that points up at rest. Its field is a unit vector in microtesla: samples are scaled to length one here, so any
-unit will do. Start and P₀ are not given there.
+The axes of the thesis vary (z down or y up). Here the world is x east, y north, z up, and an accelerometer at rest
+reads +G on an axis that points up. Magnetometer samples are scaled to length one, so their unit does not matter. The
+thesis gives neither initial state nor P₀.
 
-Not estimated: gyroscope bias and the biases of the accelerometers, which dominate with real arrays.
+The biases of gyroscope and accelerometers are not estimated; with real arrays they dominate the error.
 """
 
 from __future__ import annotations
@@ -78,25 +78,25 @@ class ArrayOrientation(ArrayEquations, Model):
     State: rows of Q (9), α (3), ω (3), unit field in the world (3), velocity and position of the virtual controller
     (6, world), external acceleration (3, body). The error state is the first 15.
 
-    The channel of the readings is ``array/acc``, one number a sensor; a single triaxial accelerometer along the body
-    axes reads ``imu/acc`` instead, so that the recordings of any IMU can be used.
+    The channel of the readings is ``array/acc``, one number per sensor. A single triaxial accelerometer along the body
+    axes uses ``imu/acc`` instead, so that recordings of any IMU can be used.
 
     Raises:
         ValueError: an unknown array, method, start or field; a planar array; integration without a gyroscope; a start
-            or mounting that is no unit quaternion; virtual dampings that are not positive.
+            or mounting that is not a unit quaternion; virtual dampings that are not positive.
     """
 
     array: AccelerometerArray | str = "controller"
     """an array, or the name of one: controller, octa, triaxial"""
     gyroscope: bool = True
-    """whether there is a gyroscope; only an array of rank 12 (octa) can do without"""
+    """whether there is a gyroscope; only an array of rank 12 (octa) works without one"""
     method: Literal["fusion", "tilt", "integration"] = "fusion"
-    """``tilt`` takes the acceleration of the hand for zero (σ_b = 0) and leaves the gyroscope out, ``integration``
-    corrects with nothing but gyroscope and orthogonality"""
+    """``tilt`` assumes no acceleration of the hand (σ_b = 0) and ignores the gyroscope; ``integration`` uses only the
+    gyroscope and orthogonality"""
     exact_rotation: bool = True
-    """propagate by the exponential instead of the printed first order (5.26)"""
+    """propagate by the exponential instead of the first-order rotation (5.26)"""
     orthonormalise: bool = True
-    """take the nearest rotation matrix after every correction"""
+    """replace Q by the nearest rotation matrix after every update"""
     start: Literal["samples", "given"] = "samples"
     """``samples``: at rest, from the first readings and field; ``given``: :attr:`start_orientation`"""
     field: Literal["start", "given"] = "start"
@@ -114,30 +114,30 @@ class ArrayOrientation(ArrayEquations, Model):
     orthogonality_std: float = 0.01
     """σ_s; the thesis gives none, 10⁻³ over-constrains"""
     orientation_prior: float = 0.01
-    """standard deviation of every element of Q at the start; 1 opens it after a start that is only guessed"""
+    """standard deviation of every element of Q at the start; 1 if the start is uncertain"""
     angular_acceleration_prior: float = 1.0
     """rad/s²"""
     rate_prior: float = 0.316
     """rad/s"""
     start_orientation: tuple[float, ...] = (1.0, 0.0, 0.0, 0.0)
-    """unit quaternion, body to world, of a given start"""
+    """unit quaternion, body to world, if the start is given"""
     magnetometer_mounting: tuple[float, ...] = (1.0, 0.0, 0.0, 0.0)
     """R_BO as a unit quaternion: magnetometer axes to body axes"""
     declination: float = 0.0
     """of the magnetic field, rad, positive east"""
     dip: float = 0.0
-    """of a given magnetic field below the horizontal, rad"""
+    """below the horizontal, rad, if the field is given"""
     position_damping: float = 2.0
-    """K_d,b of the virtual controller, 1/s; our choice: motion slower than 0.3 Hz is lost, a constant error of 0.2 m/s²
-    (1.2° of tilt) settles at 5 cm"""
+    """K_d,b of the virtual controller, 1/s; our choice: motion below 0.3 Hz is lost, and a constant error of 0.2 m/s²
+    (1.2° of tilt) leads to an offset of 5 cm"""
     velocity_damping: float = 2.0
     """K_d,v of the virtual controller, 1/s; our choice"""
     gravity: float = GRAVITY
     """g, m/s²"""
     gravity_sign: float = 1.0
-    """−1 expects gravity of the readings as (5.17), (5.25), (5.30) print it; to show the erratum"""
+    """−1: gravity as published in (5.17), (5.25), (5.30), to show the erratum"""
     coupling_sign: float = 1.0
-    """−1 takes ∂q⁺/∂ω as (5.29) prints it; to show the erratum"""
+    """−1: ∂q⁺/∂ω as published in (5.29), to show the erratum"""
 
     outputs: ClassVar[tuple[Quantity, ...]] = (ORIENTATION, UP, ANGULAR_RATE, EXTERNAL_ACCELERATION, VIRTUAL_POSITION)
     state_size: ClassVar[int] = 27
@@ -149,7 +149,7 @@ class ArrayOrientation(ArrayEquations, Model):
     }
 
     def __post_init__(self) -> None:
-        """Look the array up and refuse what does not fit together."""
+        """Look up the array and check the combination of options."""
         super().__post_init__()
         if isinstance(self.array, str):
             if self.array not in ARRAYS:
@@ -176,12 +176,12 @@ class ArrayOrientation(ArrayEquations, Model):
 
     @property
     def has_rate_rows(self) -> bool:
-        """Whether the gyroscope corrects."""
+        """Whether the gyroscope is used as a measurement."""
         return self.gyroscope and self.method != "tilt"
 
     @property
     def channels(self) -> tuple[Channel, ...]:  # type: ignore[override]
-        """What is read: depends on array and method."""
+        """Channels, depending on array and method."""
         return (*((GYROSCOPE,) if self.has_rate_rows else ()), self.readings, MAGNETOMETER)
 
     @property
@@ -191,7 +191,7 @@ class ArrayOrientation(ArrayEquations, Model):
         return vectors + 3 * self.has_rate_rows + 6
 
     def prior(self, z: Measurement) -> tuple[Array, Array]:
-        """At rest: vertical from the readings, heading from the field; or as given. α₀ = 0, ω₀ from the gyroscope."""
+        """At rest: inclination from readings, heading from the field; or as given. α₀ = 0, ω₀ from the gyroscope."""
         readings, field = z[self.readings.name], self._body_field(z)
         xp = namespace(readings)
         zero = 0.0 * field + 0.0 * xp.sum(readings, axis=-1)[..., None]
@@ -209,17 +209,17 @@ class ArrayOrientation(ArrayEquations, Model):
         return x, covariance_of(deviations, zero[..., :1])
 
     def predict(self, x: Array, z: Measurement, previous: Measurement) -> tuple[Array, Array, Array]:
-        """Equations (5.26)–(5.29): the rows turn back with the body, α and ω are driven by white jerk."""
+        """Equations (5.26)–(5.29): the rows rotate with the body, α and ω are driven by white jerk."""
         xp = namespace(x)
         Q, alpha, rate = self._matrix(x), x[..., 9:12], x[..., 12:15]
         dt, dt2 = expand(self.dt, 1), expand(self.dt, 2)
         unit = identity(3, x)
         none = 0.0 * unit
-        # q_i ← Φ q_i (5.26): the rows of Q turn back with the body
+        # q_i ← Φ q_i (5.26): rotation of the rows of Q into the new body axes
         turn = dt * rate
         back = exp_matrix(-turn) if self.exact_rotation else unit - skew(turn)
         turned = Q @ back.mT
-        # a row after the turn depends on ω by its place in the middle of the interval, turned on
+        # derivative of a rotated row by ω: evaluated in the middle of the interval, then rotated by the second half
         if self.exact_rotation:
             half = exp_matrix(-0.5 * turn)
             middle = Q @ half.mT
@@ -246,7 +246,7 @@ class ArrayOrientation(ArrayEquations, Model):
         none, zero3 = 0.0 * unit, 0.0 * x[..., :3]
         r, H, R = [], [], []
         if self.method != "integration":
-            # array (5.30): G A_P q₃ + A_T α + A_C ξ(ω); its covariance holds σ_b, shared by all accelerometers
+            # array (5.30): G A_P q₃ + A_T α + A_C ξ(ω); its covariance contains σ_b, common to all accelerometers
             P, T, C = (constant(matrix, x) for matrix in (self.geometry.A_P, self.geometry.A_T, self.geometry.A_C))
             gravity = expand(self.gravity_sign * self.gravity, 2)
             rate = x[..., 12:15]
@@ -278,18 +278,18 @@ class ArrayOrientation(ArrayEquations, Model):
         return xp.concat(r, axis=-1), block_matrix(H), block_diagonal(R)
 
     def retract(self, x: Array, dx: Array) -> Array:
-        """A sum."""
+        """Additive."""
         return namespace(x).concat([x[..., :15] + dx, x[..., 15:]], axis=-1)
 
     def finish(self, x: Array, z: Measurement) -> Array:
-        """Nearest rotation matrix if wanted; external acceleration, zero where a reading is missing; (5.66), (5.67)."""
+        """Optional nearest rotation matrix; external acceleration, zero where a reading is missing; (5.66), (5.67)."""
         xp = namespace(x)
         Q = self._matrix(x)
         Q = nearest_matrix(Q) if self.orthonormalise else Q
         readings = z[self.readings.name]
         there = xp.all(xp.isfinite(readings), axis=-1)[..., None]
         readings = xp.where(there, readings, xp.zeros_like(readings))
-        # readings less what turning adds, averaged to the specific force at the reference point; less gravity: b̈
+        # readings without rotational terms, averaged to the specific force at the reference point; less gravity: b̈
         T, C, mean = (constant(matrix, x) for matrix in (self.geometry.A_T, self.geometry.A_C, self._mean))
         turning = T @ x[..., 9:12, None] + C @ products(x[..., 12:15])[..., None]
         force = (mean @ (readings[..., None] - turning))[..., 0]
@@ -306,7 +306,7 @@ class ArrayOrientation(ArrayEquations, Model):
         return xp.concat([*rows, x[..., 9:18], virtual, external], axis=-1)
 
     def pose(self, x: Array) -> dict[str, Array]:
-        """Orientation (of the nearest rotation matrix), vertical, angular rate, accelerations, virtual position."""
+        """Orientation (nearest rotation matrix), inclination vector, angular rate, acceleration, virtual position."""
         Q = self._matrix(x)
         Q = Q if self.orthonormalise else nearest_matrix(Q)
         return {
@@ -319,7 +319,7 @@ class ArrayOrientation(ArrayEquations, Model):
 
     @property
     def _mean(self) -> np.ndarray:
-        """A_P⁺ ``(3, m)``: specific force at the reference point from readings without what turning adds."""
+        """A_P⁺ ``(3, m)``: specific force at the reference point from readings without rotational terms."""
         return np.linalg.pinv(self.geometry.A_P)
 
     def _body_field(self, z: Measurement) -> Array:

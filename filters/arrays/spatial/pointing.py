@@ -1,9 +1,9 @@
-r"""What the thesis on the game controller shows of an orientation: where the controller points, and how far it may err.
+r"""Pointing direction of the game controller, and a bound on the error of a tilt sensor, as in the thesis.
 
 P. He, "Estimating the orientation of a game controller from inertial and magnetic measurements", thesis, Université
 Laval, sections 5.3.1 and 5.3.2. The controller points along its y axis; world x east, y north, z up.
 
-Differs from print: in (5.48) and (5.49) the entry −cos θ sin ψ must be +cos θ sin ψ, so that the matrix is a rotation
+Errata: in (5.48) and (5.49) the entry −cos θ sin ψ must be +cos θ sin ψ, so that the matrix is a rotation
 and agrees with the targets (5.50); the bound (5.63) of a tilt sensor is an arcsine.
 """
 
@@ -19,7 +19,7 @@ from ...core.rotation import rotate
 def pointing_angles(q: Array) -> tuple[Array, Array]:
     """Pitch θ = arcsin e_z and azimuth ψ = atan2(e_x, e_y) ``(...)``, rad, of the body's y axis e in the world.
 
-    The azimuth counts from north (+y) to east (+x).
+    The azimuth is measured from north (+y) towards east (+x).
 
     Args:
         q: unit quaternion, body to world, ``(..., 4)``.
@@ -30,10 +30,10 @@ def pointing_angles(q: Array) -> tuple[Array, Array]:
 
 
 def tilt_error_bound(acceleration: Array, gravity: float = GRAVITY) -> Array:
-    """Largest error ``(...)`` of the vertical, rad, if an accelerometer reading is taken for gravity.
+    """Largest error ``(...)`` of the inclination, rad, if an accelerometer reading is assumed to be gravity.
 
-    arcsin(|b̈| / g) (5.63), reached where b̈ is perpendicular to the *reading*; the printed arctangent holds where b̈ is
-    perpendicular to gravity. π where |b̈| exceeds g: then nothing is known.
+    arcsin(|b̈| / g) (5.63), reached where b̈ is perpendicular to the *reading*; the published arctangent applies
+    where b̈ is perpendicular to gravity. π where |b̈| exceeds g, since the error is then unbounded.
 
     Args:
         acceleration: b̈ ``(..., 3)``, m/s², any axes.

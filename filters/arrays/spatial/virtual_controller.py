@@ -1,12 +1,12 @@
-r"""The virtual controller: a position that is drawn, not measured.
+r"""The virtual controller: a position for display, not an estimate of position.
 
-P. He, thesis, Université Laval, section 5.6. The acceleration of the hand, integrated twice, runs away with
-the smallest error of the orientation; with leaks,
+P. He, thesis, Université Laval, section 5.6. The double integral of the hand's acceleration diverges with
+the smallest orientation error. With leaks,
 
     ḃ = v − K_b b,   v̇ = b̈ − K_v v                                       (5.66), (5.67)
 
-a constant error c of b̈ settles at c / (K_b K_v). Motion slower than the corner frequencies K / 2π is lost, and the
-virtual controller returns to where it started from.
+a constant error c of b̈ leads to the offset c / (K_b K_v). Motion below the corner frequencies K / 2π is lost, and the
+virtual controller returns to its initial position.
 """
 
 from __future__ import annotations
@@ -15,13 +15,13 @@ from ...core.backend import Array, expand, namespace
 from ...core.quantity import Quantity
 
 VIRTUAL_POSITION = Quantity("virtual_position", "vector", 3, "m")
-"""Where the virtual controller is drawn: a high-passed position, world axes."""
+"""Displayed position of the virtual controller: a high-passed position, world axes."""
 
 
 def advance(state: Array, acceleration: Array, dt: Array, *, velocity_damping: Array, position_damping: Array) -> Array:
     """Velocity and position of the virtual controller after one interval, ``(..., 6)``.
 
-    Exact for an acceleration, and then for a velocity (the mean of its ends), that is held over the interval.
+    Exact for an acceleration, and then for a velocity (mean of both ends), that is constant over the interval.
 
     Args:
         state: velocity (m/s) and position (m), world axes, ``(..., 6)``.

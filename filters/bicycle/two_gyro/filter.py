@@ -1,23 +1,22 @@
 r"""Roll of a bicycle and attitude of its rider's trunk from two gyroscopes and a camera, without drift.
 
 Y. Zhang, K. Chen, J. Yi and colleagues, drift-free attitude estimation of a rigid body on a moving platform from two
-gyroscopes and relative measurements; equation numbers are the paper's. No accelerometer: that the platform does not
-pitch makes its roll observable while it turns (:mod:`.two_gyro.kinematics`).
+gyroscopes and relative measurements; equation numbers are the paper's. There is no accelerometer. The roll is
+observable while the platform turns because it does not pitch (:mod:`.two_gyro.kinematics`).
 
 State: φ, θ (3), biases of the body's gyroscope (3) and of the platform's (x and z in Σ2, all three in Σ1); yaw is not
-estimated. Every rate below is less its bias, x(k+1) = x(k) + T [dφ/dt, dθ/dt, −b/τ] (23), and the process covariance is
-Q = T² C (24), (25) with
+estimated. All rates below are bias-corrected, x(k+1) = x(k) + T [dφ/dt, dθ/dt, −b/τ] (23), and the process covariance
+is Q = T² C (24), (25) with
 
     C = blkdiag(Â C_vh Âᵀ + D̂ C_vp D̂ᵀ, σ_uh² 1, σ_up² 1),    Â = [0; A],  D̂ = [1 0; D]
 
 where C_v is the variance of one sample of a gyroscope. Parameters are densities, which hold at any rate: C_v = σ²/T.
-A sample is the mean rate of the interval that it ends, so the sample of k turns k−1 into k.
+A sample is the mean rate of the interval that it ends, so the sample of k propagates the state from k−1 to k.
 
-Differs from print: the sample of k−1 is used there; (26) has Â₃₃ and D̂₄₃ where D̂₃₂ and D̂₄₂ belong; the second
-variance of the platform's biases in (25) is that of z; Q is T² C, (27) lacks the power of T. Σ2 is exact without pitch
-only, not "without any approximation", and a constant error of the camera passes to the roll almost one to one. The
-paper gives neither noises nor T nor a prior. The pseudo-measurement of :mod:`.platform_gyro` needs the platform's
-gyroscope alone.
+Errata and differences: the paper uses the sample of k−1; (26) has Â₃₃ and D̂₄₃ instead of D̂₃₂ and D̂₄₂; the second
+variance of the platform's biases in (25) is that of z; Q is T² C, and (27) lacks the power of T. Σ2 is exact only
+without pitch, not "without any approximation". The paper gives neither noises nor T nor a prior. The pseudo-measurement
+of :mod:`.platform_gyro` needs only the platform's gyroscope.
 """
 
 from __future__ import annotations
@@ -64,9 +63,9 @@ DEG = math.pi / 180.0
 RELATIVE_ANGLES = Quantity("two-gyro/relative_angles", "angle", 3, "rad")
 """θ₁, θ₂, θ₃ in the paper's axes."""
 PITCH = Quantity("two-gyro/pitch", "angle", 1, "rad")
-"""χ of a segway, nose up positive."""
+"""χ of a Segway, nose up positive."""
 UP = Quantity("two-gyro/body_up", "direction", 3, "1")
-"""The upward vertical in the body's axes, as the sensors have them."""
+"""Inclination vector in the axes of the body's sensor."""
 TRUNK = MarkerPlaces.of_trunk(RiderGeometry())
 
 
@@ -74,29 +73,29 @@ TRUNK = MarkerPlaces.of_trunk(RiderGeometry())
 class TwoGyro(RiderEquations, Model):
     """The paper's extended Kalman filter, with both of its models.
 
-    It reads ``bicycle_imu/gyr``, ``trunk_imu/gyr`` (or ``disk/gyr``) and the camera, whose frames may be rare.
+    It uses ``bicycle_imu/gyr``, ``trunk_imu/gyr`` (or ``disk/gyr``) and the camera, which may have a lower rate.
     """
 
     model: Literal["sigma1", "sigma2"] = "sigma2"
-    """Σ2 knows the roll while the platform turns; Σ1 is exact for any motion, and its roll drifts"""
+    """Σ2 observes the roll while the platform turns; Σ1 is exact for any motion, but its roll drifts"""
     platform: Platform = "bicycle"
     """``segway``: pitch χ instead of roll φ, by (6)"""
     body: Literal["trunk", "disk"] = "trunk"
-    """what the second gyroscope is on: a rider's trunk, or the disk of ``poise/BicycleFixture-v0``"""
+    """body of the second gyroscope: a rider's trunk, or the disk of ``poise/BicycleFixture-v0``"""
     sensor: Literal["orientation", "distances"] = "orientation"
     """h(θ) of (16): θ itself, or the distances of three markers"""
     integration: Literal["euler", "midpoint"] = "midpoint"
-    """``euler`` is printed (23); ``midpoint`` takes the kinematics in the middle of the interval: with ``euler`` the
-    roll of a rider who moves is 1.3 times its standard deviation wrong at 100 Hz"""
+    """``euler`` as published (23); ``midpoint`` evaluates the kinematics in the middle of the interval. With ``euler``
+    the roll error of a moving rider is 1.3 times its standard deviation at 100 Hz"""
     constraint: bool = False
-    """Σ1 with (5) as pseudo-measurement, 0 = cos φ δω_y − sin φ δω_z: roll from the platform's gyroscope, whatever the
-    camera says; not in the paper. The samples' noise is taken as if Σ1 did not use it"""
+    """Σ1 with (5) as pseudo-measurement, 0 = cos φ δω_y − sin φ δω_z: roll from the platform's gyroscope,
+    independent of the camera; not in the paper. The correlation of its noise with that of Σ1 is neglected"""
     constraint_noise: float = 1.0 * DEG
-    """rad/s/√Hz: pitch rate and what else violates (5)"""
+    """rad/s/√Hz: pitch rate and other violations of (5)"""
     body_gyroscope_noise: Point = (0.05 * DEG, 0.05 * DEG, 0.05 * DEG)
     """σ_vh √T, rad/s/√Hz, of each axis (gyroscope 605; the paper gives none)"""
     platform_gyroscope_noise: Point = (0.05 * DEG, 0.05 * DEG, 0.05 * DEG)
-    """σ_vp √T, rad/s/√Hz, of x, y, z; y counts in Σ1 of a bicycle, and x in that of a segway"""
+    """σ_vp √T, rad/s/√Hz, of x, y, z; y is used in Σ1 of a bicycle, and x in that of a Segway"""
     body_bias_drift: float = 0.15 * DEG
     """σ_b, rad/s: standard deviation of the Markov process (10); σ_u = σ_b √(2 / (T τ))"""
     platform_bias_drift: float = 0.15 * DEG
@@ -106,18 +105,18 @@ class TwoGyro(RiderEquations, Model):
     platform_bias_time: float = 1800.0
     """τ_p, s"""
     orientation_noise: float = 2.0 * DEG
-    """rad: standard deviation of each measured θ; more than one frame's white noise, since alignment errors last"""
+    """rad: standard deviation of each measured θ; larger than the white noise of a frame, to cover alignment errors"""
     distance_noise: float = 0.003
     """m: standard deviation of each measured distance"""
     process_scale: float = 1.0
     """factor on all standard deviations of the process noise"""
     zero_yaw_guard: float = 0.0
-    """rad/s: below this yaw rate F has no coupling of θ to φ, where bias and noise of the gyroscope would make the
-    filter believe that it observes the roll (0.5 °/s helps); 0: off"""
+    """rad/s: below this yaw rate F has no coupling of θ to φ, because bias and noise of the gyroscope would act as
+    false information on the roll (0.5 °/s is useful); 0: off"""
     pitch_rate_noise: float = 0.0
-    """rad/s/√Hz along M_:2 / cos φ: the pitch rate, which is not modelled (1.4 °/s/√Hz helps on rough roads); 0: off"""
+    """rad/s/√Hz along M_:2 / cos φ: unmodelled pitch rate (1.4 °/s/√Hz is useful on rough roads); 0: off"""
     roll_rate_noise: float = 0.0
-    """rad/s/√Hz on φ: the missing sin χ dψ/dt (1.4 °/s/√Hz helps); 0: off"""
+    """rad/s/√Hz on φ: the neglected term sin χ dψ/dt (1.4 °/s/√Hz is useful); 0: off"""
     roll_prior: float = 10.0 * DEG
     """rad: standard deviation of φ at the start"""
     initial_roll: float = 0.0
@@ -131,16 +130,16 @@ class TwoGyro(RiderEquations, Model):
     platform_bias_prior: float = 0.15 * DEG
     """rad/s"""
     imu_tilt: float = 10.0 * DEG
-    """rad: how far nose up the platform's gyroscope is mounted (force-inertial paper, α)"""
+    """rad: tilt of the platform's gyroscope, nose up (force-inertial paper, α)"""
     pivot: Point = TRUNK.pivot
     """m: origin of the body's frame in the bicycle frame"""
     markers: tuple[Point, Point, Point] = TRUNK.markers
     """m in the body's frame"""
     viewpoints: tuple[Point, Point, Point] = TRUNK.viewpoints
-    """m in the bicycle frame: from where the markers are seen"""
+    """m in the bicycle frame: viewpoints of the markers"""
 
     def __post_init__(self) -> None:
-        """Refuse negative or vanishing standard deviations, and a constraint on Σ2."""
+        """Check standard deviations, and that a constraint is used with Σ1 only."""
         super().__post_init__()
         noises = ("body_gyroscope_noise", "platform_gyroscope_noise", "orientation_noise", "distance_noise")
         drifts = ("constraint_noise", "body_bias_drift", "platform_bias_drift", "process_scale")
@@ -153,7 +152,7 @@ class TwoGyro(RiderEquations, Model):
 
     @classmethod
     def rider_parameters(cls, geometry: RiderGeometry) -> dict[str, Any]:
-        """Tilt of the sensor, usual posture, places of the markers on the back."""
+        """Tilt of the sensor, usual posture, positions of the markers on the back."""
         places = MarkerPlaces.of_trunk(geometry)
         return {
             "imu_tilt": geometry.bicycle_imu_tilt,
@@ -165,7 +164,7 @@ class TwoGyro(RiderEquations, Model):
 
     @classmethod
     def for_disk(cls, **parameters: Any) -> Self:
-        """The filter for ``poise/BicycleFixture-v0``: its markers, the slower gyroscope of the disk, a longer start."""
+        """The filter for ``poise/BicycleFixture-v0``: its markers, the gyroscope of the disk, and a wider prior."""
         places = MarkerPlaces.of_disk()
         usual = {
             "body": "disk",
@@ -197,7 +196,7 @@ class TwoGyro(RiderEquations, Model):
 
     @property
     def outputs(self) -> tuple[Quantity, ...]:  # type: ignore[override]
-        """Roll (or pitch), relative angles, the body's vertical, and both biases."""
+        """Roll (or pitch), relative angles, the body's inclination vector, and both biases."""
         bias = Quantity(self.body_gyroscope.replace("gyr", "gyroscope_bias"), "vector", 3, "rad/s")
         platform = Quantity("two-gyro/platform_bias", "vector", self.platform_rates, "rad/s")
         return (ROLL if self.platform == "bicycle" else PITCH, RELATIVE_ANGLES, UP, bias, platform)
@@ -213,7 +212,7 @@ class TwoGyro(RiderEquations, Model):
 
     @property
     def platform_rates(self) -> int:
-        """How many rates of the platform are used: 2 in Σ2, 3 in Σ1."""
+        """Number of platform rates in use: 2 in Σ2, 3 in Σ1."""
         return 2 if self.model == "sigma2" else 3
 
     @property
@@ -254,7 +253,7 @@ class TwoGyro(RiderEquations, Model):
         rate, G, noise = self._dynamics(x, *samples)
         unit = identity(self.state_size, x)
         if self.integration == "midpoint":
-            # the kinematics in the middle of the interval, which half an Euler step reaches
+            # the kinematics in the middle of the interval, after half an Euler step
             rate, middle, noise = self._dynamics(x + 0.5 * T * rate, *samples)
             G = middle @ (unit + 0.5 * T3 * G)
         return x + T * rate, unit + T3 * G, self._process(x, noise)
@@ -263,7 +262,7 @@ class TwoGyro(RiderEquations, Model):
         """Measured less expected, y − h(θ), wrapped if it is an angle (16); H = [0 ∂h/∂θ 0]."""
         xp, y = namespace(x), z[self.channels[2].name]
         if self.sensor == "orientation":
-            # what is missing is replaced before the angles are formed: a NaN in them would make gradients NaN
+            # missing samples are replaced before the angles are computed, because NaN would make gradients NaN
             seen = xp.all(xp.isfinite(y), axis=-1)[..., None]
             angles = relative_angles(xp.where(seen, y, constant([1.0, 0.0, 0.0, 0.0], x)))
             r = xp.where(seen, wrap(angles - x[..., 1:4]), xp.nan)
@@ -279,16 +278,16 @@ class TwoGyro(RiderEquations, Model):
             value, by_angle, by_rate = level_constraint(x[..., :1], rate)
             row = block_matrix([[by_angle[..., None], zeros(x, 1, 6), -by_rate[..., None, :]]])
             r, H = xp.concat([r, -value], axis=-1), xp.concat([H, row], axis=-2)
-            # the gyroscope's y axis is what (5) measures of a nearly upright bicycle
+            # the noise of (5) is that of the gyroscope's y axis for a nearly upright bicycle
             variances.append((self.platform_gyroscope_noise[1] ** 2 + self.constraint_noise**2) / self.dt)
         return r, H, diagonal(variances, 0.0 * x[..., :1])
 
     def pose(self, x: Array) -> dict[str, Array]:
-        """Roll right positive, θ in the paper's axes, vertical and biases in the sensors' axes."""
+        """Roll (right positive), θ in the paper's axes, inclination vector and biases in the sensors' axes."""
         xp = namespace(x)
         theta, signs = x[..., 1:4], constant(SIGNS, x)
         angle, zero = x[..., :1], 0.0 * x[..., :1]
-        # the vertical in the platform's axes, as the sensors have them, then turned into the body's
+        # the inclination vector in the platform's sensor axes, then rotated into the body's
         cosine, sine = xp.cos(angle), xp.sin(angle)
         bicycle = self.platform == "bicycle"
         up = xp.concat([zero, sine, cosine] if bicycle else [sine, zero, cosine], axis=-1)
@@ -303,7 +302,7 @@ class TwoGyro(RiderEquations, Model):
         }
 
     def truth(self, truth: Mapping[str, Any]) -> dict[str, Any]:
-        """Roll or pitch, θ, the body's vertical and the platform's biases, from the orientations of both bodies."""
+        """Roll or pitch, θ, inclination vector and the platform's biases, from the orientations of both bodies."""
         orientations = {"bicycle/orientation", f"{self.body}/orientation"}
         return true_angles(truth, self.body, self.imu_tilt, self.used_axes) if orientations <= set(truth) else {}
 
@@ -311,18 +310,18 @@ class TwoGyro(RiderEquations, Model):
 
     @property
     def used_axes(self) -> tuple[int, ...]:
-        """Axes of the platform's rates that are used."""
+        """Axes of the platform rates in use."""
         if self.model == "sigma1":
             return (0, 1, 2)
         return (0, 2) if self.platform == "bicycle" else (1, 2)
 
     @property
     def _first(self) -> int:
-        """Which of the rates that are used turns the angle φ or χ."""
+        """Index of the rate about the axis of φ or χ."""
         return self.used_axes.index(0 if self.platform == "bicycle" else 1)
 
     def _platform_rates(self, z: Measurement) -> Array:
-        """Those of the platform's rates that are used, ``(..., 2 or 3)``, paper's axes."""
+        """The platform rates in use, ``(..., 2 or 3)``, paper's axes."""
         rate = platform_rate(z["bicycle_imu/gyr"], self.imu_tilt)
         return namespace(rate).stack([rate[..., axis] for axis in self.used_axes], axis=-1)
 
@@ -336,12 +335,12 @@ class TwoGyro(RiderEquations, Model):
         return substitution(angle, self.platform), xp.where(quiet, 0.0 * slope, slope)
 
     def _dynamics(self, x: Array, body_rate: Array, platform_rates: Array) -> tuple[Array, Array, Array]:
-        """Derivative dx/dt, its Jacobian G, and how noises per √s enter φ and θ ``(4, columns)``."""
+        """Derivative dx/dt, its Jacobian G, and the noise input matrix of φ and θ ``(4, columns)``."""
         xp, count = namespace(x), self.platform_rates
         theta, biases = x[..., 1:4], x[..., 4:]
         # true rates δω^h and δω^p of (1) and (9)
         body, used = body_rate - biases[..., :3], platform_rates - biases[..., 3:]
-        # A and M of (13); D = M S of (15), where S gives all three platform rates from those that are used
+        # A and M of (13); D = M S of (15), where S gives all three platform rates from those in use
         A, M, S, slope = body_rate_matrix(theta), platform_rate_matrix(theta), *self._substitution(x, used)
         D, platform = M @ S, times(S, used)
         # f of (23): dφ/dt is one of the used rates (8), dθ/dt = A δω^h + M δω^p, biases decay with τ (2), (10)
@@ -350,7 +349,7 @@ class TwoGyro(RiderEquations, Model):
         angles = times(A, body) + times(M, platform)
         rate = xp.concat([times(first, used), angles, vector_of(decays, 0.0 * x[..., :1]) * biases], axis=-1)
 
-        # G = ∂f/∂x by rows φ, θ, biases; ∂(D δω^p)/∂φ is where Σ2 sees the roll, E of (21)
+        # G = ∂f/∂x by rows φ, θ, biases; ∂(D δω^p)/∂φ, E of (21), makes the roll observable in Σ2
         by_theta = body_rate_derivative(theta, body) + platform_rate_derivative(theta, platform)
         G = block_matrix(
             [
@@ -359,8 +358,8 @@ class TwoGyro(RiderEquations, Model):
                 [zeros(x, 3 + count, 4), diagonal(decays, 0.0 * x[..., :1])],
             ]
         )
-        # noise columns: Â and D̂ of (24), then what the model omits on a rough road: the pitch rate along M_:2 / cos φ
-        # (of a segway the roll rate along M_:1) and sin χ dψ/dt on φ
+        # noise columns: Â and D̂ of (24), then unmodelled motion on a rough road: the pitch rate along M_:2 / cos φ
+        # (of a Segway the roll rate along M_:1) and sin χ dψ/dt on φ
         pitching = M[..., 1:2] / xp.cos(x[..., :1])[..., None] if self.platform == "bicycle" else M[..., :1]
         rough = [[zeros(x, 1, 1), zeros(x, 1, 1) + 1.0], [pitching, zeros(x, 3, 1)]]
         return rate, G, block_matrix([[zeros(x, 1, 3), first, *rough[0]], [A, D, *rough[1]]])

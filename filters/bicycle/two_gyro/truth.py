@@ -1,4 +1,4 @@
-"""What is true of the two-gyroscope filter's quantities, from the truth that an environment records."""
+"""True values of the quantities of the two-gyroscope filter, from the truth that an environment records."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ def true_angles(
 
     Args:
         truth: ``bicycle/orientation`` and ``<body>/orientation`` ``(T, 4)``, body to world; with
-            ``bicycle_imu/gyroscope_bias`` ``(T, 3)`` the platform's biases are given too.
-        body: what the second gyroscope is on.
-        imu_tilt: rad, how far nose up the platform's gyroscope is mounted.
+            ``bicycle_imu/gyroscope_bias`` ``(T, 3)`` the platform's biases are returned too.
+        body: the body of the second gyroscope.
+        imu_tilt: tilt of the platform's gyroscope, nose up, rad.
         used_axes: of the platform's biases, :attr:`.TwoGyro.used_axes`.
 
     Raises:
@@ -34,7 +34,7 @@ def true_angles(
     names = ("bicycle/orientation", f"{body}/orientation")
     missing = [name for name in names if name not in truth]
     if missing:
-        raise ValueError(f"truth must hold {' and '.join(names)}, but it lacks {missing}")
+        raise ValueError(f"truth must contain {' and '.join(names)}; {missing} are missing")
     platform, on_it = (np.asarray(truth[name], dtype=float) for name in names)
     _, pitch, roll = to_euler_zyx(platform)
     angles = {
@@ -50,7 +50,7 @@ def true_angles(
 
 
 def true_states(truth: Mapping[str, np.ndarray], model: Any) -> np.ndarray:
-    """True states ``(T, n)`` of a filter, for bounds; biases that the truth does not hold are zero.
+    """True states ``(T, n)`` of a filter, for bounds; biases that are missing in the truth are zero.
 
     Args:
         truth: as for :func:`true_angles`, with ``trunk_imu/gyroscope_bias`` (or ``disk/gyroscope_bias``) for biases.

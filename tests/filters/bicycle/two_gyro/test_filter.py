@@ -330,5 +330,5 @@ def test_the_filter_is_configured_with_the_geometry():
 def test_bad_options_are_refused(options, message):
     with pytest.raises(ValueError, match=message):
         TwoGyro(**options)
-    with pytest.raises(ValueError, match="lacks"):
+    with pytest.raises(ValueError, match="are missing"):
         true_angles({"bicycle/orientation": np.zeros((1, 4))})
