@@ -163,8 +163,8 @@ RIDES = RideStudy(
 def rides(study: Study, report: Report) -> None:
     """Tables, claims and a figure of both courses."""
     report.text(
-        "Variants: *geometry measured*: segment lengths within 2 %, joints within 1 cm, trunk mass within 3 %. *Without "
-        "load cells*: they read a constant. *No pedals, no pelvis, sum of the hands*: the paper's point mass."
+        "Variants: *geometry measured*: segment lengths within 2 %, joints within 1 cm, trunk mass within 3 %. "
+        "*Without load cells*: they read a constant. *No pedals, no pelvis, sum of the hands*: the paper's point mass."
     )
     for scenario in ("indoor_circle", "outdoor"):
         paths, every = RIDES.run(study, scenario, "force-inertial")
