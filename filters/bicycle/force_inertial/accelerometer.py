@@ -1,15 +1,16 @@
-"""Angular accelerations from accelerometers: (7) and (8) of the force/inertial paper, corrected and as printed.
+"""Angular accelerations from accelerometers: (7) and (8) of the force/inertial paper, corrected and as published.
 
-Frames and names are those of :mod:`.force_inertial.kinematics`. An accelerometer reads specific force f = a − g, which
-with z down is (0, 0, −g) level and at rest.
+Frames and names are those of :mod:`.force_inertial.kinematics`. An accelerometer measures specific force f = a − g.
+With z down this is (0, 0, −g) when level and at rest.
 
-The corrected forms are exact. They are an option, because gravity cancels when (8) feeds the torque model (9): the
-predicted torque then depends on the state only through 1 − h_h/h of gravity, h_h and h being the heights of the trunk's
-centre and of its accelerometer. With h ≤ h_h the torque holds no information on the pose, or of the wrong sign.
+The corrected forms are exact. They are not the default, because gravity cancels when (8) is inserted into the torque
+model (9). The predicted torque then depends on the state only through the share 1 − h_h/h of gravity, where h_h and h
+are the heights of the trunk's centre of mass and of its accelerometer. For h = h_h the torque contains no information
+on the pose, and for h < h_h its sign is wrong.
 
-As printed, (5)–(8) lack the lateral acceleration v_b ψ̇ of the rear contact, have +g although z points down, the
-opposite sign of every p_z, ω̇ without its y entry ψ̇ φ̇_b, φ̈_b = 0, no turn of the accelerometer's axes by φ, and a
-trunk rate differentiated as if R did not turn.
+Errata: (5)–(8) lack the lateral acceleration v_b ψ̇ of the rear contact, have +g although z points down, the opposite
+sign of every p_z, ω̇ without its y component ψ̇ φ̇_b, φ̈_b = 0, no rotation of the accelerometer's axes by φ, and a
+derivative of the trunk rate that neglects the rotation of R.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ def yaw_acceleration(
         a_by: specific force along y of the bicycle's IMU, m/s².
         phi_b: roll.
         rate: of the angles.
-        roll_acceleration: φ̈_b; the printed form takes it as zero.
+        roll_acceleration: φ̈_b; zero in the published form.
         travel: of the rear contact.
         place: p_x, p_z of the IMU: ahead of the rear contact, above ground, m.
         gravity: m/s².
@@ -70,8 +71,8 @@ def accelerometer_accelerations(
         rate: theirs.
         a_h: specific force of the trunk's accelerometer, trunk axes, m/s².
         a_by: of the bicycle's along its y.
-        roll_acceleration: φ̈_b, rad/s²; unused in the printed form.
-        axial: derivative of the trunk's rate about its axis, passed on.
+        roll_acceleration: φ̈_b, rad/s²; unused in the published form.
+        axial: derivative of the trunk's rate about its axis, passed through.
         travel: of the rear contact.
         places: p_x, p_z of the bicycle's IMU, l_s, h_s of the trunk's pivot, and h from there up to the trunk's IMU, m.
         gravity: m/s².
@@ -81,7 +82,7 @@ def accelerometer_accelerations(
     s_h, c_h = sin(angles.phi_h), cos(angles.phi_h)
     s_t, c_t = sin(angles.theta), cos(angles.theta)
     s_p, c_p = sin(angles.phi), cos(angles.phi)
-    # specific force of the pivot (5), (6), from which that of the trunk's accelerometer differs by what the trunk does
+    # specific force of the pivot (5), (6); that of the trunk's accelerometer adds the motion of the trunk
     if printed:
         roll_acceleration = 0.0 * roll_acceleration
     yaw = yaw_acceleration(a_by, angles.phi_b, rate, roll_acceleration, travel, (p_x, p_z), gravity, printed)
@@ -100,7 +101,7 @@ def accelerometer_accelerations(
         seat_z = seat_z - gravity
         lean = 2.0 * c_h * rate.psi * rate.theta - 2.0 * cotangent * rate.phi_h * rate.theta
         pitch = -2.0 * c_h * s_t * s_t * rate.phi_h * rate.psi
-    # (8): acceleration of the sensor against the pivot over h, then Coriolis, centripetal and yaw terms
+    # (8): acceleration of the sensor relative to the pivot over h, then Coriolis, centripetal and yaw terms
     return Accelerations(
         (a_y - c_h * seat_y - s_h * seat_z) / (s_t * h) + s_h * c_h * squared + lean - c_h * cotangent * yaw,
         (-a_z + s_t * seat_x - c_t * s_h * seat_y + c_h * c_t * seat_z) / h

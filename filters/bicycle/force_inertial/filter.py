@@ -1,33 +1,33 @@
-r"""Rider's trunk and bicycle's roll from two inertial units, the seat's forces and the handlebar's.
+r"""Angles of a rider's trunk and roll of the bicycle from two inertial units and forces at seat and handlebar.
 
 Y. Zhang, K. Chen, J. Yi, "Rider Trunk and Bicycle Pose Estimation With Fusion of Force/Inertial Sensors", IEEE
 Transactions on Biomedical Engineering 60, 2013, doi 10.1109/TBME.2013.2260339. Equation numbers are the paper's;
 frames, axes and letters are in :mod:`.force_inertial.kinematics`.
 
     X = [φ_h θ φ φ_b b]                trunk X-Y-X angles, roll of the bicycle, bias of the trunk's gyroscope
-    Ẋ = f(X, ω_h − b, ω_b)             (3), (4), (15), one Euler step a sample (16)
+    Ẋ = f(X, ω_h − b, ω_b)             (3), (4), (15), one Euler step per sample (16)
     y = [τ̂_φh τ̂_θ φ̂_b 0]               (11), (12), (13), (17)
 
-The seat's and the hands' moments about the trunk's pivot must be what the trunk's motion needs (9), the direction of
-the seat's force must be that of the apparent vertical, and shoulders are level. Yaw is not estimated.
+The moments of seat and hands about the trunk's pivot equal those that the trunk's motion requires (9), the seat force
+has the direction of the apparent vertical, and the shoulders are level. Yaw is not estimated.
 
-Differs from print, each with an option that brings the printed form back:
+Differences from the paper, each with an option that selects the published form:
 
-* ``acceleration``: q̈ from differentiated gyroscopes. With the accelerometers of (7), (8), gravity cancels in (9); the
-  printed (7), (8) have errors besides (:mod:`.force_inertial.accelerometer`).
-* ``torque_reading``: τ̂_θ = c_δ N_y − s_δ N_z, δ = φ_b − φ_h; the printed (12) drops N_z, and has R_z (x_C − x_V) with
-  the wrong sign.
-* ``roll_model``: the seat's force points along the **apparent** vertical, R_y / R_z = tan(φ_b − φ_c) with
-  φ_c ≈ atan(v_b ψ̇ / g); the printed (13) has φ_c = 0, true in straight riding only.
-* ``form``: F_17 has a minus, and H_14 is a derivative by φ_b (printed: by φ̇_b).
-* ``jacobian``: H is the whole derivative of the residual; (21) holds rates and accelerations fixed.
-* ``ahead_share``: level shoulders (17) count 0.8, a chest that faces ahead 0.2. A rider who leans tilts the shoulders,
-  and φ then is wrong by their tilt over cos θ.
-* the bias is the Gauss–Markov process that (15) writes, not the random walk of the text.
-* a rider is no point mass on a seat: the seat also carries the pelvis and part of the legs, the pivot is above it, each
-  hand pushes at its own grip (:mod:`.force_inertial.forces`). All of that vanishes in :meth:`ForceInertial.published`.
+* ``acceleration``: q̈ from differentiated gyroscopes. With the accelerometers of (7), (8), gravity cancels in (9); (7)
+  and (8) also have errata (:mod:`.force_inertial.accelerometer`).
+* ``torque_reading``: τ̂_θ = c_δ N_y − s_δ N_z, δ = φ_b − φ_h; (12) drops N_z, and has the wrong sign of
+  R_z (x_C − x_V).
+* ``roll_model``: the seat force points along the **apparent** vertical, R_y / R_z = tan(φ_b − φ_c) with
+  φ_c ≈ atan(v_b ψ̇ / g); (13) has φ_c = 0, which holds in straight riding only.
+* ``form``: F_17 has a minus, and H_14 is a derivative by φ_b (published: by φ̇_b).
+* ``jacobian``: H is the complete derivative of the residual; (21) treats rates and accelerations as constant.
+* ``ahead_share``: level shoulders (17) have weight 0.8, a chest that faces forward has weight 0.2. A rider who leans
+  tilts the shoulders, which causes an error of φ of their tilt over cos θ.
+* The bias is the Gauss–Markov process of (15), not the random walk of the text.
+* A rider is not a point mass on a seat: the seat also carries the pelvis and part of the legs, the pivot is above it,
+  and each hand pushes at its own grip (:mod:`.force_inertial.forces`). :meth:`ForceInertial.published` omits all this.
 
-Gyroscope offsets (14) are to be subtracted from the samples before.
+Gyroscope offsets (14) must be subtracted from the samples beforehand.
 """
 
 from __future__ import annotations
@@ -67,8 +67,8 @@ TRUNK_ANGLES = Quantity("force-inertial/trunk_angles", "angle", 3, "rad")
 ROLL = Quantity("bicycle/roll", "angle", 1, "rad")
 TRUNK_BIAS = Quantity("trunk_imu/gyroscope_bias", "vector", 3, "rad/s")
 THETA_LIMIT = 5.0 * DEG
-"""θ stays that far from 0 and 180°, where the trunk angles are singular."""
-# places in the state
+"""θ keeps this distance from 0 and 180°, where the trunk angles are singular."""
+# indices in the state
 ANGLES, BIAS, OMEGA_H, OMEGA_B, SPEED = slice(0, 4), slice(4, 7), slice(7, 10), slice(10, 13), slice(13, 14)
 TURN_H, TURN_B, PUSH, ACC_H, ACC_B = slice(14, 17), slice(17, 20), slice(20, 21), slice(21, 24), slice(24, 27)
 
@@ -84,9 +84,9 @@ class ForceInertial(ForceInertialParameters, Model):
     acceleration: Literal["gyroscope", "accelerometer"] = "gyroscope"
     """q̈ from differentiated gyroscopes, or from (7), (8)"""
     torque_model: Literal["dynamic", "static"] = "dynamic"
-    """(9), or gravity alone"""
+    """(9), or gravity alone (static torque)"""
     torque_reading: Literal["exact", "without-z", "printed"] = "exact"
-    """c_δ N_y − s_δ N_z; N_y / c_δ; the latter with the printed sign of R_z (x_C − x_V)"""
+    """c_δ N_y − s_δ N_z; N_y / c_δ; the latter with the published sign of R_z (x_C − x_V)"""
     roll_model: Literal["apparent-vertical", "printed", "none"] = "apparent-vertical"
     """φ_b − φ_c; φ_b as in (13); or no roll from the seat"""
     handlebar_load: Literal["each", "sum", "none"] = "each"
@@ -94,11 +94,11 @@ class ForceInertial(ForceInertialParameters, Model):
     form: Literal["corrected", "printed"] = "corrected"
     """of (7), (8), (20) and (21)"""
     jacobian: Literal["full", "partial"] = "full"
-    """H of the whole residual, or with rates, accelerations and readings held fixed as in (21)"""
+    """H of the complete residual, or with constant rates, accelerations and readings as in (21)"""
     bias_model: bool = True
-    """estimate the bias; without this it stays zero"""
+    """estimate the bias; otherwise it stays zero"""
     gyroscope_sample: Literal["current", "previous"] = "current"
-    """which sample drives (16): ``previous`` as printed; ``current`` for samples that describe the interval they end"""
+    """sample used in (16): ``previous`` as published; ``current`` for samples that describe the interval they end"""
 
     channels: ClassVar[tuple[Channel, ...]] = CHANNELS
     outputs: ClassVar[tuple[Quantity, ...]] = (ROLL, TRUNK_ANGLES, TRUNK_BIAS)
@@ -115,7 +115,7 @@ class ForceInertial(ForceInertialParameters, Model):
 
     @classmethod
     def published(cls, **parameters: Any) -> Self:
-        """The paper's rider: a point mass that turns about a point of the seat (table I; the rest is not published)."""
+        """The paper's rider: a point mass that rotates about a point of the seat (table I; the rest is assumed)."""
         return cls(**(PUBLISHED | parameters))
 
     # ---- the model ------------------------------------------------------------------------------------------------
@@ -128,7 +128,7 @@ class ForceInertial(ForceInertialParameters, Model):
         s_a, c_a = sin(self.imu_tilt), cos(self.imu_tilt)
         gyroscope = down(omega_b)
         yaw = c_a * gyroscope[2] - s_a * gyroscope[0]
-        # the angles at which the trunk, at rest in a steady turn, needs what was read
+        # the angles for which a trunk at rest in a steady turn requires the measured forces
         steer = steering(self, speed[..., 0], yaw)
         phi_h, theta, phi, phi_b = static_angles(self, self._readings(z, steer), speed[..., 0] * yaw)
         start = xp.stack([phi_h, theta, phi, phi_b], axis=-1)
@@ -179,12 +179,12 @@ class ForceInertial(ForceInertialParameters, Model):
         return new, xp.concat([upper, lower], axis=-2), Q
 
     def residual(self, x: Array, z: Measurement) -> tuple[Array, Array, Array]:
-        """What seat and hands read less what the motion needs, the roll, and the shoulders' tilt."""
+        """Measured less required moments, the roll, and the tilt of the shoulders."""
         xp = namespace(x)
         parts = variables(x[..., :7])
         angles = Angles(*parts[:4])
         whole = self.jacobian == "full"
-        # q̇ and q̈ of the state, and what they need of seat and hands (9)
+        # q̇ and q̈ of the state, and the load that they require from seat and hands (9)
         rate, acceleration, axial = self._motion(x, angles if whole else Angles(*map(value, angles)), parts[4:7], whole)
         needed = self._needed(x, angles, rate, acceleration, axial)
         known, z = self._known_forces(z)
@@ -192,20 +192,20 @@ class ForceInertial(ForceInertialParameters, Model):
         delta = angles.phi_b - angles.phi_h
         if not whole:
             delta = value(delta)
-        # moment about the pivot (11), (12), with that of the pedals, which carry what seat and hands do not
+        # moment about the pivot (11), (12), with that of the pedals, which carry the remaining load
         N_x, N_y, N_z = read.moment
         load = in_bicycle(needed.force, angles.phi_b if whole else value(angles.phi_b))
         down = -1.0 * (read.whole[2] + load[2])
         N_y = N_y + self.pedal_share * pedal_moment(down if whole else value(down), self.pedals())
         tau_theta = cos(delta) * N_y - sin(delta) * N_z if self.torque_reading == "exact" else N_y / cos(delta)
-        # (13): direction of the seat's force, and φ_c, the apparent vertical
+        # (13): direction of the seat force, and φ_c, the apparent vertical
         if self.roll_model == "apparent-vertical":
-            # along z the seat carries the load less what the pedals take
+            # along z the seat carries the load less that of the pedals
             z_B = (1.0 - self.pedal_share) * read.whole[2] - self.pedal_share * load[2]
             roll = atan2(read.whole[1], z_B) - angles.phi_b + apparent_vertical(needed.force)
         else:
             roll = atan2(read.seat[1], read.seat[2]) - angles.phi_b
-        # (17): tilt of the shoulders, and how far the chest is turned from straight ahead
+        # (17): tilt of the shoulders, and rotation of the chest from straight ahead
         s_h, c_h = sin(angles.phi_h), cos(angles.phi_h)
         s_p, c_p, c_t = sin(angles.phi), cos(angles.phi), cos(angles.theta)
         turn = angles.phi_b - angles.phi_h
@@ -222,7 +222,7 @@ class ForceInertial(ForceInertialParameters, Model):
         return r, H, diagonal([d * d for d in deviations], 0.0 * x[..., :1])
 
     def retract(self, x: Array, dx: Array) -> Array:
-        """A sum; angles wrap and θ keeps away from its singularities."""
+        """Additive; angles are wrapped and θ keeps its distance from the singularities."""
         xp = namespace(x)
         parts = [x[..., index] + dx[..., index] for index in range(7)]
         low, high = THETA_LIMIT, math.pi - THETA_LIMIT
@@ -248,11 +248,11 @@ class ForceInertial(ForceInertialParameters, Model):
         return readings(self, z, steer, self.handlebar_load, printed=self.torque_reading == "printed")
 
     def _known_forces(self, z: Measurement) -> tuple[Any, Measurement]:
-        """Whether seat and hands have valid samples, and the samples with something finite where they have not."""
+        """Whether seat and hands have valid samples, and the samples with finite values in place of missing ones."""
         xp = namespace(z["seat/wrench"])
         names = ("seat/wrench", "handlebar/force")
         known = [xp.all(xp.isfinite(z[name]), axis=-1) for name in names]
-        # a number that takes no part, so that derivatives stay finite
+        # an unused number, so that derivatives stay finite
         whole = {
             name: xp.where(row[..., None], z[name], -1.0 + 0.0 * xp.zeros_like(z[name]))
             for name, row in zip(names, known, strict=True)
@@ -318,7 +318,7 @@ class ForceInertial(ForceInertialParameters, Model):
         return still._replace(force=moving.force)
 
     def _with_printed_h14(self, H: Array, x: Array, rate: Rates) -> Array:
-        """H with the printed H_14: −2 m_h h_s h_h s_δ s_θ φ̇_b."""
+        """H with the published H_14: −2 m_h h_s h_h s_δ s_θ φ̇_b."""
         product = self.trunk_mass * self.pivot_height * self.trunk_height
         entry = -2.0 * product * sin(x[..., 3] - x[..., 0]) * sin(x[..., 1]) * rate.phi_b
         return rows([[entry if (i, j) == (0, 3) else H[..., i, j] for j in range(7)] for i in range(4)])
@@ -355,4 +355,4 @@ PUBLISHED: dict[str, float] = {
     "wheelbase": 0.0,
     "ahead_share": 0.0,
 }
-"""Table I of the paper; m_h, h_h, h and all noises are not published and assumed."""
+"""Table I of the paper; m_h, h_h, h and all noises are not published, and assumed here."""

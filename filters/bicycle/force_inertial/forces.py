@@ -1,24 +1,24 @@
-"""Forces of the force/inertial filter: what the seat's sensors read, and what the rider's motion needs.
+"""Forces of the force/inertial filter: readings of the seat's sensors, and loads that the rider's motion requires.
 
 Frames are those of :mod:`.force_inertial.kinematics` (z down); loads are those of the rider on seat and handlebar.
 
-**Read.** Centre of pressure from the load cells, (10) moves the six-axis sensor's load there, (11) and (12) on to the
-trunk's pivot P. Written out, the centre of pressure cancels: the moment about P is that of the six-axis sensor,
-whatever the load cells read. (Not with the printed sign of (12), where R_z x_C counts twice.) A missing load cell
-therefore costs nothing, and its noise does not count.
+**Measured load.** The load cells give the centre of pressure. (10) shifts the load of the six-axis sensor there, and
+(11) and (12) shift it on to the trunk's pivot P. The centre of pressure then cancels: the moment about P is that of the
+six-axis sensor for any reading of the load cells. (This does not hold with the published sign of (12), where R_z x_C
+counts twice.) Missing load cells and their noise therefore have no effect.
 
-**Needed.** Newton and Euler for all that sits on the seat, about P, with f = a − g of each part:
+**Required load.** Newton–Euler for everything on the seat, about P, with f = a − g of each part:
 
     N = h_h u × m_h f_H + d/dt (I_t u × u̇ + I_a ω_u u) + r_c × m_c f_c
 
 The first term is the paper's (9) and (19): a point mass m_h at h_h up the trunk's axis u. The second is the rotational
-inertia of a trunk with moments I_t across and I_a along its axis. The third is what else is carried and turns with the
-bicycle: pelvis, legs, and the part of the arms that hangs at the grips; with m_c = I_t = I_a = 0 it is the paper's
-model.
+inertia of a trunk with moments I_t across and I_a along its axis. The third is the remaining mass, which rotates with
+the bicycle: pelvis, legs, and the part of the arms at the grips. With m_c = I_t = I_a = 0 this is the paper's model.
 
-**Pedals** have no sensor. Their vertical force is what Newton's law misses, F_p = −Σ m f − R_h − F_h along z of the
-bicycle. At rest legs push down and back on the pedals, on the mean of a turn at the crank's axle; what goes beyond that
-drives, and acts further ahead (:func:`pedal_moment`). With ``pedal_share`` = 0 there are no pedals, as in the paper.
+**Pedals** have no sensor. Their vertical force is the remainder in Newton's law, F_p = −Σ m f − R_h − F_h along z of
+the bicycle. Legs at rest push down and back on the pedals, at the crank axle when averaged over a revolution. Force
+beyond that propels the bicycle and acts further ahead (:func:`pedal_moment`). ``pedal_share`` = 0 removes the pedals,
+as in the paper.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from .kinematics import Accelerations, Angles, Rates, Travel, Triple, axis_motio
 
 
 class Masses(NamedTuple):
-    """What sits on the seat; kg, kg·m², m."""
+    """Masses on the seat; kg, kg·m², m."""
 
     trunk: Scalar
     """m_h"""
@@ -48,14 +48,14 @@ class Masses(NamedTuple):
 
 
 class Needed(NamedTuple):
-    """What the seat and the hands must give."""
+    """Load that seat and hands must provide."""
 
     tau_phi_h: Scalar
     """moment about x through the pivot, N·m"""
     tau_theta: Scalar
     """moment about the trunk's pitch axis y', N·m"""
     force: Triple
-    """Σ m f of trunk and what is carried, axes of R, N"""
+    """Σ m f of trunk and carried mass, axes of R, N"""
 
 
 def _turned(arm: Triple, force: Triple, s_h: Scalar, c_h: Scalar) -> tuple[Scalar, Scalar]:
@@ -74,7 +74,7 @@ def needed_load(
     masses: Masses,
     gravity: Scalar,
 ) -> Needed:
-    """Moments about the trunk's pivot, and the force, that a motion needs.
+    """Moments about the trunk's pivot, and the force, that a motion requires.
 
     Args:
         angles: of trunk and bicycle.
@@ -83,8 +83,8 @@ def needed_load(
         axial_rate: of the trunk about its own axis, rad/s.
         travel: of the rear contact.
         pivot: l_s ahead of the rear contact and h_s high, m.
-        masses: what sits on the seat.
-        gravity: m/s²; all rates and accelerations zero give the static model.
+        masses: on the seat.
+        gravity: m/s²; with zero rates and accelerations this is the static model.
     """
     # the trunk's centre of mass, h_h up the trunk from the pivot: its specific force, times m_h
     l_s, h_s = pivot
@@ -102,7 +102,7 @@ def needed_load(
     # u itself is perpendicular to y'
     tau_y = tau_y + masses.along * axial_rate * (c_h * first[1] + s_h * first[2])
     s_b, c_b = sin(angles.phi_b), cos(angles.phi_b)
-    # what else is carried turns with the bicycle: the moment of its specific force about the pivot
+    # the carried mass rotates with the bicycle: the moment of its specific force about the pivot
     forward, up = masses.carried_forward, masses.carried_up
     c_x, c_y, c_z = point_acceleration(l_s + forward, h_s + up, angles.phi_b, rate, acceleration, travel)
     load = (masses.carried * c_x, masses.carried * c_y, masses.carried * (c_z - gravity))
@@ -111,7 +111,7 @@ def needed_load(
 
 
 def apparent_vertical(force: Triple) -> Scalar:
-    """φ_c, from the vertical to what must carry the load ``force`` = Σ m f, in the plane across R, rad."""
+    """φ_c, angle from the vertical to the load ``force`` = Σ m f, in the lateral plane of R, rad."""
     return atan2(force[1], -force[2])
 
 
@@ -123,18 +123,18 @@ def in_bicycle(force: Triple, phi_b: Scalar) -> Triple:
 
 
 class Pedals(NamedTuple):
-    """Where and how feet push on the pedals; m, N."""
+    """Forces of the feet on the pedals and their points of action; m, N."""
 
     axle_forward: Scalar
     """of the crank's axle from the pivot"""
     axle_up: Scalar
     """negative"""
     down: Scalar
-    """force of both resting legs, mean of a turn"""
+    """force of both legs at rest, mean over a revolution"""
     back: Scalar
     """likewise, backwards"""
     drive_forward: Scalar
-    """of where the driving force acts, from the pivot"""
+    """of the point of action of the driving force, from the pivot"""
 
 
 def pedal_moment(force: Scalar, pedals: Pedals) -> Scalar:
@@ -142,14 +142,14 @@ def pedal_moment(force: Scalar, pedals: Pedals) -> Scalar:
 
     Args:
         force: of the rider down on the pedals, bicycle axes, N.
-        pedals: where and how.
+        pedals: points of action.
     """
     resting = pedals.axle_forward * pedals.down - pedals.axle_up * pedals.back
     return resting + pedals.drive_forward * (force - pedals.down)
 
 
 class SeatSensors(NamedTuple):
-    """Where the seat's sensors are; m, rad."""
+    """Positions of the seat's sensors; m, rad."""
 
     post_length: Scalar
     """L_1"""
@@ -174,7 +174,7 @@ def seat_load(
 
     Args:
         wrench: force (N) and moment (N·m) of the rider on the six-axis sensor, its axes (z down).
-        sensors: where they are.
+        sensors: their positions.
         centre: of pressure x_C, y_C from the saddle point, m; zeros for the saddle point itself.
 
     Returns:
@@ -203,7 +203,7 @@ def centre_of_pressure(cells: Triple, sensors: SeatSensors) -> tuple[Scalar, Sca
 def trunk_moment(
     R: Triple, M: Triple, centre: tuple[Scalar, Scalar], sensors: SeatSensors, printed: bool = False
 ) -> Triple:
-    """Equations (11) and (12) before the trunk's turn: moment of the seat on the rider about the pivot, N·m.
+    """Equations (11), (12) in the bicycle's axes: moment of the seat on the rider about the pivot, N·m.
 
     The paper's V lies in the plane of the seat; here the pivot may be above it.
 
@@ -212,7 +212,7 @@ def trunk_moment(
         M: its moment about the centre of pressure.
         centre: of pressure from the saddle point, m.
         sensors: where they are.
-        printed: −R_z(x_C − x_V) in N_y as printed; the cross product gives plus.
+        printed: −R_z(x_C − x_V) in N_y as published; the cross product gives plus.
     """
     x, y, z = centre[0] + sensors.forward, centre[1], sensors.below
     sign = -1.0 if printed else 1.0

@@ -1,4 +1,4 @@
-"""The two gyroscopes alone: what the force/inertial filter would be without its forces.
+"""Integration of the two gyroscopes: the force/inertial filter without force measurements.
 
 The baseline of Y. Zhang, K. Chen, J. Yi, IEEE Transactions on Biomedical Engineering 60, 2013, section III: strapdown
 integration of (3) and (4) from the angles that the first forces determine. It drifts.
@@ -40,7 +40,7 @@ class ForceInertialIntegration(ForceInertialParameters, Recurrence):
         return start + 0.0 * sum(xp.sum(z[name], axis=-1, keepdims=True) for name in others)
 
     def predict(self, x: Array, z: Measurement, previous: Measurement) -> Array:
-        """Angles after one interval; θ keeps away from its singularities."""
+        """Angles after one interval; θ keeps its distance from the singularities."""
         xp = namespace(x)
         angles = Angles(*(x[..., index] for index in range(4)))
         omega = up_the_trunk(z["trunk_imu/gyr"]), down(z["bicycle_imu/gyr"])

@@ -2,16 +2,16 @@
 
 Y. Zhang, K. Chen, J. Yi, "Rider Trunk and Bicycle Pose Estimation With Fusion of Force/Inertial Sensors", IEEE
 Transactions on Biomedical Engineering 60, 2013, doi 10.1109/TBME.2013.2260339. The paper's axes: R has its origin in
-the rear contact, x forward along the contact line, y right, **z down**, and turns by ψ; the bicycle is B = R Rx(φ_b),
+the rear contact, x forward along the contact line, y right, **z down**, and yaws by ψ; the bicycle is B = R Rx(φ_b),
 its IMU B Ry(α), the trunk R Rx(φ_h) Ry(θ) Rx(φ), whose **x axis points up the trunk**: θ = 90° is upright.
 
-This package's axes are x forward, y left, z up, and z up the trunk; either change of axes is a half turn
-(:data:`DOWN`, :data:`UP_THE_TRUNK`), so going back is the same function.
+This package's axes are x forward, y left, z up, and z up the trunk. Both changes of axes are half turns (:data:`DOWN`,
+:data:`UP_THE_TRUNK`), so each function is its own inverse.
 
-Everything takes and gives scalars: arrays ``(...)`` or :class:`.Dual`. SI units, rad.
+All functions accept and return scalars: arrays ``(...)`` or :class:`.Dual`. SI units, rad.
 
-Differs from the publication: (7) and (8) are an option, with and without their errors (:mod:`.accelerometer`). The
-default differentiates the gyroscopes, which is exact, holds no gravity and divides by no p_x.
+Differences from the paper: (7) and (8) are an option, with and without their errata (:mod:`.accelerometer`). The
+default differentiates the gyroscopes, which is exact, does not involve gravity and needs no division by p_x.
 """
 
 from __future__ import annotations
@@ -71,7 +71,7 @@ class Rates(NamedTuple):
 
 
 class Accelerations(NamedTuple):
-    """Second derivatives, rad/s²; the trunk's spin enters by its rate about its own axis."""
+    """Second derivatives, rad/s²; that of φ is expressed by the trunk's rate about its own axis."""
 
     phi_h: Scalar
     theta: Scalar
@@ -141,7 +141,7 @@ def gyroscope_accelerations(
     s_b, c_b = sin(angles.phi_b), cos(angles.phi_b)
     # ψ̈: derivative of (3), with that of 1 / cos φ_b
     yaw = (-s_a * turn_b[0] + c_a * turn_b[2]) / c_b + rate.psi * rate.phi_b * s_b / c_b
-    # ω'_y, ω'_z and their derivatives, in axes that turn back by φ̇
+    # ω'_y, ω'_z and their derivatives, in axes without the rotation by φ
     y, z = c_p * omega_h[1] - s_p * omega_h[2], s_p * omega_h[1] + c_p * omega_h[2]
     turn_y = c_p * turn_h[1] - s_p * turn_h[2] - rate.phi * z
     turn_z = s_p * turn_h[1] + c_p * turn_h[2] + rate.phi * y
@@ -170,9 +170,9 @@ def point_acceleration(
     acceleration: Accelerations,
     travel: Travel,
 ) -> Triple:
-    """Acceleration (without gravity, axes of R) of the bicycle's point ``l`` ahead of the contact and ``h`` high, m/s².
+    """Acceleration (without gravity, axes of R) of the point ``l`` ahead of the contact at height ``h``, m/s².
 
-    With l_s and h_s it is that of the seat, exactly; the paper's (5) lacks v_b ψ̇ and the rotation of φ̇_b by ψ̇.
+    With l_s and h_s it is exactly that of the seat; the paper's (5) lacks v_b ψ̇ and the rotation of φ̇_b by ψ̇.
     """
     s_b, c_b = sin(phi_b), cos(phi_b)
     squared = rate.psi * rate.psi
@@ -205,7 +205,7 @@ def axis_motion(angles: Angles, rate: Rates, acceleration: Accelerations) -> tup
     ddx = -s_t * acceleration.theta - c_t * pitch * pitch
     ddy = c_h * s_t * acceleration.phi_h + s_h * c_t * acceleration.theta + 2.0 * c_h * c_t * lean * pitch - y * both
     ddz = s_h * s_t * acceleration.phi_h - c_h * c_t * acceleration.theta + 2.0 * s_h * c_t * lean * pitch - z * both
-    # R turns by ψ̇ about z: u̇ + ψ̇ z × u, and ü + 2 ψ̇ z × u̇ + ψ̈ z × u − ψ̇² (u without its z)
+    # R rotates by ψ̇ about z: u̇ + ψ̇ z × u, and ü + 2 ψ̇ z × u̇ + ψ̈ z × u − ψ̇² (u without its z)
     yaw, squared = rate.psi, rate.psi * rate.psi
     first = (dx - yaw * y, dy + yaw * x, dz)
     second = (
@@ -226,7 +226,7 @@ def rate_jacobians(
         omega_h: trunk's angular rate without bias.
         omega_b: the bicycle's.
         alpha: tilt of its IMU.
-        printed: take F_17 with the printed sign +c_φ/s_θ; the correct one is minus.
+        printed: F_17 with the published sign +c_φ/s_θ; the correct one is minus.
 
     Returns:
         ``(..., 4, 7)`` and ``(..., 4, 6)``.
@@ -241,7 +241,7 @@ def rate_jacobians(
     y, z = c_p * omega_h[1] - s_p * omega_h[2], s_p * omega_h[1] + c_p * omega_h[2]
     rate = rates(angles, omega_h, omega_b, alpha)
     sign = 1.0 if printed else -1.0
-    # F_X of (20), columns φ_h, θ, φ, φ_b, b: derivatives of (4) for φ̇_h, θ̇ and φ̇; φ̇_b of (3) holds no state
+    # F_X of (20), columns φ_h, θ, φ, φ_b, b: derivatives of (4) for φ̇_h, θ̇ and φ̇; φ̇_b of (3) is state-independent
     by_state: list[list[Any]] = [
         [
             -c_t * s_h * kappa / (s_t * c_b),
@@ -282,21 +282,21 @@ def rate_jacobians(
 
 
 def true_angles(truth: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """The filter's own quantities from the environment's truth.
+    """The quantities of the filter from the truth of the environment.
 
     Args:
         truth: with ``bicycle/orientation`` and ``trunk/orientation`` ``(T, 4)``, body to world.
 
     Returns:
-        ``force-inertial/trunk_angles`` ``(T, 3)``: φ_h, θ, φ of the trunk against R, which is yawed with the bicycle
-        but not rolled, rad.
+        ``force-inertial/trunk_angles`` ``(T, 3)``: φ_h, θ, φ of the trunk relative to R, which yaws but does not roll
+        with the bicycle, rad.
 
     Raises:
         ValueError: an orientation is missing.
     """
     for name in ("bicycle/orientation", "trunk/orientation"):
         if name not in truth:
-            raise ValueError(f"the truth must hold {name!r}, got {sorted(truth)}")
+            raise ValueError(f"the truth must contain {name!r}, got {sorted(truth)}")
     bicycle, trunk = truth["bicycle/orientation"], truth["trunk/orientation"]
     yaw = rotation.to_euler_zyx(bicycle)[0]
     level = rotation.from_euler_zyx(yaw, 0.0 * yaw, 0.0 * yaw)

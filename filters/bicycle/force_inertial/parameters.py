@@ -1,8 +1,8 @@
-"""Parameters of the force/inertial filter: rider, bicycle, sensors, noises; the defaults are a usual rider's.
+"""Parameters of the force/inertial filter: rider, bicycle, sensors, noises; the defaults are a typical rider's.
 
-All places are from the trunk's pivot (the lumbar joint; a point of the seat in the paper), forward and up in the
-bicycle's axes, m. Shares of a body's mass come from P. de Leva, "Adjustments to Zatsiorsky-Seluyanov's segment inertia
-parameters", J. Biomechanics 29(9), 1996, table 4, men.
+All positions are relative to the trunk's pivot (the lumbar joint; a point of the seat in the paper), forward and up in
+the bicycle's axes, m. Shares of a body's mass come from P. de Leva, "Adjustments to Zatsiorsky-Seluyanov's segment
+inertia parameters", J. Biomechanics 29(9), 1996, table 4, men.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ DEG = math.pi / 180.0
 LEG_MASS = 0.1986
 """of the body's mass: one leg with foot"""
 ARM_AT_GRIP = 0.53
-"""part of an arm's weight that hangs at the grip, the rest at the shoulder: place of the arm's centre of mass between
-them, from the same table"""
+"""share of an arm's weight at the grip, the rest is at the shoulder: position of the arm's centre of mass between them,
+from the same table"""
 THIGH_MASS, SHANK_MASS, FOOT_MASS = 0.1416, 0.0433, 0.0137
 """likewise"""
 THIGH_CENTRE, SHANK_CENTRE = 0.4095, 0.4395
-"""place of the centre of mass between hip and knee, knee and ankle, likewise"""
+"""position of the centre of mass between hip and knee, knee and ankle, likewise"""
 FOOT_CENTRE = 0.35
 """between ankle and pedal; assumed"""
 CHANNELS = (
@@ -46,7 +46,7 @@ CHANNELS = (
 
 @dataclass(frozen=True)
 class ForceInertialParameters(RiderEquations):
-    """Numbers that filter and integration share."""
+    """Common parameters of filter and integration."""
 
     dt: float = 0.02
     """s; the paper's 50 Hz"""
@@ -61,7 +61,7 @@ class ForceInertialParameters(RiderEquations):
     pivot_forward: float = 0.2593
     """l_s, of the trunk's pivot from the rear contact (table I: 0.26 for the seat)"""
     pivot_height: float = 1.037
-    """h_s, above ground (table I: 0.38, below bicycle's IMU and mass centre, perhaps another reference)"""
+    """h_s, above ground (table I has 0.38, below the bicycle's IMU and centre of mass, perhaps another reference)"""
     seat_forward: float = 0.0
     """of the saddle point from the pivot: −x_V"""
     seat_below: float = 0.1545
@@ -81,13 +81,13 @@ class ForceInertialParameters(RiderEquations):
     grip_up: float = 0.003
     """d_z, likewise"""
     grip_half_width: float = 0.27
-    """of each hand from the middle"""
+    """of each hand from the mid-plane"""
     wheelbase: float = 1.05
-    """from which, with the path's curvature, the steering angle follows; zero in the paper: it stays straight"""
+    """gives the steering angle from the curvature of the path; zero in the paper, where it stays straight"""
     caster: float = 0.3142
     """tilt of the steering axis, backwards"""
     trunk_mass: float = 29.835
-    """m_h, kg: trunk above the pivot, head, and what of the arms hangs at the shoulders; not published"""
+    """m_h, kg: trunk above the pivot, head, and the part of the arms at the shoulders; not published"""
     trunk_height: float = 0.3716
     """h_h, from the pivot to its centre of mass; not published"""
     trunk_across: float = 1.016
@@ -97,39 +97,39 @@ class ForceInertialParameters(RiderEquations):
     trunk_imu_height: float = 0.2729
     """h, of the trunk's IMU up the trunk from the pivot; needed by ``acceleration="accelerometer"`` only"""
     carried_mass: float = 38.166
-    """m_c: what else is carried and turns with the bicycle, kg; zero in the paper"""
+    """m_c: remaining mass, which rotates with the bicycle, kg; zero in the paper"""
     carried_forward: float = 0.15545
     """of its centre from the pivot"""
     carried_up: float = -0.19145
     """of its centre above the pivot"""
     pedal_share: float = 1.0
-    """1: the pedals carry what seat and hands do not; 0: there are none, as in the paper"""
+    """1: the pedals carry the load that seat and hands do not; 0: no pedals, as in the paper"""
     axle_forward: float = 0.1667
     """of the crank's axle from the pivot"""
     axle_up: float = -0.757
     """of the crank's axle above the pivot: negative"""
     pedal_down: float = 138.177
-    """force of both resting legs down on the pedals, mean of a turn, N"""
+    """force of both legs at rest down on the pedals, mean over a revolution, N"""
     pedal_back: float = 24.3313
     """likewise, backwards"""
     drive_forward: float = 0.3832
-    """of where a driving force acts, from the pivot: ahead of the axle by 4/π crank lengths, the mean moment of a half
-    sine of tangential force over its mean vertical part"""
+    """of the point of action of the driving force, from the pivot: 4/π crank lengths ahead of the axle, the mean
+    moment of a half sine of tangential force over its mean vertical component"""
     bias_time: float = 1800.0
     """τ, s (table I)"""
     bias_std: float = 0.15 * DEG
     """σ of (15), rad/s; not published"""
     gyroscope_noise: float = 1.0 * DEG
-    """standard deviation a sample, rad/s: stands for scale and alignment and for the Euler step too; not published"""
+    """standard deviation per sample, rad/s: also covers scale, alignment and the Euler step; not published"""
     torque_noise: float = 12.0
-    """of τ̂_φh and τ̂_θ, N·m: stands for what legs and arms do besides, which lasts; not published"""
+    """of τ̂_φh and τ̂_θ, N·m: covers unmodelled, time-correlated forces of legs and arms; not published"""
     roll_noise: float = 2.0 * DEG
     """of φ̂_b, rad; not published"""
     shoulder_noise: float = 0.1
-    """of the sine of the shoulders' tilt; not published. Too small a value pulls φ_h of an upright trunk"""
+    """of the sine of the shoulders' tilt; not published. Too small a value biases φ_h of an upright trunk"""
     ahead_share: float = 0.2
-    """0: shoulders are level (17); 1: the chest faces ahead, to the bicycle; between: a weighted mean of the two, since
-    riders who lean tilt their shoulders"""
+    """0: shoulders are level (17); 1: the chest faces forward with the bicycle; between: weighted mean of the two,
+    since riders who lean tilt their shoulders"""
     gyroscope_filter: float = 0.04
     """s, time constant of the differentiated gyroscopes' low-pass"""
     speed_filter: float = 0.2
@@ -146,7 +146,7 @@ class ForceInertialParameters(RiderEquations):
     """of b, rad/s"""
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be divided by."""
+        """Check the parameters in denominators."""
         super().__post_init__()
         positive = ("trunk_mass", "trunk_height", "trunk_imu_height", "imu_forward", "bias_time", "cells_long")
         noises = ("torque_noise", "roll_noise", "shoulder_noise")
@@ -155,7 +155,7 @@ class ForceInertialParameters(RiderEquations):
 
     @classmethod
     def rider_parameters(cls, geometry: RiderGeometry) -> dict[str, Any]:
-        """Lengths and masses of the rider, places of the sensors."""
+        """Lengths and masses of the rider, positions of the sensors."""
         return rider_parameters(geometry)
 
     def truth(self, truth: Mapping[str, Any]) -> dict[str, Any]:
@@ -163,7 +163,7 @@ class ForceInertialParameters(RiderEquations):
         return true_angles(truth) if {"bicycle/orientation", "trunk/orientation"} <= set(truth) else {}
 
     def masses(self) -> Masses:
-        """What sits on the seat."""
+        """Masses on the seat."""
         return Masses(
             self.trunk_mass,
             self.trunk_height,
@@ -175,11 +175,11 @@ class ForceInertialParameters(RiderEquations):
         )
 
     def pedals(self) -> Pedals:
-        """How the feet push."""
+        """Forces of the feet."""
         return Pedals(self.axle_forward, self.axle_up, self.pedal_down, self.pedal_back, self.drive_forward)
 
     def seat_sensors(self) -> SeatSensors:
-        """Where the seat's sensors are."""
+        """Positions of the seat's sensors."""
         return SeatSensors(
             self.post_length,
             self.post_tilt,
@@ -194,7 +194,7 @@ class ForceInertialParameters(RiderEquations):
 def rider_parameters(geometry: RiderGeometry) -> dict[str, float]:
     """Lengths and masses of one rider, by the names of :class:`ForceInertialParameters`.
 
-    Arms and legs are shares of the body's mass from a table; whatever is neither trunk nor arm turns with the bicycle.
+    Arms and legs are shares of the body's mass from a table. All mass except trunk and arms rotates with the bicycle.
     """
     pivot, mass = geometry.trunk_pivot, geometry.rider_mass
     arms, legs = 2.0 * ARM_MASS * mass, 2.0 * LEG_MASS * mass
@@ -207,7 +207,7 @@ def rider_parameters(geometry: RiderGeometry) -> dict[str, float]:
     across = 0.5 * (geometry.trunk_moments[0] + geometry.trunk_moments[1]) + reduced
     along = geometry.trunk_moments[2] + shoulders * geometry.shoulder[1] ** 2
     resting = resting_legs(geometry)
-    # what turns with the bicycle besides: pelvis at the pivot, legs, the arms' rest at the grips
+    # the mass that rotates with the bicycle: pelvis at the pivot, legs, part of the arms at the grips
     pelvis = max(0.0, mass - trunk - legs - hands)
     parts = (
         (pelvis, pivot[0], pivot[2]),
@@ -251,7 +251,7 @@ def rider_parameters(geometry: RiderGeometry) -> dict[str, float]:
 
 
 class RestingLegs(NamedTuple):
-    """Both legs on the mean of a turn of the cranks."""
+    """Both legs, averaged over a revolution of the cranks."""
 
     forward: float
     """of their centre of mass in the bicycle's axes, m"""
@@ -269,11 +269,11 @@ class Leg(NamedTuple):
     centre: np.ndarray
     """of the leg's mass, m"""
     push: np.ndarray
-    """of the pedal on the foot that holds the leg, N"""
+    """of the pedal on the foot that supports the leg, N"""
 
 
 def resting_legs(geometry: RiderGeometry, gravity: float = GRAVITY) -> RestingLegs:
-    """Statics of two legs whose hips, knees and pedals are hinges without friction, over a turn of the cranks."""
+    """Statics of two legs with frictionless hinges at hips, knees and pedals, over a revolution of the cranks."""
     leg = resting_leg(geometry, np.linspace(0.0, 2.0 * np.pi, 72, endpoint=False), gravity)
     (forward, up), (back, down) = leg.centre.mean(axis=0), 2.0 * leg.push.mean(axis=0)
     return RestingLegs(float(forward), float(up), float(down), float(back))
@@ -293,7 +293,7 @@ def resting_leg(geometry: RiderGeometry, crank: np.ndarray, gravity: float = GRA
     across = geometry.pedal_offset - geometry.hip[1]
     upper, lower = geometry.thigh, geometry.knee_to_pedal
     distance = np.minimum(np.sqrt(np.sum(reach**2, axis=-1) + across**2), 0.9999 * (upper + lower))
-    # the knee stands forward of the line from hip to pedal
+    # the knee lies forward of the line from hip to pedal
     bend = np.arccos((upper**2 + distance**2 - lower**2) / (2.0 * upper * distance))
     line = np.arctan2(reach[:, 1], reach[:, 0]) + bend
     knee = hip + upper * np.stack([np.cos(line), np.sin(line)], axis=-1)

@@ -1,4 +1,4 @@
-"""From raw samples to what the force/inertial filter compares: moment about the pivot, force, angles at rest."""
+"""From raw samples to the measurements of the force/inertial filter: moment about the pivot, force, static angles."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Readings(NamedTuple):
     seat: Triple
     """R_h, the rider's force on the seat, N"""
     whole: Triple
-    """R_h + F_h, with the hands' (as far as they count), N"""
+    """R_h + F_h, including the hands (where they are modelled), N"""
 
 
 def readings(
@@ -29,12 +29,12 @@ def readings(
     """Equations (10)–(12) and the centre of pressure below (10).
 
     Args:
-        parameters: where the sensors are.
-        z: samples; missing ones are NaN, and then so is what needs them. Load cells may be missing: the centre of
-            pressure cancels, and the saddle point serves as well.
-        steer: angle of the handlebar to the right, rad; the grips turn with it.
+        parameters: positions of the sensors.
+        z: samples; missing ones are NaN, and so are quantities that require them. Load cells may be missing: the centre
+            of pressure cancels, and the saddle point may replace it.
+        steer: angle of the handlebar to the right, rad; the grips move with it.
         hands: ``each`` hand at its grip, ``sum`` for the two terms of (12), or ``none``.
-        printed: the printed sign in (12).
+        printed: the published sign in (12).
     """
     sensors = parameters.seat_sensors()
     wrench, cells = z["seat/wrench"], z["seat/load_cells"]
@@ -65,11 +65,11 @@ def readings(
 
 
 def steering(parameters: ForceInertialParameters, speed: Array, yaw: Scalar) -> Scalar:
-    """Angle of the handlebar to the right, rad, at which the wheels roll along the path of this yaw rate.
+    """Angle of the handlebar to the right, rad, for which the wheels roll along the path of this yaw rate.
 
     Args:
         parameters: wheelbase and caster angle.
-        speed: m/s; below 0.3 m/s it is taken as that.
+        speed: m/s, at least 0.3 m/s.
         yaw: rate to the right, rad/s.
     """
     xp = namespace(speed)
@@ -81,21 +81,21 @@ def steering(parameters: ForceInertialParameters, speed: Array, yaw: Scalar) -> 
 def static_angles(
     parameters: ForceInertialParameters, read: Readings, lateral: Array
 ) -> tuple[Array, Array, Array, Array]:
-    """Angles φ_h, θ, φ, φ_b at which the trunk, at rest on a bicycle that turns steadily, needs what was read.
+    """Angles φ_h, θ, φ, φ_b for which a trunk at rest in a steady turn requires the measured forces.
 
     Args:
         parameters: of the rider.
-        read: the forces.
+        read: measured forces.
         lateral: v_b ψ̇, m/s²; zero for rest.
     """
     xp = namespace(lateral)
     gravity, scale = parameters.gravity, parameters.trunk_mass * parameters.trunk_height
     mass = parameters.trunk_mass + parameters.carried_mass
-    # roll from the direction of the seat's force (13) and of the apparent vertical atan(v_b ψ̇ / g)
+    # roll from the direction of the seat force (13) and of the apparent vertical atan(v_b ψ̇ / g)
     squared = lateral * lateral + gravity * gravity
     phi_b = xp.atan2(read.whole[1], read.whole[2] + 0.0 * lateral) + xp.atan2(lateral, gravity + 0.0 * lateral)
     s_b, c_b = sin(phi_b), cos(phi_b)
-    # the carried mass in the bicycle's axes, and the pedals that hold what seat and hands do not
+    # the carried mass in the bicycle's axes, and the pedals, which carry the remaining load
     f_y, f_z = c_b * lateral - s_b * gravity, -s_b * lateral - c_b * gravity
     carried, forward, up = parameters.carried_mass, parameters.carried_forward, parameters.carried_up
     down = -1.0 * (read.whole[2] + mass * f_z)
@@ -108,7 +108,7 @@ def static_angles(
     # u across f = (0, lateral, −gravity): f × N / (m_h h_h f²)
     cross = (lateral * M_z + gravity * M_y, -gravity * N_x, -lateral * N_x)
     across = [part / (scale * squared) for part in cross]
-    # the part of the unit vector u along f follows from its length; a moment that no trunk can have is shortened
+    # the component of the unit vector u along f follows from its length; too large a moment is limited
     length = across[0] * across[0] + across[1] * across[1] + across[2] * across[2]
     one = 1.0 + 0.0 * length
     too_far = xp.greater(length, 0.95)
@@ -118,6 +118,6 @@ def static_angles(
     y, z = y + along * lateral, z - along * gravity
     phi_h, theta = xp.atan2(y, -z), xp.atan2(xp.sqrt(y * y + z * z), x)
     c_theta = cos(theta)
-    # level shoulders, with a little that keeps φ small for an upright trunk
+    # level shoulders, with a small term that keeps φ small for an upright trunk
     phi = xp.atan2(-sin(phi_h) * c_theta, cos(phi_h) * c_theta * c_theta + 0.01)
     return phi_h, theta, phi, phi_b

@@ -1,4 +1,4 @@
-"""Matrices of the whole-body filter by their parts: eight blocks of the error state, most of them decoupled."""
+"""Block matrices of the whole-body filter: eight blocks of the error state, most of them decoupled."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ BLOCKS = (
     SHOULDER["left"],
     HIP["left"],
 )
-"""Parts of the state, in its order."""
+"""Blocks of the state, in order."""
 
 
 def assemble(blocks: dict[tuple[int, int], Array], x: Array) -> Array:
@@ -33,7 +33,7 @@ def assemble(blocks: dict[tuple[int, int], Array], x: Array) -> Array:
 
 
 def row_of(by: dict[int, Array], x: Array) -> Array:
-    """A row ``(..., 1, 20)`` of H from its parts by block."""
+    """A row ``(..., 1, 20)`` of H from its blocks."""
     zero = 0.0 * x[..., :1, None]
     parts = [
         by[i] + zero if i in by else zero + constant([[0.0] * (block.stop - block.start)], x)

@@ -1,12 +1,12 @@
-r"""Constraints of limbs that end at handlebar and pedals: C1–C3 and C5–C7, angles C4 and C8, and the start from them.
+r"""Constraints of limbs that end at handlebar and pedals: C1–C3 and C5–C7, angles C4 and C8, and initial angles.
 
 Whole-body paper, equations (11)–(19), in the paper's axes (x forward, y up, z to the right), vectors in the bicycle's
 axes. Long axes of limbs point to the proximal joint (ISB): an upper segment of length l ends at −l y from its joint.
-Residuals are divided by the lengths and are pure numbers, where print leaves metres.
+Residuals are divided by segment lengths and dimensionless (in metres in the paper).
 
-Differs from print: the knee's swivel constraint C7 is printed about the bicycle's upright y, where it loses the swivel
-at some crank positions; about the forward x it keeps it. C8 is printed with the small-angle form l_z γ / l_sp of
-asin(l_z sin γ / l_sp), which is 7° off at γ = 80°.
+Differences from the paper: the swivel constraint C7 of the knee is published about the bicycle's upward y axis, where
+the swivel is not observable at some crank positions; about the forward x axis it always is. C8 is published with the
+small-angle form l_z γ / l_sp of asin(l_z sin γ / l_sp), an error of 7° at γ = 80°.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ from ...core.rotation import cross, euler_axes, euler_matrix, euler_yxy, euler_z
 
 
 class Limb(NamedTuple):
-    """Where a limb is, with derivatives by the angles of trunk (arms only) and of its own proximal joint."""
+    """Constraint residuals of a limb with derivatives by the angles of trunk (arms only) and proximal joint."""
 
     residuals: Array
-    """``(..., 3)`` constraint value minus what it should be: length, hinge, swivel; pure numbers"""
+    """``(..., 3)`` constraint residuals: length, hinge, swivel; dimensionless"""
     by_trunk: Array | None
     """``(..., 3, 3)`` rows by constraint, columns by trunk angle; None for legs"""
     by_joint: Array
@@ -34,14 +34,14 @@ def arm(trunk: Array, shoulder: Array, pivot: Array, joint: Array, hand: Array, 
     Args:
         trunk: ``(..., 3)`` Z-X-Y angles Θ of the trunk.
         shoulder: ``(..., 3)`` Y-X-Y angles Φ.
-        pivot: ``(3,)`` point about which the trunk turns, m.
+        pivot: ``(3,)`` point about which the trunk rotates, m.
         joint: ``(3,)`` shoulder joint in the trunk's frame from there, m.
-        hand: ``(..., 3)`` place of the hand, m.
+        hand: ``(..., 3)`` position of the hand, m.
         upper: length of the upper arm, m.
         lower: elbow to hand, m.
     """
     xp = namespace(trunk, shoulder)
-    # matrices to the bicycle's axes, and the axes about which the angles turn: d(R v) = −[R v]× J dΘ
+    # matrices to the bicycle's axes, and the rotation axes of the angles: d(R v) = −[R v]× J dΘ
     R, J = euler_matrix("zxy", trunk), euler_axes("zxy", trunk)
     RH, JH = R @ euler_matrix("yxy", shoulder), R @ euler_axes("yxy", shoulder)
     offset = (R @ joint[..., None])[..., 0]
@@ -53,7 +53,7 @@ def arm(trunk: Array, shoulder: Array, pivot: Array, joint: Array, hand: Array, 
     du, dz = (-skew(u) @ JH, -skew(z) @ JH)
     by_joint = _gradients(f, u, z, normal, du, du, dz, upper, lower)
     du, dz = -skew(u) @ J, -skew(z) @ J
-    # the trunk carries the shoulder with it, its own joint does not
+    # the trunk moves the shoulder joint; the angles of the shoulder do not
     df = du - skew(offset) @ J
     by_trunk = _gradients(f, u, z, normal, du, df, dz, upper, lower)
     return Limb(xp.stack(_values(f, u, z, normal, upper, lower), axis=-1), by_trunk, by_joint)
@@ -68,7 +68,7 @@ def leg(hip: Array, joint: Array, foot: Array, upper: float, lower: float, axis:
         foot: ``(..., 3)`` pedal, m.
         upper: length of the thigh, m.
         lower: knee to pedal, m.
-        axis: ``"x"`` or ``"y"`` (printed), in the plane of C7.
+        axis: ``"x"`` or ``"y"`` (as published), in the plane of C7.
     """
     xp = namespace(hip)
     R, J = euler_matrix("zxy", hip), euler_axes("zxy", hip)
@@ -110,7 +110,7 @@ def _bend(distance: Array, upper: float, lower: float) -> Array:
     xp = namespace(distance)
     cosine = (upper * upper + lower * lower - distance[..., 0] ** 2) / (2.0 * upper * lower)
     one = 1.0 + 0.0 * cosine
-    # a measured length may put the end out of reach: straight or folded then
+    # inaccurate lengths may put the end out of reach: then straight or folded
     cosine = xp.where(xp.greater(cosine, 1.0), one, xp.where(xp.less(cosine, -1.0), -one, cosine))
     return xp.pi - xp.acos(cosine)
 
@@ -133,7 +133,7 @@ def knee_flexion(
         shank: knee to ankle, l_s, m.
         foot_length: ankle to pedal, l_z, m.
         ankle: exterior angle γ of the fixed ankle, 0 with the foot in line with the shank, rad.
-        printed: with the small-angle form of print.
+        printed: with the published small-angle form.
     """
     xp = namespace(foot)
     one = 1.0 + 0.0 * foot[..., 0]
@@ -143,7 +143,7 @@ def knee_flexion(
     return _bend(norm(joint - foot), upper, lower) + turned
 
 
-# ---- the start: inverse kinematics of limbs whose two ends are known ------------------------------------------------
+# ---- initial angles: inverse kinematics of limbs whose two ends are known -------------------------------------------
 
 
 def limb_frame(
@@ -155,18 +155,18 @@ def limb_frame(
     kind: Literal["arm", "leg"],
     swivel: Array = 0.0,
 ) -> tuple[Array, Array]:
-    """Frame of the upper segment and place of the hinge between the segments.
+    """Frame of the upper segment and position of the hinge between the segments.
 
     With D = |tip − root| and a along it, the hinge lies at root + l₁ (cos A a + sin A (cos σ e + sin σ a × e)), where
-    cos A = (l₁² + D² − l₂²) / (2 l₁ D) and e is the part of ``outward`` that is normal to a. A tip out of reach is
-    reached for with the straight limb.
+    cos A = (l₁² + D² − l₂²) / (2 l₁ D) and e is the component of ``outward`` normal to a. For a tip out of reach the
+    limb is straight.
 
     Args:
         root: ``(..., 3)`` proximal joint, m.
         tip: ``(..., 3)`` hand or pedal, m.
         upper: l₁, m.
         lower: l₂ from hinge to tip, m.
-        outward: ``(..., 3)`` direction in which elbow or knee stands out.
+        outward: ``(..., 3)`` direction in which elbow or knee points.
         kind: elbows and knees bend in opposite directions.
         swivel: σ about the line from root to tip, rad.
 
@@ -195,7 +195,7 @@ def limb_frame(
 
 
 def shoulder_angles(trunk: Array, frame: Array) -> Array:
-    """Y-X-Y angles Φ ``(..., 3)`` of an upper arm in the trunk, both given as matrices to the bicycle's frame."""
+    """Y-X-Y angles Φ ``(..., 3)`` of an upper arm relative to the trunk, from their matrices to the bicycle."""
     return euler_yxy(trunk.mT @ frame)
 
 

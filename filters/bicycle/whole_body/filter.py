@@ -5,27 +5,26 @@ Wearable Sensors", 2016; equation numbers are the paper's, * marks those that we
 inside (x forward, y up, z to the right) and the environment's at every interface (:mod:`.whole_body.linkage`).
 
 State X = [φ, ϑ̈, Θ, a_ts, Φ_r, Ψ_r, Φ_l, Ψ_l] (20): roll, yaw acceleration, trunk, acceleration of the trunk's sensor
-against the seat, right shoulder and hip, left shoulder and hip. Six gyroscopes are inputs: with w the child's and q
-the parent's rate, Θ̇ = M w + G q (6), likewise hips (15) and shoulders (10); φ̇ from (2). Outputs (17), with f the
-specific force that the bicycle's accelerometer gives at the trunk's pivot:
+relative to the seat, right shoulder and hip, left shoulder and hip. Six gyroscopes are inputs: with the rates w of the
+child and q of the parent segment, Θ̇ = M w + G q (6), likewise hips (15) and shoulders (10); φ̇ from (2). Outputs (17),
+with f the specific force that the bicycle's accelerometer gives at the trunk's pivot:
 
     a_bz = −g sin φ − p_y tan φ ω_y² − p_x cos φ ϑ̈ − v ω_y + p_y φ̈              (3*)
     a_t  = R_BTᵀ (f + a_ts)                                                      (8)
     τ    = [(k_S + R_BT k_T) × f]_x                                              (9*)
     C1–C3 of each arm, C5–C7 of each leg equal their values                      (11)–(17)
 
-Differs from print: (3) has gravity with the wrong sign and lacks the turn's own acceleration v ϑ̇, without which φ is
-pulled to zero in a turn; (9) holds in a balanced turn only. Residuals of C2, C3, C6, C7 are divided by lengths. C7 is
-taken about the forward axis (``knee_axis="y"`` is printed). k_T is the trunk's first moment of mass about its pivot
-and k_S that of what sits still between saddle and pivot (:func:`.seat_moments`); as hands may carry the
-trunk's lean, ``seat_share`` is the part of it that the seat feels. Legs and pedal forces are left to the noise.
+Differences from the paper: (3) has the wrong sign of gravity and lacks the centripetal acceleration v ϑ̇, without which
+the estimate of φ tends to zero in a turn; (9) holds in a balanced steady turn only. Residuals of C2, C3, C6 and C7 are
+divided by lengths. C7 is about the forward axis (``knee_axis="y"`` is as published). k_T is the trunk's first moment of
+mass about its pivot, and k_S that of the masses fixed between saddle and pivot (:func:`.seat_moments`). Since hands may
+support the trunk's lean, ``seat_share`` is the share that the seat carries. Legs and pedal forces are covered by the
+noise. Q is that of the gyroscopes' noise, which correlates trunk and arms. The correlation of φ, trunk and legs through
+the bicycle's gyroscope is neglected, so that the filter has four decoupled subsystems: {φ, ϑ̈}, {Θ, a_ts, Φ_r, Φ_l},
+{Ψ_r}, {Ψ_l}. A shock (|f| far from g) increases the variances of a_bz, a_t and τ for a while (``shock_guard``).
 
-Q is that of the gyroscopes' noise, which trunk and arms share; what φ, trunk and legs share of the bicycle's gyroscope
-is left out, so that the filter has four decoupled subsystems: {φ, ϑ̈}, {Θ, a_ts, Φ_r, Φ_l}, {Ψ_r}, {Ψ_l}. A
-shock (|f| far from g) widens a_bz, a_t and τ and wears off (``shock_guard``).
-
-Not estimated: yaw, gyroscope and accelerometer biases. Assumed: flat ground, no pitch, no side slip, a pelvis fixed to
-the frame, fixed ankles.
+Yaw and the biases of gyroscopes and accelerometers are not estimated. The model assumes flat ground, no pitch, no side
+slip, a pelvis fixed to the frame, and fixed ankles.
 """
 
 from __future__ import annotations
@@ -66,7 +65,7 @@ TURNING, SITTING = seat_moments(USUAL)
 NOISES = ("lateral", "trunk", "torque", "length", "hinge", "swivel", "twist")
 TIMES = ("yaw_acceleration_time", "relative_acceleration_time", "shock_time", "shock_scale")
 POSITIVE = (*(f"{name}_noise" for name in NOISES), *TIMES)
-"""Parameters by which something is divided, and deviations of measurements."""
+"""Parameters in denominators, and standard deviations of measurements."""
 
 
 @dataclass(frozen=True)
@@ -80,30 +79,30 @@ class WholeBody(RiderLinkage, Model):
     constraints: tuple[str, ...] = CONSTRAINTS
     """which constraints are used, of both arms or both legs"""
     knee_axis: Literal["x", "y"] = "x"
-    """axis of the bicycle that the leg's plane contains in C7; y is printed"""
+    """axis of the bicycle that the leg's plane contains in C7; y as published"""
     lateral: Literal["corrected", "sign", "printed"] = "corrected"
-    """(3): corrected, with the sign of gravity corrected only, as printed"""
+    """(3): corrected, with only the sign of gravity corrected, or as published"""
     torque: Literal["seat_force", "printed"] = "seat_force"
-    """(9): corrected, as printed"""
+    """(9): corrected, or as published"""
     usual_twist: bool = False
-    """one more output, not the paper's: θ₃ is about ``twist_follow`` times the steering angle, as shoulders follow
-    hands. Where hands carry the trunk's lean, the seat torque does not determine the trunk's heading"""
+    """an additional measurement, not in the paper: θ₃ is about ``twist_follow`` times the steering angle, as shoulders
+    follow hands. Where hands support the trunk's lean, the seat torque does not determine the trunk's heading"""
     shock_guard: bool = True
-    """widen a_bz, a_t and τ during shocks"""
+    """increase the variances of a_bz, a_t and τ during shocks"""
     sampling: Literal["interval", "instant"] = "interval"
-    """what a gyroscope's sample is: the mean rate of the interval that it ends, or the rate at its end (the paper's)"""
+    """meaning of a gyroscope sample: mean rate of the interval that it ends, or rate at its end (as in the paper)"""
     turning_moment: Point = TURNING
     """k_T, kg·m, trunk axes from the pivot"""
     sitting_moment: Point = SITTING
     """k_S, kg·m, bicycle axes from the saddle"""
     seat_share: float = 0.0
-    """part of the trunk's sideways lean that the seat carries; 1 in the paper, 0 for riders who prop on the handlebar,
-    as the environment's do"""
+    """share of the trunk's sideways lean that the seat carries; 1 in the paper, 0 for riders who support themselves on
+    the handlebar, as in the environment"""
     cells_wide: float = USUAL.cells_wide
     """m between the rear load cells"""
 
     bicycle_gyroscope_noise: float = 1.0e-2
-    """rad/s/√Hz (0.6 °/s/√Hz): ten times the device's, so that roll forgets a bias within a second or two"""
+    """rad/s/√Hz (0.6 °/s/√Hz): ten times the device's, so that the effect of a bias decays within two seconds"""
     trunk_gyroscope_noise: float = 7.0e-3
     """rad/s/√Hz (0.4 °/s/√Hz)"""
     limb_gyroscope_noise: float = 7.0e-3
@@ -123,16 +122,16 @@ class WholeBody(RiderLinkage, Model):
     torque_noise: float = 6.0
     """N·m, of τ"""
     length_noise: float = 0.02
-    """of C1 and C5, pure number: 5 to 10 mm"""
+    """of C1 and C5, dimensionless: 5 to 10 mm"""
     hinge_noise: float = 0.03
     """of C2 and C6, sine of an angle"""
     swivel_noise: float = 3.0
-    """of C3 and C7, sine of an angle: elbows of riders who lean stand off by about 0.25 rms for 0.6 s or so, which is
-    white noise of about 0.25 √(2 · 0.6 s · 100 Hz)"""
+    """of C3 and C7, sine of an angle: elbows of leaning riders deviate by about 0.25 rms for about 0.6 s,
+    equivalent to white noise of about 0.25 √(2 · 0.6 s · 100 Hz)"""
     twist_noise: float = 0.7
-    """rad, of ``usual_twist``; a sample's, at 100 Hz: corrects within some seconds"""
+    """rad, of ``usual_twist``, per sample at 100 Hz: takes effect within some seconds"""
     twist_follow: float = 0.3
-    """part of the steering angle by which shoulders turn with the handlebar; a guess"""
+    """ratio of shoulder rotation to steering angle; assumed"""
     roll_prior: float = 0.087
     """rad"""
     trunk_prior: float = 0.12
@@ -148,7 +147,7 @@ class WholeBody(RiderLinkage, Model):
     shock_scale: float = 0.2
     """m/s²: variances are multiplied by 1 + ((peak − threshold) / scale)²"""
     shock_time: float = 0.3
-    """s, in which the peak decays"""
+    """s, time constant of the decay of the peak"""
     gravity: float = STANDARD_GRAVITY
     """m/s²"""
 
@@ -164,26 +163,26 @@ class WholeBody(RiderLinkage, Model):
     }
 
     def __post_init__(self) -> None:
-        """Refuse unknown or repeated constraints, and what cannot be divided by."""
+        """Check the constraints, and the parameters in denominators."""
         super().__post_init__()
         object.__setattr__(self, "constraints", tuple(self.constraints))
         if not set(self.constraints) <= set(CONSTRAINTS) or len(set(self.constraints)) < len(self.constraints):
-            raise ValueError(f"constraints must be different ones of {CONSTRAINTS}, got {self.constraints}")
+            raise ValueError(f"constraints must be distinct names from {CONSTRAINTS}, got {self.constraints}")
         check_positive(self, *POSITIVE)
 
     @classmethod
     def rider_parameters(cls, geometry: RiderGeometry) -> dict[str, Any]:
-        """Lengths and places of the linkage, and what of the rider's mass the seat carries."""
+        """Lengths and joint positions of the linkage, and the first moments of the rider's mass."""
         turning, sitting = seat_moments(geometry)
         return super().rider_parameters(geometry) | {"turning_moment": turning, "sitting_moment": sitting}
 
     @property
     def residual_size(self) -> int:  # type: ignore[override]
-        """m: five accelerations and torques, two rows a constraint, the twist."""
+        """m: five accelerations and torques, two rows per constraint, the twist."""
         return 5 + 2 * len(self.constraints) + self.usual_twist
 
     def prior(self, z: Measurement) -> tuple[Array, Array]:
-        """Upright, trunk as usual, limbs by inverse kinematics; P₀ diagonal."""
+        """Upright with the usual trunk flexion, limbs by inverse kinematics; P₀ diagonal."""
         x = self.start(z)
         xp = namespace(x)
         zero = 0.0 * x[..., :1]
@@ -226,7 +225,7 @@ class WholeBody(RiderLinkage, Model):
             F[index, index] = keep[..., None] * identity(part.stop - part.start, x)
             spread = expand(deviation**2, 2) * (1.0 - keep * keep)[..., None]
             Q[index, index] = spread * identity(part.stop - part.start, x)
-        # Euler angles of trunk (6), shoulders (10) and hips (15): blocks 2, 4 to 7, each against its parent
+        # Euler angles of trunk (6), shoulders (10) and hips (15): blocks 2, 4 to 7, each relative to its parent
         steps: dict[int, Rates] = {}
         joints = [(2, "zxy", TRUNK, trunk, bicycle)]
         for side, (arm, leg) in zip(SIDES, ((4, 5), (6, 7)), strict=True):
@@ -240,7 +239,7 @@ class WholeBody(RiderLinkage, Model):
             M, G = steps[index].by_child, steps[index].by_parent
             own, its = ("trunk", "bicycle") if index == 2 else ("limb", "trunk" if index in (4, 6) else "bicycle")
             Q[index, index] = noise[own] * (M @ M.mT) + noise[its] * (G @ G.mT)
-        # the trunk's gyroscope is the child's of the trunk and the parent's of both arms: covariances between them
+        # the trunk's gyroscope is that of the child for the trunk and of the parent for the arms: cross-covariances
         for row, column in ((2, 4), (2, 6), (4, 6)):
             first = steps[row].by_child if row == 2 else steps[row].by_parent
             Q[row, column] = noise["trunk"] * (first @ steps[column].by_parent.mT)
@@ -314,7 +313,7 @@ class WholeBody(RiderLinkage, Model):
         return r, H, diagonal_matrix(variances)
 
     def _calm(self, x: Array) -> Array:
-        """Factor ``(..., 1)`` on variances: 1, more during a shock."""
+        """Factor ``(..., 1)`` on variances: 1, larger during a shock."""
         xp = namespace(x)
         one = 1.0 + 0.0 * x[..., SHOCK]
         if not self.shock_guard:
@@ -333,7 +332,7 @@ class WholeBody(RiderLinkage, Model):
         # gravity, centripetal and Euler term of the yaw at the sensor
         expected = gravity * s - py * s / c * rate * rate - px * c * yaw
         if self.lateral == "corrected":
-            # the turn's own acceleration v ϑ̇ and the Euler term of the roll, which print lacks
+            # the centripetal acceleration v ϑ̇ and the Euler term of the roll, which the paper omits
             expected = expected - x[..., SPEED] * rate + py * x[..., ACCELERATION_OF_RATE][..., :1]
         return expected, gravity * c - py * rate * rate / (c * c) + px * s * yaw, -px * c
 
@@ -346,7 +345,7 @@ class WholeBody(RiderLinkage, Model):
             s, c = xp.sin(x[..., TRUNK]), xp.cos(x[..., TRUNK])
             weight, zero = turning[..., 1:2] * self.gravity, 0.0 * s[..., :1]
             return -weight * s[..., 1:2], xp.concat([zero, -weight * c[..., 1:2], zero], axis=-1)
-        # x component of (k_S + R_BT k_T) × f, of which the seat feels only a share of the sideways lean
+        # x component of (k_S + R_BT k_T) × f; the seat carries only a share of the sideways lean
         f, share = x[..., SEAT_FORCE], self.seat_share
         still = paper_axes(constant([*self.sitting_moment], x))
         torque = (still[..., 1] + k[..., 1]) * f[..., 2] - share * (still[..., 2] + k[..., 2]) * f[..., 1]
@@ -382,5 +381,5 @@ class WholeBody(RiderLinkage, Model):
         return rows
 
     def retract(self, x: Array, dx: Array) -> Array:
-        """Angles and accelerations are corrected by a sum; what is remembered stays."""
+        """Additive for angles and accelerations; remembered samples stay."""
         return namespace(x).concat([x[..., :ERROR_SIZE] + dx, x[..., ERROR_SIZE:]], axis=-1)

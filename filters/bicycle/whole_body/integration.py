@@ -1,4 +1,4 @@
-"""Integration of six gyroscopes and nothing else: the baseline of the whole-body paper's figure 6, which drifts."""
+"""Integration of six gyroscopes: the baseline of figure 6 of the whole-body paper, which drifts."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from .rates import advance
 
 @dataclass(frozen=True)
 class WholeBodyIntegration(RiderLinkage, Recurrence):
-    """Equations (2), (6), (10), (15) of the paper from the same start as the filter.
+    """Equations (2), (6), (10), (15) of the paper from the same initial state as the filter.
 
-    State: as :class:`.RiderLinkage`; accelerations stay zero. Elbows and knees come from the encoders
+    State: as :class:`.RiderLinkage`; accelerations stay zero. Elbow and knee angles follow from the encoders
     (C4, C8), as in the filter.
     """
 
     sampling: Literal["interval", "instant"] = "interval"
-    """what a gyroscope's sample is: the mean rate of the interval that it ends, or the rate at its end (the paper's)"""
+    """meaning of a gyroscope sample: mean rate of the interval that it ends, or rate at its end (as in the paper)"""
 
     def prior(self, z: Measurement) -> Array:
-        """Upright, trunk as usual, limbs by inverse kinematics."""
+        """Upright with the usual trunk flexion, limbs by inverse kinematics."""
         return self.start(z)
 
     def predict(self, x: Array, z: Measurement, previous: Measurement) -> Array:

@@ -1,8 +1,9 @@
-r"""Bicycle, trunk, arms and legs as one linkage: what the whole-body filter and its baseline share.
+r"""Bicycle, trunk, arms and legs as one linkage, shared by the whole-body filter and its baseline.
 
-Geometry comes in the environment's axes (x forward, y left, z up; :class:`.geometry.RiderGeometry`) and is turned here
-into those of the whole-body paper (x forward, y up, z to the right), as the samples are: (x, y, z) → (x, z, −y). The
-paper's trunk turns about the seat; here it turns about the lumbar joint above a pelvis that is fixed to the frame.
+Geometry is given in the environment's axes (x forward, y left, z up; :class:`.geometry.RiderGeometry`). Geometry and
+samples are converted here to the axes of the whole-body paper (x forward, y up, z to the right): (x, y, z) → (x, z,
+−y). The trunk rotates about the lumbar joint above a pelvis that is fixed to the frame; in the paper it rotates about
+the seat.
 
 The paper's angles are the environment's: Θ is ``trunk/angles``, Φ ``shoulder_…/angles``, Ψ ``hip_…/angles``, α and β
 ``elbow_…/flexion`` and ``knee_…/flexion``, φ ``bicycle/roll``, with the same signs on both sides.
@@ -26,7 +27,7 @@ USUAL = RiderGeometry()
 SIDES = ("right", "left")
 """In the paper's order."""
 SIGNS = {"right": -1.0, "left": 1.0}
-"""Of y in the environment's axes."""
+"""Sign of y in the environment's axes."""
 ROLL, YAW_ACCELERATION, TRUNK, RELATIVE_ACCELERATION = slice(0, 1), slice(1, 2), slice(2, 5), slice(5, 8)
 SHOULDER = {"right": slice(8, 11), "left": slice(14, 17)}
 HIP = {"right": slice(11, 14), "left": slice(17, 20)}
@@ -60,7 +61,7 @@ OUTPUTS = (
 )
 
 PELVIS = 0.1117
-"""Mass of the lower trunk, part of the rider's (de Leva 1996, men)"""
+"""Mass of the lower trunk, share of the rider's (de Leva 1996, men)"""
 
 
 def paper_axes(vector: Array) -> Array:
@@ -73,7 +74,7 @@ def true_angles(truth: Mapping[str, Any]) -> dict[str, np.ndarray]:
     """The paper's angles from an environment's truth: they have the same names, axes and signs.
 
     Raises:
-        ValueError: the truth lacks one.
+        ValueError: one is missing.
     """
     missing = [quantity.name for quantity in OUTPUTS if quantity.name not in truth]
     if missing:
@@ -83,7 +84,7 @@ def true_angles(truth: Mapping[str, Any]) -> dict[str, np.ndarray]:
 
 @dataclass(frozen=True)
 class RiderLinkage(RiderEquations):
-    """Geometry of rider and bicycle (m, environment's axes), the start, the angles of elbows and knees.
+    """Geometry of rider and bicycle (m, environment's axes), initial state, angles of elbows and knees.
 
     State: φ (1), yaw acceleration (1), Θ (3), a_ts (3), Φ_r (3), Ψ_r (3), Φ_l (3), Ψ_l (3), last valid steering and
     crank angle (2).
@@ -106,7 +107,7 @@ class RiderLinkage(RiderEquations):
     crank_axle: Point = USUAL.crank_axle
     crank_length: float = USUAL.crank_length
     pedal_offset: float = USUAL.pedal_offset
-    """of a foot from the middle plane"""
+    """of a foot from the mid-plane"""
     upper_arm: float = USUAL.upper_arm
     """l_h"""
     forearm: float = USUAL.forearm
@@ -116,7 +117,7 @@ class RiderLinkage(RiderEquations):
     shank: float = USUAL.shank
     """l_s, knee to ankle"""
     ankle_to_pedal: float = USUAL.ankle_to_pedal
-    """l_z (print calls it knee to pedal in its list of symbols)"""
+    """l_z ("knee to pedal" in the paper's list of symbols)"""
     ankle_angle: float = USUAL.ankle_angle
     """γ, rad: exterior, 0 with the foot in line with the shank"""
     bicycle_imu: Point = USUAL.bicycle_imu
@@ -126,7 +127,7 @@ class RiderLinkage(RiderEquations):
     trunk_flexion: float = USUAL.trunk_flexion
     """rad: the filter starts with Θ = (−trunk_flexion, 0, 0)"""
     printed_knee: bool = False
-    """C8 with the small-angle form of print"""
+    """C8 with the published small-angle form"""
 
     channels: ClassVar[tuple[Channel, ...]] = CHANNELS
     outputs: ClassVar[tuple[Quantity, ...]] = OUTPUTS
@@ -140,12 +141,12 @@ class RiderLinkage(RiderEquations):
         return xp.sqrt(a * a + b * b + 2.0 * a * b * xp.cos(self.ankle_angle * one))
 
     def point(self, place: Point, side: str, like: Array) -> Array:
-        """A place of the left side on either side, paper's axes ``(3,)``."""
+        """A position of the left side, mirrored for the right side, paper's axes ``(3,)``."""
         x, y, z = place
         return paper_axes(constant([x, (y if side == "left" else -y), z], like))
 
     def hand(self, side: str, steer: Array) -> Array:
-        """Place of the hand ``(..., 3)`` at the steering angle ``(..., 1)``, paper's axes."""
+        """Position of the hand ``(..., 3)`` at the steering angle ``(..., 1)``, paper's axes."""
         x, y, z = self.grip
         ox, oy, oz = self.steer_origin
         arm = constant([x - ox, (y if side == "left" else -y) - oy, z - oz], steer)
@@ -153,7 +154,7 @@ class RiderLinkage(RiderEquations):
         return paper_axes(constant([*self.steer_origin], steer) + rotate(exp(axis * steer), arm + 0.0 * steer))
 
     def pedal(self, side: str, crank: Array) -> Array:
-        """Place of the pedal ``(..., 3)`` at the crank angle ``(..., 1)``, 0 with the left one in front."""
+        """Position of the pedal ``(..., 3)`` at the crank angle ``(..., 1)``, 0 with the left one in front."""
         xp, sign = namespace(crank), SIGNS[side]
         along, down = self.crank_length * xp.cos(crank[..., 0]), self.crank_length * xp.sin(crank[..., 0])
         across = self.pedal_offset + 0.0 * along
@@ -171,7 +172,7 @@ class RiderLinkage(RiderEquations):
         return rates | {GYROSCOPES[0]: self.bicycle_axes(z[GYROSCOPES[0]])}
 
     def start(self, z: Measurement) -> Array:
-        """State ``(..., 22)``: trunk as usual, limbs by inverse kinematics with plain elbows and knees.
+        """State ``(..., 22)``: usual trunk flexion, limbs by inverse kinematics without swivel.
 
         NaN until every gyroscope, the bicycle's accelerometer and both encoders have had a valid sample.
         """
@@ -233,11 +234,11 @@ class RiderLinkage(RiderEquations):
 
 
 def seat_moments(geometry: RiderGeometry) -> tuple[Point, Point]:
-    """What of the rider turns with the trunk and what with the frame, as first moments of mass in kg·m.
+    """First moments of the masses that rotate with the trunk and with the frame, kg·m.
 
-    Newton and Euler for the rider about the saddle point: the support's moment is the sum of (place × m × specific
-    force) less what hands and feet carry. Shoulders carry half of each arm, hands the rest; the centre of the pelvis
-    lies half way to the lumbar joint; legs hang between saddle and pedals and are left out.
+    Newton–Euler for the rider about the saddle point: the support moment is the sum of (position × m × specific force)
+    less the load on hands and feet. Shoulders carry half of each arm, hands the rest. The centre of the pelvis lies
+    half way to the lumbar joint. Legs are supported by saddle and pedals and left out.
 
     Returns:
         Trunk axes from the lumbar joint, and bicycle axes from the saddle (environment's axes).

@@ -1,8 +1,8 @@
-r"""How Euler angles of trunk, hips and shoulders turn when gyroscopes on both sides of the joint are known.
+r"""Rates of the Euler angles of trunk, hips and shoulders from gyroscopes on both sides of the joint.
 
-Whole-body paper, equations (6), (10) and (15), correct as printed; the gyroscope model (5) that they invert is printed
-with :math:`R_y^T(\phi)` for :math:`R_y^T(\theta_3)` and with the yaw rate on the wrong axis. Axes are the paper's (and
-the ISB's): x forward, y up, z to the right. With w the child's rate in its own axes and q the parent's in the parent's,
+Whole-body paper, equations (6), (10) and (15), as published. Erratum: the gyroscope model (5) that they invert has
+:math:`R_y^T(\phi)` instead of :math:`R_y^T(\theta_3)` and the yaw rate on the wrong axis. Axes are the paper's (and the
+ISB's): x forward, y up, z to the right. With w the child's rate in its own axes and q the parent's in the parent's,
 
     ė = M(e) w + G(e) q
 
@@ -17,7 +17,7 @@ from ...core.backend import Array, expand, namespace, rows
 
 
 class Rates(NamedTuple):
-    """Rates of three angles and what they depend on."""
+    """Rates of three angles and their derivatives."""
 
     rates: Array
     """``(..., 3)`` rad/s"""
@@ -41,8 +41,8 @@ def zxy_rates(angles: Array, child: Array, parent: Array) -> Rates:
     s, c = xp.sin(angles), xp.cos(angles)
     s1, s2, s3, c1, c2, c3 = (*(s[..., i] for i in range(3)), *(c[..., i] for i in range(3)))
     t2 = s2 / c2
-    # the child's rate turned back by the third angle (k about the first axis, n about the second), the parent's turned
-    # by the first (m, p); then ė of (6) and its derivatives by the angles, the child's rate (M) and the parent's (G)
+    # the child's rate rotated back by the third angle (k about the first axis, n about the second), the parent's
+    # rotated by the first (m, p); then ė of (6) and its derivatives by the angles, child's rate (M) and parent's (G)
     k, n = -s3 * child[..., 0] + c3 * child[..., 2], c3 * child[..., 0] + s3 * child[..., 2]
     m, p = s1 * parent[..., 0] - c1 * parent[..., 1], c1 * parent[..., 0] + s1 * parent[..., 1]
     rates = xp.stack([k / c2 - m * t2 - parent[..., 2], n - p, child[..., 1] - t2 * k + m / c2], axis=-1)
