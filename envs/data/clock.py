@@ -22,7 +22,7 @@ RATE_RANGE = 0.1
 """The loop follows the interval by no more than this part."""
 FAR = 20
 """After so many missing samples the loop takes the phase of the next stamp: the sensor may have been restarted."""
-LOCKED = 0.26
+LOCKED = 0.245
 """Root mean square deviation from the loop's phase, in intervals, up to which stamps have a sampling rate; that of
 random stamps is 0.29."""
 WELL_LOCKED = 0.15
@@ -32,6 +32,33 @@ LARGEST_SHIFT = 3.0
 MILLISECOND = 1e-3
 LONGEST_GAP = 600.0
 """s; an interruption beyond it separates two recordings."""
+USUAL_RATES = (
+    25,
+    30,
+    50,
+    52,
+    60,
+    62.5,
+    64,
+    75,
+    80,
+    100,
+    104,
+    119,
+    120,
+    125,
+    128,
+    143,
+    150,
+    200,
+    208,
+    225,
+    238,
+    240,
+    250,
+)
+USUAL_RATES += (256, 285.7, 300, 333.3, 400, 416, 440, 476, 480, 500, 512, 562.5, 600)
+"""Hz; rates at which sensors are sampled."""
 SLOWEST, FASTEST = 0.25, 2e-5
 """Intervals in s between which inertial sensors are sampled."""
 
@@ -94,14 +121,18 @@ def fit_clock(time: np.ndarray, nominal_rate: float | None = None) -> Clock:
             position, shift = numbered(np.rint((stamps - stamps[0]) / nominal), counts)
         if shift < LARGEST_SHIFT and abs(interval / nominal - 1.0) < RATE_RANGE:
             fits.append((0.0, position, interval))
-    for candidate in likely_intervals(stamps, counts) if not fits else ():
-        position, interval, spread, shift = locked(stamps, counts, candidate)
-        fits.append((spread + max(0.0, shift - 0.5), position, interval))
-        if len(fits) == 1 and fits[0][0] < WELL_LOCKED:
+    for candidates in likely_intervals(stamps, counts) if not fits else ():
+        for candidate in candidates:
+            position, interval, spread, shift = locked(stamps, counts, candidate)
+            fits.append((spread + max(0.0, shift - 0.5), position, interval))
+        if min(spread for spread, _, _ in fits) < WELL_LOCKED:
             break
-    best = min(spread for spread, _, _ in fits)
-    # Whatever fits to an interval fits to its fractions: of those that fit alike the longest.
-    spread, position, interval = max((fit for fit in fits if fit[0] <= best + 0.1), key=lambda fit: fit[2])
+    # What fits to an interval fits to its fractions too, and to shorter ones if most samples may be missing: of those
+    # that fit alike the longest, and of multiples also one that fits a little less.
+    least = min(spread for spread, _, _ in fits)
+    best = max((fit for fit in fits if fit[0] <= least + 0.03), key=lambda fit: fit[2])
+    multiples = [fit for fit in fits if fit[2] > 1.4 * best[2] and fit[0] <= best[0] + 0.1]
+    spread, position, interval = max(multiples, key=lambda fit: fit[2], default=best)
     if spread > LOCKED:
         raise ValueError(
             f"no sampling rate explains the time stamps: intervals range from {np.quantile(steps, 0.05):.4g} s to "
@@ -170,23 +201,26 @@ def packet_limit(steps: np.ndarray) -> float:
     return 0.1 * float(np.median(steps))
 
 
-def likely_intervals(stamps: np.ndarray, counts: np.ndarray) -> Iterator[float]:
-    """Candidates in s: the mean of the steps near their median, or what divides most steps (most samples are lost)."""
+def likely_intervals(stamps: np.ndarray, counts: np.ndarray) -> Iterator[list[float]]:
+    """Candidates in s: the mean of the steps near their median; what divides most steps; what devices usually have.
+
+    The second are for recordings that lack most samples. The third are for coarse stamps: in whole milliseconds a
+    sensor at 512 Hz looks like one at 500 Hz.
+    """
     steps, counts = np.diff(stamps), counts[1:]
     each = steps / counts
     usual = float(np.median(each))
     near = (each < 1.5 * usual) & (each > 0.5 * usual)
-    yield float(steps[near].sum() / counts[near].sum()) if near.any() else usual
+    yield [float(steps[near].sum() / counts[near].sum()) if near.any() else usual]
     shortest = 0.6 * max(float(np.quantile(each, 0.05)), 0.05 * usual)
     intervals = np.geomspace(1.2 * usual, min(shortest, usual), 600)
     in_milliseconds = np.abs(stamps / MILLISECOND - np.rint(stamps / MILLISECOND)).max() < 1e-3
     # Everything in whole milliseconds is divided by the millisecond.
     intervals = intervals[intervals > 1.3 * MILLISECOND] if in_milliseconds else intervals
-    few = steps[: 200_000 // len(intervals) * 10] if len(intervals) else steps[:0]
-    resultant = np.array([np.abs(np.exp(2j * np.pi / interval * few).mean()) for interval in intervals])
+    resultant = np.array([np.abs(np.exp(2j * np.pi / interval * steps[:3000]).mean()) for interval in intervals])
     peaks = np.flatnonzero((resultant[1:-1] > resultant[:-2]) & (resultant[1:-1] >= resultant[2:])) + 1
-    for best in peaks[np.argsort(-resultant[peaks])][:4]:
-        yield float(intervals[best])
+    yield [float(intervals[peak]) for peak in peaks[np.argsort(-resultant[peaks])][:4]]
+    yield [1.0 / rate for rate in USUAL_RATES if len(intervals) and intervals[-1] < 1.0 / rate < intervals[0]]
 
 
 def locked(stamps: np.ndarray, counts: np.ndarray, interval: float) -> tuple[np.ndarray, float, float, float]:
@@ -196,14 +230,18 @@ def locked(stamps: np.ndarray, counts: np.ndarray, interval: float) -> tuple[np.
         Grid point ``(P,)`` of every packet's last sample; the interval in s; the root mean square deviation of stamps
         from the loop's phase, and the typical distance of a packet from the grid point next to its stamp, in intervals.
     """
+    phase = float(stamps[0])
     for _ in range(4):
-        nearest, deviations = follow(stamps, interval)
+        nearest, deviations = follow(stamps, interval, phase)
         position, shift = numbered(nearest, counts)
         before, (interval, _, residual) = interval, line(position, stamps)
         trusted = np.abs(residual) <= 4.0 * np.median(np.abs(residual)) + 1e-12
         if trusted.sum() > 2:
             interval = line(position[trusted], stamps[trusted])[0]
-        if abs(interval / before - 1.0) < 1e-4:
+        # The first stamp jitters like all others: the loop starts in the phase of the first fifty.
+        early = slice(0, 50)
+        phase = float(np.median(stamps[early] - interval * (position[early] - position[0])))
+        if abs(interval / before - 1.0) < 1e-4 and abs(phase - stamps[0]) < 0.1 * interval:
             break
     return position, interval, float(np.sqrt(np.mean(deviations**2))), shift
 
@@ -218,10 +256,10 @@ def numbered(nearest: np.ndarray, counts: np.ndarray) -> tuple[np.ndarray, float
     return position - position[0] + counts[0] - 1, float(np.median(np.abs(position - nearest)))
 
 
-def follow(stamps: np.ndarray, interval: float) -> tuple[np.ndarray, np.ndarray]:
+def follow(stamps: np.ndarray, interval: float, phase: float) -> tuple[np.ndarray, np.ndarray]:
     """One pass of the loop; the grid point next to every stamp, and its deviation in intervals."""
     slowest, fastest = interval * (1.0 + RATE_RANGE), interval * (1.0 - RATE_RANGE)
-    phase, position = float(stamps[0]), 0
+    position = 0
     positions, deviations = [], []
     for stamp in stamps.tolist():
         ahead = (stamp - phase) / interval
@@ -243,6 +281,12 @@ def line(index: np.ndarray, time: np.ndarray) -> tuple[float, float, np.ndarray]
     k, t = index - index.mean(), time - time.mean()
     slope = float(k @ t / (k @ k))
     return slope, float(time.mean() - slope * index.mean()), t - slope * k
+
+
+def too_coarse(time: np.ndarray, clock: Clock) -> bool:
+    """Whether stamps in whole milliseconds leave open which samples of a fast sensor are missing."""
+    coarse = np.abs(time / MILLISECOND - np.rint(time / MILLISECOND)).max() < 1e-3
+    return bool(coarse and clock.interval < 2.5 * MILLISECOND and clock.missing > 0.02 * len(time))
 
 
 def within(counts: np.ndarray) -> np.ndarray:

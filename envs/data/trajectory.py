@@ -17,7 +17,7 @@ import numpy as np
 
 from ...filters.core import rotation
 from .checks import check_metadata, columns, first, real_array, unit_or_unknown
-from .clock import Clock, check_interval, fit_clock
+from .clock import Clock, check_interval, fit_clock, too_coarse
 from .frames import trajectory_frame
 from .resampling import fill_short_gaps, resampled_fields, shifted
 from .storage import read_trajectory_file, write_trajectory_file
@@ -166,12 +166,11 @@ class Trajectory:
                 f"interval before the stamp, {1.0 / clock.interval:.4g} Hz",
                 stacklevel=2,
             )
-        if clock.missing > length / 3:
-            warnings.warn(
-                f"{self.name}: {clock.missing} of {length} samples at {1.0 / clock.interval:.4g} Hz are missing; if it "
-                "is not the device's rate, name it in metadata['nominal_rate']",
-                stacklevel=2,
-            )
+        if clock.missing > length / 3 or too_coarse(kept.time, clock):
+            named = "nominal_rate" in self.metadata
+            hint = "" if named else "; if it is not the device's rate, name it in metadata['nominal_rate']"
+            rate = f"{1.0 / clock.interval:.4g} Hz"
+            warnings.warn(f"{self.name}: {clock.missing} of {length} samples at {rate} are missing{hint}", stacklevel=2)
         return self.replace(
             time=clock.start + clock.interval * np.arange(length),
             measurements=spread(kept.measurements),

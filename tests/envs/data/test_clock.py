@@ -155,3 +155,27 @@ def test_repeated_rows_are_dropped_and_a_shared_stamp_is_not_lost():
 def test_samples_of_one_stamp_have_no_rate():
     with pytest.raises(ValueError, match="time must increase"):
         make(np.zeros(5))
+
+
+def test_fast_sensors_with_coarse_stamps_and_lost_rows_are_doubted():
+    index = np.flatnonzero(rng().random(N) >= 0.3)
+    with pytest.warns(UserWarning, match="missing; if it is not the device's rate, name it"):
+        make(np.round(index / 512.0, 3)).on_grid()
+    grid = make(np.round(index / 512.0, 3), nominal_rate=512.0)
+    assert grid.dt == pytest.approx(1 / 512.0, rel=1e-4)
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_grids_of_any_rate_jitter_loss_and_gap(seed):
+    """Rates from 10 to 400 Hz; the grid is the sensor's, or (with much jitter and loss) there is an error."""
+    draw = np.random.default_rng(seed)
+    rate = float(np.exp(draw.uniform(np.log(10.0), np.log(400.0))))
+    jitter, loss, gap = draw.choice([0.0, 0.02, 0.1]), draw.choice([0.0, 0.01, 0.1, 0.3]), draw.choice([0.0, 0.0, 1.0])
+    index = np.arange(2000)
+    index = np.where(index > 1000, index + int(gap * rate), index)
+    index = index[(draw.random(2000) >= loss) | (np.arange(2000) == 0)]
+    time = draw.choice([0.0, 1000.0, 1.7e9]) + np.sort(index + jitter * draw.standard_normal(len(index))) / rate
+    clock = fit_clock(np.round(time, 3) if draw.random() < 0.5 else time)
+    assert clock.interval == pytest.approx(1.0 / rate, rel=1e-3)
+    # One tick at the start, or one of a gap, may be in doubt.
+    assert np.abs(np.diff(clock.index) - np.diff(index)).sum() <= 0.02 * len(index)
