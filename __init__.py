@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from .envs.data.plausibility import Finding, check_recording
     from .envs.data.trajectory import Trajectory
     from .envs.record import record
+    from .envs.sensors.kinds import SensorKind, register_sensor_kind
     from .filters.core.estimator import Estimator
     from .filters.core.quantity import Estimate
 
@@ -40,6 +41,7 @@ __all__ = [
     "Estimator",
     "EstimatorInfo",
     "Finding",
+    "SensorKind",
     "Trajectory",
     "__version__",
     "apply_calibration",
@@ -51,6 +53,7 @@ __all__ = [
     "load_recordings",
     "make_estimator",
     "record",
+    "register_sensor_kind",
     "run",
     "smooth",
 ]
@@ -60,6 +63,7 @@ _HOMES = {
     "Estimator": ".filters.core.estimator",
     "EstimatorInfo": ".baselines.registry",
     "Finding": ".envs.data.plausibility",
+    "SensorKind": ".envs.sensors.kinds",
     "Trajectory": ".envs.data.trajectory",
     "apply_calibration": ".envs.data.calibration.records",
     "check_recording": ".envs.data.plausibility",
@@ -70,6 +74,7 @@ _HOMES = {
     "load_recordings": ".envs.data.formats.load",
     "make_estimator": ".baselines.registry",
     "record": ".envs.record",
+    "register_sensor_kind": ".envs.sensors.kinds",
     "run": ".baselines.run",
     "smooth": ".baselines.run",
 }
