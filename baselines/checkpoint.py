@@ -52,7 +52,7 @@ def load_checkpoint(path: Path, key: Mapping[str, Any]) -> dict[str, Any]:
 
     found = [file for file in (path, previous(path)) if file.is_file()]
     if not found:
-        raise ValueError(f"there is nothing to resume: no {path.name} in {path.parent}")
+        raise ValueError(f"there is nothing to resume: no {path.name} in {path.parent}; start a new run")
     for file in found:
         try:
             # weights_only: a checkpoint may come from elsewhere and must not run code.
