@@ -112,7 +112,8 @@ def check_clock(trajectory: Trajectory) -> Iterator[Finding]:
         interval = trajectory.dt
     except ValueError as reason:
         remedy = "Name the device's nominal rate, or cut the recording."
-        yield Finding("warning", "time", str(reason), "stamps of arrival, or of several recordings", remedy)
+        what = str(reason).removeprefix(f"{trajectory.name}: ")
+        yield Finding("warning", "time", what, "stamps of arrival, or of several recordings", remedy)
         return
     rate = 1.0 / interval
     if rate < PLAUSIBLE_RATES[0]:
