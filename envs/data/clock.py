@@ -32,32 +32,8 @@ LARGEST_SHIFT = 3.0
 MILLISECOND = 1e-3
 LONGEST_GAP = 600.0
 """s; an interruption beyond it separates two recordings."""
-USUAL_RATES = (
-    25,
-    30,
-    50,
-    52,
-    60,
-    62.5,
-    64,
-    75,
-    80,
-    100,
-    104,
-    119,
-    120,
-    125,
-    128,
-    143,
-    150,
-    200,
-    208,
-    225,
-    238,
-    240,
-    250,
-)
-USUAL_RATES += (256, 285.7, 300, 333.3, 400, 416, 440, 476, 480, 500, 512, 562.5, 600)
+USUAL_RATES: tuple[float, ...] = (25, 30, 50, 52, 60, 62.5, 64, 75, 80, 100, 104, 119, 120, 125, 128, 143, 150, 200)
+USUAL_RATES += (208, 225, 238, 240, 250, 256, 285.7, 300, 333.3, 400, 416, 440, 476, 480, 500, 512, 562.5, 600)
 """Hz; rates at which sensors are sampled."""
 SLOWEST, FASTEST = 0.25, 2e-5
 """Intervals in s between which inertial sensors are sampled."""
