@@ -17,10 +17,10 @@ minimum variance (2.48). With covariances divided by σ_a², J = ∂ω_PR/∂ξ 
 
 Errata: J has the opposite sign in (2.39); Ψ in (2.41) mixes ω_TI and ω_PR; (2.27), (2.32) and (2.34) omit S, the
 correlation of the last estimate with the last ξ̂. The first estimate is known and has no error of α̂, contrary to
-w₀ = 1. ``variant`` selects where J is evaluated: ``sound`` at ω_TI, ``corrected`` at ω_PR as the thesis intends;
-``printed`` is as published. Near rest the magnitude of ω_PR does not fall below √|δξ|. J at ω_PR is then too small, and
-the weight falls just where ω_PR carries no information; ω_TI has no such lower limit. Weights are clipped to [0, 1],
-since values above 1 occur. Where J is not defined (below :data:`SLOWEST`) the weight is 1.
+w₀ = 1. ``variant`` selects where J is evaluated: ``integrated`` at ω_TI, ``corrected`` at ω_PR as the thesis intends;
+``published`` has these errata. Near rest the magnitude of ω_PR does not fall below √|δξ|. J at ω_PR is then too small,
+and the weight falls just where ω_PR carries no information; ω_TI has no such lower limit. Weights are clipped to
+[0, 1], since values above 1 occur. Where J is not defined (below :data:`SLOWEST`) the weight is 1.
 
 K. Parsa's method (appendix A) corrects ω_TI by one Gauss–Newton step towards ξ̂ and integrates from the result. Its
 normal matrix is singular only at ω = 0, not wherever one component vanishes (2.55).
@@ -52,7 +52,7 @@ from .products import product_jacobian, products, symmetric
 from .symmetric_matrix import largest_eigenpair
 
 Method = Literal["weighted", "time-integration", "polynomial-roots", "parsa"]
-Variant = Literal["sound", "corrected", "printed"]
+Variant = Literal["integrated", "corrected", "published"]
 
 COVARIANCE = Quantity("angular_rate_covariance", "vector", 9, "rad²/s²")
 """Σ of the weighted method, row-major."""
@@ -88,7 +88,7 @@ def roots_jacobian(rate: Array) -> Array:
     return Z / square @ xp.concat([rate[..., :, None] + diagonal_matrix(rate), symmetric(rate)], axis=-1)
 
 
-def printed_jacobian(xi: Array, integrated: Array, roots: Array) -> Array:
+def published_jacobian(xi: Array, integrated: Array, roots: Array) -> Array:
     """Z⁻¹ Ψ as published in (2.41) and (2.42): wrong sign, at noisy ξ, with both rates in Ψ."""
     xp = namespace(xi)
     square = xp.sum(xi[..., :3] ** 2, axis=-1) + 2.0 * xp.sum(xi[..., 3:] ** 2, axis=-1)
@@ -127,7 +127,7 @@ class ArrayRate(ArrayEquations, Recurrence):
     """the accelerometer array; it must have full rank (as OCTA), which requires at least twelve accelerometers"""
     method: Method = "weighted"
     """``polynomial-roots`` takes the sign of its own last value, ``parsa`` and ``weighted`` that of ω_TI"""
-    variant: Variant = "sound"
+    variant: Variant = "integrated"
     """of the weighted method: where J is evaluated, see the module docstring"""
     start: Literal["known", "gyroscope"] = "known"
     """where the first rate comes from: ``initial_rate``, or the first sample of ``imu/gyr``"""
@@ -181,7 +181,7 @@ class ArrayRate(ArrayEquations, Recurrence):
         bias = zero + expand(self._bias_ratio(self.bias_noise), 1) * self._spread(a)
         covariance = variance * constant(UNIT.ravel(), a)
         # with w₀ = 1, (2.32) assumes that ω₀ shares the error of α̂₀, but ω₀ is known independently: S₀ cancels this
-        none = 0.0 if self.variant == "printed" else -expand(self.dt, 1)
+        none = 0.0 if self.variant == "published" else -expand(self.dt, 1)
         shared = zero[..., :1] + none * constant(self.array.B_T.ravel(), a)
         return xp.concat([rate, covariance, zero + 1.0, shared, zero, zero, bias], axis=-1)
 
@@ -227,8 +227,8 @@ class ArrayRate(ArrayEquations, Recurrence):
     def _combine(self, x: Array, xi: Array, roots: Array) -> Array:
         """Equations (2.48), (2.14), (2.44), on covariances over σ_a²."""
         xp, rate, dt = namespace(x), x[..., :3], expand(self.dt, 2)
-        at = rate if self.variant == "sound" else roots
-        J = printed_jacobian(xi, rate, roots) if self.variant == "printed" else roots_jacobian(at)
+        at = rate if self.variant == "integrated" else roots
+        J = published_jacobian(xi, rate, roots) if self.variant == "published" else roots_jacobian(at)
         B_C, B_CT = constant(self.array.B_C, x), constant(self.array.B_TC.T, x)
         # C = J B_C Jᵀ and M = Δt J B_TCᵀ of the module docstring; ``known`` is Σ' + T
         C, JB, known = J @ B_C @ J.mT, J @ B_CT, xp.reshape(x[..., 3:12], (*x.shape[:-1], 3, 3))
@@ -245,7 +245,7 @@ class ArrayRate(ArrayEquations, Recurrence):
         w, v = weights[..., :, None], 1.0 - weights[..., :, None]
         crossed = 0.5 * v * M * w.mT
         covariance = w * known * w.mT + crossed + crossed.mT + v * C * v.mT
-        S = 0.0 * JB if self.variant == "printed" else v * JB
+        S = 0.0 * JB if self.variant == "published" else v * JB
         fused = weights * rate + (1.0 - weights) * roots
         after = self._correct_bias(x, roots - rate, _diagonal_of(known), xp.where(usable, bottom, 0.0 * one), weights)
         return xp.concat([fused, _flat(covariance), weights, _flat(S + S.mT), *after], axis=-1)

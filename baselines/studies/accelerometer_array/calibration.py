@@ -99,8 +99,8 @@ def calibration(study: Study, report: Report) -> None:
     report.compare(
         "Chapter 4: calibration of simulated devices",
         [
-            {"quantity": quantity, "published": printed, "values": (factor * largest(key)).tolist(), "unit": unit}
-            for quantity, printed, key, factor, unit in ROWS
+            {"quantity": quantity, "published": published, "values": (factor * largest(key)).tolist(), "unit": unit}
+            for quantity, published, key, factor, unit in ROWS
         ],
         f"{seeds} devices, the largest error of each over its axes. Printed are residuals of the thesis' own fits; its "
         "tables 4.1 and 4.2 list the scales and offsets of its sensors, which have no counterpart here.",

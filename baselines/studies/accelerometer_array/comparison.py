@@ -55,11 +55,11 @@ def contenders(array: str, noise: Mapping[str, Any]) -> dict[str, Any]:
         noise: see :func:`noise_of`; what is absent stays default.
     """
     model = ArrayOrientation(array=array, **noise)
-    printed = ArrayOrientation(array=array, exact_rotation=False, orthonormalise=False, **noise)
+    published = ArrayOrientation(array=array, exact_rotation=False, orthonormalise=False, **noise)
     gyroscope: dict[str, Any] = {name: value for name, value in noise.items() if name == "gyroscope_std"}
     found: dict[str, Any] = {
         "array-orientation": KalmanFilter(model, keep_covariance=False),
-        "array-orientation, first order": KalmanFilter(printed, keep_covariance=False),
+        "array-orientation, first order": KalmanFilter(published, keep_covariance=False),
         "marins, σ_q = 0.5": KalmanFilter(Marins(**gyroscope), keep_covariance=False),
         "marins, σ_q = 0.01": KalmanFilter(Marins(quaternion_std=0.01, **gyroscope), keep_covariance=False),
     }

@@ -66,8 +66,8 @@ METHODS: dict[str, tuple[str, dict[str, Any]]] = {
     "unscented filter": ("planar-unscented", {}),
     POSE: ("planar-pose", THESIS_POSE),
     "complete pose, thesis, jerks of 10": ("planar-pose", THESIS_POSE | {"angular_jerk": 10.0, "jerk": 10.0}),
-    "complete pose, thesis, printed R": ("planar-pose", THESIS_POSE | {"form": "printed-noise"}),
-    "complete pose, thesis, printed H": ("planar-pose", THESIS_POSE | {"form": "printed-jacobian"}),
+    "complete pose, thesis, published R": ("planar-pose", THESIS_POSE | {"form": "published-noise"}),
+    "complete pose, thesis, published H": ("planar-pose", THESIS_POSE | {"form": "published-jacobian"}),
     RETURNING: ("planar-pose", {}),
 }
 """Name in tables → registered name and parameters"""
@@ -188,8 +188,8 @@ def claims(rows: list[Row], inflated: list[Row], difference: float) -> list[Clai
     by_R = {R: mean_of(inflated, "rms", R=R) for R in INFLATIONS}
     names, best = ("variance", "best R"), min(by_R, key=by_R.__getitem__)
     for letter, equation in (("R", "3.44"), ("H", "3.45")):
-        statement = f"infinity: the printed {letter} ({equation}) is worse than the corrected one"
-        found.append(Claim.less(statement, rms[POSE], rms[f"complete pose, thesis, printed {letter}"]))
+        statement = f"infinity: the published {letter} ({equation}) is worse than the corrected one"
+        found.append(Claim.less(statement, rms[POSE], rms[f"complete pose, thesis, published {letter}"]))
     statement = "infinity: misprints alone make the complete pose fail: corrected, it beats the extended filter"
     wide = "infinity: the correlated acceleration wants an R larger than its variance"
     return [
@@ -210,14 +210,14 @@ def planar(study: Study, report: Report) -> None:
     report.compare(
         "Figures 3.5 to 3.12: errors of the angle in the plane",
         [
-            {"motion": motion, "method": method, "quantity": "largest error", "published": printed, "unit": "deg"}
+            {"motion": motion, "method": method, "quantity": "largest error", "published": published, "unit": "deg"}
             | {"values": values_of(rows, "largest", motion=motion, method=method)}
-            for motion, method, printed in PUBLISHED
+            for motion, method, published in PUBLISHED
         ],
         f"{seeds} motions of {duration:g} s.",
         interval=OVER_MOTIONS,
     )
-    note = "*Literal* averages raw angles; *printed R* and *printed H* are (3.44) and (3.45) as in the thesis."
+    note = "*Literal* averages raw angles; *published R* and *published H* are (3.44) and (3.45) as in the thesis."
     report.table("Planar methods", planar_table(rows), note)
     found = study.map("planar inflation", inflation_errors, [(seed, duration) for seed in roots])
     inflated = [row for part in found for row in part]

@@ -22,8 +22,8 @@ OURS, TRUE, BAND = "#1f5fa8", "#c2571a", "#b08d1a"
 GRAVITY = ExternalAcceleration().gravity
 
 
-def printed(mode: Any = 1, **parameters: Any) -> ExternalAcceleration:
-    """The filter as it is printed."""
+def published(mode: Any = 1, **parameters: Any) -> ExternalAcceleration:
+    """The filter as published."""
     return ExternalAcceleration(mode=mode, exact_rotation=False, **parameters)
 
 
@@ -56,7 +56,7 @@ def figure_2(seed: int) -> Figure:
     figure, axes = new_figure(8.5, 5.5, 4)
     true = angles(trial.up)
     for index, mode in enumerate((1, 2)):
-        found = angles(estimate(trial, printed(mode))["up"])
+        found = angles(estimate(trial, published(mode))["up"])
         for which, name in enumerate(("roll", "pitch")):
             ax = axes[2 * index + which]
             ax.plot(seconds(trial), wrapped(found[which] - true[which]), color=OURS, linewidth=0.9)
@@ -87,7 +87,7 @@ def figure_4(seed: int) -> Figure:
     figure, axes = new_figure(11.0, 7.5, 5, 3)
     true, time = angles(trial.up), seconds(trial)
     for column, mode in enumerate(MODES):
-        pose = estimate(trial, printed(mode))
+        pose = estimate(trial, published(mode))
         for row, (ours, expected) in enumerate(zip(angles(pose["up"]), true, strict=True)):
             beside(axes[3 * row + column], time, ours, expected, f"{('roll', 'pitch')[row]}, deg")
         for axis in range(3):
@@ -105,7 +105,7 @@ def figure_5(seed: int) -> Figure:
     axes[0].plot(seconds(trial), np.linalg.norm(trial.acceleration[:, 0], axis=-1), color=TRUE, linewidth=0.8)
     axes[0].set_ylabel("‖a‖, m/s²")
     for ax, mode in zip(axes[1:], MODES, strict=True):
-        off = estimate(trial, printed(mode))["external_acceleration"][:, 0] - reference(trial)[:, 0]
+        off = estimate(trial, published(mode))["external_acceleration"][:, 0] - reference(trial)[:, 0]
         ax.plot(seconds(trial), np.linalg.norm(off, axis=-1), color=OURS, linewidth=0.8)
         ax.set_ylabel(f"error, mode {mode}\nm/s²", fontsize=8.5)
     axes[-1].set_xlabel("time, s")
@@ -116,7 +116,7 @@ def figure_6(seed: int) -> Figure:
     """Test C, mode 1: errors of attitude and external acceleration with the references."""
     trial = simulate("C", [seed])
     figure, axes = new_figure(8.5, 8.0, 6)
-    time, pose = seconds(trial), estimate(trial, printed(1))
+    time, pose = seconds(trial), estimate(trial, published(1))
     axes[0].plot(time, np.linalg.norm(trial.acceleration[:, 0], axis=-1), color=TRUE, linewidth=0.8)
     axes[0].set_ylabel("‖a‖, m/s²", fontsize=8.5)
     for ax, ours, true, name in zip(
@@ -137,7 +137,7 @@ def figure_7(seed: int) -> Figure:
     alone = run(make_estimator("gyroscope-integration", dt=1.0 / RATE), a.measurements).pose["up"]
     columns = (
         (a, (("gyroscope alone", alone), *swept(a))),
-        (b, (("mode 2", estimate(b, printed(2))["up"]), *swept(b))),
+        (b, (("mode 2", estimate(b, published(2))["up"]), *swept(b))),
     )
     for column, (trial, curves) in enumerate(columns):
         for row, (name, up) in enumerate(curves):
@@ -150,7 +150,7 @@ def figure_7(seed: int) -> Figure:
 
 def swept(trial: Trial) -> tuple[tuple[str, np.ndarray], ...]:
     """Verticals of mode 1 with the smallest and the largest c_a of table II."""
-    return tuple((f"c_a = {c_a:g}", estimate(trial, printed(1, c_a=c_a))["up"]) for c_a in (0.001, 1.0))
+    return tuple((f"c_a = {c_a:g}", estimate(trial, published(1, c_a=c_a))["up"]) for c_a in (0.001, 1.0))
 
 
 FIGURES: dict[str, tuple[str, str, Callable[[int], Figure]]] = {

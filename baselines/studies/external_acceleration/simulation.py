@@ -143,7 +143,7 @@ def compare_modes(seeds: Sequence[int]) -> list[dict[str, float | str | int]]:
             "mean a": float(size.mean()),
             "peak a": float(size.max(axis=0).mean()),
         }
-        for rotated, exact in (("printed", False), ("exact", True)):
+        for rotated, exact in (("published", False), ("exact", True)):
             for mode in MODES:
                 found = errors(trial, ExternalAcceleration(mode=mode, exact_rotation=exact))
                 means = {name: float(found[name].mean()) for name in ("roll", "pitch", "inclination")}

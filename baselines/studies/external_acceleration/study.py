@@ -31,7 +31,7 @@ STILL = {
 """Test A with little motion, a reference that is turned by what table I reports, and a gyroscope that drifts."""
 TRIALS = "mean, smallest … largest over trials"
 BROAD_MODELS: dict[str, dict[str, Any]] = {
-    "mode 1, printed": {"exact_rotation": False, "gyroscope_sample": "previous"},
+    "mode 1, published": {"exact_rotation": False, "gyroscope_sample": "previous"},
     "mode 1": {},
     "mode 1, c_a = 0.3": {"c_a": 0.3},
     "mode 2": {"mode": 2},
@@ -52,7 +52,7 @@ def reproduce(study: Study, report: Report) -> None:
     report.text(
         f"{len(seeds)} simulated trials of each test, as long as the paper's, at {RATE:g} Hz; one of the paper each. "
         "Motion, sensors and the misalignment of the optical reference (1.6° an axis) are drawn for each trial. The "
-        "filter is the printed one (first-order rotation, gyroscope sample t−1); columns named *exact* replace the "
+        "filter is the published one (first-order rotation, gyroscope sample t−1); columns named *exact* replace the "
         "first-order rotation by the exponential."
     )
     tests = dict(zip(TESTS, study.map("tests", errors_of_test, [(test, seeds) for test in TESTS]), strict=True))
@@ -84,7 +84,7 @@ def errors_of_test(test: str, seeds: Sequence[int]) -> dict[str, Any]:
         "modes": {},
     }
     for mode in MODES:
-        for rotated, exact in (("printed", False), ("exact", True)):
+        for rotated, exact in (("published", False), ("exact", True)):
             found["modes"][f"{mode} {rotated}"] = errors(trial, ExternalAcceleration(mode=mode, exact_rotation=exact))
     found["c_a"] = sweep(trial)
     found["threshold"] = {
@@ -117,7 +117,7 @@ def levels(report: Report, tests: dict[str, Any]) -> None:
         for index, what in enumerate(("mean", "largest"))
     ]
     note = (
-        "*True* is the motion, which is made to have the printed levels; *apparent* is what the paper's reference "
+        "*True* is the motion, which is made to have the published levels; *apparent* is what the paper's reference "
         "y_A − g Z_ref would say of it, with the reference's misalignment and the sensor's errors in it."
     )
     report.compare("Levels of the tests (section III-B)", rows, note, interval=TRIALS)
@@ -126,9 +126,9 @@ def levels(report: Report, tests: dict[str, Any]) -> None:
 def table_i(report: Report, tests: dict[str, Any]) -> None:
     """Errors of the three modes."""
     rows: list[dict[str, Any]] = []
-    for (test, mode), printed in TABLE_I.items():
-        found, exact = (tests[test]["modes"][f"{mode} {rotated}"] for rotated in ("printed", "exact"))
-        for quantity, value in zip(QUANTITIES, printed, strict=True):
+    for (test, mode), published in TABLE_I.items():
+        found, exact = (tests[test]["modes"][f"{mode} {rotated}"] for rotated in ("published", "exact"))
+        for quantity, value in zip(QUANTITIES, published, strict=True):
             rows.append(
                 {"test": test, "mode": mode, "quantity": quantity, "published": value, "values": found[quantity]}
                 | {"unit": "deg" if quantity in ("roll", "pitch") else "m/s²"}
@@ -143,7 +143,7 @@ def table_i(report: Report, tests: dict[str, Any]) -> None:
                     "value": value,
                     "unit": "deg",
                 }
-                for rotated, errors_ in (("printed", found), ("exact", exact))
+                for rotated, errors_ in (("published", found), ("exact", exact))
                 for number, value in enumerate(errors_["inclination"])
             ]
         )
@@ -157,14 +157,14 @@ def table_i(report: Report, tests: dict[str, Any]) -> None:
         {
             "test": test,
             "mode": mode,
-            "inclination, printed rotation, deg": mean(tests[test]["modes"][f"{mode} printed"]["inclination"]),
+            "inclination, published rotation, deg": mean(tests[test]["modes"][f"{mode} published"]["inclination"]),
             "inclination, exact rotation, deg": mean(tests[test]["modes"][f"{mode} exact"]["inclination"]),
-            "error of a against the true one, m/s²": mean(tests[test]["modes"][f"{mode} printed"]["true a"]),
+            "error of a against the true one, m/s²": mean(tests[test]["modes"][f"{mode} published"]["true a"]),
         }
         for test, mode in TABLE_I
     ]
     note = (
-        "The printed first-order rotation (12) turns too little, by ω³Δt²/3: 1.9 °/s at 10 rad/s. The last column is "
+        "The published first-order rotation (12) turns too little, by ω³Δt²/3: 1.9 °/s at 10 rad/s. The last column is "
         "against the acceleration of the motion."
     )
     report.table("Beyond table I: inclination and true acceleration", more, note)
@@ -173,17 +173,17 @@ def table_i(report: Report, tests: dict[str, Any]) -> None:
 def table_ii(report: Report, tests: dict[str, Any], still: dict[str, Any]) -> None:
     """Errors of mode 1 against c_a."""
     rows = [
-        {"test": test, "c_a": c_a, "quantity": quantity, "published": printed[index][which], "unit": "deg"}
+        {"test": test, "c_a": c_a, "quantity": quantity, "published": published[index][which], "unit": "deg"}
         | {"values": tests[test]["c_a"][f"{c_a:g}"][quantity]}
         for index, test in enumerate(TESTS)
-        for c_a, printed in TABLE_II.items()
+        for c_a, published in TABLE_II.items()
         for which, quantity in enumerate(("roll", "pitch"))
     ]
     report.compare("Table II: mode 1 against c_a", rows, interval=TRIALS)
     rows = [
-        {"c_a": c_a, "quantity": quantity, "published": printed[0][which], "unit": "deg"}
+        {"c_a": c_a, "quantity": quantity, "published": published[0][which], "unit": "deg"}
         | {"values": still["c_a"][f"{c_a:g}"][quantity]}
-        for c_a, printed in TABLE_II.items()
+        for c_a, published in TABLE_II.items()
         for which, quantity in enumerate(("roll", "pitch"))
     ]
     note = "A quarter of the motion, a reference that is off by 1.84° and 1.39°, a bias of 0.5 °/s an axis, 180 s."
@@ -193,10 +193,10 @@ def table_ii(report: Report, tests: dict[str, Any], still: dict[str, Any]) -> No
 def table_iii(report: Report, tests: dict[str, Any]) -> None:
     """Errors of mode 3 against its threshold."""
     rows = [
-        {"test": test, "ε_A, n": f"{threshold:g}, {n}", "quantity": quantity, "published": printed[index][which]}
+        {"test": test, "ε_A, n": f"{threshold:g}, {n}", "quantity": quantity, "published": published[index][which]}
         | {"values": tests[test]["threshold"][f"{threshold:g}, {n}"][quantity], "unit": "deg"}
         for index, test in enumerate(TESTS)
-        for (threshold, n), printed in TABLE_III.items()
+        for (threshold, n), published in TABLE_III.items()
         for which, quantity in enumerate(("roll", "pitch"))
     ]
     report.compare("Table III: mode 3 against threshold and window", rows, interval=TRIALS)
@@ -205,7 +205,7 @@ def table_iii(report: Report, tests: dict[str, Any]) -> None:
 def claims(tests: dict[str, Any], still: dict[str, Any]) -> list[Claim]:
     """What the paper says in words, and whether it holds here."""
 
-    def inclination(test: str, mode: int, rotated: str = "printed") -> float:
+    def inclination(test: str, mode: int, rotated: str = "published") -> float:
         return mean(tests[test]["modes"][f"{mode} {rotated}"]["inclination"])
 
     def against(found: dict[str, Any], what: str) -> dict[str, float]:
@@ -281,7 +281,7 @@ def recordings(study: Study, report: Report) -> None:
     rows.append({"trial": "mean", **{name: mean([row[name] for row in rows]) for name in numbers}})
     note = (
         "Root mean square inclination error over the movement phase, deg, at the rate of the recording. Modes use the "
-        "exact rotation and the current gyroscope sample unless they are *printed*. The column with σ_G² = 10⁻⁷ has "
+        "exact rotation and the current gyroscope sample unless they are *published*. The column with σ_G² = 10⁻⁷ has "
         "one constant gain and a gyroscope noise that is thirty times smaller than the paper's."
     )
     report.table("Recordings: inclination error, deg", rows, note)

@@ -123,7 +123,7 @@ RIDES = RideStudy(
         "level shoulders (17) alone": Variant({"ahead_share": 0.0}),
         "chest ahead counts 0.4": Variant({"ahead_share": 0.4}),
         "static torque": Variant({"torque_model": "static"}),
-        "raw (13)": Variant({"roll_model": "printed"}),
+        "raw (13)": Variant({"roll_model": "published"}),
         "(12) without N_z": Variant({"torque_reading": "without-z"}),
         SIMPLE: Variant(POINT_MASS),
         "geometry measured": Variant(geometry=_tape_measure),

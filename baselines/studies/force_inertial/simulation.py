@@ -22,16 +22,16 @@ from .rides import ANGLES, RIDES
 from .states import from_the_truth
 
 AS_PUBLISHED: dict[str, Any] = {
-    "form": "printed",
+    "form": "published",
     "acceleration": "accelerometer",
     "torque_reading": "without-z",
-    "roll_model": "printed",
+    "roll_model": "published",
     "jacobian": "partial",
 }
 VARIANTS: dict[str, tuple[dict[str, Any], str, str]] = {
     "exact: differentiated gyroscopes, apparent vertical": ({}, "0.56 0.61 0.65 0.10", "0.51 0.56 1.25 0.15"),
     "same, no bias model": ({"bias_model": False}, "0.58 0.60 0.84 0.10", "0.55 0.55 1.21 0.15"),
-    "same, raw (13)": ({"roll_model": "printed"}, "0.67 1.55 1.86 8.96", "0.58 0.60 1.34 3.23"),
+    "same, raw (13)": ({"roll_model": "published"}, "0.67 1.55 1.86 8.96", "0.58 0.60 1.34 3.23"),
     "same, no roll output": ({"roll_model": "none"}, "0.58 0.86 0.97 3.50", "0.51 0.57 1.35 2.20"),
     "same, (12) without N_z": ({"torque_reading": "without-z"}, "0.84 2.37 2.58 0.10", "0.51 0.81 1.30 0.15"),
     "exact (7), (8) from accelerometers": (
@@ -40,7 +40,7 @@ VARIANTS: dict[str, tuple[dict[str, Any], str, str]] = {
         "0.95 1.53 1.14 0.65",
     ),
     "static torque, raw (13)": (
-        {"torque_model": "static", "roll_model": "printed"},
+        {"torque_model": "static", "roll_model": "published"},
         "8.06 2.57 13.5 8.96",
         "2.82 1.16 4.30 3.20",
     ),

@@ -30,7 +30,12 @@ COURSES = {"indoor": "indoor_circle", "outdoor": "outdoor"}
 """The paper's → the environment's."""
 DRIFT = ((15.0, 25.0), (50.0, 60.0))
 """s in which the integration's drift is looked at, in rides that are long enough"""
-PUBLISHED_FORMS: dict[str, Any] = {"lateral": "printed", "torque": "printed", "knee_axis": "y", "printed_knee": True}
+PUBLISHED_FORMS: dict[str, Any] = {
+    "lateral": "published",
+    "torque": "published",
+    "knee_axis": "y",
+    "published_knee": True,
+}
 NO_GUARD = 1e9
 """m/s²: a threshold that no shock reaches"""
 INERTIAL = tuple(channel.name for channel in WholeBody.channels if channel.name.endswith(("/gyr", "/acc")))

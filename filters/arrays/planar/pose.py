@@ -31,7 +31,7 @@ from ...core.model import Gain, Model, with_parameters
 from ...core.quantity import Channel, Measurement, Quantity
 from .orientation import PLANAR_ANGLE, PlanarEquations
 
-Form = Literal["corrected", "printed-noise", "printed-jacobian"]
+Form = Literal["corrected", "published-noise", "published-jacobian"]
 
 PLANAR_RATE = Quantity("planar/angular_rate", "vector", 1, "rad/s")
 """dφ/dt."""
@@ -52,7 +52,7 @@ class PlanarPose(PlanarEquations, Model):
     """
 
     form: Form = "corrected"
-    """``printed-noise``: R of (3.44); ``printed-jacobian``: H of (3.45)"""
+    """``published-noise``: R of (3.44); ``published-jacobian``: H of (3.45)"""
     angular_jerk: float = 300.0
     """σ_γ, rad/s³ per sample (the thesis gives none)"""
     jerk: float = 300.0
@@ -77,9 +77,9 @@ class PlanarPose(PlanarEquations, Model):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.form == "printed-noise" and not self.array.size == self.array.rank == 4:
+        if self.form == "published-noise" and not self.array.size == self.array.rank == 4:
             raise ValueError(
-                f"form 'printed-noise' fits four accelerometers of rank 4, {self.array.name!r} has {self.array.size} "
+                f"form 'published-noise' fits four accelerometers of rank 4, {self.array.name!r} has {self.array.size} "
                 f"of rank {self.array.rank}"
             )
 
@@ -118,7 +118,7 @@ class PlanarPose(PlanarEquations, Model):
     def residual(self, x: Array, z: Measurement) -> tuple[Array, Array, Array]:
         """Readings less the expected ones (3.42), H and R."""
         noise = (
-            np.linalg.inv(self.array.A.T @ self.array.A) if self.form == "printed-noise" else np.eye(self.array.size)
+            np.linalg.inv(self.array.A.T @ self.array.A) if self.form == "published-noise" else np.eye(self.array.size)
         )
         R = expand(self.accelerometer_noise**2, 2) * constant(noise, x) + 0.0 * x[..., :1, None]
         return z[self.array.channel.name] - self.expected(x), self.slope(x), R
@@ -134,7 +134,7 @@ class PlanarPose(PlanarEquations, Model):
         A_P, one = constant(array.A_P, x), 1.0 + 0.0 * x[..., :1, None]
         c, s = xp.cos(x[..., 0]), xp.sin(x[..., 0])
         turned = A_P @ self._force(x, rows([[-s, c], [-c, -s]]))[..., None]
-        last = A_P @ self._turn_back(x) if self.form != "printed-jacobian" else A_P * one
+        last = A_P @ self._turn_back(x) if self.form != "published-jacobian" else A_P * one
         blocks = [turned, 2.0 * constant(array.A_C, x) * x[..., 1:2, None], constant(array.A_T, x) * one]
         return xp.concat([*blocks, *(0.0 * turned,) * 4, last], axis=-1)
 

@@ -27,7 +27,7 @@ def yaw_acceleration(
     travel: Travel,
     place: tuple[Scalar, Scalar],
     gravity: Scalar,
-    printed: bool = False,
+    published: bool = False,
 ) -> Scalar:
     """Equation (7), rad/s².
 
@@ -39,12 +39,12 @@ def yaw_acceleration(
         travel: of the rear contact.
         place: p_x, p_z of the IMU: ahead of the rear contact, above ground, m.
         gravity: m/s².
-        printed: with the printed signs and omissions.
+        published: with the published signs and omissions.
     """
     p_x, p_z = place
     s_b, c_b = sin(phi_b), cos(phi_b)
     squared = rate.psi * rate.psi
-    if printed:
+    if published:
         spurious = p_x * s_b * rate.psi * rate.phi_b
         return (a_by - s_b * gravity - p_z * s_b * c_b * squared - spurious) / (p_x * c_b)
     # a_by = c_b v_b ψ̇ + p_x c_b ψ̈ + p_z φ̈_b − p_z s_b c_b ψ̇² − s_b g (6), solved for ψ̈
@@ -62,7 +62,7 @@ def accelerometer_accelerations(
     travel: Travel,
     places: tuple[Scalar, Scalar, Scalar, Scalar, Scalar],
     gravity: Scalar,
-    printed: bool = False,
+    published: bool = False,
 ) -> Accelerations:
     """Equations (7) and (8).
 
@@ -76,20 +76,20 @@ def accelerometer_accelerations(
         travel: of the rear contact.
         places: p_x, p_z of the bicycle's IMU, l_s, h_s of the trunk's pivot, and h from there up to the trunk's IMU, m.
         gravity: m/s².
-        printed: with the printed signs and omissions.
+        published: with the published signs and omissions.
     """
     p_x, p_z, l_s, h_s, h = places
     s_h, c_h = sin(angles.phi_h), cos(angles.phi_h)
     s_t, c_t = sin(angles.theta), cos(angles.theta)
     s_p, c_p = sin(angles.phi), cos(angles.phi)
     # specific force of the pivot (5), (6); that of the trunk's accelerometer adds the motion of the trunk
-    if printed:
+    if published:
         roll_acceleration = 0.0 * roll_acceleration
-    yaw = yaw_acceleration(a_by, angles.phi_b, rate, roll_acceleration, travel, (p_x, p_z), gravity, printed)
+    yaw = yaw_acceleration(a_by, angles.phi_b, rate, roll_acceleration, travel, (p_x, p_z), gravity, published)
     acceleration = Accelerations(0.0, 0.0, axial, roll_acceleration, yaw)
     seat_x, seat_y, seat_z = point_acceleration(l_s, h_s, angles.phi_b, rate, acceleration, travel)
     squared, cotangent = rate.psi * rate.psi, c_t / s_t
-    if printed:
+    if published:
         a_y, a_z = a_h[1], a_h[2]
         seat_y, seat_z = seat_y - travel.speed * rate.psi, seat_z + gravity
         lean = c_h * rate.psi * rate.theta - s_h * cotangent * rate.phi_h * rate.psi

@@ -85,13 +85,13 @@ class ForceInertial(ForceInertialParameters, Model):
     """q̈ from differentiated gyroscopes, or from (7), (8)"""
     torque_model: Literal["dynamic", "static"] = "dynamic"
     """(9), or gravity alone (static torque)"""
-    torque_reading: Literal["exact", "without-z", "printed"] = "exact"
+    torque_reading: Literal["exact", "without-z", "published"] = "exact"
     """c_δ N_y − s_δ N_z; N_y / c_δ; the latter with the published sign of R_z (x_C − x_V)"""
-    roll_model: Literal["apparent-vertical", "printed", "none"] = "apparent-vertical"
+    roll_model: Literal["apparent-vertical", "published", "none"] = "apparent-vertical"
     """φ_b − φ_c; φ_b as in (13); or no roll from the seat"""
     handlebar_load: Literal["each", "sum", "none"] = "each"
     """moment of each hand at its grip; F_hx d_z + F_hz d_x of (12) only; none"""
-    form: Literal["corrected", "printed"] = "corrected"
+    form: Literal["corrected", "published"] = "corrected"
     """of (7), (8), (20) and (21)"""
     jacobian: Literal["full", "partial"] = "full"
     """H of the complete residual, or with constant rates, accelerations and readings as in (21)"""
@@ -154,7 +154,7 @@ class ForceInertial(ForceInertialParameters, Model):
         moved = [angle + dt * change for angle, change in zip(angles, rate[:4], strict=True)]
         decay = (1.0 - dt / self.bias_time) if self.bias_model else 1.0
         # F = I + ΔT F_X (20): rows of the angles, then those of the bias
-        F_X, G = rate_jacobians(angles, omega_h, omega_b, self.imu_tilt, printed=self.form == "printed")
+        F_X, G = rate_jacobians(angles, omega_h, omega_b, self.imu_tilt, published=self.form == "published")
         zero = 0.0 * x[..., 0]
         unit = [[float(row == column) for column in range(7)] for row in range(7)]
         upper = rows([[unit[row][column] + dt * F_X[..., row, column] for column in range(7)] for row in range(4)])
@@ -216,8 +216,8 @@ class ForceInertial(ForceInertialParameters, Model):
         lost = [known, known, known if self.roll_model != "none" else xp.logical_and(known, xp.logical_not(known))]
         r = xp.stack([*(xp.where(row, part, part + xp.nan) for row, part in zip(lost, r, strict=False)), r[3]], axis=-1)
         H = xp.stack([-gradient(each, x[..., :7]) for each in residuals], axis=-2)
-        if self.form == "printed" and not whole:
-            H = self._with_printed_h14(H, x, rate)
+        if self.form == "published" and not whole:
+            H = self._with_published_h14(H, x, rate)
         deviations = [self.torque_noise, self.torque_noise, self.roll_noise, self.shoulder_noise]
         return r, H, diagonal([d * d for d in deviations], 0.0 * x[..., :1])
 
@@ -245,7 +245,7 @@ class ForceInertial(ForceInertialParameters, Model):
         return omega[0] - bias[0], omega[1] - bias[1], omega[2] - bias[2]
 
     def _readings(self, z: Measurement, steer: Scalar) -> Readings:
-        return readings(self, z, steer, self.handlebar_load, printed=self.torque_reading == "printed")
+        return readings(self, z, steer, self.handlebar_load, published=self.torque_reading == "published")
 
     def _known_forces(self, z: Measurement) -> tuple[Any, Measurement]:
         """Whether seat and hands have valid samples, and the samples with finite values in place of missing ones."""
@@ -292,7 +292,7 @@ class ForceInertial(ForceInertialParameters, Model):
                 self._travel(x),
                 (self.imu_forward, self.imu_height, self.pivot_forward, self.pivot_height, self.trunk_imu_height),
                 self.gravity,
-                printed=self.form == "printed",
+                published=self.form == "published",
             )
         return rate, found, omega_h[0]
 
@@ -317,7 +317,7 @@ class ForceInertial(ForceInertialParameters, Model):
         )
         return still._replace(force=moving.force)
 
-    def _with_printed_h14(self, H: Array, x: Array, rate: Rates) -> Array:
+    def _with_published_h14(self, H: Array, x: Array, rate: Rates) -> Array:
         """H with the published H_14: −2 m_h h_s h_h s_δ s_θ φ̇_b."""
         product = self.trunk_mass * self.pivot_height * self.trunk_height
         entry = -2.0 * product * sin(x[..., 3] - x[..., 0]) * sin(x[..., 1]) * rate.phi_b

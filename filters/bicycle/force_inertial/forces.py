@@ -201,7 +201,7 @@ def centre_of_pressure(cells: Triple, sensors: SeatSensors) -> tuple[Scalar, Sca
 
 
 def trunk_moment(
-    R: Triple, M: Triple, centre: tuple[Scalar, Scalar], sensors: SeatSensors, printed: bool = False
+    R: Triple, M: Triple, centre: tuple[Scalar, Scalar], sensors: SeatSensors, published: bool = False
 ) -> Triple:
     """Equations (11), (12) in the bicycle's axes: moment of the seat on the rider about the pivot, N·m.
 
@@ -212,10 +212,10 @@ def trunk_moment(
         M: its moment about the centre of pressure.
         centre: of pressure from the saddle point, m.
         sensors: where they are.
-        printed: −R_z(x_C − x_V) in N_y as published; the cross product gives plus.
+        published: −R_z(x_C − x_V) in N_y as published; the cross product gives plus.
     """
     x, y, z = centre[0] + sensors.forward, centre[1], sensors.below
-    sign = -1.0 if printed else 1.0
+    sign = -1.0 if published else 1.0
     return (
         -1.0 * M[0] - (y * R[2] - z * R[1]),
         -1.0 * M[1] - z * R[0] + sign * x * R[2],

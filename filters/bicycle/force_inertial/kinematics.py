@@ -217,7 +217,7 @@ def axis_motion(angles: Angles, rate: Rates, acceleration: Accelerations) -> tup
 
 
 def rate_jacobians(
-    angles: Angles, omega_h: Triple, omega_b: Triple, alpha: Scalar, printed: bool = False
+    angles: Angles, omega_h: Triple, omega_b: Triple, alpha: Scalar, published: bool = False
 ) -> tuple[Array, Array]:
     """Jacobians of the four angle rates: by the seven states (20), and by ω_h and ω_b (G of the process noise).
 
@@ -226,7 +226,7 @@ def rate_jacobians(
         omega_h: trunk's angular rate without bias.
         omega_b: the bicycle's.
         alpha: tilt of its IMU.
-        printed: F_17 with the published sign +c_φ/s_θ; the correct one is minus.
+        published: F_17 with the published sign +c_φ/s_θ; the correct one is minus.
 
     Returns:
         ``(..., 4, 7)`` and ``(..., 4, 6)``.
@@ -240,7 +240,7 @@ def rate_jacobians(
     kappa = s_a * omega_b[0] - c_a * omega_b[2]
     y, z = c_p * omega_h[1] - s_p * omega_h[2], s_p * omega_h[1] + c_p * omega_h[2]
     rate = rates(angles, omega_h, omega_b, alpha)
-    sign = 1.0 if printed else -1.0
+    sign = 1.0 if published else -1.0
     # F_X of (20), columns φ_h, θ, φ, φ_b, b: derivatives of (4) for φ̇_h, θ̇ and φ̇; φ̇_b of (3) is state-independent
     by_state: list[list[Any]] = [
         [

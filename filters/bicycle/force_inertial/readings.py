@@ -24,7 +24,7 @@ class Readings(NamedTuple):
 
 
 def readings(
-    parameters: ForceInertialParameters, z: Measurement, steer: Scalar, hands: str, printed: bool = False
+    parameters: ForceInertialParameters, z: Measurement, steer: Scalar, hands: str, published: bool = False
 ) -> Readings:
     """Equations (10)–(12) and the centre of pressure below (10).
 
@@ -34,7 +34,7 @@ def readings(
             of pressure cancels, and the saddle point may replace it.
         steer: angle of the handlebar to the right, rad; the grips move with it.
         hands: ``each`` hand at its grip, ``sum`` for the two terms of (12), or ``none``.
-        printed: the published sign in (12).
+        published: the published sign in (12).
     """
     sensors = parameters.seat_sensors()
     wrench, cells = z["seat/wrench"], z["seat/load_cells"]
@@ -45,7 +45,7 @@ def readings(
     x_C, y_C = centre_of_pressure((filled[0], filled[2], filled[1]), sensors)
     centre = (xp.where(known, x_C, 0.0 * x_C), xp.where(known, y_C, 0.0 * y_C))
     R, M = seat_load((down(wrench[..., :3]), down(wrench[..., 3:])), sensors, centre)
-    N = trunk_moment(R, M, centre, sensors, printed)
+    N = trunk_moment(R, M, centre, sensors, published)
     left, right = down(z["handlebar/force"][..., :3]), down(z["handlebar/force"][..., 3:])
     both = (left[0] + right[0], left[1] + right[1], left[2] + right[2])
     forward, up, half = parameters.grip_forward, parameters.grip_up, parameters.grip_half_width

@@ -122,7 +122,7 @@ def elbow_flexion(trunk: Array, pivot: Array, joint: Array, hand: Array, upper: 
 
 
 def knee_flexion(
-    joint: Array, foot: Array, upper: float, shank: float, foot_length: float, ankle: float, printed: bool = False
+    joint: Array, foot: Array, upper: float, shank: float, foot_length: float, ankle: float, published: bool = False
 ) -> Array:
     """C8 (18), (19): flexion β ``(...)`` of the knee, 0 if straight.
 
@@ -133,13 +133,13 @@ def knee_flexion(
         shank: knee to ankle, l_s, m.
         foot_length: ankle to pedal, l_z, m.
         ankle: exterior angle γ of the fixed ankle, 0 with the foot in line with the shank, rad.
-        printed: with the published small-angle form.
+        published: with the published small-angle form.
     """
     xp = namespace(foot)
     one = 1.0 + 0.0 * foot[..., 0]
     sine, cosine = foot_length * xp.sin(ankle * one), shank + foot_length * xp.cos(ankle * one)
     lower = xp.sqrt(sine * sine + cosine * cosine)
-    turned = foot_length * ankle / lower if printed else xp.atan2(sine, cosine)
+    turned = foot_length * ankle / lower if published else xp.atan2(sine, cosine)
     return _bend(norm(joint - foot), upper, lower) + turned
 
 

@@ -80,9 +80,9 @@ class WholeBody(RiderLinkage, Model):
     """which constraints are used, of both arms or both legs"""
     knee_axis: Literal["x", "y"] = "x"
     """axis of the bicycle that the leg's plane contains in C7; y as published"""
-    lateral: Literal["corrected", "sign", "printed"] = "corrected"
+    lateral: Literal["corrected", "sign", "published"] = "corrected"
     """(3): corrected, with only the sign of gravity corrected, or as published"""
-    torque: Literal["seat_force", "printed"] = "seat_force"
+    torque: Literal["seat_force", "published"] = "seat_force"
     """(9): corrected, or as published"""
     usual_twist: bool = False
     """an additional measurement, not in the paper: θ₃ is about ``twist_follow`` times the steering angle, as shoulders
@@ -327,7 +327,7 @@ class WholeBody(RiderLinkage, Model):
         px, _, py = self.bicycle_imu
         s, c = xp.sin(x[..., ROLL]), xp.cos(x[..., ROLL])
         rate = x[..., RATE][..., 1:2]
-        gravity = self.gravity if self.lateral == "printed" else -self.gravity
+        gravity = self.gravity if self.lateral == "published" else -self.gravity
         yaw = x[..., YAW_ACCELERATION]
         # gravity, centripetal and Euler term of the yaw at the sensor
         expected = gravity * s - py * s / c * rate * rate - px * c * yaw
@@ -341,7 +341,7 @@ class WholeBody(RiderLinkage, Model):
         xp = namespace(x)
         turning = paper_axes(constant([*self.turning_moment], x))
         k = (R @ turning[..., None])[..., 0]
-        if self.torque == "printed":
+        if self.torque == "published":
             s, c = xp.sin(x[..., TRUNK]), xp.cos(x[..., TRUNK])
             weight, zero = turning[..., 1:2] * self.gravity, 0.0 * s[..., :1]
             return -weight * s[..., 1:2], xp.concat([zero, -weight * c[..., 1:2], zero], axis=-1)

@@ -126,7 +126,7 @@ class RiderLinkage(RiderEquations):
     """ξ, rad, nose up"""
     trunk_flexion: float = USUAL.trunk_flexion
     """rad: the filter starts with Θ = (−trunk_flexion, 0, 0)"""
-    printed_knee: bool = False
+    published_knee: bool = False
     """C8 with the published small-angle form"""
 
     channels: ClassVar[tuple[Channel, ...]] = CHANNELS
@@ -227,7 +227,7 @@ class RiderLinkage(RiderEquations):
                 self.shank,
                 self.ankle_to_pedal,
                 self.ankle_angle,
-                self.printed_knee,
+                self.published_knee,
             )
             pose[f"elbow_{side}/flexion"], pose[f"knee_{side}/flexion"] = elbow[..., None], knee[..., None]
         return pose

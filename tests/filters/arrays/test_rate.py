@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from poise.filters.arrays.array import CONTROLLER, OCTA, PLANAR
 from poise.filters.arrays.products import product_jacobian, products
-from poise.filters.arrays.rate import ArrayRate, parsa_step, polynomial_roots, printed_jacobian, roots_jacobian
+from poise.filters.arrays.rate import ArrayRate, parsa_step, polynomial_roots, published_jacobian, roots_jacobian
 from poise.filters.arrays.reference_rate import reference_rate
 from poise.filters.core.observer import Observer
 from poise.filters.core.rotation import from_xyzw
@@ -72,7 +72,7 @@ def test_no_positive_eigenvalue_means_rest() -> None:
 
 
 def test_jacobian_of_the_roots_and_its_printed_sign() -> None:
-    """(2.39) is printed with the other sign; (2.41) mixes two rates, which central differences refuse."""
+    """(2.39) is published with the other sign; (2.41) mixes two rates, which central differences refuse."""
     rate = np.array([2.0, -1.5, 0.7])
     xi, step = products(rate), 1e-6
     columns = []
@@ -82,9 +82,9 @@ def test_jacobian_of_the_roots_and_its_printed_sign() -> None:
         columns.append((ends[0] - ends[1]) / (2.0 * step))
     numeric = np.stack(columns, axis=-1)
     np.testing.assert_allclose(roots_jacobian(rate), numeric, atol=1e-8)
-    np.testing.assert_allclose(printed_jacobian(xi, rate, rate), -numeric, atol=1e-8)
+    np.testing.assert_allclose(published_jacobian(xi, rate, rate), -numeric, atol=1e-8)
     other = rate + np.array([0.3, 0.0, 0.0])
-    assert np.abs(printed_jacobian(xi, other, rate) + numeric).max() > 0.02
+    assert np.abs(published_jacobian(xi, other, rate) + numeric).max() > 0.02
 
 
 def test_parsa_is_singular_at_rest_only() -> None:
@@ -109,7 +109,7 @@ def test_predicted_covariance_is_that_of_many_draws() -> None:
     rng = np.random.default_rng(4)
     array = readings(rate, turning)[:, None] + noise * rng.normal(size=(length, draws, 12))
     errors = {}
-    for variant in ("sound", "corrected", "printed"):
+    for variant in ("integrated", "corrected", "published"):
         model = ArrayRate(
             dt=DT,
             variant=variant,  # type: ignore[arg-type]
@@ -124,12 +124,12 @@ def test_predicted_covariance_is_that_of_many_draws() -> None:
         predicted = pose["angular_rate_covariance"][-1].mean(axis=0).reshape(3, 3)
         errors[variant] = np.linalg.norm(predicted - actual) / np.linalg.norm(actual)
     # 30 000 draws tell a covariance to about two per cent
-    assert errors["sound"] < 0.03
+    assert errors["integrated"] < 0.03
     assert errors["corrected"] < 0.03
-    assert errors["printed"] > 0.2
+    assert errors["published"] > 0.2
 
 
-@pytest.mark.parametrize("variant", ["sound", "corrected", "printed"])
+@pytest.mark.parametrize("variant", ["integrated", "corrected", "published"])
 def test_noise_of_the_accelerometers_need_not_be_known(variant: str) -> None:
     rate, turning = rates(200, 5)
     array = readings(rate, turning, 0.2)
@@ -210,7 +210,7 @@ def test_a_gyroscope_may_start_it() -> None:
     ("parameters", "message"),
     [
         ({"method": "best"}, "method must be one of .*'weighted'.*got 'best'"),
-        ({"variant": "new"}, "variant must be one of .*'sound'.*got 'new'"),
+        ({"variant": "new"}, "variant must be one of .*'integrated'.*got 'new'"),
         ({"start": "later"}, "start must be one of .*'gyroscope'.*got 'later'"),
         ({"accelerometer_noise": 0.0}, "accelerometer_noise must be positive, got 0.0"),
         ({"array": CONTROLLER}, "'controller' must be spatial and of rank 12.*rank 6"),
@@ -234,8 +234,8 @@ def test_reference_rate_from_tracked_orientations() -> None:
     assert np.isnan(rate[[0, -1]]).all()
     np.testing.assert_allclose(rate[1:-1], expected, atol=2e-4)
     Q = turns.as_matrix()
-    printed = Q[1:-1] @ ((Q[2:] - Q[:-2]) / 2e-3).swapaxes(-1, -2)
-    of_print = np.stack([printed[:, 2, 1], printed[:, 0, 2], printed[:, 1, 0]], axis=-1)
+    published = Q[1:-1] @ ((Q[2:] - Q[:-2]) / 2e-3).swapaxes(-1, -2)
+    of_print = np.stack([published[:, 2, 1], published[:, 0, 2], published[:, 1, 0]], axis=-1)
     np.testing.assert_allclose(of_print, -turns[1:-1].apply(expected), atol=1e-3)
     # smoothing both ways shifts nothing, and takes away little of 0.8 Hz
     smooth = reference_rate(orientation, 1e-3, cutoff=20.0)[500:-500]

@@ -16,7 +16,7 @@ from poise.filters.imu.external_acceleration import ExternalAcceleration
 
 PRINTED = {"exact_rotation": False, "gyroscope_sample": "previous"}
 
-# Z at t = 1, Z at t = 3, a at t = 3, computed apart from this package with the equations as printed.
+# Z at t = 1, Z at t = 3, a at t = 3, computed apart from this package with the equations as published.
 GOLDEN = {
     1: (
         (0.5072441448, 0.6371731625, 0.5802704012),
@@ -95,7 +95,7 @@ def test_mode_2_is_mode_1_without_c_a(waves: dict[str, np.ndarray]) -> None:
 
 
 def test_exact_rotation_follows_a_fast_turn() -> None:
-    """At 10 rad/s the printed first order loses 1.9 °/s; mode 3 never corrects here, so that is all there is."""
+    """At 10 rad/s the published first order loses 1.9 °/s; mode 3 never corrects here, so that is all there is."""
     gyroscope = np.tile([10.0, 0.0, 0.0], (101, 1))
     data = {"imu/gyr": gyroscope, "imu/acc": np.tile([0.0, 0.0, 20.0], (101, 1))}
     angle = 10.0 * 0.01 * np.arange(101)

@@ -137,7 +137,7 @@ def test_acceleration_needs_a_large_deviation_and_a_steep_field_leaves_a_bias() 
 
 @dataclass(frozen=True)
 class Printed(Marins):
-    """(5.46) as printed: the product with a scalar-first [0; ω] where q has its scalar last."""
+    """(5.46) as published: the product with a scalar-first [0; ω] where q has its scalar last."""
 
     def predict(self, x: Array, z: Measurement, previous: Measurement) -> tuple[Array, Array, Array]:
         after, F, Q = super().predict(x, z, previous)

@@ -67,7 +67,7 @@ def canned(device, seed, duration, dip=0.0, methods=()):
 
 
 PRIORS = ("closed prior", "open prior", "open prior, first order")
-SHARES = ("proposed, sound, beyond the arcsine", "tilt sensor, beyond the arcsine")
+SHARES = ("proposed, exact rotation, beyond the arcsine", "tilt sensor, beyond the arcsine")
 
 
 def canned_curves(device, seed, duration):
@@ -149,7 +149,9 @@ def test_the_controller_keeps_three_degrees_over_ten_motions():
     """The figures that the page quotes: ten motions of 100 s, sound form."""
     rows = [attitude_errors("controller", seed, methods=(PROPOSED,))[0] for seed in range(10)]
     octa = [
-        row for seed in range(3) for row in attitude_errors("octa", seed, methods=("proposed, sound, no gyroscope",))
+        row
+        for seed in range(3)
+        for row in attitude_errors("octa", seed, methods=("proposed, exact rotation, no gyroscope",))
     ]
     assert np.mean([row["pitch"] for row in rows]) < 0.65
     assert np.mean([row["inside"] for row in rows]) > 0.98

@@ -90,7 +90,7 @@ def test_claims_follow_the_numbers():
     tests, still = {test: errors_of_test(test, [1]) for test in "ABC"}, sweep_of_mode_1("A", [1], {"duration": 5.0})
     as_found = {claim.statement: claim.holds for claim in claims(tests, still)}
     modes = tests["B"]["modes"]
-    worse = tests | {"B": {**tests["B"], "modes": modes | {"2 printed": modes["1 printed"]}}}
+    worse = tests | {"B": {**tests["B"], "modes": modes | {"2 published": modes["1 published"]}}}
     changed = {claim.statement: claim.holds for claim in claims(worse, still)}
     failed = {statement for statement in as_found if as_found[statement] != changed[statement]}
     assert failed == {"Mode 2 fails in test B (more than three times mode 1)"}

@@ -85,8 +85,8 @@ def test_tilt_is_four_quadrant(phi: float) -> None:
     readings = PLANAR.readings(planar_force(np.array(phi), np.zeros(2)), np.zeros(1), np.zeros(1))
     force = PLANAR.pseudo_inverse[:2] @ readings
     assert PlanarOrientation().tilt({"array/acc": readings})[0] == pytest.approx(phi)
-    printed = np.arctan(force[0] / force[1])
-    assert abs(wrap(printed - phi)) < 1e-9 if abs(phi) < np.pi / 2 else abs(wrap(printed - phi)) > 3.14
+    published = np.arctan(force[0] / force[1])
+    assert abs(wrap(published - phi)) < 1e-9 if abs(phi) < np.pi / 2 else abs(wrap(published - phi)) > 3.14
 
 
 def test_extended_filter_is_the_derivative_of_its_model() -> None:
@@ -105,15 +105,15 @@ def test_extended_filter_is_the_derivative_of_its_model() -> None:
     np.testing.assert_allclose(P, expected, rtol=1e-12)
 
 
-@pytest.mark.parametrize("form", ["corrected", "printed-noise", "printed-jacobian"])
+@pytest.mark.parametrize("form", ["corrected", "published-noise", "published-jacobian"])
 def test_complete_pose_is_the_derivative_of_its_model(form: str) -> None:
     """(3.45) prints A_P for A_P Qᵀ; (3.44) the covariance of ẑ for that of raw readings."""
     model = PlanarPose(form=form)  # type: ignore[arg-type]
     numeric = differences(model.expected, STATE)
     same = np.allclose(model.slope(STATE), numeric, atol=1e-7)
-    assert same == (form != "printed-jacobian")
+    assert same == (form != "published-jacobian")
     _, _, R = model.residual(STATE, {"array/acc": np.zeros(4)})
-    assert np.allclose(R, 0.09 * np.eye(4)) == (form != "printed-noise")
+    assert np.allclose(R, 0.09 * np.eye(4)) == (form != "published-noise")
     z = {"array/acc": np.zeros(4)}
     _, F, _ = model.predict(STATE, z, z)
     np.testing.assert_allclose(F, differences(lambda x: model.predict(x, z, z)[0], STATE), atol=1e-8)
@@ -210,8 +210,8 @@ def test_what_print_gets_wrong_shows_on_the_infinity(turning: Trajectory) -> Non
         "extended": of(PlanarOrientation()),
         "pose": of(PlanarPose()),
         "thesis": of(PlanarPose(**thesis)),
-        "printed R": of(PlanarPose(**thesis, form="printed-noise")),
-        "printed H": of(PlanarPose(**thesis, form="printed-jacobian")),
+        "published R": of(PlanarPose(**thesis, form="published-noise")),
+        "published H": of(PlanarPose(**thesis, form="published-jacobian")),
         "tilt": of(PlanarMean(method="tilt")),
     }
     assert errors["pose"] < 4.0
@@ -220,8 +220,8 @@ def test_what_print_gets_wrong_shows_on_the_infinity(turning: Trajectory) -> Non
     assert errors["literal mean"] > 30.0
     assert errors["tilt"] > 30.0
     assert errors["thesis"] > 1.5 * errors["pose"]
-    assert errors["printed R"] > 1.5 * errors["thesis"]
-    assert errors["printed H"] > 3.0 * errors["thesis"]
+    assert errors["published R"] > 1.5 * errors["thesis"]
+    assert errors["published H"] > 3.0 * errors["thesis"]
 
 
 def test_drop_outs_are_predicted_through(turning: Trajectory) -> None:

@@ -101,9 +101,9 @@ def test_the_transition_is_its_derivative_and_not_the_printed_one(exact: bool) -
         F = model.predict(x, {}, {})[1]
         numeric = differences(lambda x: model.predict(x, {}, {})[0][:15], x)
         np.testing.assert_allclose(F, numeric, atol=1e-5 if exact else 1e-8)
-        printed = replace(model, coupling_sign=-1.0).predict(x, {}, {})[1]
-        np.testing.assert_array_equal(printed[:9, 12:], -F[:9, 12:])
-        assert np.abs(printed - numeric).max() > 0.01
+        published = replace(model, coupling_sign=-1.0).predict(x, {}, {})[1]
+        np.testing.assert_array_equal(published[:9, 12:], -F[:9, 12:])
+        assert np.abs(published - numeric).max() > 0.01
 
 
 def test_the_transition_turns_as_scipy_does() -> None:
@@ -144,11 +144,13 @@ def test_the_readings_are_those_of_points_that_move(array: AccelerometerArray) -
     np.testing.assert_allclose(r[array.size :], 0.0, atol=1e-9)
     finished = model.finish(x, z)
     np.testing.assert_allclose(finished[24:27], turn(t).inv().apply(centre), atol=2e-2)
-    # with the printed sign of gravity the readings of a body at rest are off by 2 g
+    # with the published sign of gravity the readings of a body at rest are off by 2 g
     rest = model.residual(np.concatenate([np.eye(3).ravel(), np.zeros(18)]), z | {"array/acc": G * array.e[:, 2]})[0]
     np.testing.assert_allclose(rest[: array.size], 0.0, atol=1e-12)
-    printed = replace(model, gravity_sign=-1.0)
-    rest = printed.residual(np.concatenate([np.eye(3).ravel(), np.zeros(18)]), z | {"array/acc": G * array.e[:, 2]})[0]
+    published = replace(model, gravity_sign=-1.0)
+    rest = published.residual(np.concatenate([np.eye(3).ravel(), np.zeros(18)]), z | {"array/acc": G * array.e[:, 2]})[
+        0
+    ]
     np.testing.assert_allclose(rest[: array.size], 2.0 * G * array.e[:, 2])
 
 
@@ -178,7 +180,7 @@ def test_the_recursion_equals_filterpy() -> None:
 
 
 def test_the_controller_points_within_three_degrees() -> None:
-    """Figures 5.6 and 5.7, with exact transition and nearest rotation; as printed it is worse by half."""
+    """Figures 5.6 and 5.7, with exact transition and nearest rotation; as published it is worse by half."""
     data, state = pointing(CONTROLLER, 0, 100.0)
     sound = errors(ArrayOrientation(**HORIZONTAL), data, state)
     inside = (np.abs(sound["pitch"]) < 3.0) & (np.abs(sound["azimuth"]) < 3.0)
@@ -186,9 +188,9 @@ def test_the_controller_points_within_three_degrees() -> None:
     assert rms(sound["pitch"]) < 0.55
     assert rms(sound["total"]) < 2.0
     data = {name: array[:4000] for name, array in data.items()}
-    printed = errors(replace(USUAL, exact_rotation=False, orthonormalise=False), data, state.at(slice(0, 4000)))
-    assert rms(printed["pitch"]) > 1.3 * rms(sound["pitch"][:4000])
-    assert rms(printed["total"]) > 1.3 * rms(sound["total"][:4000])
+    published = errors(replace(USUAL, exact_rotation=False, orthonormalise=False), data, state.at(slice(0, 4000)))
+    assert rms(published["pitch"]) > 1.3 * rms(sound["pitch"][:4000])
+    assert rms(published["total"]) > 1.3 * rms(sound["total"][:4000])
 
 
 def test_printed_gravity_tips_over() -> None:
@@ -199,7 +201,7 @@ def test_printed_gravity_tips_over() -> None:
     assert rms(wrong[7000:]) > 20.0
 
 
-def test_the_printed_jacobian_is_fatal_without_a_gyroscope() -> None:
+def test_the_published_jacobian_is_fatal_without_a_gyroscope() -> None:
     data, state = pointing(OCTA, 0, 20.0)
     model = ArrayOrientation(array="octa", gyroscope=False, **HORIZONTAL)
     right = errors(model, data, state)
@@ -291,7 +293,7 @@ def test_the_virtual_controller_follows_the_hand() -> None:
 
 
 def test_pitch_and_azimuth_are_those_of_the_targets() -> None:
-    """(5.48) as printed is no rotation; with the corrected sign it is R_z(−ψ) R_x(θ) and points at (5.50)."""
+    """(5.48) as published is no rotation; with the corrected sign it is R_z(−ψ) R_x(θ) and points at (5.50)."""
     psi, theta = np.random.default_rng(8).uniform(-1.2, 1.2, (2, 50))
     q = pointing_attitude(psi, theta)
     pitch, azimuth = pointing_angles(q)

@@ -29,7 +29,7 @@ VARIANTS = [
     replace(RIDER, acceleration="accelerometer"),
     replace(RIDER, torque_model="static", torque_reading="without-z", handlebar_load="sum"),
     ForceInertial.published(
-        form="printed", acceleration="accelerometer", torque_reading="printed", roll_model="printed"
+        form="published", acceleration="accelerometer", torque_reading="published", roll_model="published"
     ),
 ]
 ANGLES = "force-inertial/trunk_angles"
@@ -65,7 +65,7 @@ def errors_deg(pose, truth, skip):
     return np.degrees(rms(both[skip:]))
 
 
-@pytest.mark.parametrize("model", VARIANTS, ids=["default", "accelerometers", "static", "printed"])
+@pytest.mark.parametrize("model", VARIANTS, ids=["default", "accelerometers", "static", "published"])
 def test_jacobians_are_central_differences(model):
     rng, step = np.random.default_rng(0), 1e-6
     for _ in range(5):
@@ -74,7 +74,7 @@ def test_jacobians_are_central_differences(model):
         _, H, R = model.residual(x, z)
         assert np.linalg.eigvalsh(Q).min() > -1e-15
         assert np.linalg.eigvalsh(R).min() > 0.0
-        columns = [k for k in range(7) if not (model.form == "printed" and k == 6)]
+        columns = [k for k in range(7) if not (model.form == "published" and k == 6)]
         for k in columns:
             unit = np.eye(7)[k]
             ahead, back = model.retract(x, step * unit), model.retract(x, -step * unit)
@@ -86,7 +86,7 @@ def test_jacobians_are_central_differences(model):
 
 def test_partial_jacobian_is_the_corrected_21():
     """Rates and accelerations frozen, point mass: the terms with φ̈_b and the corrected H_14."""
-    model = ForceInertial.published(jacobian="partial", roll_model="printed")
+    model = ForceInertial.published(jacobian="partial", roll_model="published")
     rng = np.random.default_rng(3)
     for _ in range(5):
         x, z = random_state(rng), random_sample(rng)
@@ -172,14 +172,14 @@ def test_corrected_against_printed():
     found = {}
     for name, options in {
         "corrected": {},
-        "printed (13)": {"roll_model": "printed"},
+        "published (13)": {"roll_model": "published"},
         "without N_z": {"torque_reading": "without-z"},
-        "sign of (12)": {"torque_reading": "printed"},
+        "sign of (12)": {"torque_reading": "published"},
     }.items():
         model = ForceInertial.published(**options)
         found[name] = errors_deg(KalmanFilter(model, compiled=False).run(data).pose, truth, 400)
     assert np.all(found["corrected"] < [1.5, 1.5, 2.0, 0.3])
-    assert 7.0 < found["printed (13)"][3] < 11.0
+    assert 7.0 < found["published (13)"][3] < 11.0
     assert found["without N_z"][1] > 1.5 * found["corrected"][1]
     assert found["sign of (12)"][1] > 10.0
 

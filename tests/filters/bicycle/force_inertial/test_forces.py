@@ -204,9 +204,9 @@ def test_the_seat_s_load_is_moved_by_cross_products():
         # the centre of pressure cancels
         np.testing.assert_allclose(found[-1], wanted, atol=1e-10)
     R, M = seat_load((tuple(F), tuple(T)), sensors, (0.04, 0.0))
-    printed = trunk_moment(R, M, (0.04, 0.0), sensors, printed=True)
-    # with the printed sign it counts twice
-    assert printed[1] - wanted[1] == pytest.approx(-2.0 * R[2] * (0.04 + sensors.forward), abs=1e-9)
+    published = trunk_moment(R, M, (0.04, 0.0), sensors, published=True)
+    # with the published sign it counts twice
+    assert published[1] - wanted[1] == pytest.approx(-2.0 * R[2] * (0.04 + sensors.forward), abs=1e-9)
 
 
 def test_pedals_push_where_they_are():

@@ -113,12 +113,12 @@ def test_printed_accelerations_are_wrong_where_the_errata_say(oracle):
     true, rate, travel = oracle(numbers), Rates(0.0, 0.0, 0.0, 0.0, -0.8), Travel(2.0, 0.0)
     a_by, place = true["a_b"][1], (P_X, P_Z)
     assert yaw_acceleration(a_by, q[3], rate, 0.0, travel, place, G) == pytest.approx(0.0, abs=1e-12)
-    printed = yaw_acceleration(a_by, q[3], rate, 0.0, travel, place, G, printed=True)
+    published = yaw_acceleration(a_by, q[3], rate, 0.0, travel, place, G, published=True)
     s, c = np.sin(q[3]), np.cos(q[3])
     # what (7) leaves out or turns round, divided by p_x c
     lacking = c * 2.0 * -0.8 - 2.0 * s * G - 2.0 * P_Z * s * c * 0.64
-    assert printed == pytest.approx(lacking / (P_X * c), abs=1e-12)
-    assert abs(printed) > 0.5
+    assert published == pytest.approx(lacking / (P_X * c), abs=1e-12)
+    assert abs(published) > 0.5
 
 
 def test_rest_gives_no_acceleration_from_accelerometers(oracle):
@@ -129,8 +129,8 @@ def test_rest_gives_no_acceleration_from_accelerometers(oracle):
         rest = (true["a_h"], true["a_b"][1], 0.0, 0.0, Travel(0.0, 0.0), LENGTHS, G)
         found = accelerometer_accelerations(Angles(*q[:4]), Rates(*np.zeros(5)), *rest)
         np.testing.assert_allclose(found, 0.0, atol=1e-12)
-        printed = accelerometer_accelerations(Angles(*q[:4]), Rates(*np.zeros(5)), *rest, printed=True)
-        assert np.abs(printed).max() > 1.0
+        published = accelerometer_accelerations(Angles(*q[:4]), Rates(*np.zeros(5)), *rest, published=True)
+        assert np.abs(published).max() > 1.0
 
 
 def test_jacobians_are_central_differences():
@@ -147,8 +147,8 @@ def test_jacobians_are_central_differences():
         states, inputs = rate_jacobians(Angles(*(np.array(a) for a in q[:4])), tuple(omega_h), tuple(omega_b), ALPHA)
         np.testing.assert_allclose(states, wanted[:, :7], atol=1e-7)
         np.testing.assert_allclose(inputs, wanted[:, 7:], atol=1e-7)
-        printed, _ = rate_jacobians(
-            Angles(*(np.array(a) for a in q[:4])), tuple(omega_h), tuple(omega_b), ALPHA, printed=True
+        published, _ = rate_jacobians(
+            Angles(*(np.array(a) for a in q[:4])), tuple(omega_h), tuple(omega_b), ALPHA, published=True
         )
-        different = np.argwhere(np.abs(printed - states) > 1e-12)
+        different = np.argwhere(np.abs(published - states) > 1e-12)
         assert different.tolist() == [[0, 6]]

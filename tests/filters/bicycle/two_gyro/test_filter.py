@@ -185,7 +185,7 @@ def test_the_second_model_does_not_drift_and_the_first_does():
 def test_consistency_over_runs():
     """Normalised errors of 60 runs within the bounds of chi-square where the model is exact.
 
-    The midpoint step at 100 Hz is; the printed Euler step is not even there (its roll error is 1.3 times its standard
+    The midpoint step at 100 Hz is; the published Euler step is not even there (its roll error is 1.3 times its standard
     deviation), so it is given 500 Hz in the study.
     """
     errors, dt, runs = Errors(camera_interval=4), 0.01, 60

@@ -1,4 +1,4 @@
-"""Kinematics of the two-gyroscope paper against reference frames of SymPy, printed forms and central differences."""
+"""Kinematics of the two-gyroscope paper against reference frames of SymPy, published forms and central differences."""
 
 from __future__ import annotations
 
@@ -96,7 +96,7 @@ def test_a_segway_pitches_and_does_not_roll(frames):
 
 
 def test_printed_form_of_the_second_model():
-    """D of (15) with the sums θ₁ + φ as printed, and E of (21)."""
+    """D of (15) with the sums θ₁ + φ as published, and E of (21)."""
     c, s = np.cos, np.sin
     t1, t2 = THETA[:, 0], THETA[:, 1]
     M, S = kinematics.platform_rate_matrix(THETA), kinematics.substitution(ROLL, "bicycle")

@@ -146,7 +146,7 @@ def test_derivatives(axis):
 
 @pytest.mark.parametrize("crank", [0.3, 2.0, 4.5])
 def test_knee_flexion_against_an_ankle_that_is_built(crank):
-    """Thigh, shank and foot as three segments with the ankle held: the angle at the knee is C8*, and not as printed."""
+    """Thigh, shank and foot as three segments with a fixed ankle: the angle at the knee is C8*, not C8."""
     hip, foot, knee, angles = leg_at("right", crank)
     frame = Rotation.from_euler("ZXY", angles).as_matrix()
     beta = knee_of(hip, foot)
@@ -155,10 +155,10 @@ def test_knee_flexion_against_an_ankle_that_is_built(crank):
     toes = shank @ Rotation.from_euler("Z", LINKAGE.ankle_angle).as_matrix()
     ankle = knee - LINKAGE.shank * shank[:, 1]
     np.testing.assert_allclose(ankle - LINKAGE.ankle_to_pedal * toes[:, 1], foot, atol=1e-12)
-    printed = limb_constraints.knee_flexion(
+    published = limb_constraints.knee_flexion(
         hip, foot, LINKAGE.thigh, LINKAGE.shank, LINKAGE.ankle_to_pedal, LINKAGE.ankle_angle, True
     )
-    assert math.degrees(printed - beta) == pytest.approx(7.05, abs=0.02)
+    assert math.degrees(published - beta) == pytest.approx(7.05, abs=0.02)
 
 
 def test_c7_about_the_upright_axis_loses_the_knee():

@@ -23,7 +23,7 @@ from .whole_body_cases import RIDER
 INSTANT = WholeBody.for_rider(RIDER, sampling="instant", seat_share=1.0)
 VARIANTS = {
     "corrected": INSTANT,
-    "printed": replace(INSTANT, lateral="printed", torque="printed", knee_axis="y", printed_knee=True),
+    "published": replace(INSTANT, lateral="published", torque="published", knee_axis="y", published_knee=True),
     "hands carry": replace(INSTANT, seat_share=0.3, lateral="sign", constraints=("C1", "C6"), usual_twist=True),
 }
 
@@ -105,7 +105,7 @@ def test_lateral_acceleration_against_sympy():
     x[23], x[25] = values[1] * math.cos(values[4]), values[2]
     assert model._lateral(x)[0][0] == pytest.approx(expected, abs=1e-12)
     assert abs(replace(model, lateral="sign")._lateral(x)[0][0] - expected) > 0.1
-    assert abs(replace(model, lateral="printed")._lateral(x)[0][0] - expected) > 1.0
+    assert abs(replace(model, lateral="published")._lateral(x)[0][0] - expected) > 1.0
 
 
 def test_outputs_are_those_of_an_exact_motion(ideal):
