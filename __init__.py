@@ -1,16 +1,16 @@
 """poise: pose from inertial sensors.
 
-Gymnasium environments that move people and things in PyBullet and say the true pose, published Kalman filters, learned
-estimators and policies that adapt filter gains, compared on the same data, simulated and recorded.
+Gymnasium environments that simulate moving people and devices and return the true pose, published Kalman filters,
+learned estimators, and policies that adapt filter gains, compared on the same simulated and recorded data.
 
 >>> import poise
 >>> trajectory = poise.record("poise/HandMotion-v0", seed=0)
 >>> estimate = poise.run("bounded-motion", trajectory)
 >>> table = poise.evaluate(["bounded-motion", "tilt"], [trajectory])
 
-Four floors, imports only downwards: :mod:`poise.filters` (rotations, the Kalman core, published filters, metrics),
+Four layers that import downwards only: :mod:`poise.filters` (rotations, the Kalman core, published filters, metrics),
 :mod:`poise.envs` (physics, sensors, environments, recordings), :mod:`poise.baselines` (learned estimators, gain
-policies, the list of all estimators, evaluation), :mod:`poise.scripts` (the command ``poise``). Importing poise
+policies, the registry of all estimators, evaluation), :mod:`poise.scripts` (the command ``poise``). Importing poise
 registers its environments with Gymnasium and loads neither PyBullet nor torch.
 """
 
@@ -86,7 +86,7 @@ moved.install()
 
 
 def __getattr__(name: str) -> Any:
-    """Load a name of the public face on first use."""
+    """Load a public name on first use."""
     if name not in _HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     value = getattr(importlib.import_module(_HOMES[name], __name__), name)

@@ -37,7 +37,7 @@ def run(
     Args:
         estimator: a name (see :func:`poise.list_estimators`), or an estimator. One that is only named is configured
             for the trajectory (rider, bicycle, array), where its metadata say.
-        data: a trajectory, or channel name → ``(T, *batch, size)``, NaN where a channel brought no sample.
+        data: a trajectory, or channel name → ``(T, *batch, size)``, NaN where a channel has no valid sample.
         dt: sampling interval, s; needed with arrays. With a trajectory it may only confirm the trajectory's.
         grid: give the estimate on the uniform grid, gaps included, instead of at the trajectory's own samples.
 
@@ -46,7 +46,7 @@ def run(
 
     Raises:
         ValueError: no ``dt`` with arrays; a ``dt`` that contradicts trajectory or estimator; an unknown name; missing
-            channels; a clock that is no uniform sampling (:meth:`Trajectory.on_grid`).
+            channels; a clock without uniform sampling (:meth:`Trajectory.on_grid`).
     """
     interval = checked_interval(dt)
     if not isinstance(estimator, str | Estimator):

@@ -102,7 +102,7 @@ def errors(estimator: Estimator[Any], estimate: Estimate, trajectory: Trajectory
     outputs = {quantity.name: quantity for quantity in (UP, *estimator.outputs)}
     rows: list[Row] = []
     for name, quantity in outputs.items():
-        # The inclination of an orientation is scored once, as that of its upward vertical.
+        # The inclination of an orientation is scored once, as that of its inclination vector.
         if name not in pose or name == RELATIVE_ORIENTATION.name:
             continue
         if name in trajectory.quantities:
@@ -124,7 +124,7 @@ def errors(estimator: Estimator[Any], estimate: Estimate, trajectory: Trajectory
 def heading_offset(estimate: Estimate, trajectory: Trajectory) -> float | None:
     """Constant heading in deg between an estimate and a truth that otherwise agree; None if they differ in more.
 
-    A reference whose x axis points anywhere (a laboratory's) gives such an offset: it is no error of the estimate.
+    A reference with an arbitrary x axis (a laboratory's) gives such an offset, which is not an error of the estimate.
     """
     if ORIENTATION.name not in trajectory.truth or ORIENTATION.name not in estimate.pose:
         return None

@@ -94,7 +94,7 @@ class DeviceScene:
         Args:
             pose: ``orientation`` ``(4,)``, or ``up`` ``(3,)``, or the first orientation of a body.
             truth: ``position`` ``(3,)`` where known, m.
-            estimate: ``(4,)`` orientation or ``(3,)`` upward vertical in sensor axes, of any length.
+            estimate: ``(4,)`` orientation or ``(3,)`` inclination vector in sensor axes, of any length.
         """
         position = np.asarray(truth.get("position", np.full(3, np.nan)))
         self._target = position if np.isfinite(position).all() else np.array([0.0, 0.0, 0.5])

@@ -220,7 +220,7 @@ def versions(packages: Sequence[str] = PACKAGES) -> dict[str, Any]:
 
 
 def git_state(checkout: Path) -> dict[str, Any]:
-    """Return commit and whether files differ from it; empty when ``checkout`` is no git checkout."""
+    """Return commit and whether files differ from it; empty when ``checkout`` is not a git checkout."""
     # Without this test git would answer for a repository further up, that of somebody's project.
     if not (checkout / ".git").exists():
         return {}

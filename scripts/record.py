@@ -54,7 +54,7 @@ def short_name(env_id: str) -> str:
 
 
 def option(text: str) -> tuple[str, Any]:
-    """``rate=200`` → ("rate", 200); values that are no Python literals stay text.
+    """``rate=200`` → ("rate", 200); values that are not Python literals stay text.
 
     Raises:
         ValueError: there is no ``=``.

@@ -106,7 +106,7 @@ def rich_table(
             longest = max((len(cell(record.get(name))) for record in data), default=0)
             table.add_column(name, no_wrap=longest <= LONGEST_NAME)
     for record in data:
-        # Text, so that a name in brackets is no markup.
+        # Text, so that a name in brackets is not markup.
         table.add_row(*(Text(cell(record.get(name), digits)) for name in names))
     return table
 

@@ -43,7 +43,7 @@ class Trajectory:
     Attributes:
         time: ``(T,)`` s, the stamps as recorded, not decreasing: they may jitter, have gaps, and be shared by the
             samples of a packet. :meth:`on_grid` is what estimators run on.
-        measurements: channel name (``place/kind``) → ``(T, size)``; NaN where a channel brought no sample.
+        measurements: channel name (``place/kind``) → ``(T, size)``; NaN where a channel has no valid sample.
         truth: quantity name → ``(T, size)``; NaN where unknown; may be empty.
         mask: ``(T,)`` bool, the ticks that are scored; all of them by default.
         metadata: JSON-able description: name, environment, sensors, seed, version, rate, source, licence, …;
@@ -216,7 +216,7 @@ class Trajectory:
 
     @property
     def onboard_orientation(self) -> np.ndarray | None:
-        """The device's own estimate of its orientation ``(T, 4)``, which is no truth; None if it gave none."""
+        """The device's own estimate of its orientation ``(T, 4)``, which is not the truth; None if there is none."""
         return next(
             (values for name, values in self.measurements.items() if name.endswith("onboard_orientation")), None
         )

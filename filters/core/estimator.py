@@ -61,7 +61,7 @@ def check_measurements(
         time_axis: whether the first axis is time, which then must not be empty.
 
     Raises:
-        ValueError: a channel is missing, is no array of real numbers, has the wrong width, or another leading shape
+        ValueError: a channel is missing, is not an array of real numbers, has the wrong width, or another leading shape
             than the first; or there is no sample at all.
     """
     if not isinstance(measurements, Mapping):
@@ -145,7 +145,7 @@ def run(estimator: Estimator[Any], measurements: Mapping[str, Any]) -> Estimate:
     Args:
         estimator: from :func:`poise.make_estimator`, or anything that follows :class:`Estimator`.
         measurements: channel name → ``(T, *batch, size)``, sampled every ``estimator.dt`` seconds; NaN where a
-            channel brought no sample (the filters predict through it).
+            channel has no valid sample (filters then only predict).
 
     Returns:
         The estimate of every tick, time first.

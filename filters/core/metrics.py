@@ -114,7 +114,7 @@ def heading_error(estimate: Array, truth: Array) -> Array:
 def inclination_error(estimate: Array, truth: Array) -> Array:
     """Rest ``(...)`` in [0, pi] of the total error, about a horizontal axis: ``2 acos √(w² + z²)``.
 
-    It is the angle between the two upward verticals in sensor coordinates, whatever the headings.
+    It is the angle between the two inclination vectors in sensor axes, independent of the headings.
     """
 
     def angle(p: Array, q: Array) -> Array:
@@ -253,7 +253,7 @@ def score(quantity: Quantity, estimate: Array, truth: Array, mask: Any = None) -
 
     Returns:
         Metric name → (value, unit), and ``"valid"``: the share of the scored ticks where estimate and truth are known.
-        A small error with a small share is no good estimator; tabulate both.
+        A small error with a small share does not make a good estimator; report both.
 
     Raises:
         ValueError: shapes do not fit.

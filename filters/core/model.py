@@ -149,7 +149,7 @@ class Model(Equations):
     def residual(self, x: Array, z: Measurement) -> tuple[Array, Array, Array]:
         """Measured minus expected ``(..., m)``, Jacobian H ``(..., m, e)`` of the expectation, covariance R.
 
-        A row with anything not finite corrects nothing.
+        Where an element of a row is not finite, its measurement update is skipped.
         """
         raise NotImplementedError
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     import pandas
 
 Measurement = Mapping[str, Array]
-"""Channel name → array ``(..., size)``; NaN where a channel brought no sample at this tick."""
+"""Channel name → array ``(..., size)``; NaN where a channel has no valid sample at this time step."""
 
 
 GRAVITY = 9.81
@@ -97,7 +97,7 @@ ACCELEROMETER = Channel("imu/acc", 3, "m/s²")
 MAGNETOMETER = Channel("imu/mag", 3, "any")
 
 UP = Quantity("up", "direction", 3, "1")
-"""The upward vertical in sensor coordinates."""
+"""Gravity direction in the sensor frame (inclination vector): a unit vector that points up."""
 ORIENTATION = Quantity("orientation", "rotation", 4, "1")
 """Sensor to world (x east, y north, z up)."""
 RELATIVE_ORIENTATION = Quantity("relative_orientation", "rotation", 4, "1")

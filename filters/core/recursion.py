@@ -2,9 +2,9 @@
 
 Whatever the equations, four things hold here and nowhere else:
 
-* a row of a measurement that is not finite (no sample, drop-out, out of range) corrects nothing;
+* where a row of a measurement is not finite (no sample, drop-out, out of range), its update is skipped;
 * a missing sample of an input (a gyroscope, say) is replaced by the channel's last one;
-* an estimator starts by itself at the first tick at which its prior is finite; estimates before are NaN;
+* an estimator initialises itself at the first sample with a finite prior; earlier estimates are NaN;
 * gains, log factors on named constants, may change at every tick; all zeros is exactly the published tuning.
 
 NumPy data run through the compiled form (:mod:`poise.filters.compile.run`). The array form below is its definition, the

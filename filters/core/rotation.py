@@ -235,21 +235,21 @@ def to_euler_xyz(q: Array) -> tuple[Array, Array, Array]:
 
 
 def up_in_body(q: Array) -> Array:
-    """The upward vertical in body coordinates ``(..., 3)``: third row of the rotation matrix."""
+    """Inclination vector (unit vector that points up) in body axes ``(..., 3)``: third row of the rotation matrix."""
     xp = namespace(q)
     w, x, y, z = q[..., 0], q[..., 1], q[..., 2], q[..., 3]
     return xp.stack([2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)], axis=-1)
 
 
 def roll_pitch(up: Array) -> tuple[Array, Array]:
-    """Roll and pitch (Z-Y-X angles) of the upward vertical in body coordinates ``(..., 3)``."""
+    """Roll and pitch (Z-Y-X angles) of the inclination vector in body axes ``(..., 3)``."""
     xp = namespace(up)
     x, y, z = up[..., 0], up[..., 1], up[..., 2]
     return xp.atan2(y, z), xp.atan2(-x, xp.sqrt(y * y + z * z))
 
 
 def level(up: Array) -> Array:
-    """Unit quaternion of zero yaw whose upward vertical in body coordinates is ``up`` (any length, ``(..., 3)``)."""
+    """Unit quaternion of zero yaw with the inclination vector ``up`` in body axes (any length, ``(..., 3)``)."""
     roll, pitch = roll_pitch(up)
     return from_euler_zyx(0.0 * roll, pitch, roll)
 

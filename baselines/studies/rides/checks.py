@@ -1,4 +1,4 @@
-"""Physical checks of rider and bicycle in numbers: linear theory, momentum, strapdown, ripple, steps, resets."""
+"""Physical checks of rider and bicycle: linear theory, momentum, strapdown, ripple, steps, resets."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Simulated rides in numbers: speed, roll, lean, accelerations, forces, gaps."""
+"""Summary statistics of simulated rides: speed, roll, lean, accelerations, forces, gaps."""
 
 from __future__ import annotations
 

@@ -36,7 +36,7 @@ BICYCLE_LINKS = ("rear_frame", "rear_wheel", "front_assembly", "front_wheel", "c
 
 
 class BicycleState(NamedTuple):
-    """The bicycle in numbers; angles in rad, Z-Y-X order, roll to the right and steering to the left positive."""
+    """State of the bicycle as numbers; angles in rad, Z-Y-X, roll to the right and steering to the left positive."""
 
     time: float
     x: float

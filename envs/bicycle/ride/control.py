@@ -1,4 +1,4 @@
-"""Balance, path and speed: what a rider's nervous system would do.
+"""Rider control model: balance, path and speed.
 
 Steering is a linear-quadratic regulator on the Whipple model of rider and bicycle, extended by heading, offset from the
 path and its integral, with gains scheduled on speed. Speed follows what is wanted and what the curvature ahead allows,

@@ -27,7 +27,7 @@ UNITS = {"gyr": "rad/s", "acc": "m/s²", "mag": "calibration field", "onboard_or
 SLOWEST_COUNT = 2000
 """Counts of SampleTimeFine between samples: a DOT at 120 Hz has 8333, an MT at 10 Hz 1000."""
 LONGEST_GAP = 60.0
-"""s; more between two rows is no drop-out but a sensor that was started again."""
+"""s; a longer interval between two rows is a restart of the sensor and not a drop-out."""
 
 
 def axes(stem: str, names: str = "XYZ") -> list[str]:

@@ -190,7 +190,7 @@ def load_recordings(
         mapping: ``columns`` and so on, see :func:`load_recording`.
 
     Returns:
-        A trajectory for every sensor; of a folder that is no recording itself, those of all recordings in it.
+        A trajectory for every sensor; for a folder that is not a recording itself, those of all recordings in it.
 
     Raises:
         FileNotFoundError: there is no such path.

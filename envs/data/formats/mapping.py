@@ -170,12 +170,12 @@ def read_map(path: Path) -> tuple[Path, RecordingMap]:
     """The data file that a TOML file names (beside it), and its mapping.
 
     Raises:
-        ValueError: it is no TOML, names no file, or has unknown keys.
+        ValueError: it is not TOML, names no file, or has unknown keys.
     """
     try:
         content = tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as reason:
-        raise ValueError(f"it is no TOML: {reason}") from None
+        raise ValueError(f"it is not TOML: {reason}") from None
     known = ("file", "columns", "units", "signs", "time", "rate", "reference", "name")
     for key in content:
         if key not in known:

@@ -100,7 +100,7 @@ class Table:
         preamble: lines before the table.
         kind: of the file, for messages.
         named: whether the columns have names of their own.
-        unreadable: name → row and content of the first cell that is no number.
+        unreadable: name → row and content of the first cell that is not a number.
     """
 
     arrays: dict[str, np.ndarray]
@@ -120,7 +120,7 @@ class Table:
         """One array as it is.
 
         Raises:
-            ValueError: there is none of that name, or a cell of it is no number.
+            ValueError: there is none of that name, or one of its cells is not a number.
         """
         if name not in self.arrays:
             raise ValueError(f"{unknown('column', name, self.arrays)}")

@@ -271,7 +271,7 @@ def test_a_mapping_beside_the_data(tmp_path, arrays):
         ("file = 1\n[columns]\ngyr = [1]", "names the data by 'file'"),
         ('file = "none.csv"\n[columns]\ngyr = ["p"]', "there is no .*none.csv"),
         ('file = "raw.csv"\ntimes = "t"\n[columns]\ngyr = ["p"]', "unknown key 'times', did you mean 'time'"),
-        ("file = \n[columns]", "it is no TOML"),
+        ("file = \n[columns]", "it is not TOML"),
     ],
 )
 def test_wrong_mappings_are_named(tmp_path, arrays, text, message):
