@@ -66,16 +66,10 @@ class PoseEnv(DrawnEnv):
     The action of a step is the estimate for the observation *before* the step: the scored quantities one after the
     other. Rotations and directions may have any length that is not zero; zeros count as no rotation, or straight up.
 
-    Attributes:
+    Args:
         suite: the sensors: channels, observation space, observation ↔ measurement.
         quantities: what the action estimates.
-        neutral_action: the estimate of an agent without information: no rotation, straight up, zero.
         rate: time steps a second, Hz.
-
-    Args:
-        suite: see above.
-        quantities: see above.
-        rate: see above.
         render_mode: see :class:`.DrawnEnv`.
         bounds: largest magnitude of the action, for each quantity; None for 1.
     """
@@ -102,7 +96,7 @@ class PoseEnv(DrawnEnv):
 
     @property
     def neutral_action(self) -> np.ndarray:
-        """``(size,)`` float32."""
+        """Estimate of an agent without information ``(size,)`` float32: no rotation, straight up, zero."""
         neutral = np.zeros(self.action_space.shape or (), np.float32)
         for quantity, part in zip(self.quantities, self._parts, strict=True):
             if quantity.kind in UNIT_ENTRY:
