@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from ..envs.data.trajectory import Trajectory
 
 TITLES = {
-    "inclination": "Inclination error, RMS over the scored ticks, deg",
+    "inclination": "Inclination error, RMS over the evaluation mask, deg",
     "heading": "Heading error, RMS, deg",
     "total": "Total orientation error, RMS, deg",
 }

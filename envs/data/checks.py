@@ -23,7 +23,7 @@ def unit_or_unknown(truth: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         if wrong.any():
             warnings.warn(
                 f"truth[{name!r}] must have unit length or be NaN; {wrong.sum()} of {len(wrong)} rows have not (the "
-                f"first at tick {first(wrong)}: {values[first(wrong)].tolist()}) and count as unknown",
+                f"first at sample {first(wrong)}: {values[first(wrong)].tolist()}) and count as unknown",
                 stacklevel=4,
             )
             truth[name] = np.where(wrong[:, None], np.nan, values)
@@ -80,7 +80,7 @@ def columns(argument: str, arrays: Mapping[str, Any], length: int) -> dict[str, 
         if np.isinf(array).any():
             tick = first(np.isinf(array).any(axis=1))
             raise ValueError(
-                f"{argument}[{name!r}] must be finite, or NaN where unknown; it is infinite at tick {tick}"
+                f"{argument}[{name!r}] must be finite, or NaN where unknown; it is infinite at sample {tick}"
             )
         checked[name] = array
     return checked

@@ -36,7 +36,7 @@ def mean_rates(orientation: np.ndarray, gyr: np.ndarray, dt: float) -> Rates:
     """Rates of a reference and a gyroscope over the same intervals of a uniform grid; NaN where unknown."""
     n = max(1, round(WINDOW / dt))
     turn = rotation.log(rotation.multiply(rotation.conjugate(orientation[:-n]), orientation[n:]))
-    # The sample of a tick is the mean of the interval that ends there.
+    # A sample is the mean of the interval that it ends.
     sums = np.concatenate([np.zeros((1, 4)), np.cumsum(np.nan_to_num(np.column_stack([gyr, np.isnan(gyr).any(1)])), 0)])
     mean = (sums[n + 1 :] - sums[1:-n]) / n
     mean[mean[:, 3] > 0.5 / n] = np.nan

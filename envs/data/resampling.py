@@ -1,16 +1,16 @@
 """Trajectories at another rate, without losing what integrates to the pose.
 
-With ``sampling="interval"`` a sample stands for the interval that ends at its tick (of a sensor slower than the ticks:
+With ``sampling="interval"`` a sample describes the interval that ends at its time (of a slower sensor:
 that reaches back to its own last sample), and its kind decides how samples are joined:
 
-* a gyroscope is integrated to an attitude, which is read at the new ticks, so that coning is kept;
+* a gyroscope is integrated to an attitude, which is interpolated at the new times, so that coning is kept;
 * an accelerometer beside a gyroscope is integrated to a velocity in the frame of that attitude, and given in the
   attitude of the middle of the new interval, so that sculling is kept (P. G. Savage, "Strapdown Inertial Navigation
   Integration Algorithm Design", J. Guidance, Control, and Dynamics 21(1–2), 1998);
 * an orientation is interpolated, every other channel averaged.
 
-With ``sampling="instant"`` a sample is the value at its tick, and all are interpolated; motion faster than half the new
-rate is aliased. This suits estimators that use the accelerometer in the attitude of the tick.
+With ``sampling="instant"`` a sample is the value at its time, and all are interpolated; motion faster than half the new
+rate is aliased. This suits estimators that use the accelerometer in the attitude at the time of the sample.
 """
 
 from __future__ import annotations
@@ -41,11 +41,11 @@ def resampled_fields(
     rate: float,
     sampling: Literal["interval", "instant"] = "interval",
 ) -> dict[str, Any]:
-    """Fields of a trajectory on the uniform grid of ``rate`` in Hz that starts at the first tick.
+    """Fields of a trajectory on the uniform grid of ``rate`` in Hz that starts at the first sample.
 
     By intervals, strapdown integration of the result passes through the attitudes of the original, and through its
-    velocities, interpolated between old ticks. Nothing is filtered beyond the mean over an interval. At a higher rate
-    samples are repeated: no information is added. Arguments are those of
+    velocities, interpolated between the old times. Nothing is filtered beyond the mean over an interval. At a higher
+    rate samples are repeated: no information is added. Arguments are those of
     :meth:`poise.envs.data.trajectory.Trajectory.resampled`, stamps ``old`` strictly increasing.
 
     Raises:
@@ -55,7 +55,7 @@ def resampled_fields(
         raise ValueError(f"sampling must be 'interval' or 'instant', got {sampling!r}")
     if not 0.0 < rate < np.inf:
         raise ValueError(f"rate must be a positive number of Hz, got {rate}")
-    # The tolerance keeps the last tick when the ratio of the rates is a whole number.
+    # The tolerance keeps the last sample when the ratio of the rates is a whole number.
     count = int(np.floor((old[-1] - old[0]) * rate + 1e-6)) + 1
     new = old[0] + np.arange(count) / rate
     left, right, weight = neighbours(old, new)
@@ -77,7 +77,7 @@ def resampled_fields(
 
 
 def neighbours(old: np.ndarray, new: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Old ticks to the left and right of every new one and the weight ``(N, 1)`` of the right one; equal on a tick."""
+    """Old times to the left and right of every new one, and the weight ``(N, 1)`` of the right one."""
     near = 1e-6 * np.min(np.diff(old), initial=1.0)
     left = np.clip(np.searchsorted(old, new + near, side="right") - 1, 0, len(old) - 1)
     on_tick = np.abs(old[left] - new) < near
@@ -87,7 +87,7 @@ def neighbours(old: np.ndarray, new: np.ndarray) -> tuple[np.ndarray, np.ndarray
 
 
 def between(name: str, a: np.ndarray, b: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    """Values between two ticks."""
+    """Values between two samples."""
     if name.endswith("orientation"):
         step = rotation.log(rotation.multiply(rotation.conjugate(a), b))
         return rotation.normalize(rotation.multiply(a, rotation.exp(weight * step)))
@@ -126,7 +126,7 @@ def at_instants(name: str, values: np.ndarray, old: np.ndarray, new: np.ndarray)
 
 
 def fill_short_gaps(values: np.ndarray, longest: float) -> np.ndarray:
-    """Samples ``(T, size)`` with lines through missing ones whose neighbours are at most ``longest`` ticks apart."""
+    """Samples ``(T, size)`` with lines through missing ones whose neighbours are at most ``longest`` samples apart."""
     present = np.flatnonzero(np.isfinite(values).all(axis=1))
     if len(present) < 2:
         return values
@@ -141,7 +141,7 @@ def fill_short_gaps(values: np.ndarray, longest: float) -> np.ndarray:
 def samples_of(values: np.ndarray, old: np.ndarray, dt: float, edges: np.ndarray) -> Samples:
     """Samples of one sensor and the intervals that they stand for, with holes between them where some are missing.
 
-    The first sample of the first tick is held backwards over the first new interval: nothing else is known of it.
+    The first sample is extended backwards over the first new interval, since nothing else is known of it.
     """
     present = np.isfinite(values).all(axis=1)
     ends = old[present]

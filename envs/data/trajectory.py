@@ -45,12 +45,12 @@ class Trajectory:
             samples of a packet. :meth:`on_grid` is what estimators run on.
         measurements: channel name (``place/kind``) → ``(T, size)``; NaN where a channel has no valid sample.
         truth: quantity name → ``(T, size)``; NaN where unknown; may be empty.
-        mask: ``(T,)`` bool, the ticks that are scored; all of them by default.
+        mask: ``(T,)`` bool, evaluation mask; all samples by default.
         metadata: JSON-able description: name, environment, sensors, seed, version, rate, source, licence, …;
             ``nominal_rate`` in Hz is the device's own statement and decides the grid of irregular stamps.
 
     Raises:
-        ValueError: an argument has the wrong shape or type, time decreases or stands still, there is no tick or no
+        ValueError: an argument has the wrong shape or type, time decreases or stands still, there is no sample or no
             channel, a value is infinite, or the metadata are not JSON-able.
     """
 
@@ -63,15 +63,15 @@ class Trajectory:
     def __post_init__(self) -> None:
         time = real_array("time", self.time)
         if time.ndim != 1 or len(time) == 0:
-            raise ValueError(f"time must have shape (T,) with at least one tick, got {time.shape}")
+            raise ValueError(f"time must have shape (T,) with at least one sample, got {time.shape}")
         if not np.isfinite(time).all():
             raise ValueError(
-                f"time must be finite, got {time[~np.isfinite(time)][0]} at tick {first(~np.isfinite(time))}"
+                f"time must be finite, got {time[~np.isfinite(time)][0]} at sample {first(~np.isfinite(time))}"
             )
         backwards = np.diff(time) < 0.0 if time[-1] > time[0] else np.diff(time) <= 0.0
         if backwards.any():
             tick = first(backwards) + 1
-            raise ValueError(f"time must increase, got {time[tick]} s at tick {tick} after {time[tick - 1]} s")
+            raise ValueError(f"time must increase, got {time[tick]} s at sample {tick} after {time[tick - 1]} s")
         measurements = columns("measurements", self.measurements, len(time))
         if not measurements:
             raise ValueError("measurements must hold at least one channel, got none")
@@ -99,7 +99,8 @@ class Trajectory:
         """The uniform grid behind the stamps, see :func:`~poise.envs.data.clock.fit_clock`.
 
         Raises:
-            ValueError: no sampling rate explains the stamps; or there is a single tick, and the metadata name no rate.
+            ValueError: no sampling rate explains the stamps; or there is a single sample, and the metadata have no
+                rate.
         """
         nominal = self.metadata.get("nominal_rate")
         if len(self) > 1:
@@ -109,12 +110,12 @@ class Trajectory:
                 raise ValueError(f"{self.name}: {reason}") from None
         rate = nominal or self.metadata.get("rate")
         if rate is None:
-            raise ValueError(f"{self.name} has a single tick and no rate in its metadata: its interval is unknown")
+            raise ValueError(f"{self.name} has a single sample and no rate in its metadata: its interval is unknown")
         return Clock(1.0 / float(rate), float(self.time[0]), np.zeros(1, int), 0.0, 0)
 
     @property
     def dt(self) -> float:
-        """Sampling interval, s, fitted to all stamps; of a single tick ``1 / metadata["rate"]``.
+        """Sampling interval, s, fitted to all stamps; of a single sample ``1 / metadata["rate"]``.
 
         Raises:
             ValueError: see :attr:`clock`.
@@ -133,7 +134,7 @@ class Trajectory:
     def on_grid(self) -> Trajectory:
         """The trajectory on its uniform grid: what estimators, which know one interval, run on.
 
-        Gaps become ticks of NaN that are not scored, jitter is taken for jitter of the stamps, and the samples of a
+        Gaps become samples of NaN that are not scored, jitter is attributed to the stamps, and the samples of a
         packet lie in the interval before its stamp. Rows that repeat stamp and values of the row before are dropped.
         An exact grid is returned as it is.
 
@@ -182,7 +183,7 @@ class Trajectory:
     def interpolated(self, longest: float = 0.05) -> Trajectory:
         """The trajectory on its grid, with short gaps of gyroscopes and accelerometers filled by lines.
 
-        This looks ahead, so it is for work offline: a held rate integrates to an error in every gap. Filled ticks are
+        This looks ahead, so it is for work offline: a held rate integrates to an error in every gap. Filled samples are
         not scored, and ``metadata["interpolated"]`` says how many there are.
 
         Args:
@@ -247,13 +248,13 @@ class Trajectory:
         if not isinstance(ticks, slice) or ticks.step not in (None, 1):
             raise ValueError(f"a trajectory is cut by [a:b] in steps of one, got [{ticks}]; resample to thin it out")
         if len(self.time[ticks]) == 0:
-            raise ValueError(f"{ticks} leaves no tick of the {len(self)} of {self.name}")
+            raise ValueError(f"{ticks} leaves no sample of the {len(self)} of {self.name}")
         return self._rows(ticks)
 
     def __repr__(self) -> str:
         known = f", truth {', '.join(self.truth)}" if self.truth else ""
         span = f"{self.time[0]:.6g} to {self.time[-1]:.6g} s"
-        return f"Trajectory({self.name!r}, {len(self)} ticks, {span}, channels {', '.join(self.measurements)}{known})"
+        return f"Trajectory({self.name!r}, {len(self)} samples, {span}, channels {', '.join(self.measurements)}{known})"
 
     def _rows(self, rows: Any) -> Trajectory:
         return self.replace(
@@ -268,18 +269,18 @@ class Trajectory:
         return dataclasses.replace(self, **changes)
 
     def resampled(self, rate: float, sampling: Literal["interval", "instant"] = "interval") -> Trajectory:
-        """Resample to ``rate`` in Hz on the uniform grid that starts at the first tick.
+        """Resample to ``rate`` in Hz on the uniform grid that starts at the first sample.
 
         See :mod:`poise.envs.data.resampling` for what is kept.
 
         Args:
             rate: Hz.
-            sampling: what a sample is, the mean over the interval that ends at its tick or the value at its tick.
+            sampling: meaning of a sample: mean over the interval that it ends, or value at its time.
 
         Returns:
             The new trajectory. A sample is NaN if its interval overlaps a missing one, or an old neighbour is missing.
             Orientations are interpolated on the great circle, other truth linearly, both NaN beside unknown truth. A
-            tick is scored if both its old neighbours are.
+            sample is scored if both its old neighbours are.
 
         Raises:
             ValueError: ``rate`` is not positive and finite, or ``sampling`` unknown.

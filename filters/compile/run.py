@@ -1,4 +1,4 @@
-"""Run printed and compiled equations on NumPy data: one call for a tick, a sequence, or a batch of sequences."""
+"""Run printed and compiled equations on NumPy data: one call for a sample, a sequence, or a batch of sequences."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from .printer import UntraceableError, print_model
 
 _COMPILED: dict[tuple[Any, ...], CompiledEquations | None] = {}
 PARALLEL_WORK = 200_000
-"""ticks × batch above which a batch is shared among threads"""
+"""samples × batch above which several threads process a batch"""
 RECORDED = 4_000_000
 """numbers that a smoother keeps at a time (32 MB)"""
 
@@ -79,7 +79,7 @@ class CompiledEquations:
         return table
 
     def _outputs(self, model: Equations, length: int, count: int, kept: int) -> list[np.ndarray]:
-        """Arrays to be filled: poses, covariances (of the ``kept`` ticks: all or none), whitened innovations, NIS."""
+        """Arrays to be filled: poses, covariances (of the ``kept`` samples: all or none), whitened innovations, NIS."""
         e, m = model.error_size, model.residual_size
         shapes = (length, count, self.pose_size), (kept, count, e, e), (length, count, m), (length, count)
         return [np.empty(shape) for shape in shapes]
@@ -87,7 +87,7 @@ class CompiledEquations:
     def step(
         self, model: Equations, state: FilterState, arrays: Measurement, gains: Gains | None
     ) -> tuple[FilterState, Estimate]:
-        """One tick; see :meth:`poise.filters.core.recursion.Recursion.step`. For speed, not through :meth:`run`."""
+        """One sample; see :meth:`poise.filters.core.recursion.Recursion.step`. For speed, not through :meth:`run`."""
         if gains:
             gains = {name: np.asarray(factor, dtype=float)[None] for name, factor in gains.items()}
         z = np.concatenate([arrays[channel.name] for channel in model.channels], axis=-1, dtype=float)

@@ -57,7 +57,7 @@ def consistency(squared: Any, degrees: Any, mask: Any = None, level: float = 0.9
 
     Args:
         squared: NEES or NIS, any shape; values that are not finite are left out.
-        degrees: degrees of freedom, a number or an array that broadcasts to ``squared``; ticks with 0 (no
+        degrees: degrees of freedom, a number or an array that broadcasts to ``squared``; samples with 0 (no
             measurement) are left out.
         mask: bool, leading shape of ``squared``; None takes all.
         level: probability between the bounds.

@@ -113,7 +113,7 @@ def real_numbers(values: Any, what: str) -> np.ndarray:
 
 
 def stack_estimates(estimates: list[Estimate]) -> Estimate:
-    """Join estimates of single ticks along a new first axis, time."""
+    """Join estimates of single samples along a new first axis, time."""
 
     def join(parts: list[Any]) -> Any:
         return None if parts[0] is None else namespace(parts[0]).stack(parts, axis=0)
@@ -148,7 +148,7 @@ def run(estimator: Estimator[Any], measurements: Mapping[str, Any]) -> Estimate:
             channel has no valid sample (filters then only predict).
 
     Returns:
-        The estimate of every tick, time first.
+        The estimate of every sample, time first.
 
     Raises:
         ValueError: see :func:`check_measurements`.

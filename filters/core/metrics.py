@@ -1,6 +1,6 @@
 """Errors: the one definition that reward, loss, table and plot share.
 
-Errors are formed by the kind of a :class:`~poise.filters.core.quantity.Quantity`, per tick and without units changed
+Errors are formed by the kind of a :class:`~poise.filters.core.quantity.Quantity`, per sample and without units changed
 (radians, metres, …); degrees appear only in :func:`score`. Everything up to :func:`rms` works on NumPy arrays and torch
 tensors and has finite gradients, also at zero error and where the truth is unknown.
 
@@ -23,7 +23,7 @@ from .quantity import RELATIVE_ORIENTATION, UP, Quantity
 
 
 def error(quantity: Quantity, estimate: Array, truth: Array) -> Array:
-    """Size of the error of every tick, by the kind of the quantity.
+    """Size of the error of every sample, by the kind of the quantity.
 
     ============  ================================================================================
     rotation      angle of ``estimate ⊗ truth⁻¹``; its inclination alone if the heading is free
@@ -73,7 +73,7 @@ def length(v: Array) -> Array:
 def where_known(
     function: Callable[[Array, Array], Array], estimate: Array, truth: Array, *, directed: bool = False
 ) -> Array:
-    """Apply ``function`` to ticks where both are finite (and, if ``directed``, not zero); NaN elsewhere.
+    """Apply ``function`` to samples where both are finite (and, if ``directed``, not zero); NaN elsewhere.
 
     The unknown is replaced before the computation, not after it, because a NaN that is masked afterwards still makes
     the gradient NaN.
@@ -174,11 +174,11 @@ def scored(error: Array, mask: Any = None) -> Array:
 
 
 def rms(error: Array, mask: Any = None, axis: int | tuple[int, ...] | None = 0) -> Array:
-    """Root of the mean square of an error over the ticks that are scored and finite.
+    """Root mean square of an error over the samples of the evaluation mask where it is finite.
 
     Args:
         error: ``(T, *batch)``.
-        mask: bool ``(T,)`` or ``(T, *batch)``; None scores every tick.
+        mask: bool ``(T,)`` or ``(T, *batch)``; None scores every sample.
         axis: what to average over; None averages over everything.
 
     Returns:
@@ -199,7 +199,7 @@ def rms(error: Array, mask: Any = None, axis: int | tuple[int, ...] | None = 0) 
 
 
 def valid_fraction(error: Array, mask: Any = None) -> float:
-    """Share of the ticks to be scored at which the error is finite; NaN where no tick is to be scored."""
+    """Share of the evaluation mask where the error is finite; NaN for an empty mask."""
     wanted = scored(namespace(error).zeros_like(error), mask)
     valid = scored(error, mask)
     total = int(wanted.sum())
@@ -213,7 +213,7 @@ class Metric:
     Attributes:
         name: ``total``, ``heading``, ``inclination``, ``angle``, ``distance``.
         unit: of the tabulated value.
-        error: error of every tick from ``(estimate, truth)``, in rad or the quantity's unit.
+        error: error of every sample from ``(estimate, truth)``, in rad or the quantity's unit.
         scale: tabulated value of one unit of ``error``.
     """
 
@@ -249,10 +249,10 @@ def score(quantity: Quantity, estimate: Array, truth: Array, mask: Any = None) -
         quantity: what is compared.
         estimate: ``(T, *batch, quantity.size)``.
         truth: the same.
-        mask: bool ``(T,)``, the ticks that are scored; None scores all.
+        mask: bool ``(T,)``, evaluation mask; None scores all.
 
     Returns:
-        Metric name → (value, unit), and ``"valid"``: the share of the scored ticks where estimate and truth are known.
+        Metric name → (value, unit), and ``"valid"``: share of the evaluation mask where estimate and truth are known.
         A small error with a small share does not make a good estimator; report both.
 
     Raises:

@@ -1,7 +1,7 @@
 """What is measured and what is estimated: channels, quantities, estimates.
 
-A measurement is a mapping from channel name to array ``(..., size)``. ``NaN`` means: not sampled at this tick. Names
-are ``place/kind`` (``imu/gyr``, ``bicycle_imu/acc``); the axes are those of the sensor.
+A measurement is a mapping from channel name to array ``(..., size)``. ``NaN`` means: no valid sample at this time step.
+Names are ``place/kind`` (``imu/gyr``, ``bicycle_imu/acc``); the axes are those of the sensor.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ class Layout:
 
 
 class Estimate(NamedTuple):
-    """What an estimator says at one tick, or (time axis first) over a whole sequence.
+    """Output of an estimator for one sample, or (time axis first) for a whole sequence.
 
     Attributes:
         pose: quantity name → array ``(..., size)``; NaN before the estimator could start.

@@ -5,7 +5,7 @@ Whatever the equations, four things hold here and nowhere else:
 * where a row of a measurement is not finite (no sample, drop-out, out of range), its update is skipped;
 * a missing sample of an input (a gyroscope, say) is replaced by the channel's last one;
 * an estimator initialises itself at the first sample with a finite prior; earlier estimates are NaN;
-* gains, log factors on named constants, may change at every tick; all zeros is exactly the published tuning.
+* gains, log factors on named constants, may change at every sample; all zeros is exactly the published tuning.
 
 NumPy data run through the compiled form (:mod:`poise.filters.compile.run`). The array form below is its definition, the
 one that gradients flow through, and what equations run in that cannot be traced.
@@ -68,7 +68,7 @@ class Recursion:
 
     @property
     def gains(self) -> Mapping[str, Gain]:
-        """Constants that may be scaled at every tick."""
+        """Constants that may be scaled at every sample."""
         return self.model.gains
 
     @property
@@ -92,7 +92,7 @@ class Recursion:
         Args:
             state: from :meth:`init` or the step before; it is not changed.
             measurement: the samples.
-            gains: log factors for this tick.
+            gains: log factors for this sample.
 
         Raises:
             ValueError: a channel is missing or has a wrong shape, a gain is unknown, or the state belongs to another
@@ -111,7 +111,7 @@ class Recursion:
 
         Args:
             measurements: channel → ``(T, *batch, size)``; NaN where there is no sample.
-            gains: log factors, constant or per tick.
+            gains: log factors, constant or per sample.
         """
         estimate, _ = self.run_from(None, measurements, gains)
         return estimate
@@ -140,7 +140,7 @@ class Recursion:
         return stack_estimates(estimates), state
 
     def _step_each(self, state: FilterState, arrays: Measurement, gains: Gains | None) -> tuple[FilterState, Estimate]:
-        """One tick of every sequence by itself, for equations whose code depends on values."""
+        """One sample of each sequence separately, for equations whose code depends on values."""
         batch = tuple(state.started.shape)
         if not batch:
             return self._step_arrays(state, arrays, gains)

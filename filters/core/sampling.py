@@ -109,7 +109,7 @@ def per_tick_gains(gains: Gains | None, length: int) -> dict[str, Any]:
         if array.ndim == 0:
             array = namespace(array).broadcast_to(array, (length,))
         elif array.shape[0] != length:
-            raise ValueError(f"gain {name!r} must be a number or have {length} ticks first, got shape {array.shape}")
+            raise ValueError(f"gain {name!r} must be a number or have {length} samples first, got shape {array.shape}")
         table[name] = array
     return table
 

@@ -58,8 +58,8 @@ def is_dot(head: Head) -> bool:
 def load_dot(path: Path) -> list[Trajectory]:
     """Read an export of one DOT sensor, in any dialect, on the grid of its clock.
 
-    The ticks lie on the sensor's uniform grid, that of ``OutputRate`` where rows are lost or their stamps are
-    irregular; packets that were lost are ticks of NaN.
+    The time stamps lie on the sensor's uniform grid, that of ``OutputRate`` where rows are lost or their stamps are
+    irregular; lost packets are samples of NaN.
 
     Returns:
         The channels ``gyr`` rad/s, ``acc`` m/s² and, if it was exported, ``mag`` (arbitrary unit); ``gyr`` and ``acc``

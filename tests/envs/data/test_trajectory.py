@@ -44,10 +44,10 @@ def assert_same(a: Trajectory, b: Trajectory) -> None:
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"time": np.zeros((0,))}, "at least one tick"),
+        ({"time": np.zeros((0,))}, "at least one sample"),
         ({"time": np.zeros((20, 1))}, r"time must have shape \(T,\).*\(20, 1\)"),
-        ({"time": np.zeros(20)}, "time must increase, got 0.0 s at tick 1"),
-        ({"time": np.append(np.arange(19.0), np.nan)}, "time must be finite, got nan at tick 19"),
+        ({"time": np.zeros(20)}, "time must increase, got 0.0 s at sample 1"),
+        ({"time": np.append(np.arange(19.0), np.nan)}, "time must be finite, got nan at sample 19"),
         ({"time": ["a"] * 20}, "time must be an array of real numbers"),
         ({"measurements": {}}, "at least one channel"),
         ({"measurements": np.zeros((20, 3))}, "must be a mapping from name to array, got ndarray"),
@@ -56,7 +56,7 @@ def assert_same(a: Trajectory, b: Trajectory) -> None:
             r"measurements\['imu/gyr'\] must have shape \(20, size\).*19",
         ),
         ({"measurements": {"imu/gyr": np.zeros(20)}}, "must have shape"),
-        ({"measurements": {"imu/gyr": np.full((20, 3), np.inf)}}, "infinite at tick 0"),
+        ({"measurements": {"imu/gyr": np.full((20, 3), np.inf)}}, "infinite at sample 0"),
         ({"measurements": {3: np.zeros((20, 3))}}, "names as keys, got 3"),
         ({"truth": {"up": np.zeros((20, 3, 1))}}, r"truth\['up'\] must have shape"),
         ({"truth": {"up": [[1], [1, 2]]}}, r"truth\['up'\] must be an array of real numbers"),
@@ -80,7 +80,7 @@ def test_interval_name_length_and_default_mask():
     assert trajectory.uniform
     assert not make(time=np.arange(20.0) ** 1.5).uniform
     assert make(1).dt == 0.01
-    with pytest.raises(ValueError, match="single tick"):
+    with pytest.raises(ValueError, match="single sample"):
         _ = make(1, metadata={}).dt
     with pytest.raises(AttributeError):
         trajectory.time = np.zeros(3)
@@ -113,7 +113,7 @@ def test_masked_entries_are_missing(dtype):
 def test_truth_is_of_unit_length_or_unknown(name):
     values = np.tile([0.6, 0.0, 0.8] if name == "up" else [0.6, 0.0, 0.8, 0.0], (20, 1))
     values[4:6], values[9] = 0.0, 1.5 * values[9]
-    with pytest.warns(UserWarning, match=rf"truth\['{name}'\].*3 of 20 rows.*tick 4.*unknown"):
+    with pytest.warns(UserWarning, match=rf"truth\['{name}'\].*3 of 20 rows.*sample 4.*unknown"):
         truth = make(truth={name: values}).truth[name]
     np.testing.assert_array_equal(np.flatnonzero(np.isnan(truth).all(axis=1)), [4, 5, 9])
     np.testing.assert_array_equal(truth[:4], values[:4])
@@ -121,7 +121,7 @@ def test_truth_is_of_unit_length_or_unknown(name):
 
 def test_the_representation_is_one_line():
     assert repr(make()) == (
-        "Trajectory('test', 20 ticks, 0.5 to 0.69 s, channels imu/gyr, imu/acc, truth orientation, position)"
+        "Trajectory('test', 20 samples, 0.5 to 0.69 s, channels imu/gyr, imu/acc, truth orientation, position)"
     )
 
 

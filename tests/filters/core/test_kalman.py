@@ -191,7 +191,7 @@ def test_unknown_gains_are_refused() -> None:
     kalman = KalmanFilter(ConstantVelocity(dt=0.1))
     with pytest.raises(ValueError, match=r"unknown gains \['speed'\].*measurement.*process"):
         kalman.run(linear_data(0), {"speed": 0.0})
-    with pytest.raises(ValueError, match="120 ticks first"):
+    with pytest.raises(ValueError, match="120 samples first"):
         kalman.run(linear_data(0), {"process": np.zeros(7)})
 
 

@@ -82,7 +82,7 @@ def test_broad_is_read_whatever_the_container_and_extension(tmp_path, kind):
         ({"imu_acc": np.zeros((N, 2))}, r"imu_acc must be a real array of shape \(T, 3\).*\(40, 2\)"),
         ({"opt_quat": 2.0 * np.ones((N, 4))}, "unit quaternions"),
         ({"sampling_rate": np.array([[0.0]])}, "sampling_rate must be one positive"),
-        ({"imu_gyr": np.full((N, 3), np.inf)}, "infinite at tick 0"),
+        ({"imu_gyr": np.full((N, 3), np.inf)}, "infinite at sample 0"),
     ],
 )
 def test_wrong_broad_fields_are_named(tmp_path, kind, changes, message):
