@@ -74,10 +74,11 @@ def factor(kind: str, unit: str) -> float:
 
 
 def split_unit(name: str) -> tuple[str, str]:
-    """Name and unit of ``name (unit)`` or ``name [unit]``; an index like ``Mat[1]`` is part of the name."""
+    """Name and unit of ``name (unit)``, ``name [unit]`` or ``time in unit``; an index like ``Mat[1]`` is of the name."""
     match = UNIT.match(name.strip())
     if match is None:
-        return name.strip(), ""
+        stem, said, unit = name.strip().rpartition(" in ")
+        return (stem, unit) if said and plain(unit) in UNITS["time"] else (name.strip(), "")
     unit = (match["a"] if match["a"] is not None else match["b"]).strip()
     known = (plain(unit) in KNOWN_UNITS or plain(unit) in OTHER_UNITS) and not unit.isdigit()
     return (match["name"].strip(), unit) if unit == "" or known else (name.strip(), "")

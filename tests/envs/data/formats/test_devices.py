@@ -98,6 +98,17 @@ def test_core_motion_reports_minus_g_on_an_axis_that_points_up(tmp_path):
     assert angles(recording.onboard_orientation, Q).max() < 1e-5
 
 
+def test_an_app_that_writes_everything_into_one_table(tmp_path):
+    """Gravity and linear acceleration beside the accelerometer, and milliseconds named in words."""
+    table = axes("ACCELEROMETER {} (m/s²)", ACC) | axes("GRAVITY {} (m/s²)", 0.0 * ACC)
+    table |= axes("LINEAR ACCELERATION {} (m/s²)", 0.0 * ACC) | axes("GYROSCOPE {} (rad/s)", GYR)
+    table |= axes("MAGNETIC FIELD {} (μT)", MAG) | {"Time since start in ms ": (1e3 * TIME).round().astype(int)}
+    recording = poise.load_recording(write_table(tmp_path / "log.csv", table, ";"))
+    same(recording.measurements["imu/acc"], ACC)
+    same(recording.measurements["imu/gyr"], GYR)
+    assert recording.dt == pytest.approx(0.01)
+
+
 def x_io(gyr_unit="deg/s", acc_unit="g"):
     table = {"Time (s)": TIME}
     table |= axes(f"Gyroscope {{}} ({gyr_unit})", GYR * {"deg/s": 180 / np.pi, "rad/s": 1.0}[gyr_unit])
