@@ -74,7 +74,7 @@ def factor(kind: str, unit: str) -> float:
 
 
 def split_unit(name: str) -> tuple[str, str]:
-    """Name and unit of ``name (unit)``, ``name [unit]`` or ``time in unit``; an index like ``Mat[1]`` is of the name."""
+    """Name and unit of ``name (unit)``, ``name [unit]``, ``time in unit``; an index like ``Mat[1]`` is of the name."""
     match = UNIT.match(name.strip())
     if match is None:
         stem, said, unit = name.strip().rpartition(" in ")
