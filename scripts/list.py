@@ -1,4 +1,4 @@
-"""What there is by name: estimators, environments, sensors and their kinds, gestures, scenarios of rides, formats.
+"""What there is by name: estimators and their measured errors, environments, sensors, gestures, scenarios, formats.
 
 Each list is read from the table that the package itself uses. Pages of the documentation hold these lists between
 ``<!-- list: NAME -->`` and ``<!-- end of list -->``; ``--update`` writes them anew.
@@ -14,6 +14,7 @@ from typing import Any
 
 import tyro
 
+from ..filters.core.offline import SUFFIX
 from ..filters.support.optional import MissingExtraError
 from .main import run_command
 from .output import Output
@@ -30,14 +31,49 @@ class Args:
     """Arguments of ``poise list``."""
 
     lists: tyro.conf.Positional[tuple[str, ...]] = ()
-    """which lists: estimators, environments, sensors, sensor-kinds, gestures, scenarios, formats; all if none is
-    named"""
+    """which lists: estimators, environments, sensors, sensor-kinds, gestures, scenarios, formats, benchmark,
+    benchmark-heading, benchmark-limits; all if none is named"""
     markdown: bool = False
     """print the tables in Markdown, as the documentation has them"""
     update: tuple[Path, ...] = ()
     """pages whose lists are written anew, for instance `poise list --update docs/*.md`"""
     json: bool = False
     """print one JSON document instead of tables"""
+
+
+def benchmark(metric: str = "inclination") -> Rows:
+    """Every estimator's mean error on every data set of the shipped benchmark, deg."""
+    from ..baselines.recommendation import dataset_errors, load_results
+
+    recordings = load_results()["recordings"]
+    names = list(dict.fromkeys(one["dataset"] for one in recordings))
+    means = dataset_errors(recordings, metric)
+    shown = [name for name in names if any(name in errors for errors in means.values())]
+    return [{"name": name, **{each: errors.get(each) for each in shown}} for name, errors in means.items()]
+
+
+def benchmark_heading() -> Rows:
+    """The same for the heading, on data sets whose reference knows north."""
+    return benchmark("heading")
+
+
+def benchmark_limits() -> Rows:
+    """Where every estimator that runs online is nearest to the best of these, and where it falls behind most."""
+    rows = [row for row in benchmark() if not row["name"].endswith(SUFFIX)]
+    sets = [name for name in rows[0] if name != "name"]
+    best = {each: min(row[each] for row in rows if row.get(each) is not None) for each in sets}
+    found = []
+    for row in rows:
+        ratios = {each: row[each] / best[each] for each in sets if row.get(each) is not None}
+        holds, fails = min(ratios, key=lambda each: ratios[each]), max(ratios, key=lambda each: ratios[each])
+        found.append(
+            {
+                "name": row["name"],
+                "holds best on": f"{holds} ({row[holds]:.2f}°, {ratios[holds]:.1f} × the best)",
+                "falls behind most on": f"{fails} ({row[fails]:.2f}°, {ratios[fails]:.1f} × the best)",
+            }
+        )
+    return found
 
 
 def run(args: Args) -> int:
@@ -160,7 +196,10 @@ def formats() -> Rows:
 
 LISTS: Mapping[str, Callable[[], Rows]] = {
     function.__name__.replace("_", "-"): function
-    for function in (estimators, environments, sensors, sensor_kinds, gestures, scenarios, formats)
+    for function in (
+        *(estimators, environments, sensors, sensor_kinds, gestures, scenarios, formats),
+        *(benchmark, benchmark_heading, benchmark_limits),
+    )
 }
 """Name → rows."""
 

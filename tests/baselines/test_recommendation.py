@@ -7,6 +7,7 @@ from poise.baselines.benchmark import dataset_of, with_other_clocks
 from poise.baselines.evaluation import evaluate
 from poise.baselines.recommendation import (
     CORRECTED,
+    MOUNTINGS,
     Motion,
     dataset_errors,
     load_results,
@@ -14,6 +15,7 @@ from poise.baselines.recommendation import (
     recommend,
     results_of,
 )
+from poise.baselines.registry import list_estimators
 from poise.envs.hand.sensing import simulate_hand
 
 
@@ -136,3 +138,13 @@ def test_clocks_are_judged_by_data_set(motions):
     recordings = [recording("BROAD", 0.0023), recording("BROAD", 0.0024)]
     recordings += [recording("EuRoC", offset) for offset in (0.0, 0.0001, -0.004)]
     assert {dataset_of(one) for one in with_other_clocks(recordings)} == {"BROAD"}
+
+
+def test_the_shipped_results_cover_benchmarks_and_estimators():
+    found = load_results()
+    sets = {one["dataset"] for one in found["recordings"]}
+    assert {*MOUNTINGS, f"BROAD{CORRECTED}"} <= sets
+    assert {"mekf", "bounded-motion", "vqf", "gru", "external-acceleration"} <= set(dataset_errors(found["recordings"]))
+    known = {*list_estimators(), "external-acceleration (mode 2)", "external-acceleration (mode 3)"}
+    for one in found["recordings"]:
+        assert {name.removesuffix(" (offline)") for name in one["errors"]} <= known
