@@ -77,6 +77,8 @@ def load_npz(path: Path) -> dict[str, np.ndarray]:
     try:
         with zipfile.ZipFile(path) as archive:
             total = sum(entry.file_size for entry in archive.infolist())
+            if any(entry.filename.startswith("xl/") for entry in archive.infolist()):
+                raise ValueError("it is a spreadsheet; save its table as CSV")
             if not any(entry.filename.endswith(".npy") for entry in archive.infolist()):
                 raise ValueError("it is a ZIP archive without NumPy arrays; unpack it first")
             if total > min(LARGEST, LARGEST_RATIO * path.stat().st_size + 2**20):

@@ -183,6 +183,8 @@ def read_map(path: Path) -> tuple[Path, RecordingMap]:
     if not isinstance(content.get("file"), str) or "columns" not in content:
         raise ValueError("a mapping names the data by 'file' and its 'columns'")
     data = path.parent / content["file"]
+    if not data.resolve().is_relative_to(path.parent.resolve()):
+        raise ValueError(f"file must lie beside the mapping or below it, got {content['file']!r}")
     if not data.exists():
         raise ValueError(f"there is no {data}")
     arguments = {key: content[key] for key in known if key in content and key not in ("file", "name")}

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import importlib.util
+import io
+import zipfile
 from pathlib import Path
 from typing import Any
 
@@ -347,9 +349,10 @@ def test_pickles_and_bombs_are_not_loaded(tmp_path, arrays):
     for name in ("a.npy", "b.npz"):
         with pytest.raises(ValueError, match="pickled"):
             poise.load_recording(tmp_path / name, columns={"gyr": "gyr", "acc": "t"}, time="t")
-    import io
-    import zipfile
-
+    with zipfile.ZipFile(tmp_path / "d.xlsx", "w") as archive:
+        archive.writestr("xl/workbook.xml", "<workbook/>")
+    with pytest.raises(ValueError, match="a spreadsheet; save its table as CSV"):
+        poise.load_recording(tmp_path / "d.xlsx")
     header = io.BytesIO()
     np.lib.format.write_array_header_1_0(header, {"descr": "<f8", "fortran_order": False, "shape": (2**40, 3)})
     with zipfile.ZipFile(tmp_path / "c.npz", "w") as archive:
