@@ -1,7 +1,7 @@
-"""What every environment whose agent estimates a pose shares: spaces, reward, info, seeds, snapshots.
+"""Base class of environments whose agent estimates a pose: spaces, reward, info, seeds, snapshots.
 
-Estimates do not act on what is estimated. A subclass therefore computes many time steps at once, as :class:`Block`
-objects, and :class:`PoseEnv` hands them out one by one.
+Actions (estimates) do not affect the motion. A subclass therefore computes many time steps at once, as :class:`Block`
+objects, and :class:`PoseEnv` returns them one by one.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ class PoseEnv(DrawnEnv):
     """An agent reads sensors and outputs a pose estimate; the reward is minus the error of the estimate.
 
     The action of a step is the estimate for the observation *before* the step: the scored quantities one after the
-    other. Rotations and directions may have any length that is not zero; zeros count as no rotation, or straight up.
+    other. Rotations and directions may have any length that is not zero; zeros count as no rotation, or as up.
 
     Args:
         suite: the sensors: channels, observation space, observation ↔ measurement.
@@ -112,7 +112,7 @@ class PoseEnv(DrawnEnv):
             options: what ``reset`` was given; only names of :attr:`reset_options`.
 
         Returns:
-            How many steps the episode has.
+            Number of steps of the episode.
         """
         raise NotImplementedError
 
@@ -121,7 +121,7 @@ class PoseEnv(DrawnEnv):
         raise NotImplementedError
 
     def save_source(self) -> Any:
-        """The memory of :meth:`next_block`, as plain data that later calls do not change."""
+        """The state of :meth:`next_block`, as plain data that later calls do not change."""
         return None
 
     def restore_source(self, saved: Any) -> None:

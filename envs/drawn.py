@@ -1,4 +1,4 @@
-"""What lies beneath every environment of this package: pictures, reset options, copies and pickles."""
+"""Base class of all environments of this package: rendering, reset options, copies and pickles."""
 
 from __future__ import annotations
 
@@ -41,9 +41,9 @@ class Shown(NamedTuple):
 class DrawnEnv(gymnasium.Env[Any, np.ndarray]):
     """An environment that can be drawn, copied and pickled.
 
-    A copy is made anew with the arguments of the original and put where the original is in its episode: both continue
-    with the same numbers, share nothing, and closing one leaves the other alone. It has no picture or window until it
-    draws one.
+    A copy is a new environment with the arguments of the original at the same position in the episode. Both continue
+    with the same numbers and share nothing; closing one does not affect the other. The copy has no window until it
+    renders.
 
     Args:
         render_mode: ``human`` (a window), ``rgb_array`` or None.
@@ -82,7 +82,7 @@ class DrawnEnv(gymnasium.Env[Any, np.ndarray]):
         raise NotImplementedError
 
     def save_episode(self) -> Any:
-        """Where the environment is in its episode, for a copy of it."""
+        """Position in the episode, for a copy."""
         raise NotImplementedError
 
     def restore_episode(self, saved: Any) -> None:
@@ -123,7 +123,7 @@ class DrawnEnv(gymnasium.Env[Any, np.ndarray]):
         return self._scene
 
     def _show(self, step: int) -> None:
-        """Keep a window up to date, at most fifty times a second and not faster than time passes."""
+        """Update a window, at most fifty times a second and not faster than real time."""
         if self.render_mode != "human":
             return
         stride = max(1, round(self._steps_a_second / 50.0))
@@ -146,7 +146,7 @@ class DrawnEnv(gymnasium.Env[Any, np.ndarray]):
             scene.close()
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Arguments and place in the episode: what copies and pickles are made of."""
+        """Arguments and position in the episode, from which copies and pickles are made."""
         state = self.save_episode(), self._np_random, self._np_random_seed, self.spec
         return _made_again, (type(self), *self._made_with, state)
 

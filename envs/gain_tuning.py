@@ -31,12 +31,12 @@ NIS_FLOOR = 1e-6
 
 
 class GainTuningEnv(DrawnEnv):
-    """What the gain-tuning environments share; subclasses provide the trajectories.
+    """Base class of the gain-tuning environments; subclasses provide the trajectories.
 
     Args:
         filter: name of a Kalman filter with gains (:func:`poise.list_estimators`), or such a filter; it must read a
             gyroscope. It is configured with the rider and bicycle, or the device,
-            that the trajectory's metadata describe.
+            in the metadata of the trajectory.
         gains: names of the gains to be tuned, in the order of the action; None for all.
         quantity: output of the filter whose error counts; None for ``up``, or the filter's first output.
         interval: time from decision to decision, s, rounded to samples.

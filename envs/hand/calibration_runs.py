@@ -1,4 +1,4 @@
-"""Simulated calibration runs: a device with drawn scales and offsets on a rate table, or turned about by hand.
+"""Simulated calibration runs: a device with random scales and offsets on a rate table, or rotated by hand.
 
 The schedules are those of P. He's thesis (Université Laval, chapter 4); counts are those of its sensors (ADXL345,
 L3G4200D), whose tolerances are our choice.
@@ -43,7 +43,7 @@ GYROSCOPE_MOUNTINGS = (("+x", "+y"), ("+y", "+z"), ("+z", "+x"))
 
 
 def nominal_calibration(array: AccelerometerArray) -> CalibrationRecord:
-    """What the data sheets say: typical scales, no offsets, a magnetometer along the axes of the device."""
+    """Values of the data sheets: typical scales, no offsets, a magnetometer along the axes of the device."""
     return CalibrationRecord(
         {
             accelerometer_channel(array): ChannelCalibration.scaled(
@@ -56,7 +56,7 @@ def nominal_calibration(array: AccelerometerArray) -> CalibrationRecord:
 
 
 def random_calibration(array: AccelerometerArray, seed: int) -> CalibrationRecord:
-    """A device of its own: true scales, offsets, hard and soft iron, and a turned magnetometer.
+    """A random device: true scales, offsets, hard and soft iron, and a misaligned magnetometer.
 
     Standard deviations: scale of the accelerometers 5 %, offset 1 m/s² (as wide as the thesis' table 4.1); scale of the
     gyroscope 1 %, offset 0.5 °/s; hard iron 100 counts, soft iron 5 %, axes of the magnetometer 20°.
@@ -82,7 +82,7 @@ def random_calibration(array: AccelerometerArray, seed: int) -> CalibrationRecor
 
 
 def built_with(array: AccelerometerArray, axis_error: float, seed: int) -> AccelerometerArray:
-    """The array with axes turned by random angles of standard deviation ``axis_error``, rad, about each normal."""
+    """The array with axes rotated by random angles of standard deviation ``axis_error``, rad, about each normal."""
     errors = ArrayPreset("axes", "errors of the axes alone", NoiseModel(), NoiseModel(), axis_error=axis_error)
     return actual_array(array, errors, np.random.default_rng(np.random.SeedSequence(seed).spawn(4)[3]))
 
@@ -145,7 +145,7 @@ def gyroscope_runs(
 def magnetometer_run(
     truth: CalibrationRecord, seed: int, *, duration: float = 60.0, rate: float = 50.0, reference_error: float = 0.002
 ) -> MagnetometerData:
-    """The device turned about by hand into all attitudes, seen by a tracker.
+    """The device rotated by hand through all attitudes, with reference attitudes of a tracker.
 
     Args:
         truth: calibration of the device.
@@ -197,7 +197,7 @@ def _data(readings: tuple[np.ndarray, ...], up: str, out: str, raw: np.ndarray) 
 
 
 def _joined(runs: list[RateTableData]) -> RateTableData:
-    """One session: the device is mounted anew within a minute."""
+    """One session: the device is remounted within a minute."""
     data = runs[0]
     for run in runs[1:]:
         data = data.joined(replace(run, time=run.time + data.time[-1] + 60.0))

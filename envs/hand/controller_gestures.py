@@ -1,8 +1,8 @@
 """Distributions of motions of a hand-held controller: those of a thesis, and of a rate table for calibration.
 
 P. He, "Estimating the orientation of a game controller from inertial and magnetic measurements", thesis, Université
-Laval: random walk and ∞ (chapter 3), rate table (chapter 4), pointing at targets (chapter 5). Where the thesis states
-no number the default is a choice of this project and says so.
+Laval: random walk and ∞ (chapter 3), rate table (chapter 4), pointing at targets (chapter 5). Where the thesis gives
+no value, the default is marked as a choice of this project.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from .planar_motion import InfinityGesture
 from .smooth import Series
 
 SHAKING_DRAWS = 20
-"""Motions among which the one with the peak nearest to that asked for is taken."""
+"""Number of motions from which the one with the peak nearest to the requested one is chosen."""
 
 
 def _check_positive(config: object, *names: str) -> None:
@@ -35,7 +35,8 @@ class Walk:
     """A filtered random walk of every coordinate of the pose, from rest.
 
     x_k = (Δt/τ − 1) x_{k−2} + (2 − Δt/τ) x_{k−1} + Δt/τ Δx_k, Δx ~ N(0, σ²): its second differences are taken as the
-    accelerations at the knots. Their variance is 2σ²/(τ² Δt² (2 − Δt/τ)); (3.58) misprints the 2 in the bracket as 3.
+    accelerations at the knots. Their variance is 2σ²/(τ² Δt² (2 − Δt/τ)); erratum: (3.58) has 3 instead of 2 in the
+    bracket.
 
     Attributes:
         duration: length, s.
@@ -98,7 +99,7 @@ class Infinity:
         height: b, m.
         period: τ, s.
         rest: time at rest before, s.
-        ramp: time of getting under way, s; 0 for the thesis' sudden start.
+        ramp: duration of the start, s; 0 for the abrupt start of the thesis.
     """
 
     duration: float = 100.0
@@ -176,7 +177,7 @@ def pointing_attitude(azimuth: np.ndarray, elevation: np.ndarray) -> np.ndarray:
 
 
 def target_position(azimuth: np.ndarray, elevation: np.ndarray, distance: float = 10.0) -> np.ndarray:
-    """Place of a target ``(..., 3)`` on a wall ``distance`` m north of the hand: d [tan ψ, 1, tan θ sec ψ] (5.50)."""
+    """Target ``(..., 3)`` on a wall ``distance`` m north of the hand: d [tan ψ, 1, tan θ sec ψ] (5.50)."""
     return distance * np.stack([np.tan(azimuth), np.ones_like(azimuth), np.tan(elevation) / np.cos(azimuth)], axis=-1)
 
 
@@ -215,7 +216,7 @@ class Shaking:
         _check_positive(self, "rate", "peak", "cycle")
 
     def draw(self, generator: np.random.Generator, duration: float | None = None) -> ShakingGesture:
-        """Draw some motions of the asked rate and keep the one whose peak comes nearest to that asked for."""
+        """Draw some motions of the requested rate and keep the one with the peak nearest to the requested one."""
         duration = self.duration if duration is None else duration
         heading = rotation.random(generator)
         position = shaken(generator, self.band, self.acceleration)
@@ -259,7 +260,7 @@ class RateTable:
     Attributes:
         rates: rad/s, counter-clockwise seen from above; empty for a table that stands still.
         hold: time at each rate, s (thesis: 10 to 20).
-        ramp: time of going over to the next, s.
+        ramp: duration of the change to the next rate, s.
         attitude: ``(4,)`` of the device on the table, whose z axis points up.
         offset: ``(3,)`` of the device's origin from the axis, table axes, m.
         rest: time at rest before, s.

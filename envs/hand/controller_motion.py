@@ -104,7 +104,7 @@ class WalkGesture:
 
 @dataclass(frozen=True)
 class PointingGesture:
-    """Turns from target to target, each the shortest one, along 6u⁵ − 15u⁴ + 10u³; the hand moves meanwhile.
+    """Shortest rotations from target to target, along 6u⁵ − 15u⁴ + 10u³, while the hand translates.
 
     Attributes:
         duration: length, s.
@@ -148,7 +148,7 @@ class PointingGesture:
 
 @dataclass(frozen=True)
 class ShakingGesture:
-    """Turning and moving at random, more and less in turns.
+    """Random rotation and translation with varying amplitude.
 
     Attributes:
         duration: length, s.
@@ -194,9 +194,9 @@ class RateTableGesture:
 
     Attributes:
         duration: length, s.
-        starts: ``(K,)`` when the table begins to go over to each rate, s.
+        starts: ``(K,)`` time at which the table begins to change to each rate, s.
         rates: ``(K,)`` rad/s, counter-clockwise seen from above.
-        ramp: time of going over, s.
+        ramp: duration of the change, s.
         azimuth: of the table at the start, rad.
         attitude: ``(4,)`` of the device on the table.
         offset: ``(3,)`` of the device's origin from the axis, table axes (z up), m.

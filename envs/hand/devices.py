@@ -38,13 +38,13 @@ PAPER_RATE = 100.0
 
 
 def per_sample(std: float, full_scale: float, **others: Any) -> NoiseModel:
-    """White noise of a given standard deviation a sample at 100 Hz."""
+    """White noise of a given standard deviation per sample at 100 Hz."""
     return NoiseModel(white_noise=std / math.sqrt(PAPER_RATE), full_scale=full_scale, **others)
 
 
 @dataclass(frozen=True)
 class ArrayPreset(SensorPreset):
-    """Errors of a device with an array: noise, and how far the array is from the one that filters assume.
+    """Errors of a device with an array: noise, and deviations of the array from the nominal one that filters use.
 
     The accelerometer's noise is that of each uniaxial accelerometer.
 
@@ -172,7 +172,7 @@ class HandDevice:
 
     @property
     def planar(self) -> bool:
-        """Whether it moves in the vertical plane."""
+        """Whether the device moves in the vertical plane."""
         return isinstance(self.array, PlanarArray)
 
     def describe(self) -> dict[str, Any]:
@@ -223,7 +223,7 @@ def hand_device(device: str | Path | HandDevice) -> HandDevice | None:
 
 
 def array_reading(motion: SiteMotion) -> np.ndarray:
-    """Ideal readings ``(n, m)`` of m uniaxial accelerometers: each one's own site is moved, nothing is linearised.
+    """Ideal readings ``(n, m)`` of m uniaxial accelerometers, each along its own path, without linearisation.
 
     Args:
         motion: of the array's reference point; its surroundings are the array as it is built. The accelerometers of a
@@ -290,7 +290,7 @@ def device_suite(
 
 
 def check_planar(device: HandDevice, config: GestureConfig, mounting: Mounting) -> None:
-    """Refuse what would take a planar device out of its plane.
+    """Check that a planar device stays in its plane.
 
     Raises:
         ValueError: a spatial gesture, or rotated axes.
@@ -303,4 +303,4 @@ def check_planar(device: HandDevice, config: GestureConfig, mounting: Mounting) 
             f"(planar-walk, infinity, or a configuration with planar = True), got {config!r}"
         )
     if mounting.rotation != (1.0, 0.0, 0.0, 0.0):
-        raise ValueError(f"mounting of the planar device {device.name!r} must be no rotation, got {mounting.rotation}")
+        raise ValueError(f"mounting of the planar device {device.name!r} must be the identity, got {mounting.rotation}")

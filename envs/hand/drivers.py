@@ -1,7 +1,7 @@
-"""Motion drivers of the hand-held device: :class:`KinematicDriver`, and by forces in a world :class:`DynamicDriver`.
+"""Motion drivers of the hand-held device: :class:`KinematicDriver`, and force-controlled :class:`DynamicDriver`.
 
-A driver gives the states of the device in blocks of samples. Estimates do not act on the motion, so looking a block
-ahead changes nothing and lets sensors and truth be computed for many samples at once.
+A driver returns the states of the device in blocks of samples. Estimates do not affect the motion, so sensors and truth
+can be computed for many samples at once.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ class MotionDriver(Protocol):
     """Source of the device's motion."""
 
     block: int
-    """Samples that are best asked for at once."""
+    """Preferred number of samples per block."""
 
     def start(self, gesture: Gesture, mass_factor: float = 1.0) -> None:
         """Begin a gesture; the next state is that of sample 0."""
@@ -71,7 +71,7 @@ class KinematicDriver:
         self._step = 0
 
     def start(self, gesture: Gesture, mass_factor: float = 1.0) -> None:
-        """Begin a gesture; a mass means nothing here."""
+        """Begin a gesture; the mass has no effect."""
         self._gesture, self._step = gesture, 0
 
     def advance(self, samples: int) -> States:
@@ -137,7 +137,7 @@ class DynamicDriver:
         longest_step: float = 1e-3,
         gravity: float = STANDARD_GRAVITY,
     ) -> None:
-        # imported here, because whoever only plays gestures back needs no PyBullet
+        # imported here, because kinematic motion does not need PyBullet
         from ..physics.world import Physics
 
         self.rate, self.device, self.bandwidth = rate, device or Device(), bandwidth
@@ -151,7 +151,7 @@ class DynamicDriver:
     def start(self, gesture: Gesture, mass_factor: float = 1.0) -> None:
         """Begin a gesture at rest; ``mass_factor`` multiplies mass and moments of inertia.
 
-        The hand knows the nominal device only: its feedback makes up for the difference.
+        The controller uses the nominal mass; its feedback compensates the difference.
         """
         self._gesture, self._mass_factor, self._step = gesture, mass_factor, 0
         inertia = np.multiply(self.device.inertia, mass_factor)
@@ -182,7 +182,7 @@ class DynamicDriver:
         """Follow the gesture from physics step ``start``; states one step before each sample and at it."""
         physics, body, substeps = self.physics, self._body, self.substeps
         reference = self._reference(start, samples * substeps)
-        # putting the body where it is makes a block a function of plain numbers, which can be saved
+        # resetting the body to its state makes a block a function of plain numbers, which can be saved
         physics.set_base_tuples(body, *self._state)
         read, step, push, twist = physics.base_tuples, physics.step, physics.apply_force, physics.apply_torque
         mass, (ix, iy, iz) = self.device.mass, self.device.inertia

@@ -197,7 +197,7 @@ class HandMotionEnv(PoseEnv):
         return self._driver
 
     def next_block(self, most: int) -> Block:
-        """Move the device on and let the sensors see it."""
+        """Advance the device and simulate the sensors."""
         driver = self._ready_driver()
         states = driver.advance(min(most, driver.block))
         return sense(self._suite, states, self._episode_mounting, self._array)

@@ -25,7 +25,7 @@ from .controller_gestures import Infinity, Pointing, RateTable, Shaking, Walk
 from .motion import Segment, SegmentedGesture, TurnGesture, match_levels
 
 MOST_DRAWS = 200
-"""Attempts to draw a trial that is not more peaked than asked; one in five is at ``fast``."""
+"""Attempts to draw a trial with a small enough ratio of peak to mean; one in five succeeds for ``fast``."""
 
 
 class Gesture(Protocol):

@@ -27,12 +27,13 @@ DEFAULT_SENSORS = "xsens-mtw-awinda"
 
 @dataclass(frozen=True)
 class HandVariation:
-    """What differs from episode to episode besides motion and sensor errors; standard deviations, 0 for no variation.
+    """Variation between episodes in addition to motion and sensor errors; standard deviations, 0 for no variation.
 
     Attributes:
-        lever_arm: of the sensor site, m an axis.
-        mounting: of the sensor's axes on the device, rad an axis.
-        mass: of the logarithm of the device's mass and inertia, which the hand does not know (``drive="dynamic"``).
+        lever_arm: of the sensor site, m per axis.
+        mounting: of the sensor's axes on the device, rad per axis.
+        mass: of the logarithm of the device's mass and inertia, which the controller does not use
+            (``drive="dynamic"``).
     """
 
     lever_arm: float = 0.02
@@ -55,7 +56,7 @@ class HandVariation:
 
 
 def check_duration(duration: float | None) -> None:
-    """Refuse what is not a length of an episode."""
+    """Check the length of an episode."""
     if duration is not None and not 0.0 < duration < math.inf:
         raise ValueError(f"duration must be positive and finite (s), got {duration}")
 
@@ -136,7 +137,7 @@ def sense(suite: SensorSuite, states: States, mounting: Mounting, array: Acceler
 
 
 def array_truth(array: AccelerometerArray, now: BodyState, earlier: BodyState) -> dict[str, np.ndarray]:
-    """What filters for arrays estimate besides the pose: name → ``(n, size)``.
+    """True values of further quantities that filters for arrays estimate: name → ``(n, size)``.
 
     Accelerations that the motion does not know are differences over a physics step.
     """

@@ -1,4 +1,4 @@
-"""Random trajectories of a hand-held sensor without an environment around them: an episode in some milliseconds."""
+"""Random trajectories of a hand-held sensor without an environment, in some milliseconds per episode."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from .sensing import simulate_hand
 
 @dataclass(frozen=True)
 class HandTrajectories:
-    """A distribution of hand motions and of the sensors that see them.
+    """A distribution of hand motions and sensors.
 
     Where several gestures, rates or sensors are given, each trajectory draws one of each with equal probability. A
     single value stands for a tuple of one.
@@ -32,7 +32,7 @@ class HandTrajectories:
         sensors: names of sensor presets, or presets.
         noise_scale: lowest and highest factor on all errors of the sensor, drawn log-uniformly.
         duration: s.
-        lever_arm: standard deviation of the sensor site on the body, m an axis.
+        lever_arm: standard deviation of the sensor site on the body, m per axis.
         mounting: ``random``: the axes of the sensor are drawn evenly from all rotations; ``aligned``: they are the
         body's.
         drive: ``kinematic``: the body follows the gesture exactly; ``dynamic``: forces in the physics world,
@@ -80,7 +80,7 @@ class HandTrajectories:
         """Draw one trajectory.
 
         Args:
-            generator: a child of it decides about the setting, another about motion and errors.
+            generator: one child is used for the setting, another for motion and errors.
             name: for the metadata; None names gesture and seed.
 
         Returns:

@@ -1,4 +1,4 @@
-"""Fast, exact access to a multibody in PyBullet, also to its closed loops: what each physics step reads and drives.
+"""Fast, exact access to a multibody in PyBullet, including closed loops, for use in every physics step.
 
 Everything here belongs to *centre-of-mass frames* (principal axes), which PyBullet keeps in double precision. Numbers
 leave this file with quaternions scalar first.
@@ -117,7 +117,7 @@ def newton_euler(
     duration: float,
     gravity: float,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Wrench that all outside contacts together exert on some links, from the change of their momentum.
+    """Total wrench of external contacts on some links, from the rate of change of their momentum.
 
     Force = Σ m (Δv/Δt − g), moment about ``point`` = Σ (x − point) × m (Δv/Δt − g) + Δ(Σ R I Rᵀ ω)/Δt.
 

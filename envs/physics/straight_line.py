@@ -1,4 +1,4 @@
-"""Functions of small arrays as straight-line Python on floats, for what a physics step computes once."""
+"""Functions of small arrays as straight-line Python on floats, for use once per physics step."""
 
 from __future__ import annotations
 

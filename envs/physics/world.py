@@ -4,8 +4,8 @@ PyBullet's scalar-last quaternions and centre-of-mass frames stay inside this fi
 that its creation returns, one of its links by its index; :data:`BASE` is the base. States belong to the *body frame*
 (the link frame of a URDF), not to PyBullet's frame of principal axes in the centre of mass.
 
-Only double-precision fields are read: the link frame that PyBullet reports itself is single precision, which far from
-the origin would drown an accelerometer in noise.
+Only double-precision fields are used. The link frame that PyBullet reports is single precision, which far from the
+origin would add considerable noise to an accelerometer.
 """
 
 from __future__ import annotations
@@ -284,7 +284,7 @@ class Physics:
         return BodyState(self.time, position - lever, orientation, velocity, angular_velocity)
 
     def set_state(self, body: int, state: BodyState) -> None:
-        """Put the base's body frame where ``state`` says; the joints keep their positions and rates."""
+        """Set the state of the base's body frame; the joints keep their positions and rates."""
         offset, axes = self.inertial_frame(body)
         lever = rotation.rotate(state.orientation, offset)
         pybullet.resetBasePositionAndOrientation(

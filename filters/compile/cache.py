@@ -1,4 +1,4 @@
-"""Where compiled code is kept: the folder, the compiler that writes to it, and modules whose text lies in it.
+"""Cache of compiled code: the folder, the compiler that writes to it, and the printed modules in it.
 
 The folder is ``compiled`` below the one that the environment variable ``POISE_CACHE`` names, or below the user's cache
 folder. Machine code is stored with a checksum, so that a damaged file is compiled anew. Where no folder can be written,
@@ -27,7 +27,7 @@ from ..support.files import write_text
 _LOCK = threading.RLock()
 _WARNED: set[Path] = set()
 PATIENCE = 1.0
-"""s of compiling after which a line on standard error says what takes so long"""
+"""s of compiling after which a line on standard error is printed"""
 
 
 def cache_folder() -> Path | None:

@@ -125,7 +125,7 @@ def print_model(model: Equations) -> str:
 
     Raises:
         ValueError: an equation returns another shape than the model's sizes say.
-        UntraceableError: an equation branches on values, or uses functions that know nothing of traced numbers.
+        UntraceableError: an equation branches on values, or uses functions that do not support traced numbers.
     """
     tape, kind = Tape(), type(model).__name__
     names = list(parameters_of(model))

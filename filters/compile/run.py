@@ -20,7 +20,7 @@ _COMPILED: dict[tuple[Any, ...], CompiledEquations | None] = {}
 PARALLEL_WORK = 200_000
 """samples × batch above which several threads process a batch"""
 RECORDED = 4_000_000
-"""numbers that a smoother keeps at a time (32 MB)"""
+"""numbers that a smoother keeps in memory at a time (32 MB)"""
 
 
 def compiled_equations(model: Equations) -> CompiledEquations | None:
@@ -116,9 +116,9 @@ class CompiledEquations:
         return estimate, FilterState(*(array.reshape((*batch, *array.shape[1:])) for array in states))
 
     def smooth(self, model: Equations, arrays: Measurement, gains: Gains | None, keep_covariance: bool) -> Estimate:
-        """A whole sequence in the light of all its samples; see :meth:`poise.filters.core.kalman.KalmanFilter.smooth`.
+        """Smoothing of a whole sequence; see :meth:`poise.filters.core.kalman.KalmanFilter.smooth`.
 
-        Records of the way forward are kept for a stretch at a time; the filter runs over each a second time.
+        Records of the forward pass are kept for one section at a time; the filter runs twice over each.
         """
         Z = np.asarray(join(arrays, model.channels), dtype=float)
         length, batch, n, e = Z.shape[0], Z.shape[1:-1], model.state_size, model.error_size
@@ -159,7 +159,7 @@ class CompiledEquations:
         return self._estimate(model, shaped[0], shaped[1] if keep_covariance else None, *shaped[2:])
 
     def _execute(self, states: list[np.ndarray], Z: np.ndarray, parameters: np.ndarray, outs: list[np.ndarray]) -> None:
-        """Call the kernel, in threads where the work is worth it; sequences do not meet, so the numbers stay."""
+        """Call the kernel, in threads for large batches; sequences are independent, so the results are the same."""
         threads = min(processors(), Z.shape[1])
         if threads < 2 or Z.shape[0] * Z.shape[1] < PARALLEL_WORK:
             self.kernel(*states, Z, parameters, *outs)

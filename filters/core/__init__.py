@@ -1,1 +1,1 @@
-"""Rotations, quantities, the estimator protocol, the Kalman recursion and the metrics: what every filter stands on."""
+"""Rotations, quantities, the estimator protocol, the Kalman recursion and the metrics: the basis of every filter."""

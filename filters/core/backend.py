@@ -55,7 +55,7 @@ def namespace(*arrays: Any) -> Any:
 def expand(parameter: Any, trailing: int) -> Any:
     """Append ``trailing`` axes of length one, so that a parameter ``(*batch,)`` scales an array ``(*batch, …)``.
 
-    Plain numbers and traced scalars pass unchanged: they scale anything.
+    Plain numbers and traced scalars are returned unchanged, since they broadcast.
     """
     if getattr(parameter, "ndim", 0) == 0:
         return parameter

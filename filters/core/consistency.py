@@ -1,4 +1,4 @@
-"""Whether a filter's covariance tells the truth: NEES, NIS and their chi-square bounds."""
+"""Consistency of a filter's covariance with its errors: NEES, NIS and their chi-square bounds."""
 
 from __future__ import annotations
 
@@ -32,10 +32,10 @@ class Consistency:
     """Average NEES or NIS for each degree of freedom against its chi-square bounds.
 
     Attributes:
-        ratio: average divided by the degrees of freedom: 1 if consistent, more if the filter is too sure of itself.
+        ratio: average divided by the degrees of freedom: 1 if consistent, larger if the filter is overconfident.
         lower: bound that a consistent filter falls below with probability ``(1 - level) / 2``.
         upper: bound that it exceeds with the same probability.
-        samples: how many values were averaged.
+        samples: number of averaged values.
     """
 
     ratio: float
@@ -52,7 +52,7 @@ class Consistency:
 def consistency(squared: Any, degrees: Any, mask: Any = None, level: float = 0.95) -> Consistency:
     """Average NEES or NIS values and give the bounds of a consistent filter.
 
-    The bounds suppose independent values: NIS over time (innovations are white if the filter is optimal), or NEES of
+    The bounds assume independent values: NIS over time (innovations are white if the filter is optimal), or NEES of
     independent runs. NEES of one run over time is correlated, and the bounds are then too narrow.
 
     Args:

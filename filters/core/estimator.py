@@ -1,8 +1,8 @@
-"""The one protocol of everything that estimates, and :func:`run`.
+"""The protocol of all estimators, and :func:`run`.
 
-Filters, networks, adaptive filters and wrapped packages look the same: ``init`` makes the memory, ``step`` turns
-memory and measurement into new memory and an estimate. Estimators are immutable; all memory is the state, so saving,
-restoring, batching and looking ahead need nothing more.
+Filters, networks, adaptive filters and wrapped packages have the same interface. ``init`` creates the state, and
+``step`` computes a new state and an estimate from a state and a measurement. Estimators are immutable. Everything that
+they remember is in the state, which is all that saving, restoring, batching and looking ahead require.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ S = TypeVar("S")
 
 @runtime_checkable
 class Estimator(Protocol[S]):
-    """Anything that estimates a pose from a stream of measurements; channels it does not read are ignored."""
+    """An estimator of a pose from a stream of measurements; channels that it does not need are ignored."""
 
     @property
     def dt(self) -> float:
@@ -29,12 +29,12 @@ class Estimator(Protocol[S]):
 
     @property
     def channels(self) -> tuple[Channel, ...]:
-        """What it reads."""
+        """Required channels."""
         ...
 
     @property
     def outputs(self) -> tuple[Quantity, ...]:
-        """What it gives."""
+        """Estimated quantities."""
         ...
 
     def with_dt(self, dt: float) -> Self:
@@ -42,11 +42,11 @@ class Estimator(Protocol[S]):
         ...
 
     def init(self, measurement: Measurement) -> S:
-        """Memory before the first sample, with the batch shape and array kind of ``measurement``."""
+        """Initial state, with the batch shape and array type of ``measurement``."""
         ...
 
     def step(self, state: S, measurement: Measurement) -> tuple[S, Estimate]:
-        """Take one sample (arrays ``(*batch, size)``); NaN where a channel brought none."""
+        """Process one sample (arrays ``(*batch, size)``); NaN where a channel has no valid sample."""
         ...
 
 
@@ -56,7 +56,7 @@ def check_measurements(
     """Return the needed channels as arrays of one common leading shape.
 
     Args:
-        channels: what is needed.
+        channels: required channels.
         measurements: channel name → ``([T,] *batch, size)``.
         time_axis: whether the first axis is time, which then must not be empty.
 
@@ -123,7 +123,7 @@ def stack_estimates(estimates: list[Estimate]) -> Estimate:
 
 
 def run_by_steps(estimator: Estimator[Any], measurements: Mapping[str, Any]) -> Estimate:
-    """Run an estimator sample by sample: the definition that every faster ``run`` must equal.
+    """Run an estimator sample by sample, as a reference for every faster ``run``.
 
     Args:
         estimator: the estimator.
@@ -143,7 +143,7 @@ def run(estimator: Estimator[Any], measurements: Mapping[str, Any]) -> Estimate:
     """Run an estimator over a whole sequence.
 
     Args:
-        estimator: from :func:`poise.make_estimator`, or anything that follows :class:`Estimator`.
+        estimator: from :func:`poise.make_estimator`, or any implementation of :class:`Estimator`.
         measurements: channel name → ``(T, *batch, size)``, sampled every ``estimator.dt`` seconds; NaN where a
             channel has no valid sample (filters then only predict).
 

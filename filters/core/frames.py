@@ -1,4 +1,4 @@
-"""Estimates as tables: a row a sample, angles in degrees, everything else in SI units."""
+"""Estimates as tables: one row per sample, angles in degrees, everything else in SI units."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class SequenceTable:
         Columns: ``time`` (s; the sample number if no time is known), ``roll``, ``pitch``, ``yaw`` (deg, Z-Y-X angles
         of sensor to world: yaw about the vertical first), ``qw`` … ``qz`` (sensor to world), ``std_roll`` … (deg,
         where the covariance is that of a known error), every other quantity by its name and components (angles in deg,
-        ``std_`` before the name for its standard deviation), ``nis``. A method that tells no heading has no ``yaw``;
+        ``std_`` before the name for its standard deviation), ``nis``. A method without heading has no ``yaw``;
         that of ``relative_orientation`` starts at zero and drifts. ``frame.attrs["units"]`` holds the unit of every
         column.
 

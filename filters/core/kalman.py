@@ -1,6 +1,6 @@
-"""A model's equations made an estimator: the extended (error-state) Kalman filter in Joseph form.
+"""Extended (error-state) Kalman filter in Joseph form, with the equations of a model.
 
-The recursion, which handles missing samples and the start, is in :mod:`.recursion`.
+The recursion, with missing samples and initialisation, is in :mod:`.recursion`.
 """
 
 from __future__ import annotations

@@ -105,7 +105,7 @@ def times(matrix: Array, vector: Array) -> Array:
 
 
 def zero_where_known(*samples: Array) -> Array:
-    """Zeros ``(*batch, 1)`` where all of the samples ``(*batch, n)`` are there, else NaN: a prior waits for them."""
+    """Zeros ``(*batch, 1)`` where all samples ``(*batch, n)`` are valid, else NaN, which delays the prior."""
     xp = namespace(*samples)
     joined = xp.concat(samples, axis=-1)
     found = xp.all(xp.isfinite(joined), axis=-1)[..., None]

@@ -1,4 +1,4 @@
-"""Errors: the one definition that reward, loss, table and plot share.
+"""Definition of errors, used by rewards, losses, tables and plots.
 
 Errors are formed by the kind of a :class:`~poise.filters.core.quantity.Quantity`, per sample and without units changed
 (radians, metres, …); degrees appear only in :func:`score`. Everything up to :func:`rms` works on NumPy arrays and torch
@@ -51,7 +51,7 @@ def error(quantity: Quantity, estimate: Array, truth: Array) -> Array:
 
 
 def check_size(quantity: Quantity, estimate: Array, truth: Array) -> None:
-    """Refuse arrays that cannot hold ``quantity``."""
+    """Check that arrays have the size of ``quantity``."""
     for name, array in (("estimate", estimate), ("truth", truth)):
         shape = tuple(getattr(array, "shape", ()))
         if not shape or shape[-1] != quantity.size:

@@ -1,4 +1,4 @@
-"""Equations without a covariance made an estimator: observers with fixed gains, integration, plain tilt."""
+"""Estimator for equations without covariance: observers with fixed gains, integration, tilt."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from .recursion import Recursion
 
 @dataclass(frozen=True)
 class Observer(Recursion):
-    """Equations without covariance made an estimator: the recursion of :class:`.KalmanFilter` with no error state.
+    """Estimator for equations without covariance: the recursion of :class:`.KalmanFilter` without error state.
 
     Attributes:
         model: the equations and their parameters.

@@ -1,4 +1,4 @@
-"""An estimator that sees the whole recording before it answers: smoothing with the interface of an estimator."""
+"""Smoothing of whole recordings with the interface of an estimator."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from .estimator import Estimator
 from .quantity import Channel, Estimate, Measurement, Quantity
 
 SUFFIX = " (offline)"
-"""What the name of an estimator has behind it where its smoother is meant."""
+"""Suffix of an estimator's name that selects its smoother."""
 
 
 @dataclass(frozen=True)
@@ -18,10 +18,10 @@ class Offline:
     """The fixed-interval smoother of an estimator.
 
     Attributes:
-        filter: what is smoothed; it has a method ``smooth``.
+        filter: an estimator with a method ``smooth``.
 
     Raises:
-        ValueError: it has none.
+        ValueError: it has no such method.
     """
 
     filter: Estimator[Any]
@@ -58,7 +58,7 @@ class Offline:
         return self.filter.smooth(measurements)  # type: ignore[attr-defined]
 
     def init(self, measurement: Measurement) -> NoReturn:
-        """Refuse: there is no memory between samples.
+        """Not available, since a smoother has no state between samples.
 
         Raises:
             TypeError: always.
@@ -66,7 +66,7 @@ class Offline:
         raise TypeError("a smoother needs the whole recording: use run, not init and step")
 
     def step(self, state: Any, measurement: Measurement) -> NoReturn:
-        """Refuse, as :meth:`init`.
+        """Not available, as :meth:`init`.
 
         Raises:
             TypeError: always.

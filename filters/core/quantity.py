@@ -1,4 +1,4 @@
-"""What is measured and what is estimated: channels, quantities, estimates.
+"""Channels (measured), quantities (estimated) and estimates.
 
 A measurement is a mapping from channel name to array ``(..., size)``. ``NaN`` means: no valid sample at this time step.
 Names are ``place/kind`` (``imu/gyr``, ``bicycle_imu/acc``); the axes are those of the sensor.
@@ -21,9 +21,9 @@ Measurement = Mapping[str, Array]
 
 
 GRAVITY = 9.81
-"""m/s²: gravity as papers and theses round it; the default of the filters."""
+"""m/s²: rounded value of gravity in the papers; the default of the filters."""
 STANDARD_GRAVITY = 9.80665
-"""m/s²: one g_n, the unit in which sensors are calibrated and simulated."""
+"""m/s²: standard gravity g_n, used in calibration and simulation of sensors."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class Channel:
 
 @dataclass(frozen=True)
 class Quantity:
-    """Something that an estimator gives and a truth can be compared with.
+    """A quantity that an estimator outputs and that can be compared with a truth.
 
     The kind decides how an error is formed (:mod:`poise.filters.core.metrics`): ``rotation`` is a unit quaternion
     w, x, y, z (body to world), ``direction`` a unit vector, ``angle`` radians that wrap, ``vector`` anything else.
@@ -51,7 +51,7 @@ class Quantity:
 
 @dataclass(frozen=True)
 class Layout:
-    """What the arrays of an :class:`Estimate` hold.
+    """Layout of the arrays of an :class:`Estimate`.
 
     Attributes:
         outputs: the quantities of ``pose``.
@@ -72,8 +72,8 @@ class Estimate(NamedTuple):
         innovation: ``(..., m)`` whitened innovation (unit variance if the filter is consistent); 0 where a row of the
             measurement was missing; None where a method has none.
         nis: ``(...,)`` normalised innovation squared, the squared length of ``innovation``; 0 without a measurement.
-        time: ``(T,)`` s of the samples, if :func:`poise.run` knew it.
-        layout: what the arrays hold, if :func:`poise.run` made the estimate.
+        time: ``(T,)`` s of the samples, if known to :func:`poise.run`.
+        layout: of the arrays, if the estimate is from :func:`poise.run`.
     """
 
     pose: dict[str, Array]
@@ -84,7 +84,7 @@ class Estimate(NamedTuple):
     layout: Layout | None = None
 
     def to_frame(self) -> pandas.DataFrame:
-        """A table with a row a sample, angles in degrees: see :meth:`.frames.SequenceTable.frame`."""
+        """A table with one row per sample, angles in degrees: see :meth:`.frames.SequenceTable.frame`."""
         kinds = {
             quantity.name: (quantity.kind, quantity.unit) for quantity in (self.layout.outputs if self.layout else ())
         }
@@ -101,7 +101,7 @@ UP = Quantity("up", "direction", 3, "1")
 ORIENTATION = Quantity("orientation", "rotation", 4, "1")
 """Sensor to world (x east, y north, z up)."""
 RELATIVE_ORIENTATION = Quantity("relative_orientation", "rotation", 4, "1")
-"""Sensor to a level frame of unknown constant heading: all that six axes can tell."""
+"""Sensor to a level frame of unknown constant heading, as six axes determine it."""
 EXTERNAL_ACCELERATION = Quantity("external_acceleration", "vector", 3, "m/s²")
 """Acceleration of the sensor without gravity, in sensor coordinates."""
 GYROSCOPE_BIAS = Quantity("gyroscope_bias", "vector", 3, "rad/s")

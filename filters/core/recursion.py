@@ -1,14 +1,14 @@
-"""The recursion around equations: what Kalman filters and observers do with samples, alike in every form.
+"""Recursion over samples for Kalman filters and observers, identical in the array form and the compiled form.
 
-Whatever the equations, four things hold here and nowhere else:
+Four rules hold for all equations:
 
 * where a row of a measurement is not finite (no sample, drop-out, out of range), its update is skipped;
 * a missing sample of an input (a gyroscope, say) is replaced by the channel's last one;
 * an estimator initialises itself at the first sample with a finite prior; earlier estimates are NaN;
 * gains, log factors on named constants, may change at every sample; all zeros is exactly the published tuning.
 
-NumPy data run through the compiled form (:mod:`poise.filters.compile.run`). The array form below is its definition, the
-one that gradients flow through, and what equations run in that cannot be traced.
+NumPy data are processed in the compiled form (:mod:`poise.filters.compile.run`). The array form below defines the
+result, is differentiable, and runs equations that cannot be traced.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ from .sampling import (
 
 @dataclass(frozen=True)
 class Recursion:
-    """Equations made an estimator: what :class:`.KalmanFilter` and :class:`.Observer` share.
+    """Common base class of :class:`.KalmanFilter` and :class:`.Observer`.
 
     Attributes:
         model: the equations and their parameters.
@@ -58,12 +58,12 @@ class Recursion:
 
     @property
     def channels(self) -> tuple[Channel, ...]:
-        """What it reads."""
+        """Required channels."""
         return self.model.channels
 
     @property
     def outputs(self) -> tuple[Quantity, ...]:
-        """What it gives."""
+        """Estimated quantities."""
         return self.model.outputs
 
     @property
@@ -80,14 +80,14 @@ class Recursion:
         return replace(self, model=self.model.with_dt(dt))
 
     def init(self, measurement: Measurement) -> FilterState:
-        """Empty memory with the batch shape and array kind of ``measurement`` (no sample is used up)."""
+        """Initial state with the batch shape and array type of ``measurement``, which is not processed."""
         arrays = check_measurements(self.channels, measurement, time_axis=False)
         return empty_state(self.model, join(arrays, self.channels))
 
     def step(
         self, state: FilterState, measurement: Measurement, gains: Gains | None = None
     ) -> tuple[FilterState, Estimate]:
-        """Take one sample of every channel, ``(*batch, size)``; NaN where there is none.
+        """Process one sample of every channel, ``(*batch, size)``; NaN where there is none.
 
         Args:
             state: from :meth:`init` or the step before; it is not changed.
@@ -119,7 +119,7 @@ class Recursion:
     def run_from(
         self, state: FilterState | None, measurements: Mapping[str, Any], gains: Gains | None = None
     ) -> tuple[Estimate, FilterState]:
-        """As :meth:`run`, but going on from ``state`` (None: from the start) and giving the last state too."""
+        """As :meth:`run`, but from ``state`` (None: from the start), and also returns the last state."""
         arrays = check_measurements(self.channels, measurements, time_axis=True)
         check_gains(self.gains, gains, type(self.model).__name__)
         first = {name: array[0] for name, array in arrays.items()}
@@ -207,7 +207,7 @@ class Recursion:
 
 
 def correct(P: Array, r: Array, H: Array, R: Array) -> tuple[Array, Array, Array]:
-    """Condition on one measurement; rows with anything not finite are left out.
+    """Condition on one measurement; rows with an element that is not finite are skipped.
 
         S = H P Hᵀ + R,   K = P Hᵀ S⁻¹,   P⁺ = (I − K H) P (I − K H)ᵀ + K R Kᵀ,   dx = K r
 

@@ -1,6 +1,6 @@
-"""Rotations: the only place of the project where they are computed.
+"""Rotations; all rotation arithmetic of the package is here.
 
-Unit quaternions are ``(..., 4)`` with the scalar first (w, x, y, z) and turn body coordinates into world coordinates:
+Unit quaternions are ``(..., 4)`` with the scalar first (w, x, y, z) and rotate body coordinates to world coordinates:
 ``v_world = rotate(q, v_body)``. The world is x east, y north, z up. Angles are radians. Every function broadcasts over
 leading dimensions and works on NumPy arrays, torch tensors and traced expressions.
 """
@@ -37,7 +37,7 @@ def normalize(v: Array) -> Array:
 
 
 def multiply(p: Array, q: Array) -> Array:
-    """Quaternion product ``p ⊗ q``: first turn by ``q``, then by ``p``."""
+    """Quaternion product ``p ⊗ q``: rotation by ``q``, then by ``p``."""
     xp = namespace(p, q)
     pw, px, py, pz = p[..., 0], p[..., 1], p[..., 2], p[..., 3]
     qw, qx, qy, qz = q[..., 0], q[..., 1], q[..., 2], q[..., 3]

@@ -1,1 +1,1 @@
-"""What every layer uses and no formula needs: files, processes, seeds, names, versions, optional packages."""
+"""Infrastructure for all layers: files, processes, seeds, names, versions, optional packages."""

@@ -1,4 +1,4 @@
-"""Things that users ask for by name, and what they are told if there are none of that name."""
+"""Look-up by name, with messages for unknown names."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Work on several processors, and bars that show how far it is."""
+"""Parallel processing and progress bars."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What users give as parameters of an estimator: types and ranges that follow from annotations and names."""
+"""Checks of the parameters of an estimator by types and ranges that follow from annotations and names."""
 
 from __future__ import annotations
 

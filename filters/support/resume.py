@@ -1,4 +1,4 @@
-"""Work that is interrupted and resumed: results kept in files, each with what it depends on."""
+"""Resuming interrupted work: results in files, each with a key of everything that it depends on."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which poise this is: its version, and a digest of its source files for what is kept between runs."""
+"""Version of poise, and a digest of its source files for results that are kept between runs."""
 
 from __future__ import annotations
 

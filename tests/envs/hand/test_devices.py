@@ -197,7 +197,7 @@ def test_what_does_not_fit_is_refused():
         HandMotionEnv("slow", device="planar")
     with pytest.raises(ValueError, match="must stay in the vertical plane"):
         simulate_hand("mixed", 0, device="planar")
-    with pytest.raises(ValueError, match="must be no rotation"):
+    with pytest.raises(ValueError, match="must be the identity"):
         HandMotionEnv(device="planar", mounting=rotation.exp(np.array([0.1, 0, 0])))
     with pytest.raises(ValueError, match="randomise must leave the mounting"):
         HandMotionEnv(device="planar", randomise=True)
