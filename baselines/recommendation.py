@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, get_args
@@ -164,32 +164,32 @@ def recommend(
     motion = motion_of(trajectory)
     results = load_results() if results is None else results
     found = [one for one in results["recordings"] if not one["dataset"].endswith(CORRECTED)]
-    suited = [one for one in found if mounting is None or MOUNTINGS.get(one["dataset"]) == mounting]
-    near = sorted(suited or found, key=lambda one: motion.distance(Motion(**one["motion"])))[:NEIGHBOURS]
-    sets = dict(Counter(one["dataset"] for one in near))
     alive = {name for name, values in trajectory.measurements.items() if np.nanmax(np.abs(values), initial=0.0) > 0.0}
-    ranking = [
-        row
-        for name, info in list_estimators().items()
-        if set(info.channels) <= alive and (row := ranked_row(name, info.kind, near)) is not None
-    ]
+    fed = {name: info.kind for name, info in list_estimators().items() if set(info.channels) <= alive}
+    # Errors are compared on recordings on which all these were run, such as those with a magnetometer too.
+    measured = {name for one in found for name in one["errors"] if name in fed}
+    complete = [one for one in found if measured <= set(one["errors"])]
+    suited = [one for one in complete if mounting is None or MOUNTINGS.get(one["dataset"]) == mounting]
+    if not suited:
+        suited = [one for one in found if mounting is None or MOUNTINGS.get(one["dataset"]) == mounting] or found
+    near = sorted(suited, key=lambda one: motion.distance(Motion(**one["motion"])))[:NEIGHBOURS]
+    sets = dict(Counter(one["dataset"] for one in near))
+    ranking = [row for name, kind in fed.items() if (row := ranked_row(name, kind, near, fed)) is not None]
     heading = "imu/mag" in alive
     # With a magnetometer those that tell the heading come first: the others leave it drifting.
     ranking.sort(key=lambda row: (heading and row["heading"] is None, row["inclination"]))
     return Recommendation(motion, [one["name"] for one in near], sets, ranking, notes_on(trajectory, motion, near))
 
 
-def ranked_row(name: str, kind: str, near: Sequence[Mapping[str, Any]]) -> dict[str, Any] | None:
-    """Errors of one estimator on the nearest recordings; None if it was run on less than half of them."""
+def ranked_row(name: str, kind: str, near: Sequence[Mapping[str, Any]], fed: Collection[str]) -> dict[str, Any] | None:
+    """Errors of one estimator on the nearest recordings, among those that can be fed; None if it was not run on all."""
     errors = [one["errors"][name] for one in near if name in one["errors"] and "inclination" in one["errors"][name]]
-    if not errors or 2 * len(errors) < len(near):
+    if not near or len(errors) < len(near):
         return None
     inclinations = [each["inclination"] for each in errors]
     headings = [each["heading"] for each in errors if "heading" in each]
-    best = sum(
-        name == min(one["errors"], key=lambda other: one["errors"][other].get("inclination", np.inf)) for one in near
-    )
-    reason = f"best of all on {best} of {len(near)}" if best else f"{len(errors)} of {len(near)} recordings"
+    best = sum(name == min(set(fed) & set(one["errors"]), key=lambda other: inclination_of(one, other)) for one in near)
+    reason = f"the best on {best} of these {len(near)}" if best else f"mean rank {rank_of(name, near, fed):.1f}"
     return {
         "estimator": name,
         "kind": kind,
@@ -198,6 +198,17 @@ def ranked_row(name: str, kind: str, near: Sequence[Mapping[str, Any]]) -> dict[
         "heading": float(np.mean(headings)) if headings else None,
         "reason": reason,
     }
+
+
+def inclination_of(recording: Mapping[str, Any], name: str) -> float:
+    """Inclination error of an estimator on a benchmark recording; infinite if there is none."""
+    return float(recording["errors"].get(name, {}).get("inclination", np.inf))
+
+
+def rank_of(name: str, near: Sequence[Mapping[str, Any]], fed: Collection[str]) -> float:
+    """Mean rank of an estimator among those that can be fed."""
+    ranks = [1 + sum(inclination_of(one, other) < inclination_of(one, name) for other in fed) for one in near]
+    return float(np.mean(ranks))
 
 
 def notes_on(trajectory: Trajectory, motion: Motion, near: Sequence[Mapping[str, Any]]) -> list[str]:

@@ -51,7 +51,7 @@ def test_the_nearest_recordings_decide(motions):
     six = {name: values for name, values in motions["severe"].measurements.items() if name != "imu/mag"}
     wild = recommend(motions["severe"].replace(measurements=six), results=found)
     assert [row["estimator"] for row in wild.ranking] == ["tilt", "mekf"]
-    assert wild.ranking[0]["reason"] == "best of all on 6 of 6"
+    assert wild.ranking[0]["reason"] == "the best on 6 of these 6"
 
 
 def test_a_magnetometer_that_works_puts_headings_first(motions):
@@ -61,6 +61,17 @@ def test_a_magnetometer_that_works_puts_headings_first(motions):
     assert nine.ranking[0]["heading"] == pytest.approx(1.0)
     dead = motions["slow"].measurements | {"imu/mag": np.zeros((len(motions["slow"]), 3))}
     assert recommend(motions["slow"].replace(measurements=dead), results=found).ranking[0]["estimator"] == "mekf"
+
+
+def test_nine_axes_are_compared_on_recordings_with_a_magnetometer(motions):
+    found = results(motion_of(motions["slow"]), motion_of(motions["severe"]))
+    for one in found["recordings"][:5]:
+        one["errors"] = {name: errors for name, errors in one["errors"].items() if name != "mekf-9"}
+    nine = recommend(motions["slow"], results=found)
+    assert nine.sets == {"calm": 3, "wild": 3}
+    assert {row["estimator"] for row in nine.ranking} == {"mekf-9", "mekf", "tilt"}
+    six = {name: values for name, values in motions["slow"].measurements.items() if name != "imu/mag"}
+    assert recommend(motions["slow"].replace(measurements=six), results=found).sets == {"calm": 6}
 
 
 def test_conditions_are_told(motions):
