@@ -41,10 +41,10 @@ class RiderBicycleEnv(PoseEnv):
 
     ## Description
 
-    Rider and bicycle are a multibody in PyBullet on tyres of our own. The rider steers with the arms, pedals with the
-    legs, sways and leans (``fidelity="full"``), or is a lump with a moving trunk (``"lumped"``: limb angles follow by
-    inverse kinematics, feet exert no forces of their own). World: x east, y north, z up; quaternions w, x, y, z, body
-    to world; bodies have x forward, y left, z up along the body. Actions do not change the ride.
+    Rider and bicycle are one multibody in PyBullet with the tyre model of this package. The rider steers with the arms,
+    pedals with the legs, sways and leans (``fidelity="full"``), or is a rigid body with a moving trunk (``"lumped"``:
+    limb angles follow by inverse kinematics, feet exert no forces). World: x east, y north, z up; quaternions w, x, y,
+    z, body to world; bodies have x forward, y left, z up along the body. Actions do not change the ride.
 
     ## Action Space
 
@@ -78,8 +78,8 @@ class RiderBicycleEnv(PoseEnv):
 
     ## Starting State
 
-    Riding, one second after a start at static tyre deflection with consistent velocities. This second is ridden at
-    every reset to another motion; a reset to the same motion of the same person returns to its end at once.
+    Riding, one second after a start at static tyre deflection with consistent velocities. A reset to another motion
+    simulates this second; a reset to the same motion of the same person restores its end at once.
 
     ## Episode End
 
@@ -114,15 +114,15 @@ class RiderBicycleEnv(PoseEnv):
         subject: 0…4, ``"random"``, or a :class:`poise.envs.bicycle.rider.anthropometry.RiderBody`; also a reset option.
         style: ``still``, ``mild``, ``normal``, ``aggressive``, or a style; None for that of the scenario.
         suite: ``two-gyro``, ``force-inertial``, ``whole-body``, ``all``, or a list of channels
-            (:mod:`poise.envs.bicycle.sensors.suites` says where they sit and how large their errors are) and of
-            :class:`.Sensor` objects of one's own on the bodies ``bicycle``, ``trunk``, ….
+            (:mod:`poise.envs.bicycle.sensors.suites` has their sites and errors) and of your own :class:`.Sensor`
+            objects on the bodies ``bicycle``, ``trunk``, ….
         sensors: ``paper``, ``ideal``, or a device (:func:`poise.envs.sensors.presets.list_sensor_presets`) in place of
             the papers' inertial sensors.
         rate: Hz; None for that of the suite.
         duration: s.
         fidelity: ``full`` or ``lumped``.
         bicycle: ``mountain-bike`` or parameters with a crank.
-        physics_rate: physics steps a second, Hz; a multiple of 250 Hz and of ``rate``.
+        physics_rate: physics steps per second, Hz; a multiple of 250 Hz and of ``rate``.
         score: one quantity or several of ``info["pose"]``; by default the orientations of bicycle and trunk.
         noise_scale: factor on all errors, 0 for none.
         sampling: ``interval`` or ``instant``, of gyroscopes and accelerometers.
@@ -229,12 +229,12 @@ class RiderBicycleEnv(PoseEnv):
             self._scene = None
 
     def _fit(self, posture: Posture) -> None:
-        """Put the sensors on a person on the bicycle."""
+        """Mount the sensors on a person on the bicycle."""
         self._posture, self._sites = posture, sensor_sites(posture)
         self._suite = rider_bicycle_suite(sites=self._sites, gravity=STANDARD_GRAVITY, **self._sensors)
 
     def next_block(self, most: int) -> Block:
-        """Ride on and let the sensors see it."""
+        """Advance the ride and simulate the sensors."""
         log, bodies, pose = self._source.record(min(most, BLOCK))
         contact = log.contact
         ride = RideQuantities(

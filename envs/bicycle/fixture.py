@@ -1,7 +1,7 @@
 """``poise/BicycleFixture-v0``: a bicycle pushed around a circle with a motor-driven tilted disk on it.
 
-The two-gyroscope paper tries its filter on such a fixture before it tries it on a rider. No physics: the motion is
-prescribed in closed form (roll at will, no pitch, wheels without slip).
+The two-gyroscope paper tests its filter on such a fixture before riders. There is no physics: the motion is prescribed
+in closed form (arbitrary roll, no pitch, wheels without slip).
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ BLOCK = 200
 
 @dataclass(frozen=True)
 class FixtureMotion:
-    """A push around a circle; everything is a sum of sines around a steady value. Angles in rad, rates in rad/s."""
+    """A push around a circle; each coordinate is a steady value plus a sum of sines. Angles in rad, rates in rad/s."""
 
     radius: float
     """m, left positive"""
@@ -121,7 +121,7 @@ class BicycleFixtureEnv(PoseEnv):
 
     ## Description
 
-    A hand-pushed bicycle goes around a circle of about 2 m radius and rolls at will, without pitch. A motor turns a
+    A hand-pushed bicycle goes around a circle of about 2 m radius with varying roll and without pitch. A motor turns a
     tilted disk on it. Prescribed motion in closed form, no physics. World: x east, y north, z up; quaternions w, x,
     y, z, body to world.
 
@@ -140,7 +140,7 @@ class BicycleFixtureEnv(PoseEnv):
 
     ## Starting State
 
-    Under way.
+    In motion.
 
     ## Episode End
 
@@ -199,7 +199,7 @@ class BicycleFixtureEnv(PoseEnv):
 
     @property
     def geometry(self) -> RiderGeometry:
-        """Of the bicycle; the rider in it is not there."""
+        """Geometry of the bicycle, without a rider."""
         return rider_geometry(self._posture, self.sites)
 
     def begin(self, motion: np.random.Generator, sensors: np.random.Generator, options: Mapping[str, Any]) -> int:
@@ -209,7 +209,7 @@ class BicycleFixtureEnv(PoseEnv):
         return max(1, round(self.duration * self.rate))
 
     def next_block(self, most: int) -> Block:
-        """Push on and let the sensors see it."""
+        """Advance the push and simulate the sensors."""
         assert self._motion is not None
         time = (self._steps + np.arange(min(most, BLOCK))) / self.rate
         self._steps += len(time)
@@ -233,7 +233,7 @@ class BicycleFixtureEnv(PoseEnv):
         return Block(time, measurements, pose, truth, np.ones(len(time), bool))
 
     def save_source(self) -> Any:
-        """The push and how far it is."""
+        """The push and the position in it."""
         return self._motion, self._steps
 
     def restore_source(self, saved: Any) -> None:

@@ -27,9 +27,9 @@ class RiderBicycleGainEnv(GainTuningEnv):
 
     Every episode is a new ride of ``poise/RiderBicycle-v0`` with new sensor errors, simulated at reset and then
     filtered: a step runs the filter over ``interval`` seconds (several samples) with the gains of the action. A bicycle
-    is what filters with an accelerometer find hard: it leans into its turns, so that the mean specific force points
-    along its own vertical and not along the world's. Nothing that the agent sees contains the truth, and actions do
-    not change the ride.
+    is difficult for filters with an accelerometer: it leans into its turns, so that the mean specific force points
+    along the bicycle's upward axis and not along the world's. Observations do not contain the truth, and actions do not
+    change the ride.
 
     ## Action Space
 
@@ -57,7 +57,7 @@ class RiderBicycleGainEnv(GainTuningEnv):
     ## Episode End
 
     Truncated when the ride is over, or early where the rider fell (no preset scenario makes them fall); never
-    terminated. Samples that fill no interval are left out.
+    terminated. Samples of an incomplete last interval are left out.
 
     ## Info
 
@@ -68,8 +68,8 @@ class RiderBicycleGainEnv(GainTuningEnv):
     ## Cost
 
     A reset simulates the whole ride: with the lumped rider a tenth of its duration or so, with the full one a
-    quarter. To train for long, record rides once and give their :func:`.imu_of` to
-    ``poise/ReplayGain-v0``: its resets are free.
+    quarter. For long trainings, record rides once and pass their :func:`.imu_of` to
+    ``poise/ReplayGain-v0``, whose resets need no simulation.
 
     ## Arguments
 
@@ -80,11 +80,11 @@ class RiderBicycleGainEnv(GainTuningEnv):
         subject: 0…4, ``"random"`` for a new rider in every episode, or a rider.
         style: how the rider moves; None for that of the scenario.
         sensors: ``paper``, ``ideal``, or a device (:func:`poise.envs.sensors.presets.list_sensor_presets`).
-        rate: samples a second, Hz.
+        rate: samples per second, Hz.
         duration: of an episode, s.
-        fidelity: ``lumped`` (cheap; hands, feet and limbs exert no reactions of their own on frame and trunk) or
+        fidelity: ``lumped`` (cheap; hands, feet and limbs exert no reactions on frame and trunk) or
             ``full``.
-        physics_rate: physics steps a second, Hz; a multiple of 250 Hz and of ``rate``.
+        physics_rate: physics steps per second, Hz; a multiple of 250 Hz and of ``rate``.
         noise_scale: factor on all sensor errors.
         sampling: ``interval`` or ``instant``.
         common: ``gains``, ``quantity``, ``interval`` (s), ``reward``, ``consistency`` of
@@ -156,7 +156,7 @@ class RiderBicycleGainEnv(GainTuningEnv):
         ride = self.rides[int(generator.integers(len(self.rides)))]
         self._ridden = record(ride, seed=int(generator.integers(2**32)))
         self._scenery = ride.scenery
-        # another person or another ground: the picture is made anew when it is asked for
+        # another person or another ground: the scene is recreated on demand
         super().close()
         return self._ridden if self.of_rides else imu_of(self._ridden, self.site)
 

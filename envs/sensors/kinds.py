@@ -1,6 +1,6 @@
-"""Kinds of sensors as data: what an ideal one reads, its unit, size and range, in the table :data:`KINDS`.
+"""Kinds of sensors as data: ideal reading, unit, size and range, in the table :data:`KINDS`.
 
-A further kind is one more entry, or a :class:`SensorKind` of one's own: given to a
+A further kind is one more entry, or a user-defined :class:`SensorKind`: given to a
 :class:`~poise.envs.sensors.sensor.Sensor` directly, or by name after :func:`register_sensor_kind`.
 """
 
@@ -19,7 +19,7 @@ from .ideal import BodyState, Mounting, Sampling, instant_readings, magnetometer
 
 @dataclass(frozen=True)
 class SiteMotion:
-    """What happens at a sensor site at n consecutive samples, for the reading of an ideal sensor.
+    """Motion of a sensor site at n consecutive samples, from which an ideal sensor is computed.
 
     Attributes:
         now: states ``(n, …)`` of the site at the samples; its axes are those of the sensor.
@@ -28,7 +28,7 @@ class SiteMotion:
         sampling: ``interval`` or ``instant``.
         gravity: m/s².
         field: ``(3,)`` magnetic field in the world, µT.
-        surroundings: what the environment knows besides, for kinds made for it.
+        surroundings: further quantities of the environment, for kinds that read them.
     """
 
     now: BodyState
@@ -164,7 +164,7 @@ KINDS: dict[str, SensorKind] = {
 
 
 def register_sensor_kind(kind: SensorKind) -> SensorKind:
-    """Make a kind known by its name, to sensors and presets.
+    """Register a kind by its name, for sensors and presets.
 
     Returns:
         The kind.

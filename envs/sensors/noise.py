@@ -1,4 +1,4 @@
-"""Errors of real sensors: :class:`NoiseModel` holds their sizes, :class:`NoiseProcess` draws those of an episode.
+"""Errors of real sensors: :class:`NoiseModel` has their parameters, :class:`NoiseProcess` draws those of an episode.
 
 Order of the chain: scale factor, misalignment and g-sensitivity; white noise; low-pass; bias; quantisation;
 saturation; loss of samples. Everything that is independent of the signal is drawn from normal numbers in a fixed layout
@@ -22,14 +22,14 @@ from ...filters.core import rotation
 Form = Literal["additive", "angle", "rotation", "counted"]
 """Error model. ``additive``: the error is added to the reading. ``angle``: likewise, wrapped to [−π, π]. ``rotation``:
 the reading is a unit quaternion and is rotated by the error, a rotation vector (rad) in axes of the child frame.
-``counted``: additive, but what quantisation leaves is carried to the next sample, as an incremental encoder does."""
+``counted``: additive, quantised with carry to the next sample, like an incremental encoder."""
 
 FORMS: tuple[Form, ...] = ("additive", "angle", "rotation", "counted")
 
 
 @dataclass(frozen=True)
 class NoiseModel:
-    """How large the errors of a channel are. ``u`` stands for the unit of the channel; standard deviations per axis.
+    """Parameters of the errors of a channel. ``u`` is the unit of the channel; standard deviations are per axis.
 
     The defaults are an ideal sensor. Terms follow IEEE Std 952 (gyroscopes) and IEEE Std 1293 (accelerometers).
 
@@ -60,7 +60,7 @@ class NoiseModel:
     bandwidth: float = math.inf
     """Hz: -3 dB of a second-order Butterworth low-pass; without effect from half the sampling rate upwards"""
     dropout: float = 0.0
-    """1: probability that a sample is lost by itself"""
+    """1: probability of an isolated lost sample"""
     burst_rate: float = 0.0
     """1/s: how often a burst of lost samples begins"""
     burst_duration: float = 0.2
@@ -123,17 +123,17 @@ class NoiseState:
     signal_filter: np.ndarray | None
     """(2, W) low-pass on the signal; None before the first sample"""
     carry: np.ndarray
-    """(W,) what counting left for the next sample, u"""
+    """(W,) carry of the quantisation to the next sample, u"""
 
 
 class NoiseProcess:
     """The errors of one channel during one episode.
 
     Args:
-        model: how large they are.
+        model: their parameters.
         size: values a sample.
-        rate: samples a second.
-        generator: what to draw from; the process owns it from now on.
+        rate: samples per second.
+        generator: source of randomness, owned by the process from now on.
         form: the error model.
         units: size of one unit of ``model`` on each axis of the error, in units of the channel; empty for ones.
 

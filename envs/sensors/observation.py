@@ -1,6 +1,6 @@
-"""What environments sense with: channels whose measurements become observations.
+"""Channels of an environment, whose measurements become observations.
 
-What was not sampled keeps its last valid sample (zero-order hold) and is marked as not fresh.
+A channel without a new sample keeps its last valid one (zero-order hold); its flag in ``fresh`` is then 0.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ class Sensing:
         self._forget()
 
     def _forget(self) -> None:
-        """Begin anew: zeros stand for channels without a sample so far."""
+        """Reset: zeros represent channels without a sample so far."""
         self.held = {channel.name: np.zeros(channel.size, np.float32) for channel in self.channels}
 
     def reset(self, rng: np.random.Generator) -> None:

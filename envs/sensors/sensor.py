@@ -1,4 +1,4 @@
-"""One sensor of a suite: what it senses, where it sits, its rate and its errors."""
+"""One sensor of a suite: kind, mounting, rate and errors."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Placement = tuple[str, Mounting, Sampling, float]
 
 @dataclass(frozen=True)
 class Sensor:
-    """A channel with what it senses, where it sits, its rate and its errors.
+    """A channel with its kind of sensor, mounting, rate and errors.
 
     Raises:
         ValueError: a field out of its range, or a channel of another size than the kind has.
@@ -29,7 +29,7 @@ class Sensor:
 
     channel: Channel
     kind: str | SensorKind
-    """a name of :data:`poise.envs.sensors.kinds.KINDS`, or a kind of one's own"""
+    """a name of :data:`poise.envs.sensors.kinds.KINDS`, or a user-defined kind"""
     rate: float
     """Hz"""
     noise: NoiseModel
@@ -68,7 +68,7 @@ class Sensor:
 
     @property
     def placement(self) -> Placement | None:
-        """What sensors have in common whose motion is computed together; None if it does not sense its own motion."""
+        """Key of sensors whose motion is computed together; None if the sensor does not measure its own motion."""
         return (self.body, self.mounting, self.sampling, float(self.rate)) if self.sensing.on_body else None
 
     @property
@@ -111,12 +111,12 @@ class Sensor:
 
 
 def due(rate: float, steps: np.ndarray, step_rate: float) -> np.ndarray:
-    """At which of the time steps ``(T,)`` a sensor is sampled: where its own clock struck since the step before.
+    """Time steps ``(T,)`` at which a sensor is sampled: those that follow a multiple of its own interval.
 
     Args:
         rate: of the sensor, Hz.
         steps: counted from 0, when every sensor is due.
-        step_rate: time steps a second, Hz, at least ``rate``.
+        step_rate: time steps per second, Hz, at least ``rate``.
 
     Returns:
         Indices into ``steps``.

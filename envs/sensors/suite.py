@@ -32,7 +32,7 @@ class SuiteState:
 
 
 class Sensed(NamedTuple):
-    """Measurements of T time steps, and what they were made from.
+    """Measurements of T time steps, with biases and motions of the sensors.
 
     Attributes:
         measurements: channel → ``(T, size)``, NaN where not sampled or lost.
@@ -55,7 +55,7 @@ class SensorSuite(Sensing):
 
     Args:
         sensors: in the order of ``fresh``.
-        rate: time steps a second, Hz.
+        rate: time steps per second, Hz.
         gravity: m/s².
         field: magnetic field in the world (east, north, up), ``(3,)``, µT; None for that of :func:`.magnetic_field`.
 
@@ -91,7 +91,7 @@ class SensorSuite(Sensing):
         """Begin an episode: draw what is constant in it and forget the last one.
 
         Args:
-            rng: every sensor draws from a child of its own, so adding sensors at the end changes nothing before them.
+            rng: each sensor draws from a separate child, so sensors added at the end do not change the others.
         """
         super().reset(rng)
         children = rng.spawn(len(self.sensors))
@@ -264,13 +264,13 @@ def imu_suite(
 
     Args:
         preset: name of a device (:func:`list_sensor_presets`) or a preset; its ``others`` get channels of their own.
-        rate: samples a second, Hz.
+        rate: samples per second, Hz.
         lever_arm: ``(3,)`` m, from the body frame's origin to the sensor, body axes.
         mounting: ``(4,)`` unit quaternion w, x, y, z, sensor axes to body axes.
         magnetometer: False for none, True for one at ``rate``, or its own rate in Hz.
         sampling: ``interval`` or ``instant``.
         noise_scale: factor on all errors; 0 for an ideal sensor with the preset's full scale.
-        step_rate: time steps of the suite a second, Hz; None for ``rate``.
+        step_rate: time steps of the suite per second, Hz; None for ``rate``.
         site: first part of the channel names.
         body: name of the body.
         gravity: m/s².

@@ -1,1 +1,1 @@
-"""Where a ride goes: paths, terrain, scenarios and the drawn scene."""
+"""Courses of rides: paths, terrain, scenarios and the rendered scene."""

@@ -58,7 +58,7 @@ class Path:
         return SPACING * (len(self._rows) - 1)
 
     def at(self, distance: float) -> PathPoint:
-        """The point at an arc length (m); beyond the ends the path goes straight on."""
+        """The point at an arc length (m); beyond its ends the path is straight."""
         last = len(self._rows) - 1
         place = distance / SPACING
         if place <= 0.0 or place >= last:
@@ -144,7 +144,7 @@ def wandering_path(
     if not smallest_radius <= widest < math.inf:
         raise ValueError(f"widest_radius must be at least {smallest_radius} m and finite, got {widest_radius}")
     inner = 0.5 * np.array(size) - 1.3 * smallest_radius
-    # from everywhere a corner of the inner rectangle is at least this far away
+    # every point of the inner rectangle has a corner at least this far away
     if not 0.0 <= shortest_leg <= 0.95 * math.hypot(*inner):
         raise ValueError(f"shortest_leg must lie in [0, {0.95 * math.hypot(*inner):.0f}] m, got {shortest_leg}")
     x, y, heading = start
@@ -158,7 +158,7 @@ def wandering_path(
             return goal, smallest_radius
         return goal, max(smallest_radius, min(float(rng.uniform(smallest_radius, widest)), 0.4 * room))
 
-    # the run-up has taken room already
+    # the straight beginning has used some of the length
     goal, radius, curvature = next_goal()[0], smallest_radius, 0.0
     values = np.empty(max(2, math.ceil(length / SPACING) + 1))
     for index in range(len(values)):
@@ -169,11 +169,11 @@ def wandering_path(
         bearing = math.remainder(math.atan2(dy, dx) - heading, 2.0 * math.pi)
         # a ride begins straight
         sharpest = min(1.0, index * SPACING / RUN_UP) / radius
-        # near a wall, or to a goal inside the circle of the present turn, only turning more helps
+        # near a wall, or for a goal inside the circle of the present turn, a tighter turn is needed
         if dx * dx + dy * dy < (2.0 * radius) ** 2 or abs(x) > inner[0] or abs(y) > inner[1]:
             sharpest = max(sharpest, min(1.0, index * SPACING / RUN_UP) / smallest_radius)
         wanted = max(-sharpest, min(sharpest, 0.5 * bearing))
-        # a rider turns the bar over a metre or two
+        # a rider changes the steering angle over one or two metres
         curvature += (wanted - curvature) * SPACING / 1.2
         heading += curvature * SPACING
         x, y = x + math.cos(heading) * SPACING, y + math.sin(heading) * SPACING

@@ -1,4 +1,4 @@
-"""Where and how fast to ride: a registry of scenarios, each drawn anew from a generator, and composable."""
+"""Registry of scenarios (course and speed), which are drawn from a generator and can be combined."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ class Course:
 
 @dataclass(frozen=True)
 class Scenario:
-    """How a kind of course is drawn. Replace a part (``dataclasses.replace``) to compose another scenario."""
+    """Distribution of a kind of course. Replace a part (``dataclasses.replace``) to compose another scenario."""
 
     name: str
     summary: str
@@ -64,7 +64,7 @@ class Scenario:
     ground: Callable[[np.random.Generator, Path, SpeedProfile], Ground]
     """generator, path, speed → ground"""
     style: str = "normal"
-    """how the rider moves by default"""
+    """default riding style"""
 
     def draw(self, rng: np.random.Generator, duration: float) -> Course:
         """Draw a course for a ride of ``duration`` seconds."""

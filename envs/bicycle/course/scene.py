@@ -1,4 +1,4 @@
-"""Pictures of rider and bicycle and of the fixture: the same shapes as in the physics, in a world of their own."""
+"""Rendering of rider, bicycle and fixture: the shapes of the physics, in a separate world."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ with extra("sim"):
     import pybullet
 
 DISK_RADIUS, DISK_COLOUR, POST_COLOUR = 0.2, (0.93, 0.86, 0.62), (0.55, 0.57, 0.6)
-"""m; what a disk of the two-gyroscope paper's fixture looks like"""
+"""m; appearance of the disk of the two-gyroscope paper's fixture"""
 TILE, TILES = 1.0, 8
 """m, and tiles on each side of the bicycle"""
 
@@ -32,7 +32,7 @@ class BicycleScene:
     """A bicycle over a ground of tiles that follows it.
 
     Args:
-        tree: the bicycle, and what hangs on it.
+        tree: the bicycle and its attachments.
         ground: what it rolls on.
         gui: open a window.
     """

@@ -1,7 +1,7 @@
 """A bicycle as one multibody in PyBullet: rear frame, front assembly, two wheels, crank; tyres and chain around it.
 
 The base is the rear frame and its body frame is the bicycle frame: origin on the ground under the rear hub when
-upright, x forward, y left, z up. A rider hangs further links on the same tree.
+upright, x forward, y left, z up. A rider adds further links to the same tree.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ class BicycleState(NamedTuple):
 
 @dataclass(frozen=True)
 class BicycleMemory:
-    """What the bicycle remembers besides PyBullet's state."""
+    """State of the bicycle in addition to PyBullet's state."""
 
     bristles: tuple[tuple[float, float], ...]
     drivetrain: tuple[float, float, float] | None
@@ -102,7 +102,7 @@ class Bicycle:
         ground: what it rolls on; None for a level plane at height 0.
         tyre: its tyres.
         load: what sits on it when starting, for the tyres' static deflection: mass and centre of the rider.
-        extend: hangs further links (a rider) on the tree before it is loaded.
+        extend: adds further links (a rider) to the tree before it is loaded.
     """
 
     def __init__(
@@ -153,7 +153,7 @@ class Bicycle:
 
     @property
     def ratio(self) -> float:
-        """Turns of the rear wheel a turn of the crank (0 without a crank)."""
+        """Revolutions of the rear wheel per revolution of the crank (0 without a crank)."""
         return 0.0 if self.drivetrain is None else self.drivetrain.ratio
 
     def lay(self, ground: Ground | None) -> None:
@@ -273,8 +273,8 @@ class Bicycle:
     def brake_torques(self, force: float) -> tuple[float, float]:
         """Torques (N·m, not positive) of the brakes on rear and front wheel that together brake with a force (N).
 
-        They share it as the wheels share the weight while slowing down. Each lets go before its wheel would skid, and
-        fades below walking pace: brakes hold wheels, they do not turn them back.
+        They share it in proportion to the load on the wheels during deceleration. Each is limited before its wheel
+        would skid, and fades below walking pace, so that brakes never turn a wheel backwards.
         """
         wheels = (self.parameters.rear_wheel, self.parameters.front_wheel)
         height, wheelbase = self._centre[2], self.parameters.wheelbase
@@ -293,13 +293,13 @@ class Bicycle:
         return found[0], found[1]
 
     def shift(self) -> None:
-        """Let the rider change the gear where the cadence asks for it."""
+        """Change the gear if the cadence requires it."""
         if self.drivetrain is not None:
             (wheel, wheel_rate), (crank, _) = self.body.joint_tuples(self._driven)
             self.drivetrain.shift(self.physics.time, crank, wheel, wheel_rate)
 
     def state(self) -> BicycleState:
-        """Where the bicycle is and how it moves, now."""
+        """Present state of the bicycle."""
         motion, angles = self._pose(*self.physics.base_tuples(self.body.body))
         x, y, z, speed, roll_rate, pitch_rate, yaw_rate = motion
         roll, pitch, yaw = angles
@@ -359,7 +359,7 @@ class Bicycle:
         return self.body.centre_motion(self.own_links)
 
     def own_wrench(self, before: CentreMotion, after: CentreMotion, point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Wrench of everything outside on the bicycle in the last step; see :func:`newton_euler`."""
+        """Wrench of all external forces on the bicycle in the last step; see :func:`newton_euler`."""
         dt, gravity = self.physics.time_step, self.physics.gravity
         return newton_euler(before, after, self.own_masses, self.own_moments, point, dt, gravity)
 

@@ -16,7 +16,7 @@ class Drivetrain:
     """A chain as a one-way torsional spring with damping: it pulls, and slips freely when the wheel overtakes.
 
     The torque follows from the twist between the crank (times the ratio) and the wheel. The torques on crank and wheel,
-    with their reactions on the frame, are what a chain's tension does when it is tangent to both sprockets.
+    with their reactions on the frame, are those of a chain tension tangent to both sprockets.
 
     Args:
         parameters: gears, stiffness and damping.
@@ -25,7 +25,7 @@ class Drivetrain:
     def __init__(self, parameters: DriveParameters) -> None:
         self.parameters = parameters
         self.ratio = parameters.gears[0]
-        """turns of the wheel a turn of the crank"""
+        """revolutions of the wheel per revolution of the crank"""
         self.slipped = 0.0
         """rad: angle by which the wheel has run ahead"""
         self._shifted = -math.inf

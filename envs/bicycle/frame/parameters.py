@@ -1,4 +1,4 @@
-"""What a bicycle is made of: geometry, masses and inertias, with units and source.
+"""Parameters of bicycles: geometry, masses and inertias, with units and source.
 
 Positions are in the *bicycle frame* of the upright bicycle with straight steering: origin on the ground under the rear
 hub, x forward, y left, z up. Inertias are matrix elements about the part's own centre of mass along these axes; a
@@ -21,7 +21,7 @@ class RigidPart:
     """A rigid body that is symmetric about the x-z plane.
 
     Raises:
-        ValueError: a mass or an inertia that no body can have.
+        ValueError: an impossible mass or inertia.
     """
 
     mass: float
@@ -91,7 +91,7 @@ class DriveParameters:
     inertia: Vector3
     """kg·m²: moments about the axle along x, y, z"""
     gears: tuple[float, ...] = (0.6, 0.8, 1.05, 1.4, 1.85, 2.4, 3.1)
-    """turns of the rear wheel a turn of the crank, rising"""
+    """revolutions of the rear wheel per revolution of the crank, rising"""
     chain_stiffness: float = 400.0
     """N·m/rad at the rear hub"""
     chain_damping: float = 8.0
@@ -119,7 +119,7 @@ class BicycleParameters:
     wheelbase: float
     """m"""
     trail: float
-    """m: how far the front contact trails the point where the steering axis meets the ground"""
+    """m: distance of the front contact behind the point where the steering axis meets the ground"""
     steer_axis_tilt: float
     """rad: backward tilt of the steering axis from the vertical (90° − head angle)"""
     rear_wheel: WheelParameters

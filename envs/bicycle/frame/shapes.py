@@ -1,4 +1,4 @@
-"""What a bicycle looks like: shapes to draw for each of its links."""
+"""Shapes of a bicycle for rendering, by link."""
 
 from __future__ import annotations
 

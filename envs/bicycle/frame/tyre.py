@@ -21,7 +21,7 @@ ROLLING_SPEED = 0.05
 
 @dataclass(frozen=True)
 class TyreParameters:
-    """What a tyre is made of; defaults are round figures of a bicycle tyre of 3 bar or so (choice of this project).
+    """Parameters of a tyre; defaults are rounded values of a bicycle tyre at about 3 bar (choice of this project).
 
     Raises:
         ValueError: a stiffness, length or friction that is not positive, or a negative damping.
@@ -36,11 +36,11 @@ class TyreParameters:
     shear_damping: float = 300.0
     """N·s/m"""
     relaxation_length: float = 0.1
-    """m: rolling distance over which a bristle forgets; cornering stiffness = shear stiffness times this"""
+    """m: relaxation length of a bristle; cornering stiffness = shear stiffness times this"""
     friction: float = 0.9
     """1: largest ratio of shear force to load"""
     camber_thrust: bool = True
-    """whether a leaning wheel pushes sideways by itself, tan(camber) times the load"""
+    """whether a leaning wheel has a camber thrust of tan(camber) times the load"""
 
     def __post_init__(self) -> None:
         for name in ("stiffness", "shear_stiffness", "relaxation_length", "friction"):
@@ -74,7 +74,7 @@ AIRBORNE = TyreForce((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0)
 
 
 class Tyre:
-    """One tyre with its memory: the deflections of the bristles.
+    """One tyre with its state: the deflections of the bristles.
 
     Args:
         radius: to the tread of the unloaded tyre, m.

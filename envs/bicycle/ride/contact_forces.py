@@ -1,7 +1,7 @@
-"""Forces between rider and bicycle, from the rider's motion: Newton's and Euler's laws, not PyBullet's joint sensors.
+"""Forces between rider and bicycle, from the rider's motion by Newton–Euler, without PyBullet's joint sensors.
 
-The seat carries what the rider's change of momentum needs besides gravity, hands and feet. Three load cells under the
-saddle share its vertical force and its horizontal moments as statics demands.
+The seat force follows from the rate of change of the rider's momentum, gravity, and the forces on hands and feet. Three
+load cells under the saddle share its vertical force and horizontal moments by statics.
 """
 
 from __future__ import annotations
@@ -98,7 +98,7 @@ def contact(
     physics = rider.bicycle.physics
     force, moment = newton_euler(before, after, rider.masses, rider.moments, saddle, physics.time_step, physics.gravity)
     for forces, places in (hands, feet):
-        # what the rider does to bar and pedals, they do back
+        # reactions of handlebar and pedals
         force = force + forces.sum(axis=0)
         moment = moment + rotation.cross(places - saddle, forces).sum(axis=0)
     return Contact(-force, -moment, hands[0], feet[0])

@@ -1,9 +1,9 @@
 """Rider control model: balance, path and speed.
 
 Steering is a linear-quadratic regulator on the Whipple model of rider and bicycle, extended by heading, offset from the
-path and its integral, with gains scheduled on speed. Speed follows what is wanted and what the curvature ahead allows,
-by a force at the wheels that pedalling, or the brakes, have to provide: known resistances and a proportional-integral
-correction.
+path and its integral, with gains scheduled on speed. The speed controller follows the target speed within the limits of
+the curvature ahead. Its output is a force at the wheels, provided by pedalling or brakes: known resistances plus a
+proportional-integral correction.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ LOWEST_SPEED = 0.3
 PREVIEW_BIN = 0.1
 """s"""
 PREVIEW_BINS = 20
-"""how far the pilot looks ahead along the path"""
+"""preview distance of the rider along the path"""
 REACTION = 0.2
-"""s in which a rider's push or braking follows the wish to accelerate or slow down"""
+"""s, time constant of a rider's pedalling or braking"""
 ANTICIPATED = 3
-"""bins: the wish is that much early"""
+"""bins of lead of the target"""
 POSITIVE = ("effort", "largest_torque", "largest_drive", "largest_power", "lateral_acceleration", "braking", "rate")
 """settings that must not be zero"""
 
@@ -68,11 +68,11 @@ class ControlSettings:
     largest_brake: float = 4.2
     """m/s² by both brakes together, slope included; the rear wheel would lift off at 5"""
     lateral_acceleration: float = 2.0
-    """m/s²: the pilot slows down before turns that would need more"""
+    """m/s²: the rider slows down before turns that would need more"""
     forward_acceleration: float = 0.7
-    """m/s²: how fast the wanted speed rises"""
+    """m/s²: largest increase of the target speed"""
     braking: float = 1.5
-    """m/s²: how fast it falls, and what is reckoned with before a turn"""
+    """m/s²: largest decrease, also assumed before a turn"""
     rate: float = 250.0
     """Hz"""
 
@@ -85,7 +85,7 @@ class ControlSettings:
 
 @dataclass(frozen=True)
 class PilotMemory:
-    """What a pilot remembers."""
+    """State of the rider control model."""
 
     distance: float
     offset: float
@@ -116,9 +116,9 @@ def regulator(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Feedback and preview gains of the steer torque at one speed, with a zero-order hold between control steps.
 
-    The state is counted from that of the steady turn at the path's curvature, so that changes of the turn disturb it;
-    these are known ahead, and the optimal torque answers them before they come (linear-quadratic preview control, M.
-    Tomizuka, Optimal continuous finite preview problem, IEEE Trans. Autom. Control 20 (1975)).
+    The state is relative to that of the steady turn at the path's curvature, so that changes of the turn act as
+    disturbances. They are known in advance, and the optimal torque anticipates them (linear-quadratic preview control,
+    M. Tomizuka, Optimal continuous finite preview problem, IEEE Trans. Autom. Control 20 (1975)).
 
     Returns:
         Gains ``(7,)`` on the state, and ``(2, PREVIEW_BINS)`` on the change of the steady turn's roll and steer, rad,
@@ -155,13 +155,13 @@ def gain_row(bicycle: BicycleParameters, settings: ControlSettings, gravity: flo
 
 
 class Pilot:
-    """Keeps a bicycle upright, on a path and at a speed.
+    """Controller that keeps a bicycle upright, on a path and at a speed.
 
     Args:
         bicycle: rider included, see :meth:`BicycleParameters.with_load`.
         settings: weights.
         gravity: m/s².
-        highest_speed: up to which gains are computed, m/s.
+        highest_speed: highest speed of the gain table, m/s.
     """
 
     def __init__(
@@ -223,7 +223,7 @@ class Pilot:
         curvatures = self.path.curvatures(self.distance + distances)
         limits = self.speed_limits(curvatures, distances)
         speeds = np.minimum(speed, limits)
-        # who slows down gets there later
+        # braking delays the arrival
         times = np.concatenate([[0.0], np.cumsum(2.0 * np.diff(distances) / (speeds[1:] + speeds[:-1]))])
         steers = -self.bicycle.wheelbase / math.cos(self.bicycle.steer_axis_tilt) * curvatures
         rolls = (self._roll_share[0] + self._roll_share[1] * speeds**2) * steers
@@ -253,7 +253,7 @@ class Pilot:
         self.distance, self.offset = self.path.progress(self.distance, state.x, state.y)
         point = self.path.at(self.distance)
         heading = math.remainder(state.yaw - point.heading, 2.0 * math.pi)
-        # beyond a metre or half a radian off the path, come back steadily instead of ever harder
+        # beyond a metre or half a radian off the path, limit the correction
         offset = max(-1.0, min(1.0, self.offset))
         heading = max(-0.5, min(0.5, heading))
         self.offset_integral = max(-2.0, min(2.0, self.offset_integral + self.period * offset))
@@ -279,7 +279,7 @@ class Pilot:
         return self.command
 
     def _wish(self, speed: float) -> None:
-        """Let the wanted speed follow, no faster than is comfortable."""
+        """Rate-limit the target speed."""
         s = self.settings
         change = max(-s.braking * self.period, min(s.forward_acceleration * self.period, speed - self.target))
         self.target += change
@@ -302,7 +302,7 @@ class Pilot:
         return max(-largest_brake, min(largest_drive, force))
 
     def save(self) -> PilotMemory:
-        """All memory but the path."""
+        """State without the path."""
         return PilotMemory(
             self.distance,
             self.offset,

@@ -1,4 +1,4 @@
-"""One ride: world, bicycle, rider and pilot together, stepped, saved and restored."""
+"""One ride: world, bicycle, rider and control model, which can be stepped, saved and restored."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ from ..rider.style import RiderMotion
 from .control import ControlSettings, Pilot, PilotMemory
 
 PREVIEW = 0.3
-"""s: how far ahead the rider leans into turns"""
+"""s: lead of the rider's lean into turns"""
 COASTING = 5.0
-"""N of wanted slowing that is left to drag, before the brake is used"""
+"""N of deceleration force left to drag before the brakes are used"""
 FALLEN = 1.0
 """rad of roll at which a ride is over"""
 
@@ -46,9 +46,9 @@ class Ride:
         motion: how the rider moves.
         path: where to ride; the ride begins at its start.
         speed: wanted speed (m/s) over time (s).
-        ground: what to ride on; None for a level plane.
+        ground: None for a level plane.
         fidelity: ``full`` or ``lumped``.
-        physics_rate: physics steps a second, Hz; a multiple of the control rate.
+        physics_rate: physics steps per second, Hz; a multiple of the control rate.
         tyre: None for default tyres.
         control: None for default settings.
         crank: angle at the start, rad.
@@ -101,7 +101,7 @@ class Ride:
     ) -> None:
         """Start another ride of the same person in the same world; bit for bit what a new :class:`Ride` would do.
 
-        Nothing that was saved before can be restored any more. Arguments as those of the class.
+        States saved before can no longer be restored. Arguments as those of the class.
         """
         self.physics.steps = 0
         self.bicycle.lay(ground)
@@ -135,7 +135,7 @@ class Ride:
         self.state = state = self.bicycle.state()
         self.bicycle.shift()
         lean = self.rider.intended_lean
-        # a rider who leans to the right holds the bicycle further to the left
+        # a rider who leans to the right keeps the bicycle further to the left
         torque, drive = self.pilot.update(state, self.speed(state.time), -self._lean_effect * lean)
         ahead = self.path.at(self.pilot.distance + PREVIEW * state.speed)
         self.rider.plan(state, ahead.curvature, torque, drive)

@@ -87,8 +87,8 @@ class RideSource:
     def begin(self, scenario: Scenario, subject: Any, motion: np.random.Generator) -> None:
         """Begin a ride at the end of its first second; what was drawn is kept to ride it again.
 
-        The same draw goes back to the state kept there; another one of the same person begins in the same world;
-        another person, or a fall before, needs a new world. All three give the same ride, bit for bit.
+        The same draw restores the state kept there. Another draw of the same person begins in the same world; another
+        person, or a previous fall, requires a new world. All three give the same ride, bit for bit.
         """
         seed = str(motion.bit_generator.seed_seq.state)  # type: ignore[attr-defined]
         key = (scenario, subject, self.style, self.duration, self.physics_rate, self.tyre, seed)
@@ -152,7 +152,7 @@ class RideSource:
         return Ridden(log, bodies, pose)
 
     def save(self) -> SavedRide:
-        """The drawn ride and how far it is; also where PyBullet's state is kept for a quick return."""
+        """The drawn ride and the position in it, with a reference to PyBullet's state for a quick return."""
         assert self.ride is not None
         token = uuid.uuid4().hex
         self._kept[token] = self.ride.save()
@@ -161,7 +161,7 @@ class RideSource:
         return SavedRide(self._plan, self._samples, self.fallen_at, dict(self._quaternions), token)
 
     def restore(self, saved: SavedRide) -> None:
-        """Undo :meth:`save`: from memory where the ride is still there, else by riding it again."""
+        """Undo :meth:`save`: from memory if the state is still there, else by simulating the ride again."""
         if self.ride is not None and saved.plan is self._plan and saved.token in self._kept:
             self.ride.restore(self._kept[saved.token])
         else:

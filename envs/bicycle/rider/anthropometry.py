@@ -77,7 +77,7 @@ class RiderBody:
     """A person.
 
     Raises:
-        ValueError: a stature or mass that no rider has, or both together.
+        ValueError: an impossible stature or mass, or combination of both.
     """
 
     stature: float = 1.76

@@ -19,13 +19,13 @@ CRANKS = np.linspace(0.0, 2.0 * math.pi, POINTS)
 SHOULDERS_FOLLOW = 0.45
 """part of the steering angle by which the trunk twists, so that the outer hand stays within reach"""
 STRAIGHTEST = 0.985
-"""part of the straight arm's length that an arm is stretched to"""
+"""largest extension of an arm, as a share of its straight length"""
 BIT = 0.01
 """rad for slopes"""
 
 
 class LimbTables:
-    """Abduction of each limb over steer (arms) or crank (legs), and the legs' weight felt at the crank.
+    """Abduction of each limb over steer (arms) or crank (legs), and the torque of the legs' weight at the crank.
 
     Args:
         posture: the person on the bicycle.
@@ -90,7 +90,7 @@ class LimbTables:
         return angles
 
     def abductions(self, steer: float, crank: float, trunk: Sequence[float], swivel: Sequence[float]) -> list[float]:
-        """Abduction of each limb that puts elbows and knees where they are wanted, rad.
+        """Abduction of each limb for given positions of elbows and knees, rad.
 
         Args:
             steer: rad, left positive.

@@ -1,4 +1,4 @@
-"""A rider as further links on the bicycle's tree, and what they look like."""
+"""The rider's links on the bicycle's tree, and their shapes."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from .anthropometry import Mass, join
 from .posture import LIMBS, SIGNS, Posture
 
 PIVOT_MASS, PIVOT_INERTIA = 1e-3, (1e-4, 1e-4, 1e-4)
-"""kg, kg·m² of the links between two of a joint's three axes: too little to be felt"""
+"""kg, kg·m² of the links between two of a joint's three axes: negligible"""
 SHIRT, TROUSERS, SKIN, SHOE = (0.15, 0.35, 0.65), (0.18, 0.18, 0.22), (0.85, 0.65, 0.52), (0.1, 0.1, 0.1)
 AXES = {"y": (0.0, 1.0, 0.0), "x": (1.0, 0.0, 0.0), "z": (0.0, 0.0, 1.0)}
 TRUNK_JOINTS = ("trunk_y", "trunk_x", "trunk")
@@ -30,7 +30,7 @@ def segment_links() -> tuple[str, ...]:
 
 
 def _three_joints(tree: Tree, parent: str, child: str, origin: np.ndarray, mass: Mass, shapes: list[str]) -> None:
-    """Hang a link on three joints about y, x and z that meet in one point."""
+    """Attach a link by three joints about y, x and z with a common centre."""
     for axis in ("y", "x"):
         tree.link(f"{child}_{axis}", PIVOT_MASS, PIVOT_INERTIA, (0.0, 0.0, 0.0))
         tree.joint(parent, f"{child}_{axis}", origin, AXES[axis])

@@ -1,4 +1,4 @@
-"""How a person sits on a bicycle: saddle height, trunk flexion, joints and limbs, and the masses they carry."""
+"""Posture of a person on a bicycle: saddle height, trunk flexion, joints, limbs and their masses."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ class Posture:
 
     @property
     def trunk_imu(self) -> tuple[float, float, float]:
-        """Place of the trunk's IMU in the trunk frame, m."""
+        """Position of the trunk's IMU in the trunk frame, m."""
         x, y, z = (self.body.scale * part for part in TRUNK_IMU)
         return x, y, z
 
@@ -87,7 +87,7 @@ class Posture:
         return origin + rotation.rotate(rotation.exp(axis * angle), zero)
 
     def elbow_out(self, side: str, trunk: np.ndarray) -> np.ndarray:
-        """Direction ``(..., 3)`` in which the elbow stands out, trunk axes: sideways in the bicycle frame."""
+        """Direction ``(..., 3)`` in which the elbow points, trunk axes: sideways in the bicycle frame."""
         return rotation.rotate_back(trunk, np.array([0.0, SIGNS[side], 0.0]))
 
     def arm_target(self, side: str, steer: np.ndarray | float, trunk: np.ndarray) -> np.ndarray:
@@ -220,7 +220,7 @@ def sit(bicycle: BicycleParameters, body: RiderBody) -> Posture:
 
 
 def loop_closure_error(truth: Mapping[str, np.ndarray], posture: Posture) -> np.ndarray:
-    """Distance between each hand or foot and what it holds, from the truth of a ride alone.
+    """Loop-closure errors at hands and feet, from the truth of a ride alone.
 
     The chain of the limb's orientations leads to the tip, steering and crank angle to the grip or the pedal.
 

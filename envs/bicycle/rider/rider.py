@@ -1,8 +1,8 @@
 """A rider who sits, holds, pedals, steers and sways: joint torques on the links of :mod:`.rider.links`.
 
 ``full``: hands and feet are held to handlebar and pedals by point-to-point constraints. The arms steer and the legs
-pedal by joint torques that let the tips push with the wanted force (virtual work); whatever else the constraints carry
-follows from the motion. ``lumped``: legs and arms are rigid parts of pelvis and trunk; the hands' forces act on the
+pedal by joint torques that produce the desired forces at the tips (virtual work). The remaining constraint forces
+follow from the motion. ``lumped``: legs and arms are rigid parts of pelvis and trunk; the hands' forces act on the
 handlebar and, oppositely, on the trunk, and the pedalling torque acts between frame and crank.
 """
 
@@ -55,7 +55,7 @@ USUAL_HAND_LOAD = 60.0
 
 @dataclass(frozen=True)
 class RiderMemory:
-    """What a rider remembers between physics steps."""
+    """State of a rider between physics steps."""
 
     torques: tuple[float, ...]
     trunk: tuple[float, ...]
@@ -119,11 +119,11 @@ class Rider:
         self.constraints: list[int] = []
 
     def extend(self, tree: Tree) -> None:
-        """Hang the rider's links on a bicycle's tree."""
+        """Add the rider's links to a bicycle's tree."""
         (add_full_rider if self.full else add_lumped_rider)(tree, self.posture)
 
     def mount(self, bicycle: Bicycle) -> None:
-        """Get to know the links after the bicycle with this rider was loaded."""
+        """Look up the links after the bicycle with this rider has been loaded."""
         self.bicycle, body = bicycle, bicycle.body
         self.trunk_links = body.index(TRUNK_JOINTS)
         self.limb_links = [body.index(limb_joints(name)) for name in LIMBS] if self.full else []
@@ -145,7 +145,7 @@ class Rider:
         """Take the posture at rest, hands and feet in place with consistent velocities.
 
         Args:
-            motion: what the rider intends.
+            motion: intended motion of the rider.
             crank: rad.
             crank_rate: rad/s.
         """
@@ -194,13 +194,13 @@ class Rider:
         return self._trunk_target[1]
 
     def plan(self, state: BicycleState, curvature: float, steer_torque: float, drive: float) -> None:
-        """Decide on muscle torques for the next control period.
+        """Compute muscle torques for the next control period.
 
         Args:
             state: of the bicycle.
             curvature: of the path a little ahead, 1/m, left positive.
             steer_torque: N·m on the handlebar, left positive.
-            drive: wanted force at the wheel, N; braking is not the rider's legs' business.
+            drive: desired propulsive force at the wheel, N, without braking.
         """
         change, swivel, unsteady = self.motion.at(state.time - self._began, curvature, state.roll)
         follow = SHOULDERS_FOLLOW * max(-0.8, min(0.8, state.steer))
@@ -214,11 +214,11 @@ class Rider:
         push = min(LARGEST_PEDAL_FORCE, wanted / (length * MEAN_STROKE)) if self.full else 0.0
         phases = [state.crank, state.crank + math.pi]
         downwards = [push * max(0.0, math.cos(phase)) for phase in phases]
-        # who pushes hard on the pedals pulls at the handlebar
+        # large pedal forces are balanced by pulling at the handlebar
         back = sum(down * (self._axle_arm + length * math.cos(a)) for down, a in zip(downwards, phases, strict=True))
         pulled = min(STRONGEST_PULL, max(0.0, back - PUSHED_BACK) / (len(SIDES) * self._press_arm))
         strength, load = 0.5 * steer_torque / self._grip_arm, self._hand_load
-        # a rider who leans props on the inner hand and eases the outer one, along the steering axis: no turn of the bar
+        # a leaning rider loads the inner hand and unloads the outer one, along the steering axis: no steering torque
         prop = self._prop * math.sin(self._trunk_target[1])
         eased = min(0.5 * abs(prop), (1.0 - LEAST_PRESS) * load)
         pressed = min(abs(prop) - eased, (MOST_PRESS - 1.0) * load)
@@ -241,7 +241,7 @@ class Rider:
         torques = [0.0, 0.0, 0.0]
         # muscles also carry the legs' weight around, half of it each
         lift = self._tables.leg_weight(state.crank)
-        # and keep the feet up with the wheel, so that the chain stays nearly taut
+        # and keep the crank at the speed of the wheel, so that the chain stays nearly taut
         lift += max(-15.0, min(15.0, KEEPING_UP * (state.wheel_rate / ratio - state.crank_rate)))
         up = self._into_trunk(trunk, [0.0, 0.0, self._elbow_weight])[0]
         for index, compute in enumerate(self._limb_torques):
@@ -265,7 +265,7 @@ class Rider:
         for index in range(3):
             angle, rate = felt[index]
             torques[index] += TRUNK_STIFFNESS * (self._trunk_target[index] - angle) - TRUNK_DAMPING * rate
-        # a rider knows the weight of the own trunk, and braces against what the hands press
+        # feed-forward of the trunk's weight and of the hand forces
         torques[0] -= gravity * self._trunk_moment * math.sin(felt[0][0])
         torques[0] += self._braced
         for index, target in enumerate(self._swivel):
@@ -305,7 +305,7 @@ class Rider:
         return straight_line(compute, position=3, front=4, frame=4, left=3, right=3)
 
     def grips(self) -> np.ndarray:
-        """Places ``(2, 3)`` of left and right hand now, world, m."""
+        """Positions ``(2, 3)`` of left and right hand now, world, m."""
         link = self.bicycle.links["front_assembly"]
         front = self.bicycle.physics.state(self.bicycle.body.body, link)
         arm = np.array(self.posture.bicycle.grip) - self.posture.bicycle.steer_origin
@@ -313,7 +313,7 @@ class Rider:
         return front.position + rotation.rotate(front.orientation, arms)
 
     def pedals(self) -> np.ndarray:
-        """Places ``(2, 3)`` of left and right pedal now, world, m."""
+        """Positions ``(2, 3)`` of left and right pedal now, world, m."""
         crank = self.bicycle.physics.state(self.bicycle.body.body, self.bicycle.links["crank"])
         drive = self.posture.bicycle.drive
         assert drive is not None
@@ -355,7 +355,7 @@ class Rider:
         return forces, self.pedals()
 
     def gaps(self) -> np.ndarray:
-        """Distance ``(4,)`` between each hand or foot and what it holds, m; zeros if lumped."""
+        """Loop-closure errors ``(4,)`` at hands and feet, m; zeros if lumped."""
         if not self.full:
             return np.zeros(4)
         physics, body = self.bicycle.physics, self.bicycle.body.body

@@ -1,6 +1,6 @@
-"""The soft part between pelvis and seat post: a vertical spring and damper that can only press.
+"""Compliance between pelvis and seat post: a vertical spring and damper that transmit compression only.
 
-Rider and saddle are otherwise one piece: the pelvis slides along the frame's z axis and does nothing else.
+The pelvis moves only along the frame's z axis; otherwise rider and saddle are rigidly connected.
 """
 
 from __future__ import annotations
@@ -57,9 +57,9 @@ class Saddle:
 
 
 ARMS_ON_HANDS = 0.30
-"""N/kg: weight of both arms that hangs on the hands, per mass of the rider (found in rides: 0.26 to 0.31)"""
+"""N/kg: weight of both arms carried by the hands, per mass of the rider (found in rides: 0.26 to 0.31)"""
 AHEAD = 0.06
-"""N·m/kg: moment of the trunk that the hands leave to the saddle, so that the weight rests just ahead of its middle"""
+"""N·m/kg: moment of the trunk carried by the saddle, so that the weight rests just ahead of its middle"""
 LEGS_ON_SADDLE = 0.4
 """1: part of the legs' weight that pedals do not carry (found in rides: 0.4)"""
 

@@ -1,4 +1,4 @@
-"""How a rider moves on the bicycle: sway, lean into turns, elbows and knees, unsteady hands. Mild to aggressive."""
+"""Riding styles from mild to aggressive: sway, lean into turns, elbows and knees, unsteady hands."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ LARGEST_LEAN = 0.4
 
 @dataclass(frozen=True)
 class RiderStyle:
-    """Habits of a rider; choices of this project within what riders are seen to do.
+    """Parameters of a riding style; choices of this project within observed ranges.
 
     Raises:
-        ValueError: a negative amplitude, or a sway that no rider does.
+        ValueError: a negative amplitude, or an implausible sway.
     """
 
     name: str
@@ -32,9 +32,9 @@ class RiderStyle:
     turn_lean: float
     """rad·m: lean into a turn, relative to the bicycle, times the path's curvature"""
     levelling: float
-    """1: part of the bicycle's roll that the trunk takes back, so that the shoulders stay level"""
+    """1: share of the bicycle's roll that the trunk compensates, so that the shoulders stay level"""
     swivel: float = math.radians(3.0)
-    """rad: standard deviation of how far elbows and knees stand off their usual plane, and of their slow wander"""
+    """rad: standard deviation of the swivel of elbows and knees and of its slow variation"""
     hand_load: float = 60.0
     """N that each hand leans on the handlebar, besides the arm's weight: about a fifth of the rider's weight in all.
     Of a rider of 1.76 m and 68 kg; others lean so that their weight rests on the same part of the saddle.
@@ -78,7 +78,7 @@ def rider_style(style: str | RiderStyle) -> RiderStyle:
 
 
 class RiderMotion:
-    """What one rider intends over time: smooth random functions, fixed when they are drawn.
+    """Intended motion of one rider: smooth random functions of time.
 
     Args:
         style: habits.

@@ -1,9 +1,9 @@
-"""Errors of the devices on the papers' instrumented bicycle: what they state, and what they leave open.
+"""Device noise models of the papers' instrumented bicycle: published values and assumptions.
 
 Sources: *two-gyro* = Y. Zhang, K. Chen, J. Yi, T. Liu, Q. Pan, rigid body on a moving platform with two gyroscopes and
 relative measurements; *force-inertial* = Y. Zhang, K. Chen, J. Yi, rider trunk and bicycle pose from force and inertial
 sensors, IEEE Trans. Biomed. Eng. 60 (2013); *whole-body* = whole-body pose in bicycle riding from a small set of
-wearable sensors. Whatever is called *assumed* is a choice of this project. Two choices recur: a limit ("below x") is
+wearable sensors. *Assumed* values are choices of this project. Two choices recur: a limit ("below x") is
 three standard deviations, and the gyroscopes' offset at rest has been measured and subtracted (force-inertial (14)), so
 that only its drift is left.
 """
@@ -20,7 +20,7 @@ DEG, G = math.pi / 180.0, STANDARD_GRAVITY
 LINES = 256
 """of the optical encoders (whole-body, section II-A: Grayhill 63R)"""
 COUNTS = 4 * LINES
-"""a turn: both edges of both tracks of the standard quadrature code (Grayhill 63R data sheet)"""
+"""per turn: both edges of both tracks of the standard quadrature code (Grayhill 63R data sheet)"""
 DRIFT_TIME = 1800.0
 """s: correlation time of gyroscope biases (force-inertial, table I)"""
 

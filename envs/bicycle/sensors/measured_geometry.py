@@ -70,7 +70,7 @@ def measured(
     places: float = 0.01,
     mass: float = 0.03,
 ) -> RiderGeometry:
-    """The same as somebody with a tape measure and a table of segment masses would have it.
+    """The same, as measured with a tape measure and a table of segment masses.
 
     Args:
         geometry: the true one.

@@ -16,15 +16,15 @@ from .sites import SensorSites
 
 @dataclass(frozen=True)
 class RideQuantities:
-    """What truly happens at one time step, or with a time axis first at many; world axes, SI units.
+    """True quantities at one time step, or with a leading time axis at many; world axes, SI units.
 
-    What no sensor of a suite needs may be left out.
+    Fields that no sensor of the suite needs may be left out.
     """
 
     bodies: Mapping[str, BodyState]
     """motion of the bodies named in :mod:`.sites`; distances need positions, everything else orientations"""
     sites: SensorSites
-    """where the sensors sit"""
+    """sensor sites"""
     wheel_rate: float | np.ndarray | None = None
     """(...) rad/s of the rear wheel, at the time step or on average since the last one"""
     steer: float | np.ndarray | None = None
@@ -53,7 +53,7 @@ class RideQuantities:
 def seat_wrench(ride: RideQuantities) -> np.ndarray:
     """Force (N) and moment about its own origin (N·m) of the rider on the six-axis sensor ``(..., 6)``, its axes.
 
-    The rider's weight reads negative on z. Saddle and post above the sensor are taken as massless.
+    The rider's weight is negative on z. Saddle and post above the sensor are massless.
     """
     frame, sensor = pick(ride.bodies, "bicycle").orientation, ride.sites.seat_sensor
     force, moment = (rotation.rotate_back(frame, ride.known(name)) for name in ("seat_force", "seat_moment"))
@@ -71,7 +71,7 @@ def seat_load_cells(ride: RideQuantities) -> np.ndarray:
 
 
 def centre_of_pressure(cells: np.ndarray, sites: SensorSites) -> np.ndarray:
-    """Where the vertical load on the saddle acts ``(..., 2)``: m ahead and to the left of the saddle point.
+    """Centre of pressure on the saddle ``(..., 2)``: m ahead and to the left of the saddle point.
 
     Args:
         cells: ``(..., 3)`` compression front, rear left, rear right, N.

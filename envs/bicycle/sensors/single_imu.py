@@ -1,4 +1,4 @@
-"""One inertial measurement unit of a ride, as if nothing else had been recorded, for filters of a single IMU."""
+"""Extraction of one inertial measurement unit of a ride, for filters of a single IMU."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ SITES = ("bicycle_imu", "trunk_imu")
 
 
 def imu_of(trajectory: Trajectory, site: str = "bicycle_imu") -> Trajectory:
-    """What one IMU of a ride measured, with the true motion of the sensor itself.
+    """Measurements of one IMU of a ride, with the true motion of the sensor.
 
     Args:
         trajectory: an episode of ``poise/RiderBicycle-v0`` or ``poise/BicycleFixture-v0``, recorded, loaded or
-            simulated; its metadata say where the sensors sit.
+            simulated; its metadata contain the sensor sites.
         site: ``bicycle_imu`` or ``trunk_imu``.
 
     Returns:

@@ -1,7 +1,7 @@
-"""Where the sensors of the published suites sit on rider and bicycle, and along which axes.
+"""Sensor sites and axes of the published suites on rider and bicycle.
 
-Sensor axes are x forward, y left, z up along the body that carries them (the papers' point down or to the right: signs
-change, nothing else). Bodies and frames, as the environment must name them: ``bicycle`` (rear frame; origin on the
+Sensor axes are x forward, y left, z up along the body that carries them. (The papers' axes point down or to the right,
+which changes signs only.) Bodies and frames: ``bicycle`` (rear frame; origin on the
 ground under the rear hub), ``trunk`` (origin in the lumbar joint, z up the trunk), ``upper_arm_left``,
 ``upper_arm_right``, ``thigh_left``, ``thigh_right`` (origin in the proximal joint, z from the distal joint to it).
 """
@@ -39,7 +39,7 @@ def pitched(angle: float) -> tuple[float, ...]:
 
 @dataclass(frozen=True)
 class SensorSites:
-    """Where the sensors sit on one rider and bicycle; lengths in m.
+    """Sensor sites on one rider and bicycle; lengths in m.
 
     Raises:
         ValueError: a wheel radius that is not positive, or not three markers and three viewpoints.
@@ -62,7 +62,7 @@ class SensorSites:
     markers: tuple[Vector3, Vector3, Vector3]
     """in the frame of the body that the camera sees"""
     viewpoints: tuple[Vector3, Vector3, Vector3]
-    """from where the distance of each marker is taken, bicycle frame; three times one point for one camera"""
+    """viewpoints of the marker distances, bicycle frame; three times the same point for one camera"""
     seen: str = "trunk"
     """the body that the camera sees"""
 
@@ -102,7 +102,7 @@ def sensor_sites(
         saddle=bicycle.saddle,
         seat_sensor=Mounting(seat, pitched(POST_TILT)),
         load_cells=LoadCells(),
-        # our tyre touches the ground with its tread where it is lowest, so it rolls on its unloaded radius
+        # the tyre model touches the ground with the lowest point of its tread, so it rolls on its unloaded radius
         wheel_radius=bicycle.rear_wheel.radius,
         markers=tuple(tuple((trunk + marker).tolist()) for marker in np.array(MARKERS)),  # type: ignore[arg-type]
         viewpoints=tuple(viewpoints),  # type: ignore[arg-type]

@@ -1,4 +1,4 @@
-"""The published sensor suites of rider and bicycle: which channels, on which device, at which rate."""
+"""The published sensor suites of rider and bicycle: channels, devices and rates."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ HIGHEST_RATE = 1000.0
 
 
 class BicycleChannel(NamedTuple):
-    """What is behind a channel."""
+    """Definition of a channel."""
 
     kind: SensorKind
     body: str
@@ -41,7 +41,7 @@ class BicycleChannel(NamedTuple):
 
     @property
     def size(self) -> int:
-        """Values a sample."""
+        """Number of values per sample."""
         return self.kind.size or 1
 
 
@@ -91,7 +91,7 @@ def list_bicycle_suites() -> list[str]:
 
 
 def suite_channels(name: str | Sequence[str | Sensor]) -> tuple[tuple[str, ...], tuple[Sensor, ...], float]:
-    """Channels, sensors of one's own, and rate (Hz) of a named suite or of a list (100 Hz).
+    """Channels, user-defined sensors, and rate (Hz) of a named suite or of a list (100 Hz).
 
     Raises:
         ValueError: an unknown suite or channel, a channel twice, or none.
@@ -145,7 +145,7 @@ def rider_bicycle_suite(
             (:func:`poise.envs.sensors.presets.list_sensor_presets`) in place of all inertial sensors.
         rate: time steps a second and rate of all sensors but the camera, Hz; None for that of the paper.
         noise_scale: factor on all errors, between 0 (ideal, with the papers' ranges and camera rate) and 1 or beyond.
-        sites: where they sit, see :func:`.sensor_sites`; None for the papers' mean rider on their mountain bike.
+        sites: see :func:`.sensor_sites`; None for the papers' mean rider on their mountain bike.
         magnetometer: add magnetometers to the bicycle's IMU, and to the trunk's where the suite has one.
         relative_rate: of the camera, Hz; None for the papers' 16 Hz (or ``rate``, if that is less), and for ``rate``
             with ideal sensors.
@@ -186,5 +186,5 @@ def rider_bicycle_suite(
                 signal, channel.kind, its_rate, noise, body, mounting, sampling, device.name, device.form, device.units
             )
         )
-    # sensors of one's own come last: they change no number of the others
+    # user-defined sensors come last, so that random numbers of the others do not change
     return SensorSuite([*made[len(own) :], *made[: len(own)]], steps, gravity=gravity, field=field)
