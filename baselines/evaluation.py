@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from ..envs.data.formats.load import load_recordings
-from ..envs.data.plausibility import check_recording
+from ..envs.data.plausibility import check_recording, sites
 from ..envs.data.reference_clock import measured
 from ..envs.data.trajectory import REFERENCE_CLOCK, Trajectory
 from ..filters.core.estimator import Estimator
@@ -176,7 +176,14 @@ class Evaluation:
             names = [channel.name for channel in estimator.channels]
             lacking = [name for name in names if name not in self.trajectory.measurements]
             if lacking:
-                self.skipped[label] = f"no channel {', '.join(lacking)}"
+                there = sites(self.trajectory)
+                # Of a recording of several sensors one must be chosen (imu_of, or --site).
+                hint = (
+                    f" (sensors there: {', '.join(there)})"
+                    if lacking[0].startswith("imu/") and there != ["imu"]
+                    else ""
+                )
+                self.skipped[label] = f"no channel {', '.join(lacking)}{hint}"
                 return
             self.estimates[label] = (estimator, run_on(estimator, self.trajectory))
         except Exception as reason:  # an estimator may be anybody's: one that fails must not cost the others' results

@@ -42,6 +42,7 @@ def run(args: Args) -> int:
     import warnings
 
     from ...baselines.export import WRITERS, write_estimates
+    from ...baselines.registry import make_estimator
     from ...baselines.run import run as run_filter
     from ...baselines.run import smooth
     from ...envs.data.plausibility import check_recording
@@ -50,8 +51,9 @@ def run(args: Args) -> int:
     if args.output is not None and args.output.suffix.lower() not in WRITERS:
         raise ValueError(f"output must end in one of {', '.join(WRITERS)}, got {args.output.name!r}")
     with plain_warnings(), Output("estimate", args) as out:
+        channels = [channel.name for channel in make_estimator(args.estimator).channels]
         loaded, passed_over = load_all(args.recordings, args.calibration, args.site)
-        sensors = {sensor.name: sensor for one in loaded for sensor in sensors_of(one)}
+        sensors = {sensor.name: sensor for one in loaded for sensor in sensors_of(one, channels)}
         estimates: dict[str, Estimate] = {}
         run_estimator = smooth if args.offline else run_filter
         for name, sensor in sensors.items():

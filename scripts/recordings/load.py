@@ -102,11 +102,16 @@ def site_channels(trajectory: Trajectory, site: str) -> dict[str, Any]:
     }
 
 
-def sensors_of(trajectory: Trajectory) -> list[Trajectory]:
-    """The sensors of a recording, each as ``imu``; the recording itself if it has one."""
+def sensors_of(trajectory: Trajectory, channels: Sequence[str] = ()) -> list[Trajectory]:
+    """The sensors of a recording, each as ``imu``; the recording itself if it has one.
+
+    Args:
+        trajectory: the recording.
+        channels: what an estimator reads: the recording itself if it has them all.
+    """
     from ...envs.data.plausibility import sites
 
-    if "imu/gyr" in trajectory.measurements:
+    if "imu/gyr" in trajectory.measurements or (channels and set(channels) <= set(trajectory.measurements)):
         return [trajectory]
     found = [site for site in sites(trajectory) if f"{site}/gyr" in trajectory.measurements]
     return [at_site(trajectory, site) for site in found] or [trajectory]

@@ -6,6 +6,10 @@ import numpy as np
 import pandas
 import pytest
 
+import poise
+from poise.envs.bicycle.environment import RiderBicycleEnv
+from poise.envs.bicycle.sensors.single_imu import SITES
+from poise.envs.data.formats.load import load_recording
 from poise.envs.hand.sensing import simulate_hand
 from poise.scripts.main import main
 
@@ -72,3 +76,28 @@ def test_users_are_warned_where_they_estimate(tmp_path, capsys):
     path = motion.replace(measurements=wrong, metadata={"name": "wrong"}).save(tmp_path / "wrong.h5")
     assert main(["estimate", str(path)]) == 0
     assert "readings in g. Multiply by 9.80665" in capsys.readouterr().err
+
+
+@pytest.fixture(scope="module")
+def ride(tmp_path_factory):
+    env = RiderBicycleEnv("straight", subject=1, suite="two-gyro", fidelity="lumped", duration=2.0)
+    path = poise.record(env, seed=1).save(tmp_path_factory.mktemp("rides") / "ride.h5")
+    env.close()
+    return path
+
+
+def test_a_filter_of_rides_gets_the_whole_ride_and_one_of_an_imu_each_site(ride, tmp_path, capsys):
+    whole, sites = tmp_path / "whole.csv", tmp_path / "sites.csv"
+    assert main(["estimate", str(ride), "--estimator", "two-gyro", "--output", str(whole)]) == 0
+    assert "bicycle/roll" in pandas.read_csv(whole).columns
+    assert main(["estimate", str(ride), "--estimator", "gyroscope-integration", "--output", str(sites)]) == 2
+    assert "lack" in capsys.readouterr().err
+    full = load_recording(ride)
+    with_force = full.measurements | {f"{site}/acc": np.tile([0.0, 0.0, 9.81], (len(full), 1)) for site in SITES}
+    path = full.replace(measurements=with_force).save(tmp_path / "full.h5")
+    assert main(["estimate", str(path), "--estimator", "mekf", "--output", str(sites)]) == 0
+    names = set(pandas.read_csv(sites).sensor)
+    assert {name.removeprefix(full.name).strip("-/") for name in names} == set(SITES)
+    assert main(["evaluate", str(path), "--estimators", "mekf", "--runs", str(tmp_path)]) == 2
+    assert "sensors there: bicycle_imu, trunk_imu" in capsys.readouterr().err
+    assert main(["evaluate", str(path), "--estimators", "mekf", "--site", "trunk_imu", "--runs", str(tmp_path)]) == 0
