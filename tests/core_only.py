@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import io
 import os
+import re
 import sys
 import tempfile
 from collections.abc import Sequence
@@ -36,6 +37,7 @@ import numpy as np  # noqa: E402
 import poise  # noqa: E402
 from poise.scripts.main import main  # noqa: E402
 
+README = Path(__file__).resolve().parents[1] / "README.md"
 FAST = ("external-acceleration", "mahony", "tilt")
 SHIPPED = ("gru", "external-acceleration+policy", "bounded-motion+policy")
 
@@ -108,6 +110,15 @@ def command(*words: str) -> tuple[int, str, str]:
     return status, out.getvalue(), err.getvalue()
 
 
+def the_readme_is_right() -> None:
+    """Its example of a user's own recording, as it stands there."""
+    section = README.read_text(encoding="utf-8").split("## Your own recording")[1].split("\n## ")[0]
+    (code,) = re.findall(r"```python\n(.*?)```", section, re.DOTALL)
+    with contextlib.redirect_stdout(io.StringIO()) as out:
+        exec(compile(code, "README.md", "exec"), {"__name__": "example"})
+    assert out.getvalue()
+
+
 def the_rest_says_what_it_needs() -> None:
     """One line that names the extra; an ImportError from Python."""
     status, out, err = command("list")
@@ -148,6 +159,7 @@ def check() -> None:
         every_filter_runs()
         an_agent_acts(moved_by_hand(folder))
         recordings_are_evaluated(folder)
+        the_readme_is_right()
         the_rest_says_what_it_needs()
     found = sorted(name for name in BLOCKED if name in sys.modules)
     assert not found, f"loaded: {found}"
