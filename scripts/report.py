@@ -107,6 +107,22 @@ def agreement_tables(table: pandas.DataFrame) -> dict[str, list[dict[str, Any]]]
     return tables
 
 
+def numbered(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """A matrix of many estimators with numbers as headings, so that it fits a terminal; each row names its number."""
+    to = [name for name in rows[0] if name.startswith("to ")]
+    if len(to) <= MOST_COLUMNS - 2:
+        return rows
+    number = {name.removeprefix("to "): str(index) for index, name in enumerate(to, start=1)}
+    labels = [str(row["estimator"]) for row in rows]
+    shown = [
+        {"estimator": f"{number.get(label.split(' (family')[0], '–')} {label}"}
+        | {number[name.removeprefix("to ")]: row[name] for name in to}
+        for label, row in zip(labels, rows, strict=True)
+    ]
+    named = {label.split(" (family")[0] for label in labels}
+    return shown + [{"estimator": f"{index} {name}"} for name, index in number.items() if name not in named]
+
+
 def narrow(row: Mapping[str, Any]) -> dict[str, Any]:
     """A row that fits a terminal: with many groups only their mean, median and largest."""
     numbers = {name: value for name, value in row.items() if isinstance(value, float)}
@@ -155,7 +171,7 @@ def print_comparison(
         sections[heading] = markdown_table(rows)
     for title, rows in agreement_tables(table).items():
         heading = f"{name}: {title}" if name else title
-        out.show(rows, heading)
+        out.show(numbered(rows), heading)
         sections[heading] = markdown_table(rows)
     if table.attrs.get("reference_clock") and table["metric"].isin(list(TITLES)).any():
         clock = {"recorded": "as recorded", "corrected": "corrected by the measured offset"}[

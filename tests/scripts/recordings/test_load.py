@@ -12,6 +12,7 @@ from poise.envs.bicycle.sensors.single_imu import SITES
 from poise.envs.data.formats.load import load_recording
 from poise.envs.hand.sensing import simulate_hand
 from poise.scripts.main import main
+from poise.scripts.report import numbered
 
 
 @pytest.fixture(scope="module")
@@ -101,3 +102,15 @@ def test_a_filter_of_rides_gets_the_whole_ride_and_one_of_an_imu_each_site(ride,
     assert main(["evaluate", str(path), "--estimators", "mekf", "--runs", str(tmp_path)]) == 2
     assert "sensors there: bicycle_imu, trunk_imu" in capsys.readouterr().err
     assert main(["evaluate", str(path), "--estimators", "mekf", "--site", "trunk_imu", "--runs", str(tmp_path)]) == 0
+
+
+def test_a_matrix_of_many_estimators_fits_a_terminal():
+    names = [f"a-rather-long-name-{number}" for number in range(12)]
+    rows = [{"estimator": name, **{f"to {other}": 1.0 for other in [*names, "reference"]}} for name in names]
+    shown = numbered(rows)
+    assert list(shown[0]) == ["estimator", *(str(number) for number in range(1, 14))]
+    assert shown[4]["estimator"] == "5 a-rather-long-name-4"
+    assert shown[-1] == {"estimator": "13 reference"}
+    assert numbered(rows[:1]) != rows[:1]
+    few = [{"estimator": "a", "to b": 1.0}]
+    assert numbered(few) == few
