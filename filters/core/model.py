@@ -12,9 +12,9 @@ import copy
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields, replace
-from typing import Any, ClassVar, Literal, Self, TypeVar, get_args, get_origin
+from typing import Any, ClassVar, Self, TypeVar
 
-from ..support.parameters import annotations_of
+from ..support.parameters import check_parameters
 from .backend import Array
 from .quantity import Channel, Measurement, Quantity
 
@@ -69,20 +69,14 @@ class Equations:
     error_parts: ClassVar[Mapping[str, tuple[int, int]]] = {}
 
     def __post_init__(self) -> None:
-        """Refuse parameters that are not finite numbers, choices that there are not, and intervals of no length."""
+        """Refuse parameters of a wrong type or out of their range."""
+        given = {field.name: getattr(self, field.name) for field in fields(self)}
+        # Arrays, one number for each sequence of a batch, are not checked.
         kind: Any = type(self)
-        for name, hint in annotations_of(kind).items():
-            if get_origin(hint) is Literal and getattr(self, name) not in get_args(hint):
-                raise ValueError(f"{name} must be one of {get_args(hint)}, got {getattr(self, name)!r}")
+        check_parameters(kind, {name: value for name, value in given.items() if not getattr(value, "ndim", 0)})
         for field in fields(self):
-            value = getattr(self, field.name)
-            if isinstance(value, int) and isinstance(field.default, float):
-                object.__setattr__(self, field.name, float(value))
-        for name, value in parameters_of(self).items():
-            if not math.isfinite(value):
-                raise ValueError(f"{type(self).__name__}: parameter {name} must be a finite number, got {value}")
-        if self.dt <= 0.0:
-            raise ValueError(f"{type(self).__name__}: dt must be positive seconds, got {self.dt}")
+            if isinstance(field.default, float) and not hasattr(given[field.name], "dtype"):
+                object.__setattr__(self, field.name, float(given[field.name]))
 
     def finish(self, x: Array, z: Measurement) -> Array:
         """Last word of a tick, after the correction: normalise, remember what the next tick needs."""

@@ -23,7 +23,7 @@ NOT_NEGATIVE = re.compile(
 """Names of numbers that are zero or above: standard deviations, limits, gains."""
 MEASURED = re.compile(r"(accelerometer|magnetometer|array|orientation|distance)_(noise|std|variance)$")
 """Noises of measurements: without any, an innovation has no covariance."""
-LARGEST, SMALLEST = 1e12, 1e-12
+LARGEST, SMALLEST = 1e15, 1e-12
 """Magnitudes between which covariances made of parameters can be inverted; anything physical lies between."""
 
 
@@ -85,7 +85,7 @@ def number_refused(name: str, value: Any) -> str:
     if isinstance(value, bool | np.bool_) or not isinstance(value, Real) or not abs(float(value)) <= LARGEST:
         return f"a finite number (at most {LARGEST:g} in magnitude)"
     if POSITIVE.search(name) or MEASURED.match(name):
-        return "" if float(value) >= SMALLEST else f"above 0 (at least {SMALLEST:g})"
+        return "" if float(value) >= SMALLEST else f"positive (at least {SMALLEST:g})"
     return "" if float(value) >= 0.0 or not NOT_NEGATIVE.search(name) else "0 or above"
 
 

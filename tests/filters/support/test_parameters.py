@@ -45,14 +45,14 @@ def test_what_fits_passes(given):
 @pytest.mark.parametrize(
     ("name", "value", "accepted"),
     [
-        ("dt", 0.0, r"above 0 \(at least 1e-12\)"),
+        ("dt", 0.0, r"positive \(at least 1e-12\)"),
         ("dt", True, "a finite number"),
         ("dt", "0.01", "a finite number"),
         ("dt", np.array([0.1, 0.2]), "a finite number"),
         ("dt", 1e300, "a finite number"),
         ("gyroscope_noise", float("nan"), "a finite number"),
         ("gyroscope_noise", -1.0, "0 or above"),
-        ("accelerometer_noise", 0.0, r"above 0 \(at least 1e-12\)"),
+        ("accelerometer_noise", 0.0, r"positive \(at least 1e-12\)"),
         ("mode", True, r"one of \(1, 2\)"),
         ("mode", 1.0, r"one of \(1, 2\)"),
         ("start", "level", r"one of \('tilt', 'known'\)"),
