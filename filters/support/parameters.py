@@ -12,15 +12,13 @@ from typing import Any, Literal
 
 import numpy as np
 
-POSITIVE = re.compile(
-    r"(dt|gravity|mass|interval|time|step|window|wheelbase|length|width|wide|forearm|shank|thigh|arm)$|tau_"
-)
-"""Names of numbers that are above zero: masses, times, lengths of things."""
+POSITIVE = re.compile(r"(dt|gravity|interval|time|step|window|length|width|wide|forearm|shank|thigh|arm)$|tau_")
+"""Names of numbers that are above zero: times, lengths of limbs."""
 NOT_NEGATIVE = re.compile(
-    r"(noise|std|deviation|variance|prior|drift|bound|range|tolerance|threshold|adaptation|rejection|decay|jerk|lag|hold"
+    r"(noise|std|mass|wheelbase|deviation|variance|prior|drift|bound|range|tolerance|threshold|adaptation|rejection|decay|jerk|lag|hold"
     r"|inflation|filter|gain|scale|share|weight|guard|follow|acceleration)$|(gain|k)_"
 )
-"""Names of numbers that are zero or above: standard deviations, limits, gains."""
+"""Names of numbers that are zero or above: standard deviations, masses, limits, gains."""
 MEASURED = re.compile(r"(accelerometer|magnetometer|array|orientation|distance)_(noise|std|variance)$")
 """Noises of measurements: without any, an innovation has no covariance."""
 LARGEST, SMALLEST = 1e15, 1e-12
@@ -43,7 +41,8 @@ def check_parameters(maker: Callable[..., Any], given: Mapping[str, Any]) -> Non
         if name in hints:
             reason = refused(name, value, hints[name], getattr(maker, name, None))
             if reason:
-                raise ValueError(f"{name} must be {reason}, got {shown(value)}")
+                must = "must not be" if reason == "negative" else "must be"
+                raise ValueError(f"{name} {must} {reason}, got {shown(value)}")
 
 
 @functools.lru_cache
@@ -56,7 +55,7 @@ def annotations_of(maker: Callable[..., Any]) -> dict[str, Any]:
 
 
 def refused(name: str, value: Any, kind: Any, default: Any = None) -> str:
-    """What would be accepted instead of the value; empty if the value is."""
+    """What a value must be (or ``negative``, which it must not be); empty if it is accepted."""
     origin = typing.get_origin(kind)
     if origin is Literal:
         choices = typing.get_args(kind)
@@ -86,7 +85,7 @@ def number_refused(name: str, value: Any) -> str:
         return f"a finite number (at most {LARGEST:g} in magnitude)"
     if POSITIVE.search(name) or MEASURED.match(name):
         return "" if float(value) >= SMALLEST else f"positive (at least {SMALLEST:g})"
-    return "" if float(value) >= 0.0 or not NOT_NEGATIVE.search(name) else "0 or above"
+    return "" if float(value) >= 0.0 or not NOT_NEGATIVE.search(name) else "negative"
 
 
 def tuple_refused(name: str, value: Any, parts: tuple[Any, ...], default: Any) -> str:

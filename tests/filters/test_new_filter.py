@@ -81,7 +81,7 @@ def test_it_is_made_with_its_parameters():
         make("vertical", start="level")
     with pytest.raises(ValueError, match="spread must be positive"):
         make("vertical", spread=0.0)
-    with pytest.raises(ValueError, match="noise must be 0 or above"):
+    with pytest.raises(ValueError, match="noise must not be negative"):
         make("vertical", noise=-1.0)
 
 
