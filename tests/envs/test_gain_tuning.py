@@ -160,8 +160,8 @@ def test_recordings_are_read_from_files(tmp_path, trajectory):
     [
         ({"filter": "kalman"}, "unknown estimator 'kalman'"),
         ({"filter": 3}, "filter must be a Kalman filter"),
-        ({"gains": ("process", "cheek")}, "gains must be different ones of"),
-        ({"gains": ()}, "gains must be different ones of"),
+        ({"gains": ("process", "cheek")}, "gains must be distinct names from"),
+        ({"gains": ()}, "gains must be distinct names from"),
         ({"quantity": "position"}, "quantity must be one of"),
         ({"interval": 0.0}, "interval must be positive"),
         ({"reward": "fame"}, "reward must be"),
