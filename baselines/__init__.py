@@ -1,1 +1,1 @@
-"""Estimators to compare: learned ones, policies that adapt gains, the list of all by name, evaluation and plots."""
+"""Learned estimators, gain policies, the registry of all estimators, evaluation and plots."""

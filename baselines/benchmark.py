@@ -1,4 +1,4 @@
-"""The data and the contenders of the standard comparison; the command ``poise benchmark`` runs it."""
+"""Data sets and estimators of the standard comparison, which ``poise benchmark`` runs."""
 
 from __future__ import annotations
 
@@ -37,11 +37,11 @@ HAND_CHANNELS = ("imu/gyr", "imu/acc", "imu/mag")
 """What ``poise/HandMotion-v0`` measures."""
 
 PLAIN_PYTHON = ("ahrs-mahony", "ahrs-mahony-9", "ahrs-ekf", "ahrs-ekf-9")
-"""Wrapped loops in plain Python that take minutes on recordings and add little: left out unless asked for."""
+"""Slow wrapped loops in plain Python, which take minutes on recordings: left out by default."""
 
 
 def simulated(seed: int, episodes: int, gestures: Sequence[str] = GESTURES, **options: Any) -> list[Trajectory]:
-    """Record episodes of ``poise/HandMotion-v0``, moved by forces in PyBullet.
+    """Record episodes of ``poise/HandMotion-v0`` with the dynamic driver.
 
     Args:
         seed: root seed; each episode has a child.
@@ -71,7 +71,7 @@ def simulated(seed: int, episodes: int, gestures: Sequence[str] = GESTURES, **op
 
 
 def simulated_rides(seed: int, scenarios: Sequence[str] = RIDES, duration: float = 40.0) -> list[Trajectory]:
-    """Record rides of a bicycle, and look at the IMU of the bicycle and at that of the trunk, each by itself.
+    """Record rides of a bicycle; the IMUs of bicycle and trunk become separate trajectories.
 
     Args:
         seed: root seed; each ride has a child, and a subject of its own.
@@ -119,7 +119,7 @@ def groups_of(trajectories: Sequence[Trajectory]) -> dict[str, str]:
 
 
 def contenders(names: Sequence[str] = (), channels: Collection[str] = HAND_CHANNELS) -> dict[str, str | Estimator[Any]]:
-    """Label → estimator: those that are named, or all that the data suit, with the other modes of the paper.
+    """Label → estimator: those that are named, or all that the data are sufficient for, with all modes of the paper.
 
     Args:
         names: which ones; empty for all that are installed and read no other channels than those of the data.
@@ -145,7 +145,7 @@ def contenders(names: Sequence[str] = (), channels: Collection[str] = HAND_CHANN
 
 
 def is_available(name: str) -> bool:
-    """Whether an estimator can be made: the package that it wraps may be missing."""
+    """Whether an estimator can be made; the package that it wraps may be missing."""
     try:
         make_estimator(name)
     except ImportError:

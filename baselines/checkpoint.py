@@ -1,4 +1,4 @@
-"""Checkpoints of a training: one file that is written in one move, names what it belongs to and holds no code."""
+"""Checkpoints of a training: one file, written atomically, with a key of the training and without code."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ ARRAY = "__array__"
 
 
 def save_checkpoint(path: Path, key: Mapping[str, Any], state: Mapping[str, Any]) -> None:
-    """Write a checkpoint in one move; the one before stays beside it as ``<stem>.previous<suffix>``.
+    """Write a checkpoint atomically; the previous one is kept beside it as ``<stem>.previous<suffix>``.
 
     Args:
         path: file to (re)place.
@@ -101,7 +101,7 @@ def wrapped(value: Any) -> Any:
 
 
 def unwrapped(value: Any) -> Any:
-    """What :func:`wrapped` was given."""
+    """Inverse of :func:`wrapped`."""
     if isinstance(value, dict):
         if value.keys() == {ARRAY}:
             return value[ARRAY].numpy()

@@ -1,4 +1,4 @@
-"""The table of errors: how it prints, its means as a wide table, agreement of estimators without a truth."""
+"""Table of errors: text form, means as a wide table, and agreement of estimators without a truth."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import pandas
 from .scoring import COLUMNS
 
 WIDTH = 80
-"""Characters of a printed line."""
+"""Width of a printed line in characters."""
 MOST_ROWS = 60
 COMPLETE = 0.98
 """Share of the best estimator's samples that an estimator must have estimates for, to be ranked with it."""
@@ -56,7 +56,7 @@ def shortened(text: str, width: int) -> str:
 
 
 def coverage(table: pandas.DataFrame, metric: str) -> pandas.Series:
-    """Share of all samples that were to be scored at which each estimator of a metric had an estimate.
+    """Share of the evaluation mask with an estimate, for each estimator of a metric.
 
     Trajectories on which it could not be run count as zero, so that an easy half does not win.
     """
@@ -72,7 +72,7 @@ def coverage(table: pandas.DataFrame, metric: str) -> pandas.Series:
 
 
 def summary(table: pandas.DataFrame, metric: str = "inclination", groups: Mapping[str, str] | None = None) -> Any:
-    """Means over trajectories as a wide table: a row an estimator, a column a group, best estimators first.
+    """Means over trajectories as a wide table: one row per estimator, one column per group, best estimators first.
 
     Estimators that have no estimate for some of the samples, or could not be run on some trajectories, come after
     those that have: their mean is over other, often easier, samples. The column ``valid`` then tells the share.
@@ -97,7 +97,7 @@ def summary(table: pandas.DataFrame, metric: str = "inclination", groups: Mappin
 
 
 def agreement(table: pandas.DataFrame, metric: str = "inclination") -> Any:
-    """How far estimators are from each other on recordings without truth: a row and a column an estimator, deg.
+    """Differences between estimators on recordings without truth: one row and one column per estimator, deg.
 
     The order is that of the table: no estimator is the truth, so there is no ranking.
 

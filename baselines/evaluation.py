@@ -1,4 +1,4 @@
-"""Estimators × trajectories → one long table of errors. No estimator is a special case."""
+"""Evaluation of estimators on trajectories: one long table of errors."""
 
 from __future__ import annotations
 
@@ -43,8 +43,8 @@ ReferenceClock = Literal["recorded", "corrected"]
 
 AUTO = "auto"
 LARGEST_NIS = {"bounded-motion": 5.0}
-"""Family → NIS a degree of freedom that no sound recording reaches (0.5 at most in 27 of four benchmarks); other
-filters' noise is set so that theirs tells nothing."""
+"""Family → NIS per degree of freedom that no valid recording reaches (0.5 at most in 27 of four benchmarks). The noise
+parameters of other filters make their NIS unsuitable for this check."""
 
 
 def evaluate(
@@ -65,13 +65,13 @@ def evaluate(
             rider, bicycle or device that its metadata describe.
         trajectories: trajectories, or paths of recordings. Recordings of one name get the part of their path that
             tells them apart.
-        reference: what stands in for the truth of trajectories that know none: an estimator, ``"onboard"`` for the
-            orientation that the device computed, or ``"auto"`` for ``mekf-9`` or ``bounded-motion``, whichever the
-            channels suffice for. Such rows name it in ``metric`` (``inclination to mekf-9``): they show agreement, not
+        reference: what replaces a missing truth: an estimator, ``"onboard"`` for the
+            orientation that the device computed, or ``"auto"`` for ``mekf-9`` or ``bounded-motion``, depending on the
+            channels. Such rows name it in ``metric`` (``inclination to mekf-9``): they show agreement, not
             error. None or ``"auto"`` compares every estimator with every other (:func:`.error_table.agreement`).
         reference_clock: ``"recorded"`` takes the truth as it is; ``"corrected"`` moves it by the offset between its
             clock and the gyroscope's, which loaders measure (``metadata["reference_clock_offset"]``).
-        offline: run the smoother of every estimator that has one too, as ``<label> (offline)``.
+        offline: also run the smoother of every estimator that has one, as ``<label> (offline)``.
         check: warn of implausible recordings (:func:`poise.check_recording`).
         progress: show a progress bar.
 
@@ -134,7 +134,7 @@ def evaluate(
 
 
 class Evaluation:
-    """All estimators on one trajectory: what they gave, or why they could not be run."""
+    """Results of all estimators on one trajectory, or the reasons why they could not be run."""
 
     def __init__(
         self,
@@ -168,7 +168,7 @@ class Evaluation:
                     self.everyone = True
 
     def run(self, label: str) -> None:
-        """Run one estimator; whatever it raises on these data is the reason why it is left out."""
+        """Run one estimator; if it raises an error on these data, the error is the reason for its omission."""
         if label in self.skipped:
             return
         try:
@@ -186,7 +186,7 @@ class Evaluation:
                 self.skipped[label] = f"no channel {', '.join(lacking)}{hint}"
                 return
             self.estimates[label] = (estimator, run_on(estimator, self.trajectory))
-        except Exception as reason:  # an estimator may be anybody's: one that fails must not cost the others' results
+        except Exception as reason:  # user code may raise anything; the results of the others must be kept
             kind = "" if isinstance(reason, ValueError | ImportError) else f"{type(reason).__name__}: "
             self.skipped[label] = f"{kind}{reason}"
 
@@ -201,7 +201,7 @@ class Evaluation:
                 others += [(label, pose) for label, pose in poses.items() if label not in known]
         found = {}
         for label, (estimator, estimate) in self.estimates.items():
-            # That an estimator agrees with itself says nothing.
+            # Agreement of an estimator with itself carries no information.
             found[label] = errors(estimator, estimate, self.trajectory, [one for one in others if one[0] != label])
             nis = next((value for _, metric, value, _ in found[label] if metric == "nis"), 0.0)
             if nis > LARGEST_NIS.get(family(label), float("inf")):
@@ -214,7 +214,7 @@ class Evaluation:
         return found
 
     def check_north(self) -> None:
-        """Warn if the headings of all estimators differ from the truth's by one and the same angle."""
+        """Warn if the headings of all estimators differ from that of the truth by the same angle."""
         told = [label for label, (_, one) in self.estimates.items() if ORIENTATION.name in one.pose]
         offsets = [heading_offset(self.estimates[label][1], self.trajectory) for label in told]
         known = [offset for offset in offsets if offset is not None]
@@ -228,14 +228,14 @@ class Evaluation:
 
 
 def report_findings(trajectory: Trajectory) -> None:
-    """Warn of everything that makes estimates wrong."""
+    """Warn of all findings that make estimates wrong."""
     for finding in check_recording(trajectory):
         if finding.severity == "warning":
             warnings.warn(f"{trajectory.name}: {finding}", stacklevel=3)
 
 
 def named_trajectories(trajectories: Trajectories) -> list[Trajectory]:
-    """Trajectories, loaded, each of a name of its own.
+    """Loaded trajectories with distinct names.
 
     Raises:
         ValueError: two that were given as objects have one name.
@@ -259,7 +259,7 @@ def named_trajectories(trajectories: Trajectories) -> list[Trajectory]:
 
 
 def distinct(trajectories: Sequence[Trajectory], paths: Sequence[Path | None]) -> list[Trajectory]:
-    """The same trajectories; those that share a name are named after their paths, as far as these differ.
+    """The same trajectories; those that share a name are renamed by the differing parts of their paths.
 
     Raises:
         ValueError: two without a path have one name.
@@ -318,6 +318,6 @@ def named_estimators(estimators: Estimators) -> dict[str, str | Estimator[Any]]:
 
 
 def label_of(estimator: Estimator[Any]) -> str:
-    """The name an estimator has of itself, or that of its model's class."""
+    """The name of an estimator, or that of its model's class."""
     name = getattr(estimator, "name", None)
     return str(name) if name else type(getattr(estimator, "model", estimator)).__name__

@@ -19,15 +19,15 @@ if TYPE_CHECKING:
 
 
 def write_estimates(estimates: Mapping[str, Estimate], path: str | Path) -> Path:
-    """Write what :meth:`Estimate.to_frame` tells of one or several sensors.
+    """Write the tables of :meth:`Estimate.to_frame` of one or several sensors.
 
     ========== =====================================================================================================
-    ``.csv``   a row a sample; of several sensors one below the other, named in the first column ``sensor``
+    ``.csv``   one row per sample; several sensors below each other, named in the first column ``sensor``
     .parquet   the same (needs the package pyarrow)
-    ``.h5``    a group a sensor, a data set a column, its unit in the attribute ``unit``
-    ``.npz``   an array a column, ``sensor/column`` of several sensors
-    ``.sto``   orientations for OpenSim (OpenSense): a column ``w,x,y,z`` a sensor, sensor to a world with z up, on one
-               uniform time axis that all sensors cover
+    ``.h5``    one group per sensor, one data set per column, its unit in the attribute ``unit``
+    ``.npz``   one array per column, ``sensor/column`` for several sensors
+    ``.sto``   orientations for OpenSim (OpenSense): one column ``w,x,y,z`` per sensor, sensor to a world with z up,
+               on one uniform time axis that all sensors cover
     ========== =====================================================================================================
 
     Args:
@@ -75,7 +75,7 @@ def write_parquet(estimates: Mapping[str, Estimate], path: Path) -> None:
 
 
 def write_hdf5(estimates: Mapping[str, Estimate], path: Path) -> None:
-    """A group a sensor, a data set a column."""
+    """One group per sensor, one data set per column."""
     import h5py
 
     with replacing(path) as temporary, h5py.File(temporary, "w") as file:
@@ -87,7 +87,7 @@ def write_hdf5(estimates: Mapping[str, Estimate], path: Path) -> None:
 
 
 def write_npz(estimates: Mapping[str, Estimate], path: Path) -> None:
-    """An array a column."""
+    """One array per column."""
     frames = {f"{sensor}/" if len(estimates) > 1 else "": one.to_frame() for sensor, one in estimates.items()}
     arrays = {f"{before}{column}": frame[column].to_numpy() for before, frame in frames.items() for column in frame}
     with replacing(path) as temporary, temporary.open("wb") as file:

@@ -28,7 +28,7 @@ COLOURS = {
 """Kind of estimator → colour."""
 
 TRUTH_COLOR = "black"
-"""Of what is true, in every figure."""
+"""Colour of the truth, in every figure."""
 
 
 def new_figure(width: float, height: float, rows: int = 1, columns: int = 1) -> tuple[Figure, list[Any]]:
@@ -60,8 +60,8 @@ def save(figure: Figure, path: Path) -> Path:
 def rms_bars(table: pandas.DataFrame, kinds: Mapping[str, str], metric: str = "inclination", title: str = "") -> Figure:
     """Mean error of every estimator as bars, best on top, with each trajectory as a dot.
 
-    The scale is that of the better half of the estimators: what lies beyond is cut, and a triangle at the edge says
-    so, with the largest value.
+    The scale is set by the better half of the estimators. Values beyond it are cut off and marked by a triangle at the
+    edge with the largest value.
 
     Args:
         table: from :func:`poise.evaluate`.
@@ -128,7 +128,7 @@ def _patch(colour: str) -> Any:
 def error_curves(
     trajectory: Trajectory, estimates: Mapping[str, Estimate], kinds: Mapping[str, str], title: str = ""
 ) -> Figure:
-    """What the motion was and how wrong the inclination of some estimators was, over time.
+    """Motion and inclination errors of some estimators over time.
 
     Args:
         trajectory: with truth; its specific force and angular rate (true ones without an IMU) are drawn above.
@@ -162,7 +162,7 @@ def error_curves(
         errors.plot(time, per_tick, color=colour, linestyle=style, linewidth=0.9, label=label)
     errors.set_ylabel("inclination error, deg")
     errors.set_xlabel("time, s")
-    # The better half sets the scale: one estimator that is lost would flatten all others.
+    # The better half sets the scale, so that one diverging estimator does not hide the others.
     end = 1.3 * sorted(usual)[(len(usual) - 1) // 2] if usual else 1.0
     errors.set_ylim(0.0, max(end, 1e-3))
     legend_above(errors)

@@ -1,8 +1,7 @@
-"""Which estimator for which recording: by its channels, and by the measured errors on recordings like it.
+"""Recommendation of estimators for a recording, by its channels and by measured errors on similar recordings.
 
-The errors stand in a file that ``poise benchmark --save`` writes: every recording of the benchmarks with numbers that
-say what its motion was like, and what every estimator got on it. A recording is compared with those by the same
-numbers; nothing is a rule of thumb.
+``poise benchmark --save`` writes the errors to a file: for every benchmark recording, numbers that describe its motion
+and the error of every estimator. A recording is compared with these by the same numbers, without further rules.
 """
 
 from __future__ import annotations
@@ -35,25 +34,25 @@ MOUNTINGS: dict[str, Mounting] = {
     "simulated hand": "hand-held",
     "simulated rides": "bicycle",
 }
-"""Data set → where the sensor was."""
+"""Data set → mounting of the sensor."""
 NEIGHBOURS = 6
-"""Recordings that a recommendation rests on."""
+"""Number of recordings used for a recommendation."""
 ERRORS = ("inclination", "heading", "total")
 CORRECTED = ", clock corrected"
-"""Behind the name of a data set: its reference was moved to the clock of the gyroscope."""
+"""Suffix of a data set whose reference was corrected to the clock of the gyroscope."""
 SMOOTHING = 1.0
-"""s: means over it are acceleration that lasts, which no filter can tell from a tilt."""
+"""s: averaging time of sustained acceleration, which cannot be distinguished from tilt."""
 
 
 @dataclass(frozen=True)
 class Motion:
-    """What a motion was like, without any estimator.
+    """Description of a motion, without any estimator.
 
     Attributes:
         rate: sampling rate, Hz.
         turning: root mean square angular rate, deg/s.
         shaking: root mean square of the length of the specific force about its median, m/s².
-        lasting: the same of means over a second: acceleration that lasts.
+        lasting: the same of means over one second: sustained acceleration.
     """
 
     rate: float
@@ -90,7 +89,7 @@ def motion_of(trajectory: Trajectory) -> Motion:
 
 
 def results_of(trajectories: Sequence[Trajectory], table: pandas.DataFrame, suffix: str = "") -> list[dict[str, Any]]:
-    """What a benchmark found, a recording each, as JSON: name, data set, motion, errors of every estimator in deg.
+    """Results of a benchmark by recording, as JSON: name, data set, motion, errors of every estimator in deg.
 
     Args:
         trajectories: the recordings, with truth.
@@ -102,7 +101,7 @@ def results_of(trajectories: Sequence[Trajectory], table: pandas.DataFrame, suff
         part = table[(table["trajectory"] == trajectory.name) & table["metric"].isin(ERRORS)]
         errors: dict[str, dict[str, float]] = {}
         for row in part.itertuples():
-            # A heading of the truth that is arbitrary tells nothing of that of an estimate.
+            # An arbitrary heading of the truth cannot be compared with that of an estimate.
             told = row.metric == "inclination" or dataset_of(trajectory) in NORTH
             if row.quantity in ("up", "orientation") and np.isfinite(row.value) and told:
                 errors.setdefault(row.estimator, {})[row.metric] = round(row.value, 4)
@@ -134,9 +133,9 @@ class Recommendation:
         motion: what its motion is like.
         nearest: names of the recordings that the errors are from.
         sets: data set → how many of these.
-        ranking: a row an estimator, best first: estimator, kind, mean and largest inclination error, heading error
+        ranking: one row per estimator, best first: estimator, kind, mean and largest inclination error, heading error
             (deg), and the reason.
-        notes: what else matters about this recording.
+        notes: further remarks on this recording.
     """
 
     motion: Motion
@@ -149,11 +148,11 @@ class Recommendation:
 def recommend(
     trajectory: Trajectory, mounting: Mounting | None = None, results: Mapping[str, Any] | None = None
 ) -> Recommendation:
-    """Rank the estimators that a recording can feed by their errors on the benchmark recordings nearest to it.
+    """Rank the estimators that can be run on a recording by their errors on the nearest benchmark recordings.
 
     Args:
         trajectory: a recording with ``imu/gyr`` and ``imu/acc``.
-        mounting: where the sensor is; by default recordings of all mountings are considered.
+        mounting: of the sensor; by default recordings of all mountings are considered.
         results: from :func:`load_results`; the shipped ones by default.
 
     Raises:
@@ -176,13 +175,13 @@ def recommend(
     sets = dict(Counter(one["dataset"] for one in near))
     ranking = [row for name, kind in fed.items() if (row := ranked_row(name, kind, near, fed)) is not None]
     heading = "imu/mag" in alive
-    # With a magnetometer those that tell the heading come first: the others leave it drifting.
+    # With a magnetometer estimators with heading come first: that of the others drifts.
     ranking.sort(key=lambda row: (heading and row["heading"] is None, row["inclination"]))
     return Recommendation(motion, [one["name"] for one in near], sets, ranking, notes_on(trajectory, motion, near))
 
 
 def ranked_row(name: str, kind: str, near: Sequence[Mapping[str, Any]], fed: Collection[str]) -> dict[str, Any] | None:
-    """Errors of one estimator on the nearest recordings, among those that can be fed; None if it was not run on all."""
+    """Errors of one estimator on the nearest recordings; None if it was not run on all of them."""
     errors = [one["errors"][name] for one in near if name in one["errors"] and "inclination" in one["errors"][name]]
     if not near or len(errors) < len(near):
         return None
@@ -206,7 +205,7 @@ def inclination_of(recording: Mapping[str, Any], name: str) -> float:
 
 
 def rank_of(name: str, near: Sequence[Mapping[str, Any]], fed: Collection[str]) -> float:
-    """Mean rank of an estimator among those that can be fed."""
+    """Mean rank of an estimator among those that can be run."""
     ranks = [1 + sum(inclination_of(one, other) < inclination_of(one, name) for other in fed) for one in near]
     return float(np.mean(ranks))
 

@@ -1,6 +1,6 @@
-"""Every estimator by name: the filters, learned estimators, and filters whose gains a policy sets.
+"""Registry of all estimators: filters, learned estimators, and filters with gains set by a policy.
 
-The only place where names turn into estimators.
+All names of estimators are resolved here.
 """
 
 from __future__ import annotations
@@ -81,12 +81,12 @@ def make_estimator(name: str, *, metadata: Mapping[str, Any] | None = None, **pa
     """Make an estimator.
 
     Args:
-        name: see :func:`list_estimators`; with `` (offline)`` behind it, the estimator's smoother.
-        metadata: of the recording that it shall run on (``trajectory.metadata``): a filter that can be is configured
-            with the rider's anthropometry, the bicycle's geometry or the device's array that they describe.
+        name: see :func:`list_estimators`; the suffix `` (offline)`` selects the estimator's smoother.
+        metadata: of the recording (``trajectory.metadata``): filters are configured with the rider's anthropometry, the
+            bicycle's geometry or the device's array described there.
         parameters: ``dt``, the sampling interval in s (0.01 by default), and constants of the method, by the names of
-            its dataclass fields: ``make_estimator("external-acceleration", mode=3, dt=1 / 286)``. They win over
-            ``metadata``.
+            its dataclass fields: ``make_estimator("external-acceleration", mode=3, dt=1 / 286)``. They take precedence
+            over ``metadata``.
 
     Returns:
         The estimator, ready for :func:`poise.run`.

@@ -1,4 +1,4 @@
-"""``poise.run`` and ``poise.smooth``: an estimator over a recording, at the recording's own clock."""
+"""``poise.run`` and ``poise.smooth``: an estimator on a recording, at the time stamps of the recording."""
 
 from __future__ import annotations
 
@@ -30,16 +30,16 @@ def run(
 ) -> Estimate:
     """Run an estimator over a recording.
 
-    Of a trajectory, time is respected: the estimator runs on the uniform grid behind the time stamps, gaps are missing
-    samples that it predicts through, and an estimator made for another sampling interval is adjusted. Bare arrays have
-    no time, so their interval must be given.
+    With a trajectory, the estimator runs on the uniform grid behind the time stamps. Gaps are missing samples, for
+    which it only predicts, and an estimator with another sampling interval is adjusted. Arrays have no time stamps, so
+    their interval must be given.
 
     Args:
         estimator: a name (see :func:`poise.list_estimators`), or an estimator. One that is only named is configured
             for the trajectory (rider, bicycle, array), where its metadata say.
         data: a trajectory, or channel name → ``(T, *batch, size)``, NaN where a channel has no valid sample.
         dt: sampling interval, s; needed with arrays. With a trajectory it may only confirm the trajectory's.
-        grid: give the estimate on the uniform grid, gaps included, instead of at the trajectory's own samples.
+        grid: return the estimate on the uniform grid, gaps included, instead of at the trajectory's samples.
 
     Returns:
         The estimate, time first, with ``time``: as many samples as the trajectory has, or as its grid.
@@ -85,7 +85,7 @@ def smooth(
     *,
     grid: bool = False,
 ) -> Estimate:
-    """Estimate a recording in the light of all its samples: fixed-interval smoothing, for use after the fact.
+    """Fixed-interval smoothing of a recording: every estimate uses all samples (offline use).
 
     Every Kalman filter of the package has a smoother (:meth:`.KalmanFilter.smooth`), with covariance; ``vqf`` has the
     offline form of its own package.
@@ -141,7 +141,7 @@ def run_on(estimator: Estimator[Any], trajectory: Trajectory) -> Estimate:
 
 
 def layout_of(estimator: Estimator[Any]) -> Layout:
-    """What the arrays of its estimates hold."""
+    """Layout of the arrays of its estimates."""
     return Layout(tuple(estimator.outputs), dict(getattr(equations_of(estimator), "error_parts", {})))
 
 

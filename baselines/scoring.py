@@ -18,33 +18,33 @@ from ..filters.core.quantity import ORIENTATION, RELATIVE_ORIENTATION, UP, Estim
 from .run import fitted, run_on
 
 COLUMNS = ("estimator", "trajectory", "quantity", "metric", "value", "unit")
-"""Columns of a table of errors, one number a row."""
+"""Columns of a table of errors, one number per row."""
 ONBOARD = "onboard"
 """Reference: the orientation that the device itself computed."""
 AUTOMATIC = ("mekf-9", "bounded-motion")
-"""References for recordings without truth, the first that the channels suffice for."""
+"""References for recordings without truth, in order of preference."""
 
 LARGEST_NORTH = 15.0
-"""deg: declination and disturbances that are taken for errors of a heading; more is another definition of north."""
+"""deg: larger constant heading offsets indicate another definition of north rather than an error."""
 
 StandIn = tuple[str, dict[str, np.ndarray]]
-"""Label and pose of what stands in for the truth."""
+"""Label and pose of the replacement of the truth."""
 Row = tuple[str, str, float, str]
 """Quantity, metric, value, unit."""
 
 
 def has_truth(trajectory: Trajectory) -> bool:
-    """Whether the trajectory knows where up is."""
+    """Whether the truth contains the inclination."""
     return UP.name in trajectory.quantities
 
 
 def without_truth(trajectory: Trajectory) -> bool:
-    """Whether nothing is known that an estimate of the pose could be compared with."""
+    """Whether the trajectory has no truth of the pose."""
     return not set(trajectory.truth) - {"position", "velocity"}
 
 
 def automatic_reference(trajectory: Trajectory) -> str | None:
-    """The reference that a recording can feed: with the heading of a magnetometer that works, or six axes."""
+    """Default reference for a recording: with heading if its magnetometer works, else six axes."""
     from .registry import list_estimators
 
     alive = {
@@ -69,7 +69,7 @@ def onboard_orientation(trajectory: Trajectory) -> np.ndarray:
 
 
 def reference_pose(reference: str | Estimator[Any], label: str, trajectory: Trajectory) -> StandIn:
-    """What stands in for the truth of a trajectory on its grid.
+    """Replacement of the truth of a trajectory on its grid.
 
     Raises:
         ValueError: the trajectory lacks a channel that the reference needs.
@@ -132,7 +132,7 @@ def heading_offset(estimate: Estimate, trajectory: Trajectory) -> float | None:
     half = np.arctan2(r[:, 3], r[:, 0])[trajectory.mask]
     mean = np.nanmean(np.exp(2j * half)) if np.isfinite(half).any() else 0.0
     offset = float(np.degrees(np.angle(mean)))
-    # The length of the mean is 1 if all headings differ alike: 0.95 is a spread of 18°.
+    # The length of the mean is 1 if all headings differ equally: 0.95 is a standard deviation of 18°.
     return offset if abs(mean) > 0.95 and abs(offset) > LARGEST_NORTH else None
 
 
@@ -146,5 +146,5 @@ def scored_rows(quantity: Quantity, estimate: Any, truth: Any, mask: np.ndarray,
 
 
 def family(label: str) -> str:
-    """What estimators that share their equations have in common: the name without axes, policy or variant."""
+    """Family of estimators with the same equations: the name without axes, policy or variant."""
     return re.sub(r"-9\b|\+policy$", "", label.split(" (")[0])

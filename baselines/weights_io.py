@@ -1,7 +1,7 @@
-"""Weights in a file, and beside them a card that says what they are.
+"""Weights in a file, with a card that describes them.
 
-``name.safetensors`` holds arrays only: reading it runs no code. ``name.json``, the card, holds whatever describes them
-and the SHA-256 of the weights, so that these cannot be changed without it. Shipped weights lie in :data:`WEIGHTS`.
+``name.safetensors`` holds arrays only: reading it runs no code. ``name.json``, the card, contains their description
+and SHA-256, so that a change of the weights is detected. Shipped weights lie in :data:`WEIGHTS`.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ DIGEST = "sha256"
 
 
 def save_weights(path: str | Path, arrays: Mapping[str, np.ndarray], card: Mapping[str, Any]) -> Path:
-    """Write ``path`` (weights) and, with the suffix ``.json``, the card; each in one move.
+    """Write ``path`` (weights) and, with the suffix ``.json``, the card; each atomically.
 
     Args:
         path: file of the weights; ``.safetensors`` is appended where it is missing. Folders are made.
@@ -110,7 +110,7 @@ def find_weights(path_or_name: str | Path) -> Path:
         FileNotFoundError: there are none.
     """
     given = Path(path_or_name)
-    # A bare name means what is shipped, whatever lies in the working directory.
+    # A bare name selects shipped weights, independent of the working directory.
     bare = given.name == str(path_or_name) and given.suffix != SUFFIX
     path = weights_path(WEIGHTS / given if bare else given)
     if not path.is_file():

@@ -1,4 +1,4 @@
-"""What an array of accelerometers can tell: rank, condition number and noise gains of each quantity."""
+"""Analyse an array of accelerometers: rank, condition number and noise gains of each quantity."""
 
 from __future__ import annotations
 

@@ -25,7 +25,7 @@ class Args:
     estimators: tuple[str, ...] = ()
     """names of estimators (default: all that are installed, except some slow loops)"""
     reference: str = "auto"
-    """what stands in for the truth of recordings without one (agreement, not error), see `poise evaluate --help`"""
+    """replacement of a missing truth (agreement, not error), see `poise evaluate --help`"""
     offline: bool = False
     """run the smoother of every estimator that has one as well"""
     trials: int = 5
@@ -35,7 +35,7 @@ class Args:
     save: Path | None = None
     """file for the errors of all recordings and simulations, from which `poise recommend` reads"""
     runs: Path = Path("runs")
-    """where the run folder goes"""
+    """parent of the run folder"""
     json: bool = False
     """print one JSON document instead of tables"""
 

@@ -3,7 +3,7 @@
 accelerometer: runs on a rate table; columns time, up, out (+x … -z: the axis of the device that points up, outwards),
 rate (rad/s) or rate_dps (deg/s), and one column of raw readings for each accelerometer of --array.
 gyroscope: the same with three columns of raw readings; each axis upright once.
-magnetometer: turned into all attitudes; columns time, x, y, z and, to align it, qw, qx, qy, qz (reference attitude,
+magnetometer: rotated through all attitudes; columns time, x, y, z and, to align it, qw, qx, qy, qz (reference attitude,
 device to world).
 frame: rotation between a tracker's frame and the device; columns bx, by, bz (axes in the device), ox, oy, oz (tracker).
 """
@@ -38,15 +38,15 @@ class Args:
     channel: str | None = None
     """channel that the record calibrates; by default imu/acc (arrays: array/acc), imu/gyr, imu/mag"""
     record: Path = Path("calibration.json")
-    """where the record goes; channels of other sensors that are in the file already are kept"""
+    """file of the record; existing channels of other sensors in it are kept"""
     gravity: float = 9.80665
     """local gravity, m/s²"""
     saturation: float | None = None
-    """raw readings of at least this magnitude are discarded; by default those that stick to the end of the range"""
+    """raw readings of at least this magnitude are discarded; by default those that stay at the end of the range"""
     estimate_axes: bool = False
     """accelerometers: find the directions of their axes too; needs runs with each axis up, and one upside down"""
     simulate: bool = False
-    """no files: simulate the runs of a device with drawn scales and offsets, and compare with the truth"""
+    """no files: simulate the runs of a device with random scales and offsets, and compare with the truth"""
     hold: float = 3.0
     """of simulated runs: time at each rate of the table, s"""
     seed: int = 0

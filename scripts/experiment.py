@@ -1,11 +1,11 @@
-"""A run of a command and what it leaves behind: ``runs/<command>/<time>-<seed>/``.
+"""Run of a command and its folder: ``runs/<command>/<time>-<seed>/``.
 
 | file | holds |
 |---|---|
 | ``args.json`` | command, seed and every argument |
 | ``versions.json`` | Python, platform, poise (with commit), packages |
-| ``results.csv`` | one number a row: estimator, trajectory, quantity, metric, value, unit |
-| ``report.md`` | what a person reads |
+| ``results.csv`` | one number per row: estimator, trajectory, quantity, metric, value, unit |
+| ``report.md`` | report in Markdown |
 | ``figures/`` | plots, drawn from ``results.csv`` |
 """
 
@@ -150,7 +150,7 @@ def known_recordings(paths: Sequence[Path]) -> list[Trajectory]:
 
 
 def command_line(command: str, args: Any, options: Sequence[str]) -> str:
-    """The command that gives the same again.
+    """The command that repeats the run.
 
     Args:
         command: its name.
@@ -180,7 +180,7 @@ def new_folder(parent: Path, name: str) -> Path:
 
 
 def write_results(path: Path, rows: Iterable[Any]) -> Path:
-    """Write rows of results as CSV, in one move, so that a reader never sees half a file.
+    """Write rows of results as CSV, atomically.
 
     Args:
         path: file to (re)place.

@@ -1,7 +1,7 @@
-"""What there is by name: estimators and their measured errors, environments, sensors, gestures, scenarios, formats.
+"""Lists of names: estimators and their measured errors, environments, sensors, gestures, scenarios, formats.
 
 Each list is read from the table that the package itself uses. Pages of the documentation hold these lists between
-``<!-- list: NAME -->`` and ``<!-- end of list -->``; ``--update`` writes them anew.
+``<!-- list: NAME -->`` and ``<!-- end of list -->``; ``--update`` rewrites them.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class Args:
     markdown: bool = False
     """print the tables in Markdown, as the documentation has them"""
     update: tuple[Path, ...] = ()
-    """pages whose lists are written anew, for instance `poise list --update docs/*.md`"""
+    """pages whose lists are updated, for instance `poise list --update docs/*.md`"""
     json: bool = False
     """print one JSON document instead of tables"""
 
@@ -102,7 +102,7 @@ def placed(name: str) -> str:
 
 
 def updated(page: str) -> str:
-    """The text of a page with its lists written anew.
+    """The text of a page with updated lists.
 
     Raises:
         ValueError: the page marks a list that does not exist.

@@ -43,7 +43,7 @@ class Command(NamedTuple):
 COMMANDS: dict[str, Command] = {
     "list": Command(".list", "estimators, environments, sensors, gestures, scenarios, file formats by name"),
     "record": Command(".record", "record trajectories of an environment into files"),
-    "rides": Command(".rides", "ride every scenario with every rider; numbers beside those of the papers"),
+    "rides": Command(".rides", "simulate every scenario with every rider; statistics beside those of the papers"),
     "train": Command(".train", "train a learned estimator"),
     "tune": Command(".tune", "fit the gains of a filter: constant ones, or a policy that sets them"),
     "inspect": Command(".recordings.inspect", "what a recording holds; whether units, signs and clock are plausible"),
@@ -51,10 +51,10 @@ COMMANDS: dict[str, Command] = {
     "estimate": Command(".recordings.estimate", "angles, quaternions, standard deviations of a recording, as a file"),
     "evaluate": Command(".recordings.evaluate", "measure estimators on recorded trajectories"),
     "calibrate": Command(".calibrate", "scale, offset and axes of raw sensors, from rate-table and tumbling runs"),
-    "array": Command(".array", "what an array of accelerometers can tell: rank and noise gains"),
+    "array": Command(".array", "analyse an array of accelerometers: rank and noise gains"),
     "benchmark": Command(".benchmark", "compare all estimators on simulated motion and on recordings"),
-    "reproduce": Command(".reproduce", "do the study of a paper again: its tables and figures beside ours"),
-    "speed": Command(".speed", "measure steps a second of environments and estimators"),
+    "reproduce": Command(".reproduce", "reproduce the study of a paper: its tables and figures beside ours"),
+    "speed": Command(".speed", "measure steps per second of environments and estimators"),
 }
 
 

@@ -1,7 +1,7 @@
-"""What a command says: tables and sentences for people, or with ``--json`` one document for programs.
+"""Output of a command: tables and sentences for people, or with ``--json`` one document for programs.
 
 The document is the only text on standard output: ``{"command", "version", "seed", "rows": [{…}, …], …}``. Rows of
-several tables name theirs in ``table``; numbers that are not finite are null. What is going on goes to standard error.
+several tables name theirs in ``table``; numbers that are not finite are null. Progress messages go to standard error.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Record episodes of an environment into files, several at a time; call it again to go on after an interruption."""
+"""Record episodes of an environment into files, several at a time; call it again to resume after an interruption."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ class Args:
     environment: tyro.conf.Positional[str] = "hand-motion"
     """environment: an id such as poise/HandMotion-v0, or its short form hand-motion"""
     folder: Annotated[Path, tyro.conf.arg(aliases=["-o"])] = Path("recordings")
-    """where the files go; finished episodes of the same kind in it are kept"""
+    """folder of the files; finished episodes of the same kind in it are kept"""
     episodes: int = 10
-    """how many episodes there shall be"""
+    """total number of episodes"""
     seed: int = 0
-    """root seed; every episode has a child of its own"""
+    """root seed; every episode has a separate child"""
     processes: int = 2
-    """episodes played at a time"""
+    """number of parallel processes"""
     options: tuple[str, ...] = ()
     """arguments of the environment, as name=value (gesture=fast rate=200)"""
     json: bool = False

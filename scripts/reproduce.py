@@ -1,7 +1,7 @@
-"""Do the study of a paper again: its tables and figures beside what this package gets.
+"""Reproduce the study of a paper: its tables and figures beside the results of this package.
 
-Papers: two-gyro, force-inertial, whole-body, accelerometer-array, external-acceleration. What is computed stays in the
-run's folder; an interrupted study goes on with --resume.
+Papers: two-gyro, force-inertial, whole-body, accelerometer-array, external-acceleration. Results are kept in the run
+folder; --resume continues an interrupted study.
 """
 
 from __future__ import annotations
@@ -32,9 +32,9 @@ class Args:
     paper: tyro.conf.Positional[str]
     """two-gyro, force-inertial, whole-body, accelerometer-array or external-acceleration"""
     quick: bool = False
-    """less than five minutes: two riders, one ride each of 20 s, unless told otherwise"""
+    """less than five minutes: two riders, one ride each of 20 s, unless given otherwise"""
     seed: int = 0
-    """root seed; every ride has a child of its own"""
+    """root seed; every ride has a separate child"""
     seeds: int | None = None
     """rides of each rider (default: 3, with --quick 1)"""
     subjects: tuple[int, ...] | None = None
@@ -42,19 +42,19 @@ class Args:
     duration: float | None = None
     """of a ride, s (default: 60, with --quick 20)"""
     recordings: tuple[Path, ...] = ()
-    """recorded data to look at as well, where the study does (default: the folder in POISE_DATA, if that is set)"""
+    """recorded data for studies that use them (default: the folder in POISE_DATA, if that is set)"""
     processes: int = 2
-    """how much is computed at a time"""
+    """number of parallel processes"""
     resume: Path | None = None
-    """folder of a run that was interrupted; what it computed is kept"""
+    """folder of an interrupted run; its results are kept"""
     runs: Path = Path("runs")
-    """where the run folder goes"""
+    """parent of the run folder"""
     json: bool = False
     """print one JSON document instead of tables"""
 
 
 def run(args: Args) -> int:
-    """Do the study, print what it finds as it is found, and leave a run folder with a report."""
+    """Do the study, print results as they are computed, and write a run folder with a report."""
     from ..baselines.studies import find_paper
 
     reproduce = find_paper(args.paper)

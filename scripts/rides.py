@@ -1,4 +1,4 @@
-"""Ride every preset scenario with every preset rider; numbers of each ride beside what the papers report."""
+"""Simulate every preset scenario with every preset rider; statistics of each ride beside those of the papers."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ class Args:
     subjects: tuple[int, ...] = (0, 1, 2, 3, 4)
     """numbers of riders"""
     processes: int = 2
-    """rides at a time"""
+    """number of parallel processes"""
     seed: int = 0
-    """root seed; every scenario and rider has a child of its own"""
+    """root seed; every scenario and rider has a separate child"""
     resume: Path | None = None
-    """folder of a run that was interrupted; its finished rides are kept"""
+    """folder of an interrupted run; its finished rides are kept"""
     runs: Path = Path("runs")
-    """where the run folder goes"""
+    """parent of the run folder"""
     checks: bool = False
     """instead of the table of rides, check the physics and compare filters of one IMU on some rides (minutes)"""
     json: bool = False

@@ -1,4 +1,4 @@
-"""Measure filters and environments beside packages and bare physics; one run, ratios, no history."""
+"""Measure the speed of filters and environments relative to other packages and bare physics."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Train a learned estimator; weights, card and all that led to them stay in the run folder."""
+"""Train a learned estimator; the run folder keeps weights, card, arguments and versions."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Args:
     network: tyro.conf.Positional[Literal["gru"]] = "gru"
     """what is trained; gain policies are trained by `poise tune`"""
     preset: Literal["quick", "shipped"] = "quick"
-    """quick: some minutes, to see that it works; shipped: the training of the weights in the package"""
+    """quick: some minutes, as a test; shipped: the training of the weights in the package"""
     seed: int = 0
     """root seed of episodes, weights and order"""
     episodes: int | None = None
@@ -51,11 +51,11 @@ class Args:
     test_episodes: int = 48
     """simulated episodes that the finished network is tested on"""
     resume: Path | None = None
-    """run folder of an interrupted training; give the other arguments as then"""
+    """run folder of an interrupted training; the other arguments must be the same"""
     export: Path | None = None
-    """file to which the weights are written too"""
+    """additional file for the weights"""
     runs: Path = Path("runs")
-    """where the run folder goes"""
+    """parent of the run folder"""
     json: bool = False
     """print one JSON document instead of tables"""
 

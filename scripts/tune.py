@@ -39,7 +39,7 @@ class Args:
     method: Literal["ppo", "constant"] = "ppo"
     """ppo: train a policy that sets the gains while the filter runs; constant: search the best constant gains"""
     preset: Literal["quick", "shipped"] = "quick"
-    """quick: a minute or two, to see that it works; shipped: the training of the weights in the package"""
+    """quick: a minute or two, as a test; shipped: the training of the weights in the package"""
     seed: int = 0
     """root seed of motions, sensors and training"""
     steps: int | None = None
@@ -51,11 +51,11 @@ class Args:
     recordings: tuple[Path, ...] = ()
     """files or folders of recordings with known orientation to compare on; never trained on"""
     resume: Path | None = None
-    """run folder of an interrupted training; give the other arguments as then"""
+    """run folder of an interrupted training; the other arguments must be the same"""
     export: Path | None = None
-    """file to which the weights are written too"""
+    """additional file for the weights"""
     runs: Path = Path("runs")
-    """where the run folder goes"""
+    """parent of the run folder"""
     json: bool = False
     """print one JSON document instead of tables"""
 

@@ -1,4 +1,4 @@
-"""The clock of a recording: from the time stamps that a device wrote to the uniform grid that estimators need.
+"""The clock of a recording: the uniform sampling grid behind the time stamps of a device.
 
 Stamps are rounded, jitter, come in packets and have gaps; the sensor behind them samples at a constant rate. That rate
 is a fit of time over the sample's number on the grid, not a median of intervals: stamps rounded to milliseconds at
@@ -21,7 +21,7 @@ RATE_GAIN = 0.25 * PHASE_GAIN**2
 RATE_RANGE = 0.1
 """The loop follows the interval by no more than this part."""
 FAR = 20
-"""After so many missing samples the loop takes the phase of the next stamp: the sensor may have been restarted."""
+"""Number of missing samples after which the loop takes the phase of the next stamp, as after a restart."""
 LOCKED = 0.245
 """Root mean square deviation from the loop's phase, in intervals, up to which stamps have a sampling rate; that of
 random stamps is 0.29."""
@@ -271,7 +271,7 @@ def within(counts: np.ndarray) -> np.ndarray:
 
 
 def check_interval(interval: float, time: np.ndarray) -> None:
-    """Refuse an interval at which no inertial sensor is sampled.
+    """Check that an interval is plausible for an inertial sensor.
 
     Raises:
         ValueError: names the unit in which the stamps would be plausible.

@@ -1,4 +1,4 @@
-"""Trajectories as tables: a row a sample, measurements and truth."""
+"""Trajectories as tables: one row per sample, measurements and truth."""
 
 from __future__ import annotations
 

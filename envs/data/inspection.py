@@ -1,4 +1,4 @@
-"""What a recording holds, in numbers: clock, rest, noise and bias at rest, gravity, magnetic field, reference."""
+"""Statistics of a recording: clock, rest, noise and bias at rest, gravity, magnetic field, reference."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ class Inspection:
 
     Attributes:
         clock: property → text.
-        channels: a row a channel.
-        sensors: a row a sensor.
+        channels: one row per channel.
+        sensors: one row per sensor.
         rest: sensor → ``(T,)`` bool, samples at rest.
     """
 
@@ -36,7 +36,7 @@ class Inspection:
 
 
 def inspect_recording(trajectory: Trajectory) -> Inspection:
-    """Describe a recording; nothing is judged (see :func:`poise.check_recording`)."""
+    """Describe a recording without checks (see :func:`poise.check_recording`)."""
     rest = {site: at_rest(trajectory, site) for site in sites(trajectory)}
     channels = [channel_row(name, values, trajectory.time) for name, values in trajectory.measurements.items()]
     sensors = [sensor_row(trajectory, site, rest[site]) for site in rest]

@@ -1,7 +1,7 @@
-"""Whether a recording is what it claims to be: SI units, signs and axes of a right-handed sensor, time in seconds.
+"""Plausibility of a recording: SI units, signs and axes of a right-handed sensor, time in seconds.
 
-An estimator cannot tell a wrong unit from a violent motion. Every check here compares a number with what physics and
-other channels allow, and names the mistake that explains the number best.
+An estimator cannot distinguish a wrong unit from strong motion. Each check here compares a number with limits from
+physics and other channels, and names the most likely mistake.
 """
 
 from __future__ import annotations
@@ -50,11 +50,11 @@ Severity = Literal["note", "warning"]
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that is odd about a recording.
+    """One finding about a recording.
 
     Attributes:
-        severity: ``warning`` if estimates will be wrong, ``note`` if it is only good to know.
-        channel: what it concerns: a channel, ``time``, or a quantity of the truth.
+        severity: ``warning`` if estimates will be wrong, else ``note``.
+        channel: affected channel, ``time``, or quantity of the truth.
         what: what was found, with the number.
         cause: the likely cause.
         remedy: what to do about it.
@@ -74,10 +74,10 @@ def check_recording(trajectory: Trajectory) -> list[Finding]:
     """Look for wrong units, signs, axes and clocks.
 
     Args:
-        trajectory: any; every ``site/gyr``, ``site/acc`` and ``site/mag`` is looked at.
+        trajectory: any; every ``site/gyr``, ``site/acc`` and ``site/mag`` is checked.
 
     Returns:
-        Findings, warnings first; empty if nothing is odd.
+        Findings, warnings first; empty for a plausible recording.
     """
     findings = list(check_clock(trajectory))
     wrong_clock = any(finding.severity == "warning" for finding in findings)
@@ -340,7 +340,7 @@ def check_sign(trajectory: Trajectory, channel: str, acc: np.ndarray, mag: np.nd
 
 
 def check_reference(trajectory: Trajectory) -> Iterator[Finding]:
-    """What is known of the clock of the reference."""
+    """Offset of the clock of the reference, if known."""
     offset = trajectory.metadata.get("reference_clock_offset")
     if isinstance(offset, int | float) and abs(offset) > 1e-3:
         what = f"the reference is {1e3 * abs(offset):.1f} ms {'ahead of' if offset > 0.0 else 'behind'} the gyroscope"

@@ -1,8 +1,8 @@
-"""Whether a gyroscope agrees with the direction that another sensor of the same place measures.
+"""Consistency of a gyroscope with the direction that another sensor at the same site measures.
 
-Turned by the integrated gyroscope, gravity (or the magnetic field) stands still. Here short windows are turned under
-every hypothesis about the gyroscope's unit and axes, and the one under which the measured direction stands still is
-compared with "as given". Accelerations average out over the segments of a window, because velocity stays bounded.
+Rotated by the integrated gyroscope, gravity (or the magnetic field) is constant. Short windows are rotated under each
+hypothesis about the gyroscope's unit and axes, and the one with the most constant direction is compared with "as
+given". Accelerations average out over the segments of a window, because velocity stays bounded.
 """
 
 from __future__ import annotations
@@ -58,11 +58,11 @@ class RateConsistency:
 
     Attributes:
         as_given: residual motion of the direction, root mean square, as a share of its length (rad, if small).
-        at_rest: the same if the gyroscope reported zero: how much there is to explain.
+        at_rest: the same for a gyroscope that reports zero, as a reference.
         unit: unit of :data:`SCALES` that leaves least.
-        unit_residual: what it leaves.
+        unit_residual: residual with this unit.
         axes: ``(3, 3)`` signed permutation of the reported axes that leaves least, at that unit.
-        axes_residual: what it leaves.
+        axes_residual: residual with these axes.
     """
 
     as_given: float

@@ -1,4 +1,4 @@
-"""The reference of a recording against its gyroscope: clocks that differ, and bodies that are not aligned.
+"""Clock offset and alignment of the reference of a recording relative to its gyroscope.
 
 No estimator is involved. The rotation of the reference over a short interval and the integral of the gyroscope over the
 same interval describe one motion. If the reference runs ahead by τ, it shows the rate ω(t + τ) ≈ ω + τ dω/dt: the
@@ -18,9 +18,9 @@ from .trajectory import REFERENCE_CLOCK, Trajectory
 WINDOW = 0.04
 """s over which rotations are compared: shorter ones are noise of the reference, longer ones blur the motion."""
 LEAST_MOTION = 0.3
-"""rad/s; root mean square rate below which offsets cannot be told."""
+"""rad/s; root mean square rate below which offsets are not determined."""
 LARGEST_ERROR = 2e-4
-"""s; offsets whose standard error is larger are not told."""
+"""s; offsets with a larger standard error are not reported."""
 LARGEST = 0.5
 """s; offsets are looked for within it."""
 
@@ -45,7 +45,7 @@ def mean_rates(orientation: np.ndarray, gyr: np.ndarray, dt: float) -> Rates:
 
 
 def clock_offset(orientation: np.ndarray, gyr: np.ndarray, dt: float) -> float | None:
-    """Seconds by which the reference runs ahead of the gyroscope; None where the motion does not tell.
+    """Seconds by which the reference is ahead of the gyroscope; None if the motion does not determine it.
 
     The regression is repeated on the reference as corrected so far, until nothing is left.
 
@@ -66,7 +66,7 @@ def clock_offset(orientation: np.ndarray, gyr: np.ndarray, dt: float) -> float |
         known = np.isfinite(slope).all(axis=1) & np.isfinite(difference).all(axis=1)
         if known.sum() < 50 or np.sqrt(3.0 * np.mean(rates.gyroscope[known] ** 2)) < LEAST_MOTION:
             return None
-        # Where the reference jumps (a marker was swapped) it says nothing about the clock.
+        # Jumps of the reference (swapped markers) carry no information about the clock.
         size = np.linalg.norm(difference - np.median(difference[known], axis=0), axis=1)
         known &= size <= 5.0 * np.median(size[known]) + 1e-9
         a, b = (values[known] - values[known].mean(axis=0) for values in (slope, difference))
@@ -120,7 +120,7 @@ def aligned(trajectory: Trajectory) -> Trajectory:
     grid = trajectory.on_grid()
     orientation = np.where(grid.mask[:, None], grid.truth["orientation"], np.nan)
     time = grid.dt * np.arange(len(grid))
-    # Magnitudes of rates tell the clocks roughly whatever the axes.
+    # Magnitudes of rates give the approximate clock offset for any axes.
     offset = grid.dt * coarse_shift(orientation, grid.measurements["imu/gyr"], grid.dt)
     orientation = shifted({"orientation": orientation}, time, offset)["orientation"]
     rates = mean_rates(orientation, grid.measurements["imu/gyr"], grid.dt)

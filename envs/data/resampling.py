@@ -1,4 +1,4 @@
-"""Trajectories at another rate, without losing what integrates to the pose.
+"""Resampling of trajectories that preserves the integrals to attitude and velocity.
 
 With ``sampling="interval"`` a sample describes the interval that ends at its time (of a slower sensor:
 that reaches back to its own last sample), and its kind decides how samples are joined:

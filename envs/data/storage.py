@@ -1,4 +1,4 @@
-"""Trajectories on disk: one HDF5 file each, written whole or not at all, and HDF5 files of others read with care.
+"""Trajectories on disk: one HDF5 file each, written atomically, and safe reading of other HDF5 files.
 
 Layout, version 2: attributes ``format``, ``format_version`` and ``digest``; datasets ``time``, ``mask``, ``metadata``
 (JSON text), ``measurements/<place>/<kind>`` and ``truth/<quantity>``, all with a checksum of their values. The digest

@@ -1,6 +1,6 @@
-"""A trajectory: what the sensors said, what was true, and how both came about.
+"""A trajectory: measurements, truth and their metadata.
 
-Simulated episodes and recordings are the same thing here, so that everything that reads one reads the other.
+Simulated episodes and recordings have the same type, so that all functions accept both.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class Trajectory:
 
     Attributes:
         time: ``(T,)`` s, the stamps as recorded, not decreasing: they may jitter, have gaps, and be shared by the
-            samples of a packet. :meth:`on_grid` is what estimators run on.
+            samples of a packet. Estimators run on :meth:`on_grid`.
         measurements: channel name (``place/kind``) → ``(T, size)``; NaN where a channel has no valid sample.
         truth: quantity name → ``(T, size)``; NaN where unknown; may be empty.
         mask: ``(T,)`` bool, evaluation mask; all samples by default.
@@ -132,7 +132,7 @@ class Trajectory:
         return typical > 0.0 and bool(np.all(np.abs(steps / typical - 1.0) < 0.01)) and self.clock.missing == 0
 
     def on_grid(self) -> Trajectory:
-        """The trajectory on its uniform grid: what estimators, which know one interval, run on.
+        """The trajectory on its uniform grid, as estimators require it.
 
         Gaps become samples of NaN that are not scored, jitter is attributed to the stamps, and the samples of a
         packet lie in the interval before its stamp. Rows that repeat stamp and values of the row before are dropped.
@@ -311,7 +311,7 @@ class Trajectory:
         return self.replace(truth=truth, metadata=details | {"reference_clock_corrected": offset})
 
     def to_frame(self) -> pandas.DataFrame:
-        """A table with a row a sample: see :func:`~poise.envs.data.frames.trajectory_frame`."""
+        """A table with one row per sample: see :func:`~poise.envs.data.frames.trajectory_frame`."""
         units = self.metadata.get("units")
         return trajectory_frame(
             self.time, self.measurements, self.truth, self.mask, units if isinstance(units, Mapping) else {}

@@ -1,4 +1,4 @@
-"""Take estimates away: run an estimator over recordings and write angles, quaternions, standard deviations, biases."""
+"""Run an estimator on recordings and write angles, quaternions, standard deviations and biases to a file."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Args:
     plot: Path | None = None
     """picture of the angles over time, .png, .pdf or .svg"""
     site: str | None = None
-    """in recordings of several sensors, the only one to look at"""
+    """in recordings of several sensors, the one to use"""
     calibration: Path | None = None
     """record of `poise calibrate` that turns raw readings of the recordings into SI units"""
     json: bool = False
@@ -75,7 +75,7 @@ def run(args: Args) -> int:
 
 
 def summary_row(name: str, estimate: Estimate) -> dict[str, Any]:
-    """What an estimate was, in one row: samples, rate, ranges of the angles, final standard deviations."""
+    """Summary of an estimate in one row: samples, rate, ranges of the angles, final standard deviations."""
     import numpy as np
 
     frame = estimate.to_frame()

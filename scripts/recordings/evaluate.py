@@ -1,4 +1,4 @@
-"""Measure estimators on recordings: those with a reference against it, others against each other."""
+"""Evaluate estimators on recordings: against the reference if there is one, else against each other."""
 
 from __future__ import annotations
 
@@ -21,20 +21,20 @@ class Args:
     estimators: tuple[str, ...] = ("bounded-motion", "external-acceleration", "mekf", "mahony", "gru")
     """names of estimators; `poise evaluate --estimators all .` takes every one that is installed"""
     reference: str = "auto"
-    """what stands in for the truth of recordings without one (agreement, not error): an estimator, `onboard` for the
+    """replacement of a missing truth (agreement, not error): an estimator, `onboard` for the
     orientation that the device computed, or `auto`: mekf-9, or bounded-motion where there is no magnetometer"""
     reference_clock: Literal["recorded", "corrected"] = "recorded"
     """take the truth as recorded, or corrected by the measured offset between its clock and that of the gyroscope"""
     offline: bool = False
     """run the smoother of every estimator that has one as well: estimates that use the whole recording"""
     site: Annotated[str | None, tyro.conf.arg(aliases=["--place"])] = None
-    """in recordings of several sensors, the one to look at, such as bicycle_imu or trunk_imu of a ride"""
+    """in recordings of several sensors, the one to use, such as bicycle_imu or trunk_imu of a ride"""
     calibration: Path | None = None
     """record of `poise calibrate` that turns raw readings of the recordings into SI units"""
     seed: int = 0
     """names the run folder; evaluation draws no random numbers"""
     runs: Path = Path("runs")
-    """where the run folder goes"""
+    """parent of the run folder"""
     json: bool = False
     """print one JSON document instead of tables"""
 

@@ -1,4 +1,4 @@
-"""Look at recordings before believing them: what was recognised, rate, gaps, rest, units, signs, reference."""
+"""Inspect recordings: recognised format, rate, gaps, rest, units, signs, reference."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Args:
 
 
 def run(args: Args) -> int:
-    """Describe, judge, draw."""
+    """Describe, check, draw."""
     from ...envs.data.inspection import inspect_recording
     from ...envs.data.plausibility import check_recording
     from .load import load_all, passed_over_text, plain_warnings

@@ -21,7 +21,7 @@ def load_all(
     Args:
         paths: files or folders.
         calibration: record of ``poise calibrate``.
-        site: in recordings of several sensors, the one to look at.
+        site: in recordings of several sensors, the one to use.
 
     Returns:
         Trajectories of distinct names; files of folders that were passed over, with the reason.
@@ -136,7 +136,7 @@ def plain_warnings() -> Iterator[None]:
 
 
 def passed_over_text(passed_over: Sequence[tuple[Path, str]], most: int = 10) -> str:
-    """What was passed over and why, a line a file."""
+    """Files that were passed over with the reason, one line per file."""
     lines = [f"- {file}: {' '.join(reason.split())}" for file, reason in passed_over[:most]]
     more = len(passed_over) - len(lines)
     return "\n".join([*lines, *([f"- … and {more} more"] if more > 0 else [])])

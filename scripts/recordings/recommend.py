@@ -1,4 +1,4 @@
-"""Which estimator suits a recording: ranked by measured errors on benchmark recordings that move alike."""
+"""Recommend estimators for a recording, ranked by measured errors on benchmark recordings with similar motion."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class Args:
     recordings: tyro.conf.Positional[tuple[Path, ...]]
     """files, or folders that are searched for recordings"""
     mounting: Literal["worn", "hand-held", "vehicle", "bicycle"] | None = None
-    """where the sensor is; by default recordings of all mountings are considered"""
+    """mounting of the sensor; by default recordings of all mountings are considered"""
     most: int = 8
     """estimators to show"""
     calibration: Path | None = None
