@@ -1,8 +1,8 @@
-"""The asymmetric actor–critic that PPO trains: the actor sees observations, the critic the truth as well.
+"""Asymmetric actor–critic for PPO: the actor receives observations, the critic also the truth.
 
 L. Pinto, M. Andrychowicz, P. Welinder, W. Zaremba, P. Abbeel, "Asymmetric Actor Critic for Image-Based Robot Learning",
-Robotics: Science and Systems, 2018. The first numbers of an observation are what the actor sees; those that follow
-are known in simulation only and reach nothing but the value function, so the policy runs without them.
+Robotics: Science and Systems, 2018. The first numbers of an observation are inputs of the actor. The others are known
+in simulation only and are inputs of the value function alone, so the policy runs without them.
 """
 
 from __future__ import annotations
@@ -74,7 +74,7 @@ class AsymmetricActorCriticPolicy(ActorCriticPolicy):
 
 
 class GainPPO(PPO):
-    """PPO that calls ``after_update`` after every update: between two rollouts nothing is in flight.
+    """PPO that calls ``after_update`` after every update, between two rollouts.
 
     A callback of stable-baselines3 is called after the exploration noise of the next rollout was drawn, which is too
     late for a checkpoint.

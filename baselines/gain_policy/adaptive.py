@@ -1,4 +1,4 @@
-"""A filter whose gains a policy sets while it runs, as one estimator among others."""
+"""Adaptive filter: a policy sets the gains of a Kalman filter while it runs."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from .policy import GainPolicy
 class AdaptiveEstimator:
     """A Kalman filter tuned by a policy: an :class:`~poise.filters.core.estimator.Estimator` on NumPy arrays.
 
-    The policy decides once an interval, from what has been seen until then; between decisions the gains stay. With
+    The policy decides once per interval from the samples so far; between decisions the gains are constant. With
     a neutral policy it is the filter itself, bit by bit. The state holds arrays only.
 
     Attributes:
@@ -30,7 +30,8 @@ class AdaptiveEstimator:
         policy: sets the gains.
 
     Raises:
-        ValueError: the policy sets gains that the filter has not, or the filter reads no gyroscope and accelerometer.
+        ValueError: the policy sets gains that the filter does not have, or the filter reads no gyroscope and
+            accelerometer.
     """
 
     filter: KalmanFilter
@@ -59,7 +60,7 @@ class AdaptiveEstimator:
 
     @cached_property
     def tuned(self) -> TunedFilter:
-        """The filter with what the policy chooses and sees."""
+        """The filter with the actions and observations of the policy."""
         return TunedFilter(self.filter, self.policy.ranges, self.policy.features)
 
     @property
@@ -69,24 +70,24 @@ class AdaptiveEstimator:
 
     @property
     def channels(self) -> tuple[Channel, ...]:
-        """What it reads."""
+        """Required channels."""
         return self.filter.channels
 
     @property
     def outputs(self) -> tuple[Quantity, ...]:
-        """What it gives."""
+        """Estimated quantities."""
         return self.filter.outputs
 
     def with_dt(self, dt: float) -> AdaptiveEstimator:
-        """The same for another sampling interval; decisions stay as many seconds apart."""
+        """The same for another sampling interval; the time between decisions is kept."""
         return replace(self, filter=self.filter.with_dt(dt))
 
     def init(self, measurement: Measurement) -> TunedState:
-        """Empty memory with the batch shape of ``measurement``."""
+        """Initial state with the batch shape of ``measurement``."""
         return self.tuned.init(measurement)
 
     def step(self, state: TunedState, measurement: Measurement) -> tuple[TunedState, Estimate]:
-        """Take one sample ``(*batch, size)`` of every channel, NaN where there is none.
+        """Process one sample ``(*batch, size)`` of every channel, NaN where there is none.
 
         Raises:
             ValueError: see :func:`poise.filters.core.estimator.check_measurements`.
@@ -102,14 +103,14 @@ class AdaptiveEstimator:
         return self.run_from(None, measurements)[0]
 
     def run_from(self, state: TunedState | None, measurements: Mapping[str, Any]) -> tuple[Estimate, TunedState]:
-        """As :meth:`run`, but going on from ``state`` (None: from the start) and giving the last state too."""
+        """As :meth:`run`, but from ``state`` (None: from the start), and also returns the last state."""
         estimate, state, _ = self.run_with_actions(state, measurements)
         return estimate, state
 
     def run_with_actions(
         self, state: TunedState | None, measurements: Mapping[str, Any]
     ) -> tuple[Estimate, TunedState, np.ndarray]:
-        """As :meth:`run_from`, and the action ``(T, *batch, k)`` that was in force at every sample."""
+        """As :meth:`run_from`, with the action ``(T, *batch, k)`` at every sample."""
         arrays = check_measurements(self.channels, measurements, time_axis=True)
         arrays = {name: np.asarray(array) for name, array in arrays.items()}
         length = len(next(iter(arrays.values())))
@@ -146,7 +147,7 @@ def shipped(weights: str, dt: float = 0.01, **parameters: Any) -> AdaptiveEstima
     Args:
         weights: name of the policy.
         dt: sampling interval, s.
-        parameters: constants of the filter that shall differ from the published tuning, by the model's field names. The
+        parameters: constants of the filter that differ from the published tuning, by the model's field names. The
             policy was trained on the published ones.
 
     Raises:

@@ -26,7 +26,7 @@ with extra("rl"):
 AHEAD = (1, 10, 40)
 """Decisions over which the critic looks ahead."""
 PRIVILEGED = 2 + 2 * len(AHEAD)
-"""Numbers at the end of an observation that only the critic may see."""
+"""Number of privileged inputs at the end of an observation, for the critic only."""
 SMALL_ERROR = math.radians(0.2)
 """Added to the error that relative rewards are divided by."""
 
@@ -63,7 +63,7 @@ class RateGroup:
         self.start()
 
     def _foresight(self) -> np.ndarray:
-        """What is known of every decision beforehand ``(N, decisions + 1, PRIVILEGED - 1)``.
+        """Privileged information for every decision ``(N, decisions + 1, PRIVILEGED - 1)``.
 
         The gyroscope's bias, and over each of :data:`AHEAD` the mean cost of the reference and the mean acceleration.
         """
@@ -97,7 +97,7 @@ class RateGroup:
         self.state, self.error = self.initial, np.zeros(self.rows)
 
     def observe(self) -> np.ndarray:
-        """Observations, and what only the critic may see ``(rows, n + PRIVILEGED)``."""
+        """Observations with the privileged inputs of the critic ``(rows, n + PRIVILEGED)``."""
         own = np.log1p(np.degrees(self.error))[:, None]
         parts = [self.tuned.observe(self.state), self.foresight[self.trajectory, self.decision], own]
         return np.concatenate(parts, axis=-1).astype(np.float32)
@@ -149,7 +149,7 @@ class RateGroup:
         }
 
     def restore(self, snapshot: dict[str, Any]) -> None:
-        """Go on from a :meth:`snapshot` as if nothing had happened in between."""
+        """Continue exactly from a :meth:`snapshot`."""
         self.generator.bit_generator.state = json.loads(snapshot["generator"])
         self.trajectory, self.decision, self.end, self.error = (np.array(array) for array in snapshot["rows"])
         arrays = [np.array(array) for array in snapshot["state"]]
@@ -176,14 +176,14 @@ class TuningBatch(VecEnv):
     degrees.
 
     Args:
-        tuned: the filter, what may be chosen of it and what is seen.
+        tuned: the filter with its actions and features.
         trajectories: drawn from with replacement; every rate among them gets its share of the episodes.
         n_envs: episodes that run at a time, at least one for each rate.
         seed: of the choice of trajectories.
         quantity: output that is scored; None for ``up``.
         reference: action ``(k,)``; None for the published tuning.
-        error_scale: errors far above this count by their logarithm, s ln(1 + e / s), so that a few wild seconds do not
-            drown the rest; deg; infinite for errors as they are.
+        error_scale: errors far above this count by their logarithm, s ln(1 + e / s), so that a few seconds do not
+            dominate the reward; deg; infinite for unscaled errors.
         relative: whether rewards are divided by the mean error of the reference on the trajectory, so that easy and
             hard trajectories count the same.
 
@@ -223,7 +223,7 @@ class TuningBatch(VecEnv):
         )
 
     def privileged_statistics(self) -> tuple[np.ndarray, np.ndarray]:
-        """Mean and standard deviation of the numbers that only the critic may see, each ``(PRIVILEGED,)``."""
+        """Mean and standard deviation of the privileged inputs, each ``(PRIVILEGED,)``."""
         known = np.concatenate([group.foresight.reshape(-1, PRIVILEGED - 1) for group in self.groups])
         # The agent's own error is not known beforehand; it is about that of the reference.
         table = np.concatenate([known, known[:, 1:2]], axis=1)
@@ -234,7 +234,7 @@ class TuningBatch(VecEnv):
         return {"returns": self.returns.copy(), "groups": [group.snapshot() for group in self.groups]}
 
     def restore(self, snapshot: dict[str, Any]) -> None:
-        """Go on from a :meth:`snapshot` of a batch that was made with the same arguments."""
+        """Continue from a :meth:`snapshot` of a batch with the same arguments."""
         self.returns = np.array(snapshot["returns"])
         for group, kept in zip(self.groups, snapshot["groups"], strict=True):
             group.restore(kept)
@@ -251,7 +251,7 @@ class TuningBatch(VecEnv):
         self.actions = np.asarray(actions, float)
 
     def step_wait(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[dict[str, Any]]]:
-        """Advance all episodes by one interval; those that are over begin anew."""
+        """Advance all episodes by one interval; finished ones restart."""
         observations, rewards, overs = [], [], []
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
         for group, first, last in zip(self.groups, self.bounds[:-1], self.bounds[1:], strict=True):

@@ -1,4 +1,4 @@
-"""What gain policies are trained on and how; names and meanings of PPO's settings are stable-baselines3's."""
+"""Training configuration of gain policies; settings of PPO have the names and meanings of stable-baselines3."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ...envs.hand.trajectories import HandTrajectories
 from ...envs.sensors.presets import sensor_preset
 
 SUSTAINED = Mixed(lengths=(15.0, 40.0), rest_share=0.1, spread=0.5, single_share=0.25)
-"""Motion of one kind that lasts, beside the quick changes of ``mixed``."""
+"""Sustained motion of one kind, in addition to the quick changes of ``mixed``."""
 
 VIBRATING = replace(
     sensor_preset("st-lsm6dsox"),
@@ -30,7 +30,7 @@ TRAINING_MOTIONS = HandTrajectories(
     noise_scale=(0.1, 1.0),
     duration=60.0,
 )
-"""What shipped policies are trained on."""
+"""Training data of the shipped policies."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class TrainingConfig:
     gains: tuple[str, ...] | None = None
     """gains that the policy sets; None for all of the filter"""
     interval: float = 0.1
-    """s from decision to decision"""
+    """s between decisions"""
     motions: HandTrajectories = TRAINING_MOTIONS
     """what is simulated"""
     trajectories: int = 240
@@ -56,7 +56,7 @@ class TrainingConfig:
     total_timesteps: int = 1_000_000
     """decisions in total"""
     n_envs: int = 256
-    """episodes at a time"""
+    """parallel episodes"""
     n_steps: int = 64
     """decisions of each episode between two updates"""
     batch_size: int = 4096
@@ -66,11 +66,12 @@ class TrainingConfig:
     learning_rate: float = 1e-4
     """at the start; falls linearly to a tenth"""
     gamma: float = 0.995
-    """discount a decision; 0.995 looks 20 s ahead at 10 decisions a second, as a biased gyroscope takes time to show"""
+    """discount factor per decision; 0.995 looks 20 s ahead at 10 decisions per second, since the effect of a gyroscope
+    bias takes time"""
     gae_lambda: float = 0.95
     """λ of generalised advantage estimation"""
     sde_sample_freq: int = 32
-    """decisions for which the exploration (gSDE) keeps its noise matrix; a filter forgets single ones"""
+    """decisions for which the exploration (gSDE) keeps its noise matrix; single decisions have no lasting effect"""
     net_arch: tuple[int, ...] = (64, 64)
     """units of the hidden layers"""
     initial_std: float = 0.1
@@ -106,12 +107,12 @@ class TrainingConfig:
 def shipped_config(filter: str) -> TrainingConfig:
     """The configuration that the shipped weights of a filter were trained with.
 
-    They begin from the oracle warm start. Started from the best constant gains, the same number of steps wins little in
-    simulation and loses on recordings; from an oracle over the whole box of actions, the filter is lost in single
+    They begin from the oracle warm start. From the best constant gains, the same number of steps gains little in
+    simulation and loses on recordings. With an oracle over the whole box of actions the filter diverges in single
     motions.
     """
     if filter == "bounded-motion":
-        # The bias gain is left alone: motion that looks like a wandering bias is more frequent than one.
+        # The bias gain is not tuned: motion that resembles a bias drift is more frequent than a real one.
         return TrainingConfig(filter=filter, gains=("process", "velocity"), warm_start_centre=(0.0, 0.0))
     # The valley in which the measurement variance does the work, and c_a, which trusts the filter's own error, little.
     return TrainingConfig(filter=filter, warm_start_centre=(-0.7, 0.7, -0.7))

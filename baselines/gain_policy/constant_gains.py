@@ -1,4 +1,4 @@
-"""The best constant gains of a filter: what an adaptive policy must beat, and the starting point of its training."""
+"""The best constant gains of a filter: reference for an adaptive policy, and starting point of its training."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from .policy import GainPolicy
 
 @dataclass(frozen=True, eq=False)
 class ConstantGains:
-    """What a search over constant gains found.
+    """Result of a search over constant gains.
 
     Attributes:
         action: ``(k,)`` in [−1, 1], best for the mean over the trajectories.

@@ -1,10 +1,9 @@
-"""Oracle warm start: a first policy cloned from the gains that turn out best when the future is known.
+"""Oracle warm start: a first policy cloned from the hindsight-optimal gains.
 
 On simulated trajectories the cost of many constant actions can be computed for every decision. The logarithm of the
 cost of the seconds that follow is fitted by a cubic polynomial of the action, and a network from features to actions is
-trained on the expectation of the polynomials' exponentials. Nothing is sampled, so there is none of the variance that a
-policy gradient has to begin with. The cost leaves out the price of changing gains; that is left to the reinforcement
-learning that continues from here.
+trained on the expectation of the polynomials' exponentials. Nothing is sampled, which avoids the initial variance of a
+policy gradient. The cost neglects the effect of changing gains, which the subsequent reinforcement learning includes.
 """
 
 from __future__ import annotations
@@ -26,7 +25,7 @@ BEHAVIOURS = 4
 ROUNDS = 3
 """Trainings, each with the features of the policy before as well."""
 REACH = 0.7
-"""How far candidates lie from the start: within one valley of the cost, since what lies between two is bad."""
+"""Distance of candidates from the start, within one valley of the cost, since the cost between valleys is high."""
 SMALL_COST = 0.05
 """Added to relative costs before their logarithm is taken."""
 
@@ -87,7 +86,7 @@ def fit_oracle(
     """Clone the oracle: fit a network to the gains of least future cost.
 
     Args:
-        tuned: the filter, what may be chosen of it and what is seen.
+        tuned: the filter with its actions and features.
         trajectories: simulated, with truth.
         start: constant action ``(k,)``, the first of the candidates; the others lie within :data:`REACH` of it.
         net_arch: units of the hidden layers.

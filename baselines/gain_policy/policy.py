@@ -1,4 +1,4 @@
-"""A gain policy: a small network from a filter's own statistics to its gains, evaluated with NumPy alone."""
+"""A gain policy: a small network from statistics of a filter to its gains, evaluated with NumPy."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class GainPolicy:
     Attributes:
         filter: name of the filter that it tunes.
         ranges: of the actions.
-        features: what it sees, and the interval of its decisions.
+        features: its observation, and the interval of its decisions.
         layers: weights and biases; the normalisation of observations is part of the first.
         card: description of the training.
 

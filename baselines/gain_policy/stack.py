@@ -23,10 +23,10 @@ class TrajectoryStack:
         tuned: the filter at that rate.
         trajectories: the N trajectories.
         quantity: output of the filter that is scored.
-        channels: what the filter reads, channel → ``(T, N, size)``.
+        channels: of the filter, channel → ``(T, N, size)``.
         truth: true values of ``quantity`` ``(T, N, size)``.
-        mask: samples that are scored ``(T, N)``.
-        decisions: D; T is D times the samples from decision to decision.
+        mask: evaluation mask ``(T, N)``.
+        decisions: D; T is D times the samples between decisions.
     """
 
     tuned: TunedFilter

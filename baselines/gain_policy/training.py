@@ -1,8 +1,8 @@
 """Train a gain policy by proximal policy optimisation (stable-baselines3); a stopped training resumes bit by bit.
 
-The motions are simulated (:class:`poise.envs.hand.trajectories.HandTrajectories`), a fixed set drawn from a seed.
-First the best constant gains are searched; the network starts from them and is rewarded for what it gains over them,
-which changes no optimal policy but takes most of the variance away, since both see the same motion.
+The motions are simulated (:class:`poise.envs.hand.trajectories.HandTrajectories`), a fixed set drawn from a seed. First
+the best constant gains are searched. The network starts from them, and its reward is relative to their error. This does
+not change the optimal policy but removes most of the variance, since both process the same motion.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 CHECKPOINT = "checkpoint.pt"
 """File of the run folder that a stopped training resumes from."""
 LOOKS = 6
-"""How often a training with a validation looks at its policy, about."""
+"""Approximate number of validations during a training."""
 
 Report = Callable[[dict[str, float]], None]
 Validate = Callable[[GainPolicy], float]
@@ -58,14 +58,14 @@ def train_policy(
     """Train a policy; the same arguments on the same machine give the same policy, interrupted and resumed or not.
 
     Args:
-        config: what to do.
+        config: settings.
         kalman: the filter, if it is not the one that ``config.filter`` names.
         trajectories: to train on, instead of simulated ones.
         start: constant action ``(k,)`` to start from; None searches it, or takes that of the checkpoint.
         folder: where checkpoints and TensorBoard logs go; None keeps nothing.
         resume: continue from the checkpoint in ``folder``; a longer ``total_timesteps`` than before is allowed.
         report: called after every update with ``steps``, ``gain`` (share of the error that is saved) and ``seconds``.
-        validate: gives a score of a policy, the less the better; the best of about six looks is returned, not the last.
+        validate: gives a score of a policy, the less the better; the best of about six validated policies is returned.
 
     Returns:
         The policy; its card holds the configuration, the training time and the constant gains that it started from.
@@ -132,8 +132,8 @@ class PolicyTraining:
 
     Args:
         config: settings.
-        tuned: the filter, what may be chosen of it and what is seen.
-        motions: what is trained on.
+        tuned: the filter with its actions and features.
+        motions: training data.
         start: constant action ``(k,)`` to start from, the reference of the reward.
         home: folder of checkpoints and logs; None keeps nothing.
         key: what a checkpoint must agree with.
@@ -184,7 +184,7 @@ class PolicyTraining:
         return time.perf_counter() - self.started + self.earlier
 
     def begin(self) -> None:
-        """The oracle warm start, a first look at its policy, and the first observation."""
+        """The oracle warm start, a first validation of its policy, and the first observation."""
         from .actor_critic import warm_start
 
         config = self.config
@@ -218,13 +218,13 @@ class PolicyTraining:
         return replace(policy, card=json.loads(json.dumps(card)))
 
     def exported(self) -> GainPolicy:
-        """The policy of now."""
+        """The current policy."""
         from .actor_critic import export_policy
 
         return export_policy(self.model, self.env, self.tuned)
 
     def after_update(self) -> None:
-        """Look at the policy if it is time, report, and write a checkpoint."""
+        """Validate the policy if due, report, and write a checkpoint."""
         due = self.steps - self.looked >= self.config.total_timesteps / LOOKS
         if due and self.steps < self.config.total_timesteps:
             self.look()
@@ -235,7 +235,7 @@ class PolicyTraining:
         self.save()
 
     def look(self) -> None:
-        """Score the policy of now, and keep it if it is the best so far."""
+        """Score the current policy, and keep it if it is the best so far."""
         if self.validate is None:
             return
         self.looked = self.steps

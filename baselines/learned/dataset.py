@@ -1,4 +1,4 @@
-"""What a network is trained on: features and the true inclination in the gravity-aligned frame, of many sequences."""
+"""Training data of a network: features and true inclination in the gravity-aligned frame, for many sequences."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ from .gravity_aligned_frame import FEATURES, VECTORS, GravityAlignedFrame
 
 
 class Window(NamedTuple):
-    """A stretch of several sequences.
+    """A window of several sequences.
 
     Attributes:
         features: ``(B, N, F)`` float32.
         up: ``(B, N, 3)`` float32, the true up vector in the gravity-aligned frame.
-        mask: ``(B, N)`` bool, what is scored.
+        mask: ``(B, N)`` bool, evaluation mask.
         first: whether the sequences begin here; otherwise the window continues the one before.
     """
 
@@ -59,7 +59,7 @@ class LearnedDataset:
 
     @classmethod
     def from_trajectories(cls, trajectories: Iterable[Trajectory], frame: GravityAlignedFrame | None = None) -> Self:
-        """Features of simulated or recorded trajectories that know the inclination.
+        """Features of simulated or recorded trajectories with known inclination.
 
         Args:
             trajectories: with the channels ``imu/gyr`` and ``imu/acc`` and the truth ``up`` or ``orientation``.
@@ -121,7 +121,7 @@ class LearnedDataset:
         return dataset
 
     def save(self, path: str | Path) -> Path:
-        """Write a NumPy archive in one move."""
+        """Write a NumPy archive atomically."""
         with replacing(path) as part:
             names = np.array(self.names)
             np.savez(part, features=self.features, up=self.up, mask=self.mask, names=names)
@@ -135,7 +135,7 @@ class LearnedDataset:
             return cls(file["features"], file["up"], file["mask"], names)
 
     def digest(self) -> str:
-        """Letters that tell data sets apart."""
+        """Digest that identifies a data set."""
         content = hashlib.sha256()
         for array in (self.features, self.up, self.mask):
             content.update(np.ascontiguousarray(array).data)
@@ -150,7 +150,8 @@ class LearnedDataset:
             size: sequences in a batch; a smaller rest is left out if there is a ``generator``.
             length: intervals in a window.
             generator: order of the sequences and headings; None: as they are.
-            rotate: rotate every sequence by a random angle about the vertical: the heading of the frame means nothing.
+            rotate: rotate every sequence by a random angle about the vertical, since the heading of the frame is
+                arbitrary.
         """
         order = np.arange(len(self)) if generator is None else generator.permutation(len(self))
         size = min(size, len(self))

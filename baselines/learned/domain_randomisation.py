@@ -1,7 +1,7 @@
 """Domain randomisation: the simulated hand motions, sensors and mountings that the learned estimator is trained on.
 
-Wider than what it is tested on, so that recordings lie inside: rests of any length, motions from a tremor to a shake,
-at 50 to 300 Hz, each episode with a sensor, a mounting and motion parameters of its own.
+The distribution is wider than the test data, so that recordings lie inside it: rests of any length, motions from tremor
+to shaking, at 50 to 300 Hz, with random sensor, mounting and motion parameters in each episode.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ DEG = math.pi / 180.0
 
 
 def log_uniform(generator: np.random.Generator, bounds: Range) -> float:
-    """A number between two positive bounds, each decade equally likely."""
+    """Log-uniform random number between two positive bounds."""
     return float(np.exp(generator.uniform(*np.log(bounds))))
 
 
@@ -33,8 +33,8 @@ def log_uniform(generator: np.random.Generator, bounds: Range) -> float:
 class VariedMotion:
     """Segments of random motion and rests, whose strengths, bands and lengths differ from episode to episode.
 
-    All ranges are drawn from log-uniformly. The hand never goes anywhere: position is a band-limited function between
-    rests some decimetres apart.
+    All ranges are log-uniform. The hand stays in place: its position is a band-limited function between rests some
+    decimetres apart.
     """
 
     first_rest: Range = (0.3, 40.0)
@@ -102,7 +102,7 @@ class VariedMotion:
 
 @dataclass(frozen=True)
 class VariedSensors:
-    """Gyroscopes and accelerometers between a laboratory's and a phone's, calibrated so far as to have small biases.
+    """Gyroscopes and accelerometers from laboratory to phone grade, calibrated to small biases.
 
     Ranges of the fields of :class:`~poise.envs.sensors.noise.NoiseModel`, drawn from log-uniformly.
     """
@@ -162,7 +162,7 @@ class VariedSensors:
 
 @dataclass(frozen=True)
 class Shaking:
-    """Vibration and taps, added to the accelerometer; they have no net velocity and turn nothing."""
+    """Vibration and taps, added to the accelerometer, without net velocity or rotation."""
 
     vibrating_share: float = 0.3
     """of episodes"""
@@ -218,7 +218,7 @@ class DomainRandomisation:
         instant_share: share of episodes, among those at ``instant_rate`` or more, whose sensors report instants instead
             of means.
         instant_rate: Hz; below it instants alias what means do not.
-        lever_arm: m, standard deviation an axis of the sensor's place, drawn from log-uniformly.
+        lever_arm: m, standard deviation per axis of the sensor's position, log-uniform.
         motion, sensors, shaking: see there.
     """
 
@@ -235,7 +235,7 @@ class DomainRandomisation:
         """Simulate one episode.
 
         Args:
-            seed: its children, one each, decide about motion, setting, shaking and the sensors' errors.
+            seed: separate children are used for motion, setting, shaking and sensor errors.
             name: for the metadata.
 
         Returns:

@@ -1,4 +1,4 @@
-"""A trained network as an estimator like all others."""
+"""A trained network with the interface of an estimator."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from .gru import GruNetwork
 
 
 class LearnedState(NamedTuple):
-    """All memory of the estimator.
+    """Complete state of the estimator.
 
     Attributes:
         frame: of the gravity-aligned frame.
@@ -38,9 +38,9 @@ class LearnedState(NamedTuple):
 class LearnedEstimator:
     """Inclination from six axes, by a recurrent network behind a gravity-aligned frame.
 
-    :class:`.GravityAlignedFrame` runs at the rate of the sensor. At fixed intervals, whatever that rate is, the network
-    gets the features of the interval and estimates by how much the frame leans; in between the estimate is held, in
-    the frame, where it changes slowly.
+    :class:`.GravityAlignedFrame` runs at the rate of the sensor. At fixed intervals, independent of that rate, the
+    network receives the features of the interval and estimates the tilt of the frame. Between them the estimate is
+    constant in the frame, where it changes slowly.
 
     Attributes:
         network: the weights.
@@ -91,12 +91,12 @@ class LearnedEstimator:
         return replace(self, frame=self.frame.with_dt(dt))
 
     def init(self, measurement: Measurement) -> LearnedState:
-        """Empty memory with the batch shape and array kind of ``measurement`` (no sample is used up)."""
+        """Initial state with the batch shape and array type of ``measurement``, which is not processed."""
         like = join(check_measurements(self.channels, measurement, time_axis=False), self.channels)
         return LearnedState(self._observer().init(measurement), zeros(like, self.network.size), zeros(like, 2))
 
     def step(self, state: LearnedState, measurement: Measurement) -> tuple[LearnedState, Estimate]:
-        """Take one sample of every channel, ``(*batch, 3)``; NaN where there is none."""
+        """Process one sample of every channel, ``(*batch, 3)``; NaN where there is none."""
         frame, seen = self._observer().step(state.frame, measurement)
         features, due = seen.pose["features"], seen.pose["due"]
         memory, tilt = state.memory, state.tilt

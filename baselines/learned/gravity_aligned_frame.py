@@ -1,7 +1,7 @@
-"""The front end of the learned estimator: samples in a gravity-aligned frame, summed up over short intervals.
+"""Front end of the learned estimator: samples in a gravity-aligned frame, accumulated over short intervals.
 
-In sensor axes gravity turns with the hand, and a network would have to learn strapdown integration first. In a frame
-that the gyroscope keeps level, gravity stays where it is, and what is left to learn is by how much the frame leans.
+In sensor axes gravity rotates with the hand, and a network would have to learn strapdown integration first. In a frame
+that the gyroscope keeps level, gravity is constant, and only the tilt of the frame remains to be learned.
 """
 
 from __future__ import annotations
@@ -30,13 +30,13 @@ class GravityAlignedFrame(Recurrence):
     r"""A gravity-aligned frame from gyroscope and accelerometer by an observer with fixed gains, and features in it.
 
     Like :class:`~poise.filters.imu.bounded_motion.BoundedMotion`, without covariance and so a tenth of its work: the
-    velocity v that the specific force f integrates to leaks away, and what stays of it is blamed on tilt and bias,
+    velocity v, the leaky integral of the specific force f, is attributed to errors of tilt and bias,
 
         q̇ = ½ q ⊗ (ω − b) + ½ (k_θ v × e₃) ⊗ q,   v̇ = q f q* − g e₃ − k_v v,   ḃ = −k_b q* (v × e₃) q
 
     The gains are those in which the Kalman filter with its published settings ends, k_θ = σ_g / σ_V,
     k_v² = 2 g k_θ + (σ_a / σ_V)², except that of the bias, which is chosen larger, to settle within a trial. The last
-    sample stands in for missing ones; after ``hold`` without the accelerometer all integrals of force are given up.
+    sample replaces missing ones; after ``hold`` without the accelerometer all integrals of force are reset.
 
     Heading is that of the start, drifting. State: q (4), b (3), v (3), f in the frame (3), its leaking integrals over
     0.25 s and 4 s (6), sums over the interval of force and rate (6), of their squares and of | ‖f‖ − g | (3), length
@@ -56,9 +56,9 @@ class GravityAlignedFrame(Recurrence):
     slow_leak: float = 4.0
     """s"""
     settling: float = 10.0
-    """s: time constant of the youth, which is 1 at the start and tells the network that nothing has settled yet"""
+    """s: time constant of the youth, which is 1 at the start and indicates the initial transient to the network"""
     hold: float = 0.05
-    """s: for how long the last accelerometer sample stands in for missing ones"""
+    """s: longest time for which the last accelerometer sample replaces missing ones"""
     gravity: float = 9.80665
     """g, m/s²"""
 
@@ -73,7 +73,7 @@ class GravityAlignedFrame(Recurrence):
         return namespace(f).concat([level(f), *[0.0 * f] * 8, 0.0 * f[..., :2], one, 0.0 * one], axis=-1)
 
     def predict(self, x: Array, z: Measurement, previous: Measurement) -> Array:
-        """Turn by the gyroscope; a new interval begins where the last sample ended one."""
+        """Rotate by the gyroscope; a new interval begins if the last sample ended one."""
         xp = namespace(x)
         dt = expand(self.dt, 1)
         q, b = x[..., :4], x[..., 4:7]

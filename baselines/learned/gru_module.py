@@ -58,13 +58,13 @@ def up_of(tilt: Array) -> Array:
 def inclination_loss(tilt: Array, up: Array, mask: Array) -> Array:
     """Mean over sequences of the root mean square inclination error in time, rad.
 
-    This is what a table of trials shows. Its gradient weighs a sequence of small errors as much as one of large ones,
-    which the mean square over all would not.
+    Tables of trials show this error. Its gradient weights sequences with small and large errors equally, in contrast to
+    the mean square over all samples.
 
     Args:
         tilt: ``(B, N, 2)`` estimate.
         up: ``(B, N, 3)`` truth in the gravity-aligned frame.
-        mask: ``(B, N)`` bool, what is scored.
+        mask: ``(B, N)`` bool, evaluation mask.
 
     Returns:
         A number; zero, with gradient zero, where nothing is scored.

@@ -1,4 +1,4 @@
-"""How fast the environments step, beside the bare physics step that they rest on."""
+"""Speed of the environments relative to the bare physics step."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How fast the filters of a family are, in every form, beside filterpy that is driven with the same model functions."""
+"""Speed of the filters of a family, in every form, relative to filterpy with the same model functions."""
 
 from __future__ import annotations
 

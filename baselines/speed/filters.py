@@ -1,4 +1,4 @@
-"""How fast the filters are, beside packages that users know: rates and ratios of one run on one machine."""
+"""Speed of the filters relative to other packages: rates and ratios of one run on one machine."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ BATCHES = (256, 1024)
 
 
 def samples(length: int, seed: int = 0) -> dict[str, np.ndarray]:
-    """Six-axis samples of a tumbling sensor; what they are does not change what they cost."""
+    """Six-axis samples of a tumbling sensor; their values do not affect the cost."""
     generator = np.random.default_rng(seed)
     force = generator.standard_normal((length, 3)) + np.array([0.0, 0.0, 9.8])
     return {"imu/gyr": generator.standard_normal((length, 3)), "imu/acc": force}

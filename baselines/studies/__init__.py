@@ -1,4 +1,4 @@
-"""The studies of the papers, done again on simulated rides and motions: a module a paper."""
+"""Reproductions of the studies of the papers on simulated rides and motions, one package per paper."""
 
 from __future__ import annotations
 

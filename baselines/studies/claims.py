@@ -1,4 +1,4 @@
-"""What a study finds in words: every sentence stands beside the numbers of the run that decide whether it holds."""
+"""Claims of a study: each statement with the numbers of the run that decide whether it holds."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Rows of results, one an estimate, as tables of a report."""
+"""Rows of results, one per estimate, as tables of a report."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Numbers that the external-acceleration paper prints (J. K. Lee, E. J. Park, S. N. Robinovitch, 2012)."""
+"""Published values of the external-acceleration paper (J. K. Lee, E. J. Park, S. N. Robinovitch, 2012)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Whether the force/inertial filter's covariance is right where its model is exact.
+"""Consistency of the force/inertial filter's covariance where its model is exact.
 
 The gyroscopes' samples are given, the true angles move as these say plus the process noise, and the residual at the
 truth is measurement noise.

@@ -1,4 +1,4 @@
-"""The force/inertial filter on exact synthetic data: what every correction is worth, and what changes the errors."""
+"""The force/inertial filter on exact synthetic data: effect of each correction, and sources of error."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""True states of the force/inertial filter, for what is evaluated at the truth: torques, bounds."""
+"""True states of the force/inertial filter, for the evaluation of torques and bounds."""
 
 from __future__ import annotations
 
