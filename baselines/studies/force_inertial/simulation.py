@@ -31,7 +31,7 @@ AS_PUBLISHED: dict[str, Any] = {
 VARIANTS: dict[str, tuple[dict[str, Any], str, str]] = {
     "exact: differentiated gyroscopes, apparent vertical": ({}, "0.56 0.61 0.65 0.10", "0.51 0.56 1.25 0.15"),
     "same, no bias model": ({"bias_model": False}, "0.58 0.60 0.84 0.10", "0.55 0.55 1.21 0.15"),
-    "same, raw (13)": ({"roll_model": "published"}, "0.67 1.55 1.86 8.96", "0.58 0.60 1.34 3.23"),
+    "same, (13) as published": ({"roll_model": "published"}, "0.67 1.55 1.86 8.96", "0.58 0.60 1.34 3.23"),
     "same, no roll output": ({"roll_model": "none"}, "0.58 0.86 0.97 3.50", "0.51 0.57 1.35 2.20"),
     "same, (12) without N_z": ({"torque_reading": "without-z"}, "0.84 2.37 2.58 0.10", "0.51 0.81 1.30 0.15"),
     "exact (7), (8) from accelerometers": (
@@ -39,13 +39,13 @@ VARIANTS: dict[str, tuple[dict[str, Any], str, str]] = {
         "0.92 0.93 0.58 0.43",
         "0.95 1.53 1.14 0.65",
     ),
-    "static torque, raw (13)": (
+    "static torque, (13) as published": (
         {"torque_model": "static", "roll_model": "published"},
         "8.06 2.57 13.5 8.96",
         "2.82 1.16 4.30 3.20",
     ),
     "as published, sign of (12) corrected": (AS_PUBLISHED, "23 25 20 12", "50 33 30 3.2"),
-    "as published, accelerometers turned round": (AS_PUBLISHED, "9.1 3.1 13.4 8.95", "3.0 2.6 9.0 3.2"),
+    "as published, accelerometers with reversed sign": (AS_PUBLISHED, "9.1 3.1 13.4 8.95", "3.0 2.6 9.0 3.2"),
     "integration from the true start": ({}, "2.9 1.7 5.4 0.34", "4.6 4.6 6.0 0.37"),
 }
 """Name → options, and what an independent simulation of the same equations found indoors and outdoors, deg."""
@@ -88,7 +88,7 @@ def variant(name: str, course: Course, seeds: int, duration: float, root: int) -
         kalman = KalmanFilter(ForceInertial.published(shoulder_noise=1e6), keep_covariance=False)
         pose = from_the_truth(kalman, without_forces(samples), truth)
         return errors_of(pose, {key: array[1:] for key, array in truth.items()}, settled)
-    if name.endswith("turned round"):
+    if name.endswith("reversed sign"):
         samples = samples | {key: -samples[key] for key in ("bicycle_imu/acc", "trunk_imu/acc")}
     kalman = KalmanFilter(ForceInertial.published(**options), keep_covariance=False)
     return errors_of(kalman.run(samples).pose, truth, settled)
@@ -184,13 +184,13 @@ def claims(means: dict[tuple[str, str], dict[str, float]], slowest: dict[str, fl
         ours = means[exact, course]
         found.append(Claim.every(f"{course}: the exact formulation keeps every angle within 1.5°", ours, 1.5))
         for name, angle in (
-            ("same, raw (13)", "φ_b"),
+            ("same, (13) as published", "φ_b"),
             ("same, no roll output", "φ_b"),
             ("same, (12) without N_z", "θ"),
-            ("static torque, raw (13)", "φ_h"),
+            ("static torque, (13) as published", "φ_h"),
             ("exact (7), (8) from accelerometers", "θ"),
             ("as published, sign of (12) corrected", "φ_h"),
-            ("as published, accelerometers turned round", "φ_h"),
+            ("as published, accelerometers with reversed sign", "φ_h"),
             ("integration from the true start", "φ_h"),
         ):
             statement = f"{course}: {name} at least doubles the error of {angle}"

@@ -108,7 +108,7 @@ RIDES = RideStudy(
     variants={
         "filter": Variant(),
         "no biases": Variant(samples=partial(without_errors, unbiased=INERTIAL)),
-        "seat that carries the trunk": Variant({"seat_share": 1.0}, with_trunk_on_the_seat),
+        "seat supports the trunk": Variant({"seat_share": 1.0}, with_trunk_on_the_seat),
         "seat_share 1": Variant({"seat_share": 1.0}),
         "swivel 0.3": Variant({"swivel_noise": 0.3}),
         "measured geometry": Variant(geometry=_tape_measure),
@@ -137,7 +137,7 @@ RIDES = RideStudy(
         Less(
             "The paper's seat torque lowers the error of θ2 if the seat carries the trunk",
             "θ2",
-            "seat that carries the trunk",
+            "seat supports the trunk",
             "filter",
         ),
         Less("The published forms double the error of φ", "φ", "filter", "published forms", 0.5),
@@ -152,9 +152,9 @@ RIDES = RideStudy(
 def rides(study: Study, report: Report) -> None:
     """Indoor circle and outdoor course of every rider."""
     report.text(
-        "Variants: *no biases*: true biases of inertial sensors subtracted. *Seat that carries the trunk*: load cells "
+        "Variants: *no biases*: true biases of inertial sensors subtracted. *Seat supports the trunk*: load cells "
         "replaced by (9*) of the true motion. *seat_share 1*: the paper's seat torque, on riders whose hands carry the "
-        "lean. *Swivel 0.3*: C3 and C7 trusted ten times more. *Measured geometry*: lengths ±2 %, places ±1 cm. "
+        "lean. *Swivel 0.3*: C3 and C7 trusted ten times more. *Measured geometry*: lengths ±2 %, positions ±1 cm. "
         "*Published forms*: (3), (9), C7 about y and C8 as published."
     )
     for course, scenario in COURSES.items():

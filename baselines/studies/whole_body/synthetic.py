@@ -76,8 +76,8 @@ def case_scores(course: str, seed: int, duration: float) -> dict[str, dict[str, 
         "swivel 1": errors_of(ride, swivel_noise=1.0),
         "swivel 3 (default)": errors_of(ride, swivel_noise=3.0),
         "no C3, C7": errors_of(ride, swivel_noise=ABSENT),
-        "seat tells nothing (seat_share 0)": errors_of(ride, seat_share=0.0, torque_noise=ABSENT),
-        "lengths ±2 %, places ±1 cm, full biases": errors_of(hard, wrong),
+        "no information from the seat (seat_share 0)": errors_of(ride, seat_share=0.0, torque_noise=ABSENT),
+        "lengths ±2 %, positions ±1 cm, full biases": errors_of(hard, wrong),
         "(3), (9), C7, C8 as published": errors_of(ride, **PUBLISHED_FORMS),
     }
     cases |= RIDES.baselines(ride.time, true_angles(ride.truth))
