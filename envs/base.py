@@ -69,7 +69,7 @@ class PoseEnv(DrawnEnv):
     Args:
         suite: the sensors: channels, observation space, observation ↔ measurement.
         quantities: what the action estimates.
-        rate: time steps a second, Hz.
+        rate: time steps per second, Hz.
         render_mode: see :class:`.DrawnEnv`.
         bounds: largest magnitude of the action, for each quantity; None for 1.
     """

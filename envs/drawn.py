@@ -47,7 +47,7 @@ class DrawnEnv(gymnasium.Env[Any, np.ndarray]):
 
     Args:
         render_mode: ``human`` (a window), ``rgb_array`` or None.
-        rate: steps a second of the environment, Hz.
+        rate: steps per second of the environment, Hz.
 
     Raises:
         ValueError: another render mode.

@@ -77,7 +77,7 @@ def standing_ride(fidelity: Literal["full", "lumped"]) -> Ride:
 
 
 def reset_rate(identity: str, options: dict[str, Any]) -> float:
-    """Median resets a CPU second, each to a motion not ridden before."""
+    """Median resets per CPU second, each to a new motion."""
     import gymnasium
 
     env = gymnasium.make(identity, disable_env_checker=True, **options)
@@ -105,7 +105,7 @@ def bare_steps(count: int) -> Callable[[], None]:
 
 
 def environment_rate(identity: str, options: dict[str, Any]) -> float:
-    """Median steps a CPU second; episodes are reset where they end, outside the clock."""
+    """Median steps per CPU second; episodes are reset where they end, outside the clock."""
     import gymnasium
 
     env = gymnasium.make(identity, disable_env_checker=True, **options).unwrapped

@@ -60,7 +60,7 @@ class KinematicDriver:
     """The device follows the gesture exactly; no physics engine is involved.
 
     Args:
-        rate: samples a second, Hz.
+        rate: samples per second, Hz.
     """
 
     block = 6000
@@ -119,7 +119,7 @@ class DynamicDriver:
     the gesture at the physics steps), so what is left to the feedback is the rounding of the rotation.
 
     Args:
-        rate: samples a second, Hz.
+        rate: samples per second, Hz.
         device: what is moved.
         bandwidth: undamped natural frequency of the feedback, Hz.
         longest_step: upper bound of the physics step, s.

@@ -48,7 +48,7 @@ class RideRecorder:
 
     Args:
         ride: the ride.
-        steps: physics steps a sample.
+        steps: physics steps per sample.
     """
 
     def __init__(self, ride: Ride, steps: int) -> None:

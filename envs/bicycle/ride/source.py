@@ -56,8 +56,8 @@ class RideSource:
         bicycle: what is ridden.
         style: how riders move; None for the style of each scenario.
         duration: s of a ride.
-        rate: samples a second, Hz.
-        physics_rate: physics steps a second, Hz; a multiple of ``rate``.
+        rate: samples per second, Hz.
+        physics_rate: physics steps per second, Hz; a multiple of ``rate``.
         fidelity: ``full`` or ``lumped``.
         tyre: of both wheels.
     """

@@ -110,7 +110,7 @@ STRAIN_GAUGES = Device(
 )
 ANGLE_ENCODER = Device(
     "Grayhill 63R",
-    "whole-body section II-A: 256 lines; data sheet: quadrature, so 1024 counts a turn; zero within 0.5° assumed",
+    "whole-body section II-A: 256 lines; data sheet: quadrature, so 1024 counts per turn; zero within 0.5° assumed",
     NoiseModel(turn_on_bias=0.5 * DEG, resolution=2.0 * math.pi / COUNTS, full_scale=math.pi),
     form="angle",
 )
@@ -136,7 +136,7 @@ def wheel_encoder(radius: float, rate: float) -> Device:
 
     Args:
         radius: of the wheel, m.
-        rate: samples a second, Hz.
+        rate: samples per second, Hz.
     """
     return Device(
         "Grayhill 63R",

@@ -143,7 +143,7 @@ def rider_bicycle_suite(
             own on the bodies that :mod:`.sites` names.
         sensors: ``paper`` for the papers' devices, ``ideal`` for none of their errors, or the name of a device
             (:func:`poise.envs.sensors.presets.list_sensor_presets`) in place of all inertial sensors.
-        rate: time steps a second and rate of all sensors but the camera, Hz; None for that of the paper.
+        rate: time steps per second and rate of all sensors but the camera, Hz; None for that of the paper.
         noise_scale: factor on all errors, between 0 (ideal, with the papers' ranges and camera rate) and 1 or beyond.
         sites: see :func:`.sensor_sites`; None for the papers' mean rider on their mountain bike.
         magnetometer: add magnetometers to the bicycle's IMU, and to the trunk's where the suite has one.

@@ -124,7 +124,7 @@ def qualisys_file(folder: Path) -> Path | None:
 
 
 def load_phone(folder: Path) -> list[Trajectory]:
-    """Read the folder of a phone, with Qualisys' orientation if the benchmark's file of it lies beside."""
+    """Read the folder of a phone, with the orientation of Qualisys if the file of the benchmark is beside it."""
     (recorded,) = load_streams(folder)
     reference = qualisys_file(folder)
     if reference is None:

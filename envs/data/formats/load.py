@@ -56,7 +56,7 @@ def is_own(head: Head) -> bool:
 
 
 def load_own(path: Path) -> list[Trajectory]:
-    """Read what this package wrote, whole."""
+    """Read a trajectory file of this package."""
     return [load_trajectory(path)]
 
 
