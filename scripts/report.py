@@ -65,7 +65,7 @@ def parts(table: pandas.DataFrame) -> Iterator[tuple[str, str, pandas.DataFrame]
 
 
 def wide_tables(table: pandas.DataFrame, groups: Mapping[str, str] | None = None) -> dict[str, list[dict[str, Any]]]:
-    """Title → rows (one per estimator, one column per group, then the mean over trajectories), for every metric in deg."""
+    """Title → rows (one per estimator; a column per group and the mean over trajectories), for every metric in deg."""
     from ..baselines.error_table import summary
 
     kinds = kinds_of(table["estimator"].unique())

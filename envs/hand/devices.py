@@ -85,8 +85,8 @@ ARRAY_PRESETS = (
     ),
     ArrayPreset(
         "array-data-sheet",
-        "white noise of 0.022 m/s² per sample (ADXL320 and ADXL345 at 100 Hz), 0.03 °/s/√Hz (L3G4200D), 0.25 µT; ranges "
-        "wide enough for shaking",
+        "white noise of 0.022 m/s² per sample (ADXL320 and ADXL345 at 100 Hz), 0.03 °/s/√Hz (L3G4200D), 0.25 µT; "
+        "ranges wide enough for shaking",
         NoiseModel(white_noise=math.radians(0.03), full_scale=100.0),
         per_sample(0.022, 1000.0),
         per_sample(0.25, 1000.0),

@@ -82,8 +82,8 @@ PRESETS = (
         "paper-hand",
         "our simulated analogue of the hand-held trials of J. K. Lee, E. J. Park, S. N. Robinovitch, Estimation of "
         "attitude and external acceleration using inertial sensor measurement during various dynamic conditions, IEEE "
-        "Trans. Instrum. Meas. 61 (2012): white noise of 0.01 rad/s and 0.01 m/s² per sample at 100 Hz, bias 0.2 °/s and "
-        "0.02 m/s², scale 0.5 % and 0.2 %, one sigma an axis; ranges ours; no magnetometer",
+        "Trans. Instrum. Meas. 61 (2012): white noise of 0.01 rad/s and 0.01 m/s² per sample at 100 Hz, bias 0.2 °/s "
+        "and 0.02 m/s², scale 0.5 % and 0.2 %, one sigma per axis; ranges ours; no magnetometer",
         NoiseModel(white_noise=1e-3, turn_on_bias=0.2 * DEG, scale_factor=5e-3, full_scale=2000.0 * DEG),
         NoiseModel(white_noise=1e-3, turn_on_bias=0.02, scale_factor=2e-3, full_scale=16.0 * G),
     ),
