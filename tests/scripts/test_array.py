@@ -48,7 +48,7 @@ def test_a_spoilt_calibration_record_is_explained(details, tmp_path, capsys):
     path = tmp_path / "record.json"
     path.write_text(json.dumps({"format": "poise-calibration", "version": 1, "channels": {}, "details": details}))
     assert main(["array", str(path)]) == 2
-    assert "it holds no array" in capsys.readouterr().err
+    assert "contains no array" in capsys.readouterr().err
 
 
 def test_evaluate_shows_estimators_that_give_no_angle(tmp_path, capsys):

@@ -72,7 +72,7 @@ def test_frame(tmp_path, capsys):
     np.testing.assert_allclose(printed["tracker_to_device"], [np.sqrt(0.5), 0, 0, -np.sqrt(0.5)], atol=1e-12)
     path.write_text("bx,by,bz,ox,oy,oz\n1,0,0,0,1,0\n0,1,0,1,0,0\n0,0,1,0,0,1\n")
     assert main(["calibrate", "frame", str(path), "--record", str(tmp_path / "f.json")]) == 2
-    assert "mirror" in capsys.readouterr().err
+    assert "reflection" in capsys.readouterr().err
 
 
 def test_wrong_words_are_explained(folder, tmp_path, capsys):

@@ -61,7 +61,7 @@ def test_fields_are_those_of_the_filter(name):
 
 def test_wrong_words_are_refused():
     fields, output, state = study.equations("sigma2")
-    with pytest.raises(ValueError, match="words must be made of"):
+    with pytest.raises(ValueError, match="words must consist of"):
         lie_gradients(fields, output, state, [("f9",)])
-    with pytest.raises(ValueError, match="are left"):
+    with pytest.raises(ValueError, match="are missing"):
         exact_rank(lie_gradients(fields, output, state, [("f0",)]), {}, {})
