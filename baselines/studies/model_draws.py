@@ -15,9 +15,9 @@ import numpy as np
 
 from ...filters.core.backend import Array
 from ...filters.core.consistency import Consistency, consistency, nees
-from ...filters.core.kalman import FilterState, KalmanFilter
+from ...filters.core.kalman import KalmanFilter
 from ...filters.core.quantity import Channel, Measurement
-from ...filters.core.sampling import join
+from ...filters.core.sampling import empty_state, join
 from .claims import Claim
 
 OFFSET = "drawn/offset"
@@ -75,7 +75,7 @@ def consistencies(
     drawn = with_offset(model, offsets[0].shape[-1])
     data[OFFSET] = np.stack([0.0 * offsets[0], *offsets])
     held = join({name: values[0] for name, values in data.items()}, drawn.channels)
-    state = FilterState(start, P, held, np.ones(runs, dtype=bool))
+    state = empty_state(drawn, held)._replace(x=start, covariance=P, held=held, started=np.ones(runs, dtype=bool))
     estimate, end = KalmanFilter(drawn, compiled=False).run_from(state, {name: v[1:] for name, v in data.items()})
     error, found = x[:, :size] - end.x[:, :size], {}
     for name, part in parts.items():

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..core.estimator import check_measurements
 from ..core.kalman import FilterState, KalmanFilter
 from ..core.quantity import Estimate
 from .features import FeatureMemory, InnovationFeatures
@@ -98,6 +99,7 @@ class TunedFilter:
 
     def advance(self, state: TunedState, measurements: Mapping[str, Any]) -> tuple[Estimate, TunedState]:
         """Process samples ``(T, *batch, size)`` of one interval, not beyond its end, with the current action."""
+        measurements = check_measurements(self.kalman.channels, measurements, time_axis=True)
         length = len(next(iter(measurements.values())))
         gains = {
             name: np.broadcast_to(factor, (length, *factor.shape)) for name, factor in self.gains(state.action).items()

@@ -51,13 +51,13 @@ def zeros(rows, columns):  # type: ignore[no-untyped-def]
 
 
 @jit
-def scratch(n, e, m, d):  # type: ignore[no-untyped-def]
+def scratch(n, e, m, d, p):  # type: ignore[no-untyped-def]
     """Memory of a run, reused at every tick: vectors, matrices of states and of rows, lists of integers.
 
-    For n states, e error states, m rows and d numbers a sample: current, present, before, x1, x0, r, dx; P0, F, Q,
-    work; H, R, S, HP, K; every, first, column, rows.
+    For n states, e error states, m rows, d numbers a sample and p parameters: current, present, before, x1, x0, r, dx,
+    grown; P0, F, Q, work; H, R, S, HP, K; every, first, column, rows.
     """
-    vectors = np.empty(d), np.empty(d), np.empty(d), np.empty(n), np.empty(n), np.empty(m), np.empty(e)
+    vectors = np.empty(d), np.empty(d), np.empty(d), np.empty(n), np.empty(n), np.empty(m), np.empty(e), np.empty(p)
     square = zeros(e, e), zeros(e, e), zeros(e, e), zeros(e, e)
     measured = zeros(m, e), zeros(m, m), zeros(m, m), zeros(m, e), zeros(m, e)
     every, most = np.empty(e, np.int64), max(e, m)
@@ -68,18 +68,62 @@ def scratch(n, e, m, d):  # type: ignore[no-untyped-def]
 
 
 @jit
-def take(z, held, current, present, before):  # type: ignore[no-untyped-def]
-    """A sample with the last one where it is missing (current), with zeros where nothing is known (present, before)."""
+def take(z, held, age, starts, dt, current, present, before):  # type: ignore[no-untyped-def]
+    """A sample with the last one where it is missing (current), with zeros where nothing is known (present, before).
+
+    ``age`` is that of each channel, whose elements are ``starts[c]:starts[c + 1]``. Returns whether anything is held.
+    """
     for i in range(z.shape[0]):
         current[i] = z[i] if np.isfinite(z[i]) else held[i]
         present[i] = current[i] if np.isfinite(current[i]) else 0.0
         before[i] = held[i] if np.isfinite(held[i]) else 0.0
         held[i] = current[i]
+    missing = False
+    for c in range(age.shape[0]):
+        age[c] = 0.0 if finite(z[starts[c] : starts[c + 1]]) else age[c] + dt
+        missing = missing or age[c] > 0.0
+    return missing
 
 
 @jit
-def begin(x0, P0, x, P):  # type: ignore[no-untyped-def]
-    """Start from a prior if it is finite; returns whether it is."""
+def squared(vector, start, stop):  # type: ignore[no-untyped-def]
+    """Sum of the squares of some elements."""
+    total = 0.0
+    for i in range(start, stop):
+        total += vector[i] * vector[i]
+    return total
+
+
+@jit
+def gather(present, z, pose, age, dt, declination, always, places, inputs):  # type: ignore[no-untyped-def]
+    """The inputs of :func:`poise.filters.core.monitor.watch`; ``places`` as in :class:`.monitor.Places`."""
+    for i in range(3):
+        inputs[i] = present[places[0] + i]
+        inputs[3 + i] = z[places[1] + i]
+        inputs[6 + i] = z[places[2] + i] if places[2] >= 0 else np.nan
+        inputs[9 + i] = pose[places[3] + i] if places[3] >= 0 else np.nan
+    for i in range(4):
+        inputs[12 + i] = pose[places[4] + i] if places[4] >= 0 else (1.0 if i == 0 else 0.0)
+    inputs[16] = age
+    inputs[17] = dt
+    inputs[18] = declination
+    inputs[19] = always
+
+
+@jit
+def realign(memory, places, present, dt, current):  # type: ignore[no-untyped-def]
+    """Put the averages of force and field into a sample, as :func:`poise.filters.core.monitor.realigned` does."""
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        a, b = dt * present[places[0] + j], dt * present[places[0] + k]
+        current[places[1] + i] = memory[i] - (a * memory[k] - b * memory[j])
+        if places[2] >= 0 and memory[10] > 0.0:
+            current[places[2] + i] = memory[6 + i] - (a * memory[6 + k] - b * memory[6 + j])
+
+
+@jit
+def begin(x0, P0, factor, x, P):  # type: ignore[no-untyped-def]
+    """Start from a prior if it is finite, with a factor on its covariance; returns whether it is."""
     if not finite(x0):
         return False
     for i in range(P0.shape[0]):
@@ -87,7 +131,8 @@ def begin(x0, P0, x, P):  # type: ignore[no-untyped-def]
             return False
     copy(x0, x)
     for i in range(P0.shape[0]):
-        copy(P0[i], P[i])
+        for j in range(P0.shape[0]):
+            P[i, j] = factor * P0[i, j]
     return True
 
 

@@ -7,12 +7,17 @@ covariance is a Kalman filter whose error state and measurement are empty.
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable
+from dataclasses import astuple
 from typing import Any
 
 import numpy as np
 
+from ..core.held_inputs import grown
 from ..core.model import Equations, Model, Recurrence, parameters_of, with_parameters
+from ..core.monitor import INFLATION, INPUTS, LOST, MEMORY, places_of, starts_of, watch
+from ..core.quantity import GYROSCOPE
 from ..core.sampling import split
 from .trace import Tape, print_code
 
@@ -23,31 +28,38 @@ import numpy as np
 from numba import njit
 
 from poise.filters.compile.cache import jit
-from poise.filters.compile.kernel import begin, copy, copy_matrix, correct, fill, keep, propagate, scratch, take, zeros
+from poise.filters.compile.kernel import (
+    begin, copy, copy_matrix, correct, fill, gather, keep, propagate, realign, scratch, squared, take, zeros
+)
 from poise.filters.compile.smoothing import smooth_step
 
 inf, nan = np.inf, np.nan
-
 """
 
 _INNER = '@njit(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)'
 
-_RUN = '''
+_RUN = """
+starts = np.array({starts})
+
+
 @jit
-def run(x, P, held, started, Z, parameters, poses, covariances, whites, nis):
-    """All ticks of all sequences of a batch; x, P, held and started are changed in place."""
-    vectors, square, measured, lists = scratch(x.shape[1], P.shape[1], whites.shape[2], Z.shape[2])
-    current, present, before, x1, x0, r, dx = vectors
+def run(x, P, held, age, monitor, started, Z, parameters, restart, poses, covariances, whites, nis):
+    # All ticks of all sequences of a batch; the state, x to started, is changed in place.
+    sizes = x.shape[1], P.shape[1], whites.shape[2], Z.shape[2], parameters.shape[2]
+    vectors, square, measured, lists = scratch(*sizes)
+    current, present, before, x1, x0, r, dx, grown = vectors
     P0, F, Q, work = square
     H, R, S, HP, K = measured
-    every, first, column, rows = lists
+    every, first, column, rows = lists{memory}
     for t in range(Z.shape[0]):
         for b in range(Z.shape[1]):
             p = parameters[t if parameters.shape[0] > 1 else 0, b if parameters.shape[1] > 1 else 0]
-            z, state, P1, white = Z[t, b], x[b], P[b], whites[t, b]
-            take(z, held[b], current, present, before)
-            if started[b]:
-                predict(state, present, before, p, x1, F, Q)
+            z, state, P1, white, pose_now = Z[t, b], x[b], P[b], whites[t, b], poses[t, b]
+            missing = take(z, held[b], age[b], starts, p[{dt}], current, present, before)
+            lost = {lost}
+            if started[b] and not lost:
+                noise = p{grown}
+                predict(state, present, before, noise, x1, F, Q)
                 if P1.shape[0] > 0:
                     propagate(F, P1, Q, work, every, first, column)
                     # predicted
@@ -57,15 +69,38 @@ def run(x, P, held, started, Z, parameters, poses, covariances, whites, nis):
                 # updated
                 finish(x0, z, p, state)
             else:
+                factor = 1.0{realigned}
                 prior(current, p, x0, P0)
                 nis[t, b] = 0.0
                 fill(white, 0.0)
-                started[b] = begin(x0, P0, state, P1)
+                started[b] = begin(x0, P0, factor, state, P1) or started[b]
                 # begun
-            pose(state, p, poses[t, b])
+            pose(state, p, pose_now){watched}
             if covariances.shape[0] > 0 or not started[b]:
-                keep(started[b], P1, poses[t, b], covariances, t, b)
-'''
+                keep(started[b], P1, pose_now, covariances, t, b)
+"""
+
+_GROWN = """
+                if missing:
+                    for i in range(p.shape[0]):
+                        grown[i] = p[i]
+                    noise = grown"""
+
+_GROWN_ONE = """
+                    ω = squared(present, {start}, {stop})
+                    grown[{i}] = grow(p[{i}], age[b, {c}], ω, p[{dt}], p[{dt}]**{power}, {constants})"""
+
+_REALIGNED = """
+                if lost:
+                    realign(monitor[b], places, present, p[{dt}], current)
+                    factor = {inflation}"""
+
+_WATCHED = """
+            if restart and started[b]:
+                gather(present, z, pose_now, age[b, {c}], p[{dt}], {declination}, {always}, places, inputs)
+                watch(monitor[b], inputs, watched)
+                for i in range(watched.shape[0]):
+                    monitor[b, i] = watched[i]"""
 
 # ``record`` is ``run`` with further lines in place of the comments: it keeps what the way back needs.
 _RECORDED = {
@@ -120,8 +155,50 @@ class UntraceableError(TypeError):
     """A method of a model that computes something that cannot be recorded."""
 
 
-def print_model(model: Equations) -> str:
+def print_shared() -> str:
+    """Print the equations that belong to no model: the growth of a held input's noise and the monitor."""
+    names = list(inspect.signature(grown).parameters)
+    tape = Tape()
+    growth = print_code({"value": np.array([grown(*(tape.node("input", name) for name in names))], dtype=object)})
+    memory, inputs = tape.inputs("memory", MEMORY), tape.inputs("inputs", INPUTS)
+    text = [_HEAD, "", "@jit", f"def grow({', '.join(names)}):", *growth[:-1]]
+    text += [growth[-1].replace("value[0] =", "return"), "", "", "@jit", "def watch(memory, inputs, after):"]
+    text += ["    fill(after, 0.0)", *print_code({"after": watch(memory, inputs)})]
+    return "\n".join([*text, ""])
+
+
+def _print_run(model: Equations, names: list[str], shared: str) -> str:
+    """The loop over time, with what the model's held inputs and the monitor need."""
+    channels = [channel.name for channel in model.channels]
+    begins, dt, places = [*starts_of(model.channels).values()], names.index("dt"), places_of(model)
+    begins.append(sum(channel.size for channel in model.channels))
+    parts = {"starts": begins, "dt": dt, "grown": "", "watched": "", "memory": "", "lost": "False", "realigned": ""}
+    head = []
+    if model.held_inputs:
+        head = [f"from {shared} import grow"]
+        parts["grown"] = _GROWN
+        for item in model.held_inputs:
+            c = channels.index(item.channel)
+            constants = ", ".join(repr(float(v)) for v in (item.spread, item.share, item.time, item.bound))
+            place = {"i": names.index(item.parameter), "c": c, "start": begins[c], "stop": begins[c + 1]}
+            parts["grown"] += _GROWN_ONE.format(**place, dt=dt, power=item.power, constants=constants)
+    if places is not None:
+        head += [f"from {shared} import watch", f"places = np.array({list(astuple(places))})"]
+        declination = f"p[{names.index('declination')}]" if "declination" in names and places.field >= 0 else "0.0"
+        parts["memory"] = f"\n    inputs, watched = np.empty({INPUTS}), np.empty({MEMORY})"
+        parts["lost"] = f"restart and monitor[b, {LOST}] > 0.5"
+        parts["realigned"] = _REALIGNED.format(dt=dt, inflation=INFLATION)
+        c = channels.index(GYROSCOPE.name)
+        parts["watched"] = _WATCHED.format(c=c, dt=dt, declination=declination, always=float(model.error_size > 0))
+    return "\n".join([*head, _RUN.format(**parts)])
+
+
+def print_model(model: Equations, shared: str = "shared") -> str:
     """Trace equations and print the module that runs them.
+
+    Args:
+        model: the equations.
+        shared: name of the module that :func:`print_shared` has printed.
 
     Raises:
         ValueError: an equation returns another shape than the model's sizes say.
@@ -160,7 +237,7 @@ def print_model(model: Equations) -> str:
         raise TypeError(f"{kind} is neither a Model nor a Recurrence")
     equations["finish(x, z, p, xn)"] = (("xn",), lambda: traced.finish(x, z))
     equations["pose(x, p, out)"] = (("out",), posed)
-    text = [_HEAD]
+    text = [_HEAD, ""]
     for signature, (outputs, compute) in equations.items():
         where = f"{kind}.{signature.split('(')[0]}"
         try:
@@ -175,9 +252,10 @@ def print_model(model: Equations) -> str:
         # Zeros are not printed; matrices keep theirs between calls, vectors share their memory and are cleared.
         clear = [f"    fill({name}, 0.0)" for name in outputs if name in ("xn", "out", "r")]
         text += [_INNER, f"def {signature}:", *clear, *print_code(arrays), "    return", "", ""]
-    text.append(_RUN.lstrip("\n"))
+    run = _print_run(model, names, shared)
+    text.append(run)
     if isinstance(traced, Model):
-        recorded = _RUN
+        recorded = run
         for mark, line in _RECORDED.items():
             recorded = recorded.replace(mark, line)
         text += [recorded, _SMOOTH]

@@ -14,7 +14,7 @@ from ..core.quantity import Estimate, Measurement
 from ..core.sampling import FilterState, Gains, empty_state, join, per_tick_gains
 from ..support.parallel import processors
 from .cache import compile_now, load
-from .printer import UntraceableError, print_model
+from .printer import UntraceableError, print_model, print_shared
 
 _COMPILED: dict[tuple[Any, ...], CompiledEquations | None] = {}
 PARALLEL_WORK = 200_000
@@ -48,7 +48,8 @@ class CompiledEquations:
     """The compiled recursion of one class of equations; parameters are passed at every call."""
 
     def __init__(self, model: Equations) -> None:
-        self.module = load(print_model(model), type(model).__name__)
+        shared = load(print_shared(), "shared").__name__
+        self.module = load(print_model(model, shared), type(model).__name__)
         self.kernel = self.module.run
         self.names = tuple(parameters_of(model))
         self.columns: dict[str, slice] = {}
@@ -57,9 +58,9 @@ class CompiledEquations:
             self.columns[quantity.name] = slice(start, start + quantity.size)
             start += quantity.size
         self.pose_size = start
-        width, e = sum(channel.size for channel in model.channels), model.error_size
-        state = [np.empty((0, model.state_size)), np.empty((0, e, e)), np.empty((0, width)), np.empty(0, bool)]
-        samples = [np.empty((0, 0, width)), self._parameters(model, None, 0, ())]
+        width = sum(channel.size for channel in model.channels)
+        state = empty_state(model, np.empty((0, width)))
+        samples = [np.empty((0, 0, width)), self._parameters(model, None, 0, ()), True]
         compile_now(self.kernel, (*state, *samples, *self._outputs(model, 0, 0, 0)), type(model).__name__)
 
     def _parameters(self, model: Equations, gains: Gains | None, length: int, batch: tuple[int, ...]) -> np.ndarray:
@@ -85,7 +86,7 @@ class CompiledEquations:
         return [np.empty(shape) for shape in shapes]
 
     def step(
-        self, model: Equations, state: FilterState, arrays: Measurement, gains: Gains | None
+        self, model: Equations, state: FilterState, arrays: Measurement, gains: Gains | None, restart: bool
     ) -> tuple[FilterState, Estimate]:
         """One sample; see :meth:`poise.filters.core.recursion.Recursion.step`. For speed, not through :meth:`run`."""
         if gains:
@@ -96,12 +97,18 @@ class CompiledEquations:
         after = FilterState(*(np.array(array) for array in state))
         flat = [array.reshape(count, *array.shape[len(batch) :]) for array in after]
         outputs = self._outputs(model, 1, count, 1)
-        self.kernel(*flat, z.reshape(1, count, -1), self._parameters(model, gains, 1, batch), *outputs)
+        self.kernel(*flat, z.reshape(1, count, -1), self._parameters(model, gains, 1, batch), restart, *outputs)
         shaped = [array.reshape((*batch, *array.shape[2:])) for array in outputs]
         return after, self._estimate(model, shaped[0], *shaped[1:])
 
     def run(
-        self, model: Equations, state: FilterState, arrays: Measurement, gains: Gains | None, keep_covariance: bool
+        self,
+        model: Equations,
+        state: FilterState,
+        arrays: Measurement,
+        gains: Gains | None,
+        restart: bool,
+        keep_covariance: bool,
     ) -> tuple[Estimate, FilterState]:
         """A whole sequence; see :meth:`poise.filters.core.recursion.Recursion.run_from`."""
         Z = np.asarray(join(arrays, model.channels), dtype=float)
@@ -110,12 +117,14 @@ class CompiledEquations:
         Z = np.require(Z.reshape(length, count, Z.shape[-1]), requirements=["C", "W"])
         states = [np.array(array).reshape(count, *array.shape[len(batch) :]) for array in state]
         outputs = self._outputs(model, length, count, length if keep_covariance else 0)
-        self._execute(states, Z, self._parameters(model, gains, length, batch), outputs)
+        self._execute(states, Z, self._parameters(model, gains, length, batch), restart, outputs)
         poses, covariances, whites, nis = (array.reshape((len(array), *batch, *array.shape[2:])) for array in outputs)
         estimate = self._estimate(model, poses, covariances if keep_covariance else None, whites, nis)
         return estimate, FilterState(*(array.reshape((*batch, *array.shape[1:])) for array in states))
 
-    def smooth(self, model: Equations, arrays: Measurement, gains: Gains | None, keep_covariance: bool) -> Estimate:
+    def smooth(
+        self, model: Equations, arrays: Measurement, gains: Gains | None, restart: bool, keep_covariance: bool
+    ) -> Estimate:
         """Smoothing of a whole sequence; see :meth:`poise.filters.core.kalman.KalmanFilter.smooth`.
 
         Records of the forward pass are kept for one section at a time; the filter runs twice over each.
@@ -135,7 +144,7 @@ class CompiledEquations:
             if len(stretches) > 1:
                 own = parameters if len(parameters) == 1 else parameters[stretch]
                 size = stretch.stop - stretch.start
-                self.kernel(*states, Z[stretch], own, *self._outputs(model, size, count, 0))
+                self.kernel(*states, Z[stretch], own, restart, *self._outputs(model, size, count, 0))
         later = np.zeros(count, bool), *(np.zeros((count, *shape)) for shape in ((e,), (e, e), (e, e), (e, e)))
         for stretch, start in zip(reversed(stretches), reversed(starts), strict=True):
             size, own = stretch.stop - stretch.start, parameters if len(parameters) == 1 else parameters[stretch]
@@ -144,7 +153,7 @@ class CompiledEquations:
             records += [np.empty((size, count, *shape)) for shape in ((n,), (e,), (e, e), (e, e))]
             compile_now(
                 self.module.record,
-                (*start, Z[stretch], own, pose, covariance, white, single, *records),
+                (*start, Z[stretch], own, restart, pose, covariance, white, single, *records),
                 f"{type(model).__name__} (smoother)",
             )
             compile_now(
@@ -158,11 +167,18 @@ class CompiledEquations:
         shaped = [array.reshape((len(array), *batch, *array.shape[2:])) for array in (poses, covariances, whites, nis)]
         return self._estimate(model, shaped[0], shaped[1] if keep_covariance else None, *shaped[2:])
 
-    def _execute(self, states: list[np.ndarray], Z: np.ndarray, parameters: np.ndarray, outs: list[np.ndarray]) -> None:
+    def _execute(
+        self,
+        states: list[np.ndarray],
+        Z: np.ndarray,
+        parameters: np.ndarray,
+        restart: bool,
+        outs: list[np.ndarray],
+    ) -> None:
         """Call the kernel, in threads for large batches; sequences are independent, so the results are the same."""
         threads = min(processors(), Z.shape[1])
         if threads < 2 or Z.shape[0] * Z.shape[1] < PARALLEL_WORK:
-            self.kernel(*states, Z, parameters, *outs)
+            self.kernel(*states, Z, parameters, restart, *outs)
             return
 
         def work(first: int, last: int) -> None:
@@ -170,7 +186,7 @@ class CompiledEquations:
             part = slice(first, last)
             own = np.ascontiguousarray(parameters[:, part]) if parameters.shape[1] > 1 else parameters
             mine = [np.empty(out[:, part].shape) for out in outs]
-            self.kernel(*(state[part] for state in states), np.ascontiguousarray(Z[:, part]), own, *mine)
+            self.kernel(*(state[part] for state in states), np.ascontiguousarray(Z[:, part]), own, restart, *mine)
             for out, filled in zip(outs, mine, strict=True):
                 out[:, part] = filled
 

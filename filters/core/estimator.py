@@ -53,7 +53,7 @@ class Estimator(Protocol[S]):
 def check_measurements(
     channels: tuple[Channel, ...], measurements: Mapping[str, Any], *, time_axis: bool
 ) -> dict[str, Array]:
-    """Return the needed channels as arrays of one common leading shape.
+    """Return the needed channels as arrays of one common leading shape, NaN where there is no possible sample.
 
     Args:
         channels: required channels.
@@ -89,10 +89,29 @@ def check_measurements(
                 f"channel {channel.name!r} must have the leading shape {leading} of {channels[0].name!r}, "
                 f"got {shape[:-1]}"
             )
-        arrays[channel.name] = array
+        arrays[channel.name] = without_impossible(channel, array)
     if time_axis and leading is not None and leading[0] == 0:
         raise ValueError("measurements are empty: at least one sample is needed")
     return arrays
+
+
+def without_impossible(channel: Channel, samples: Array) -> Array:
+    """The samples ``(..., size)`` with NaN for what no sensor can have measured.
+
+    That is what lies beyond the channel's limit or is infinite; of a vector, all of it if one coordinate is missing or
+    impossible; and zeros where a direction is needed, which is how some devices write that there is no sample.
+    """
+    if samples.ndim == 1 and not is_torch(samples):  # a single sample, at every time step of a loop: without NumPy
+        numbers, limit = samples.tolist(), channel.limit
+        if all(-limit <= number <= limit for number in numbers) and (any(numbers) or not channel.has_direction):
+            return samples
+    xp = namespace(samples)
+    good = xp.abs(samples) <= channel.limit
+    if channel.is_vector:
+        good = xp.all(good, axis=-1)[..., None]
+    if channel.has_direction:
+        good = good & xp.any(samples != 0.0, axis=-1)[..., None]
+    return samples if bool(xp.all(good)) else xp.where(good, samples, xp.nan)
 
 
 def real_numbers(values: Any, what: str) -> np.ndarray:

@@ -25,11 +25,14 @@ class KalmanFilter(Recursion):
     Attributes:
         model: the equations and their parameters.
         compiled: use the traced and compiled form for NumPy data.
+        restart: start anew when the estimate contradicts the sensors for too long (:mod:`.monitor`); off for the
+            equations of a paper alone.
         keep_covariance: give the covariance with every estimate of a sequence (off saves memory in long runs).
     """
 
     model: Model
     compiled: bool = True
+    restart: bool = True
     keep_covariance: bool = True
 
     @property
@@ -61,7 +64,7 @@ class KalmanFilter(Recursion):
         form = compiled_equations(self.model)
         if form is None:
             raise TypeError(f"{type(self.model).__name__} cannot be compiled, which smoothing needs")
-        return form.smooth(self.model, arrays, gains, self.keep_covariance)
+        return form.smooth(self.model, arrays, gains, self.restart, self.keep_covariance)
 
 
 __all__ = ["FilterState", "Gain", "Gains", "KalmanFilter", "Model", "correct", "scaled"]

@@ -16,6 +16,7 @@ from typing import Any, ClassVar, Self, TypeVar
 
 from ..support.parameters import check_parameters
 from .backend import Array
+from .held_inputs import HeldInput
 from .quantity import Channel, Measurement, Quantity
 
 E = TypeVar("E", bound="Equations")
@@ -54,7 +55,7 @@ class Equations:
     Attributes of the class: ``channels``, what is read; ``outputs``, the quantities of ``pose``; ``state_size`` n, the
     numbers in the state; ``error_size`` e and ``residual_size`` m, zero without covariance; ``gains``, name →
     :class:`Gain`; ``error_parts``, quantity → (start, stop) of its part of the error state, if it has one (of a
-    rotation: in world axes).
+    rotation: in world axes); ``held_inputs``, whose noise grows while their last sample stands in for missing ones.
     """
 
     dt: float = 0.01
@@ -67,6 +68,7 @@ class Equations:
     residual_size: ClassVar[int] = 0
     gains: ClassVar[Mapping[str, Gain]] = {}
     error_parts: ClassVar[Mapping[str, tuple[int, int]]] = {}
+    held_inputs: ClassVar[tuple[HeldInput, ...]] = ()
 
     def __post_init__(self) -> None:
         """Refuse parameters of a wrong type or out of their range."""

@@ -15,7 +15,9 @@ class Observer(Recursion):
     Attributes:
         model: the equations and their parameters.
         compiled: use the traced and compiled form for NumPy data.
+        restart: start anew when the estimate contradicts the sensors for too long (:mod:`.monitor`).
     """
 
     model: Recurrence
     compiled: bool = True
+    restart: bool = True

@@ -26,6 +26,12 @@ STANDARD_GRAVITY = 9.80665
 """m/s²: standard gravity g_n, used in calibration and simulation of sensors."""
 
 
+LIMITS = {"rad/s": 100.0, "m/s²": 2000.0}
+"""Unit → beyond what any sensor of a body that moves measures: 5700 °/s, 200 g."""
+LARGEST_NUMBER = 1e8
+"""The same for all other units: the field of the earth is 65 000 nT, a converter of 24 bits counts to 1.7·10⁷."""
+
+
 @dataclass(frozen=True)
 class Channel:
     """A stream of samples: its name, its width and its unit."""
@@ -33,6 +39,26 @@ class Channel:
     name: str
     size: int
     unit: str
+
+    @property
+    def kind(self) -> str:
+        """Last part of the name, such as ``gyr``, ``acc`` or ``mag``."""
+        return self.name.rpartition("/")[2]
+
+    @property
+    def limit(self) -> float:
+        """Largest absolute value that a sensor can have measured; what is beyond counts as no sample."""
+        return LIMITS.get(self.unit, LARGEST_NUMBER)
+
+    @property
+    def is_vector(self) -> bool:
+        """Whether the numbers are coordinates of one vector or rotation: one without the others is no sample."""
+        return (self.kind in ("gyr", "acc", "mag") and self.size == 3) or self.has_direction
+
+    @property
+    def has_direction(self) -> bool:
+        """Whether the direction of the vector is what counts: zeros, which have none, are no sample."""
+        return (self.kind in ("acc", "mag") and self.size == 3) or (self.kind == "orientation" and self.size == 4)
 
 
 @dataclass(frozen=True)

@@ -1,11 +1,13 @@
 """Recursion over samples for Kalman filters and observers, identical in the array form and the compiled form.
 
-Four rules hold for all equations:
+Six rules hold for all equations:
 
 * where a row of a measurement is not finite (no sample, drop-out, out of range), its update is skipped;
 * a missing sample of an input (a gyroscope, say) is replaced by the channel's last one;
 * an estimator initialises itself at the first sample with a finite prior; earlier estimates are NaN;
-* gains, log factors on named constants, may change at every sample; all zeros is exactly the published tuning.
+* gains, log factors on named constants, may change at every sample; all zeros is exactly the published tuning;
+* the noise of an input grows with the age of its last sample (:mod:`.held_inputs`);
+* an estimate that contradicts the sensors for too long starts anew (:mod:`.monitor`).
 
 NumPy data are processed in the compiled form (:mod:`poise.filters.compile.run`). The array form below defines the
 result, is differentiable, and runs equations that cannot be traced.
@@ -22,11 +24,14 @@ import numpy as np
 from ..compile.run import compiled_equations
 from .backend import Array, constant, is_torch, namespace
 from .estimator import check_measurements, stack_estimates
-from .model import Gain, Model, Recurrence
-from .quantity import Channel, Estimate, Measurement, Quantity
+from .held_inputs import grown_parameters
+from .model import Gain, Model, Recurrence, with_parameters
+from .monitor import INFLATION, LOST, inputs_of, places_of, realigned, watch
+from .quantity import GYROSCOPE, Channel, Estimate, Measurement, Quantity
 from .sampling import (
     FilterState,
     Gains,
+    aged,
     check_batch,
     check_gains,
     empty_state,
@@ -46,10 +51,12 @@ class Recursion:
     Attributes:
         model: the equations and their parameters.
         compiled: use the traced and compiled form for NumPy data.
+        restart: start anew when the estimate contradicts the sensors for too long; off for the equations alone.
     """
 
     model: Model | Recurrence
     compiled: bool = True
+    restart: bool = True
 
     @property
     def dt(self) -> float:
@@ -103,7 +110,11 @@ class Recursion:
         check_gains(self.gains, gains, type(self.model).__name__)
         if self.compiled and not is_torch(state.x):
             form = compiled_equations(self.model)
-            return form.step(self.model, state, arrays, gains) if form else self._step_each(state, arrays, gains)
+            return (
+                form.step(self.model, state, arrays, gains, self.restart)
+                if form
+                else self._step_each(state, arrays, gains)
+            )
         return self._step_arrays(state, arrays, gains)
 
     def run(self, measurements: Mapping[str, Any], gains: Gains | None = None) -> Estimate:
@@ -130,7 +141,7 @@ class Recursion:
         if self.compiled and not is_torch(state.x):
             form = compiled_equations(self.model)
             if form:
-                return form.run(self.model, state, arrays, gains, self._keeps_covariance)
+                return form.run(self.model, state, arrays, gains, self.restart, self._keeps_covariance)
             step = self._step_each
         factors, estimates = per_tick_gains(gains, length), []
         for t in range(length):
@@ -158,7 +169,7 @@ class Recursion:
         pose = {name: array.reshape((*batch, *array.shape[1:])) for name, array in estimate.pose.items()}
         rest = (
             None if part is None else part.reshape((*batch, *part.shape[1:]))
-            for part in cast(tuple[Any, ...], estimate[1:])
+            for part in cast(tuple[Any, ...], estimate[1:4])
         )
         return joined, Estimate(pose, *rest)
 
@@ -169,38 +180,53 @@ class Recursion:
         sample = join(arrays, self.channels)
         xp = namespace(sample, state.x)
         current, started, samples = hold(sample, state.held), state.started, split(sample, self.channels)
+        age = aged(state.age, sample, self.channels, model.dt)
         whitened = xp.zeros_like(state.x[..., :1]) + constant([0.0] * model.residual_size, state.x)
         x, P = state.x, state.covariance
-        if bool(xp.any(started)):
+        places = places_of(model) if self.restart else None
+        lost = started & (state.monitor[..., LOST] > 0.5) if places is not None else started & ~started
+        going = started & ~lost
+        if bool(xp.any(going)):
             now, before = (split(filled(part), self.channels) for part in (current, state.held))
-            if isinstance(model, Model):
-                x1, F, Q = model.predict(x, now, before)
+            grown = grown_parameters(model, age, now) if bool(xp.any(age > 0.0)) else {}
+            held = with_parameters(model, grown) if grown else model
+            if isinstance(held, Model) and isinstance(model, Model):
+                x1, F, Q = held.predict(x, now, before)
                 P1 = F @ P @ F.mT + 0.5 * (Q + Q.mT)
                 dx, P1, whitened = correct(P1, *model.residual(x1, samples))
                 x1 = model.retract(x1, dx)
             else:
-                x1, P1 = model.predict(x, now, before), P
+                x1, P1 = held.predict(x, now, before), P
             x1 = model.finish(x1, samples)
-            if bool(xp.all(started)):
+            if bool(xp.all(going)):
                 x, P = x1, P1
             else:
-                x = xp.where(started[..., None], x1, x)
-                P = xp.where(started[..., None, None], P1, P)
-                whitened = xp.where(started[..., None], whitened, xp.zeros_like(whitened))
-        if not bool(xp.all(started)):
-            first = model.prior(split(current, self.channels))
-            x0, P0 = first if isinstance(model, Model) else (first, P)
-            P0 = P0 + xp.zeros_like(P)
+                x = xp.where(going[..., None], x1, x)
+                P = xp.where(going[..., None, None], P1, P)
+                whitened = xp.where(going[..., None], whitened, xp.zeros_like(whitened))
+        if not bool(xp.all(going)):
+            first = current
+            if places is not None:
+                anew = realigned(places, current, state.monitor, model.dt)
+                first = xp.where(lost[..., None], anew, current)
+            begun = model.prior(split(first, self.channels))
+            x0, P0 = begun if isinstance(model, Model) else (begun, P)
+            P0 = xp.where(lost[..., None, None], INFLATION * P0, P0 + xp.zeros_like(P))
             ready = xp.all(xp.isfinite(x0), axis=-1) & xp.all(xp.all(xp.isfinite(P0), axis=-1), axis=-1)
-            new = ready & ~started
+            new = ready & ~going
             x = xp.where(new[..., None], x0, x)
             P = xp.where(new[..., None, None], P0, P)
             started = started | ready
-        pose, covariance = model.pose(x), P
+        pose, covariance, memory = model.pose(x), P, state.monitor
+        if places is not None and bool(xp.any(started)):
+            outputs = xp.concat([pose[quantity.name] for quantity in self.outputs], axis=-1)
+            ages = age[..., [channel.name for channel in self.channels].index(GYROSCOPE.name)][..., None]
+            seen = watch(memory, inputs_of(model, places, filled(current), sample, outputs, ages))
+            memory = xp.where(started[..., None], seen, memory)
         if not bool(xp.all(started)):
             pose = {name: xp.where(started[..., None], value, value + xp.nan) for name, value in pose.items()}
             covariance = xp.where(started[..., None, None], P, P + xp.nan)
-        after = FilterState(x, P, current, started)
+        after = FilterState(x, P, current, age, memory, started)
         if not isinstance(model, Model):
             return after, Estimate(pose)
         return after, Estimate(pose, covariance, whitened, xp.sum(whitened * whitened, axis=-1))

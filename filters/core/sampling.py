@@ -7,8 +7,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .backend import Array, constant, is_torch, namespace, stack_channels, to_numpy
+from .backend import Array, constant, expand, is_torch, namespace, stack_channels, to_numpy
 from .model import E, Equations, Gain, parameters_of, with_parameters
+from .monitor import MEMORY, places_of
 from .quantity import Channel, Measurement
 
 Gains = Mapping[str, Any]
@@ -22,12 +23,16 @@ class FilterState(NamedTuple):
         x: ``(*batch, n)`` state; zeros before the start.
         covariance: ``(*batch, e, e)`` of the error state; e is 0 for an observer.
         held: ``(*batch, d)`` last finite sample of every channel element, NaN if there was none.
+        age: ``(*batch, channels)`` s since the last complete sample of each channel.
+        monitor: ``(*batch, w)`` memory of :func:`.monitor.watch`; w is 0 where nothing is watched.
         started: ``(*batch,)`` bool.
     """
 
     x: Array
     covariance: Array
     held: Array
+    age: Array
+    monitor: Array
     started: Array
 
 
@@ -51,6 +56,14 @@ def hold(sample: Array, held: Array) -> Array:
     return xp.where(xp.isfinite(sample), sample, held)
 
 
+def aged(age: Array, sample: Array, channels: tuple[Channel, ...], dt: Array) -> Array:
+    """Seconds ``(*batch, channels)`` since each channel's last complete sample, after a tick."""
+    xp = namespace(sample)
+    parts = split(sample, channels).values()
+    there = xp.stack([xp.all(xp.isfinite(part), axis=-1) for part in parts], axis=-1)
+    return xp.where(there, xp.zeros_like(age), age + expand(dt, 1))
+
+
 def filled(sample: Array) -> Array:
     """The sample, with zeros where nothing is known."""
     xp = namespace(sample)
@@ -69,10 +82,10 @@ def empty_state(model: Equations, like: Array) -> FilterState:
     """Memory before the first sample, of the batch shape and kind of samples ``like`` ``(*batch, d)``."""
     e = model.error_size
     held = zeros(like, like.shape[-1]) + namespace(like).nan
-    started = zeros(like) > 0.5
-    return FilterState(
-        zeros(like, model.state_size), zeros(like, e, e), held, started if is_torch(like) else np.array(started)
-    )
+    memory = zeros(like, 0 if places_of(model) is None else MEMORY)
+    age, started = zeros(like, len(model.channels)), zeros(like) > 0.5
+    started = started if is_torch(like) else np.array(started)
+    return FilterState(zeros(like, model.state_size), zeros(like, e, e), held, age, memory, started)
 
 
 def check_batch(arrays: Measurement, started: Array) -> None:

@@ -35,6 +35,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from ..core.backend import Array, expand, namespace
+from ..core.held_inputs import HeldInput
 from ..core.matrices import covariance_of, identity
 from ..core.model import Gain, Model
 from ..core.quantity import (
@@ -112,6 +113,8 @@ class BoundedMotion(Model):
         "bias": Gain("bias_noise", description="process variance σ_b² of the gyroscope bias"),
         "velocity": Gain("velocity_bound", description="variance σ_V² of the pseudo-measurement of velocity"),
     }
+
+    held_inputs: ClassVar[tuple[HeldInput, ...]] = (HeldInput("imu/gyr", "gyroscope_noise"),)
 
     def prior(self, z: Measurement) -> tuple[Array, Array]:
         """Sensor at rest: inclination from the first accelerometer sample, heading, bias and velocity zero."""

@@ -46,6 +46,7 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from ..core.backend import Array, constant, expand, namespace
+from ..core.held_inputs import HeldInput
 from ..core.model import Gain, Model
 from ..core.quantity import ACCELEROMETER, EXTERNAL_ACCELERATION, GYROSCOPE, UP, Measurement
 from ..core.rotation import exp_matrix, norm, normalize, skew
@@ -100,6 +101,8 @@ class ExternalAcceleration(Model):
         "measurement": Gain("accelerometer_noise", description="measurement variance σ_A²"),
         "c_a": Gain("c_a", 1.0, 1.0, "constant of the acceleration model", (SMALLEST_C_A, LARGEST_C_A)),
     }
+
+    held_inputs: ClassVar = (HeldInput("imu/gyr", "gyroscope_noise", power=2),)
 
     def __post_init__(self) -> None:
         """Check the range of c_a."""

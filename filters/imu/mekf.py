@@ -33,6 +33,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from ..core.backend import Array, constant, expand, namespace
+from ..core.held_inputs import HeldInput
 from ..core.matrices import block_diagonal, block_matrix, covariance_of, identity
 from ..core.model import Gain, Model
 from ..core.quantity import (
@@ -87,6 +88,8 @@ class MEKF(Model):
         "bias": Gain("bias_noise", description="process variance σ_b² of the gyroscope bias"),
         "measurement": Gain("accelerometer_noise", description="measurement variance σ_a²"),
     }
+
+    held_inputs: ClassVar[tuple[HeldInput, ...]] = (HeldInput("imu/gyr", "gyroscope_noise"),)
 
     def prior(self, z: Measurement) -> tuple[Array, Array]:
         """Sensor at rest: inclination from the first accelerometer sample, heading and bias zero."""

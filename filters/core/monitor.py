@@ -1,0 +1,194 @@
+r"""Whether an estimator still knows where up and north are, and where they are if it does not.
+
+Independent of the estimator, specific force and magnetic field are averaged in axes that the gyroscope keeps still:
+
+    m ← exp(ω Δt)* m,   m ← m + k (f − m),   k = Δt / min(t + Δt, T)
+
+Accelerations of something that stays nearby average out, so m points up, roughly (the first half of VQF's idea: D.
+Laidig, T. Seel, Information Fusion 91, 2023, section 3.1). It is trusted if it was averaged for a second and is not
+short beside the root mean square of its samples, as it would be with a gyroscope in other units, without gravity or in
+free fall. An estimate that contradicts a trusted average by more than any acceleration can for longer than
+:data:`PATIENCE` is lost: it starts anew, from the averages. So neither a bad first sample nor a long gap decides for
+good. The heading is watched until it has been confirmed once; after that the field may be disturbed, and only the
+estimator decides. The inclination of a method without covariance is watched until then, too: what it makes of its drift
+later is its own.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from .backend import Array, constant, expand, namespace
+from .model import Equations
+from .quantity import ACCELEROMETER, GYROSCOPE, MAGNETOMETER, Channel, Quantity
+from .rotation import cross, exp, rotate, rotate_back, up_in_body
+
+AVERAGED = 3.0
+"""T, s: time constant of the averages."""
+SETTLED = 1.0
+"""s of averaging before an average is trusted."""
+LARGEST_LEAN, LARGEST_LEAN_AT_START = math.radians(40.0), math.radians(20.0)
+"""Angle between estimated and averaged vertical beyond which they contradict each other: for good, and until they have
+agreed, to half the latter, for :data:`CONFIRMED`."""
+LARGEST_TURN = math.radians(15.0)
+"""The same for the heading, which is watched until then only."""
+PATIENCE = 1.5
+"""s for which they must do so."""
+CONFIRMED = 2.0
+"""s of agreement after which a start counts as good."""
+GYROSCOPE_GAP = 0.1
+"""s without a gyroscope after which averaging begins anew."""
+SHORTEST_FORCE, SHORTEST_FIELD = 0.2, 0.9
+"""Least length of an average, in root mean squares of its samples."""
+INFLATION = 4.0
+"""Factor on the covariance of a prior that is formed of averages in motion."""
+
+INPUTS = 20
+"""Of :func:`watch`: rate (3), force (3), field (3), up (3), orientation (4), age of the rate, dt, declination, and
+whether the inclination is watched for good (1) or until it was confirmed (0)."""
+MEMORY = 15
+"""Of :func:`watch`: average force (3), mean square, time, time of contradiction; the same of the field (3, 1, 1, 1);
+times of agreement of the heading and of the inclination; whether the estimate is lost (1 or 0)."""
+FORCE, FIELD, FIELD_TIME, LOST = slice(0, 3), slice(6, 9), 10, 14
+"""Where some of it is."""
+
+
+def watch(memory: Array, inputs: Array) -> Array:
+    """Memory ``(..., 15)`` after a sample; the estimator starts anew at the next one if it is lost.
+
+    Args:
+        memory: ``(..., 15)``; zeros at the start.
+        inputs: ``(..., 20)``; force and field NaN where there is no sample, the vertical NaN for that of the
+            orientation.
+    """
+    xp = namespace(memory, inputs)
+    rate, up, q = inputs[..., :3], inputs[..., 9:12], inputs[..., 12:16]
+    up = xp.where(xp.isfinite(up), up, up_in_body(q))
+    age, dt, declination, always = (inputs[..., i : i + 1] for i in (16, 17, 18, 19))
+    turn = exp(rate * dt)
+    broken = xp.greater(age, GYROSCOPE_GAP)
+    zero = 0.0 * dt
+
+    def averaged(part: Array, sample: Array) -> tuple[Array, Array, Array]:
+        there = xp.all(xp.isfinite(sample), axis=-1)[..., None]
+        sample = xp.where(there, sample, xp.zeros_like(sample))
+        mean, square = rotate_back(turn, part[..., :3]), part[..., 3:4]
+        time = xp.where(broken, zero, part[..., 4:5])
+        longer = time + dt
+        share = xp.where(there, dt / xp.where(xp.greater(longer, AVERAGED), zero + AVERAGED, longer), zero)
+        time = xp.where(there, xp.where(xp.greater(longer, AVERAGED), zero + AVERAGED, longer), time)
+        squared = xp.sum(sample * sample, axis=-1)[..., None]
+        return mean + share * (sample - mean), square + share * (squared - square), time
+
+    def trusted(mean: Array, square: Array, time: Array, shortest: float) -> Array:
+        length = xp.sum(mean * mean, axis=-1)[..., None]
+        return xp.logical_and(xp.greater_equal(time, SETTLED), xp.greater(length, shortest**2 * square))
+
+    force, force_square, force_time = averaged(memory[..., :6], inputs[..., 3:6])
+    field, field_square, field_time = averaged(memory[..., 6:12], inputs[..., 6:9])
+    upright = trusted(force, force_square, force_time, SHORTEST_FORCE)
+    aligned = xp.sum(up * force, axis=-1)[..., None]
+    length = xp.sqrt(xp.sum(force * force, axis=-1)[..., None] + 1e-30)
+    standing = xp.logical_and(upright, xp.greater(aligned, math.cos(0.5 * LARGEST_LEAN_AT_START) * length))
+    stood = xp.where(standing, memory[..., 13:14] + dt, memory[..., 13:14])
+    confirmed = xp.greater_equal(stood, CONFIRMED)
+    least = xp.where(confirmed, zero + math.cos(LARGEST_LEAN), zero + math.cos(LARGEST_LEAN_AT_START))
+    leaning = xp.logical_and(upright, xp.less(aligned, least * length))
+    leant = xp.where(leaning, memory[..., 5:6] + dt, xp.where(upright, zero, memory[..., 5:6]))
+
+    world = rotate(q, field)
+    east, north = world[..., :1], world[..., 1:2]
+    s, c = xp.sin(declination), xp.cos(declination)
+    along, across = east * s + north * c, east * c - north * s
+    horizontal = xp.sqrt(along * along + across * across + 1e-30)
+    heading = xp.logical_and(
+        xp.logical_and(upright, xp.logical_not(leaning)), trusted(field, field_square, field_time, SHORTEST_FIELD)
+    )
+    turned = xp.logical_and(heading, xp.less(along, math.cos(LARGEST_TURN) * horizontal))
+    agreeing = xp.logical_and(heading, xp.greater(along, math.cos(0.5 * LARGEST_TURN) * horizontal))
+    off = xp.where(turned, memory[..., 11:12] + dt, xp.where(heading, zero, memory[..., 11:12]))
+    agreed = xp.where(agreeing, memory[..., 12:13] + dt, memory[..., 12:13])
+
+    watched = xp.logical_or(xp.greater(always, 0.5), xp.logical_not(confirmed))
+    lost = xp.logical_or(
+        xp.logical_and(xp.greater(leant, PATIENCE), watched),
+        xp.logical_and(xp.greater(off, PATIENCE), xp.less(agreed, CONFIRMED)),
+    )
+    leant, off, agreed = (xp.where(lost, zero, value) for value in (leant, off, agreed))
+    parts = [force, force_square, force_time, leant, field, field_square, field_time, off, agreed, stood]
+    return xp.concat([*parts, xp.where(lost, zero + 1.0, zero)], axis=-1)
+
+
+@dataclass(frozen=True)
+class Places:
+    """Where the inputs of :func:`watch` are found: first element in a sample or in a pose; −1 for what there is not."""
+
+    rate: int
+    force: int
+    field: int
+    up: int
+    orientation: int
+
+
+def places_of(model: Equations) -> Places | None:
+    """Where a recursion finds what the monitor needs; None for a model that cannot be watched.
+
+    It can if it reads one inertial sensor and tells the vertical.
+    """
+    samples, pose = starts_of(model.channels), starts_of(model.outputs)
+    heading = MAGNETOMETER.name in samples and "orientation" in pose
+    orientation = pose.get("orientation", pose.get("relative_orientation", -1))
+    up = pose.get("up", -1)
+    if not ({GYROSCOPE.name, ACCELEROMETER.name} <= samples.keys() and max(up, orientation) >= 0):
+        return None
+    field = samples[MAGNETOMETER.name] if heading else -1
+    return Places(samples[GYROSCOPE.name], samples[ACCELEROMETER.name], field, up, orientation)
+
+
+def starts_of(parts: Sequence[Channel | Quantity]) -> dict[str, int]:
+    """Where each channel or quantity begins among all of them side by side."""
+    sizes = [part.size for part in parts]
+    return {part.name: sum(sizes[:index]) for index, part in enumerate(parts)}
+
+
+def inputs_of(model: Equations, places: Places, held: Array, sample: Array, pose: Array, age: Array) -> Array:
+    """The inputs ``(..., 20)`` of :func:`watch`.
+
+    Args:
+        model: the equations.
+        places: of :func:`places_of`.
+        held: ``(..., d)`` last samples, side by side.
+        sample: ``(..., d)`` of this tick; NaN where there is none.
+        pose: ``(..., p)`` outputs of the model, side by side.
+        age: ``(..., 1)`` s since the gyroscope's last sample.
+    """
+    xp, zero = namespace(held), 0.0 * age
+
+    def part(source: Array, start: int, size: int) -> Array:
+        missing = zero + constant([1.0, 0.0, 0.0, 0.0] if size == 4 else [math.nan] * size, zero)
+        return source[..., start : start + size] if start >= 0 else missing
+
+    declination = expand(getattr(model, "declination", 0.0), 1)
+    parts = [part(held, places.rate, 3), part(sample, places.force, 3), part(sample, places.field, 3)]
+    parts += [part(pose, places.up, 3), part(pose, places.orientation, 4), age]
+    always = zero + float(model.error_size > 0)
+    return xp.concat([*parts, zero + expand(model.dt, 1), zero + declination, always], axis=-1)
+
+
+def realigned(places: Places, current: Array, memory: Array, dt: Array) -> Array:
+    """Samples ``(..., d)`` with the averages of force and field in their places: a prior is formed of them.
+
+    The averages are those of the sample before; they are turned by the rate of this one, to first order.
+    """
+    xp = namespace(current, memory)
+    rate = expand(dt, 1) * current[..., places.rate : places.rate + 3]
+    rate = xp.where(xp.isfinite(rate), rate, xp.zeros_like(rate))
+    force, field = (part - cross(rate, part) for part in (memory[..., FORCE], memory[..., FIELD]))
+    samples = xp.concat([current[..., : places.force], force, current[..., places.force + 3 :]], axis=-1)
+    if places.field < 0:
+        return samples
+    known = xp.greater(memory[..., FIELD_TIME : FIELD_TIME + 1], 0.0)
+    field = xp.where(known, field, current[..., places.field : places.field + 3])
+    return xp.concat([samples[..., : places.field], field, samples[..., places.field + 3 :]], axis=-1)

@@ -1,0 +1,102 @@
+"""Gaps of the gyroscope: noise that grows with the age of its last sample, and a covariance that is true after it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+from poise.envs.hand.sensing import simulate_hand
+from poise.filters.core import rotation
+from poise.filters.core.held_inputs import HeldInput, grown
+from poise.filters.core.kalman import KalmanFilter
+from poise.filters.imu.mekf import MEKF9
+from poise.filters.registry import make
+
+HELD = HeldInput("imu/gyr", "gyroscope_noise", spread=0.4, share=0.5, time=0.1, bound=1e12)
+
+
+def variance(age: float, rate: np.ndarray, dt: float, held: HeldInput = HELD) -> float:
+    """Sum of what the noise adds in all intervals up to an age."""
+    ages = np.arange(dt, age + 0.5 * dt, dt)
+    noises = np.array([held.noise(np.array(0.0), np.array(a), rate, dt) for a in ages])
+    return float(np.sum(noises**2 * dt**held.power))
+
+
+@pytest.mark.parametrize("age", [0.05, 0.3, 4.0])
+@pytest.mark.parametrize("power", [1, 2])
+def test_intervals_add_up_to_the_integral(age: float, power: int) -> None:
+    rate, tau = np.array([1.0, -2.0, 2.0]), HELD.time
+    squared = HELD.spread**2 + HELD.share**2 * 9.0
+    expected, _ = quad(lambda a: 2.0 * squared * a**3 / (a * a + 2.0 * tau * tau), 0.0, age)
+    assert variance(age, rate, 0.01, replace(HELD, power=power)) == pytest.approx(expected, rel=1e-9)
+    assert variance(age, rate, 0.05, HELD) == pytest.approx(expected, rel=1e-9)
+
+
+def test_it_never_exceeds_its_bound() -> None:
+    held = replace(HELD, bound=1.5)
+    assert variance(60.0, np.array([3.0, 0.0, 0.0]), 0.1, held) == pytest.approx(1.5, rel=1e-3)
+
+
+def test_a_sample_of_age_zero_changes_no_bit() -> None:
+    sigma = 0.1 + 0.2
+    assert grown(np.array(sigma), np.array(0.0), np.array(4.0), 0.01, 0.01, 0.3, 0.5, 0.1, 2.0) == sigma
+
+
+def with_gap(name: str, gap: int, seed: int) -> float:
+    """Mean normalised squared error of the attitude at the first sample after gaps, for each degree of freedom."""
+    trajectory = simulate_hand("mixed", seed, rate=100.0, duration=60.0)
+    q = trajectory.truth["orientation"]
+    starts = list(range(500, len(q) - gap - 2, max(gap, 150)))[:24]
+    kalman: Any = make(name, dt=trajectory.dt)
+    data = {
+        channel.name: np.repeat(trajectory.measurements[channel.name][:, None], len(starts), axis=1)
+        for channel in kalman.channels
+    }
+    for index, start in enumerate(starts):
+        for samples in data.values():
+            samples[start : start + gap, index] = np.nan
+    estimate = kalman.run(data)
+    ends, index = np.array(starts) + gap, np.arange(len(starts))
+    error = rotation.log(rotation.multiply(q[ends], rotation.conjugate(estimate.pose["orientation"][ends, index])))
+    P = estimate.covariance[ends, index][:, :3, :3]
+    return float(np.mean(np.sum(error * np.linalg.solve(P, error[..., None])[..., 0], axis=-1)) / 3.0)
+
+
+@pytest.mark.parametrize("name", ["mekf-9", "bounded-motion-9"])
+@pytest.mark.parametrize("gap", [10, 50, 200, 1000])
+def test_the_covariance_is_true_after_a_gap(name: str, gap: int) -> None:
+    assert 0.1 < with_gap(name, gap, seed=11) < 5.0
+
+
+@pytest.mark.parametrize("name", ["mekf", "bounded-motion"])
+def test_single_lost_samples_are_harmless(name: str) -> None:
+    trajectory = simulate_hand("mixed", 3, rate=100.0, duration=40.0)
+    up, kalman = trajectory.truth["up"], make(name, dt=trajectory.dt)
+    data = {channel.name: trajectory.measurements[channel.name] for channel in kalman.channels}
+    lost = np.zeros(len(up), dtype=bool)
+    lost[20::17] = True
+
+    def error(samples: dict[str, np.ndarray]) -> float:
+        found = kalman.run(samples).pose["up"]  # type: ignore[attr-defined]
+        return float(np.sqrt(np.mean(np.sum((found - up)[200:] ** 2, axis=-1))))
+
+    # One row in 17 is lost; a tenth of a degree is what holding a rate costs at this speed, whatever its noise.
+    whole = error(data)
+    gappy = error({name: np.where(lost[:, None], np.nan, array) for name, array in data.items()})
+    assert np.degrees(gappy - whole) < 0.1
+
+
+def test_the_age_is_in_the_state() -> None:
+    kalman, rng = KalmanFilter(MEKF9()), np.random.default_rng(0)
+    data = {name: rng.normal(size=(40, 3)) + np.array([0.0, 5.0, 9.0]) for name in ("imu/gyr", "imu/acc", "imu/mag")}
+    for samples in data.values():
+        samples[12:30] = np.nan
+    whole, _ = kalman.run_from(None, data)
+    _, state = kalman.run_from(None, {name: samples[:20] for name, samples in data.items()})
+    np.testing.assert_allclose(state.age, 0.08)
+    rest, _ = kalman.run_from(state, {name: samples[20:] for name, samples in data.items()})
+    np.testing.assert_array_equal(rest.covariance, whole.covariance[20:])
