@@ -11,6 +11,8 @@ from typing import Any, ClassVar, NamedTuple, Protocol, Self
 import gymnasium
 import numpy as np
 
+from ..filters.support.parameters import arguments_of, check_parameters
+
 RENDER_MODES = ("human", "rgb_array")
 
 
@@ -59,7 +61,8 @@ class DrawnEnv(gymnasium.Env[Any, np.ndarray]):
     _made_with: tuple[tuple[Any, ...], dict[str, Any]]
 
     def __new__(cls, *args: Any, **kwargs: Any) -> Self:
-        """Remember the arguments, for copies."""
+        """Check the types of the arguments, and remember them for copies."""
+        check_parameters(cls.__init__, arguments_of(cls.__init__, args, kwargs))
         made = super().__new__(cls)
         made._made_with = args, kwargs
         return made
@@ -95,6 +98,8 @@ class DrawnEnv(gymnasium.Env[Any, np.ndarray]):
         Raises:
             ValueError: an unknown one; the message lists those that are known.
         """
+        if options is not None and not isinstance(options, Mapping):
+            raise ValueError(f"options must be a mapping from name to value, got {options!r}")
         given = dict(options or {})
         unknown = sorted(set(given) - set(self.reset_options))
         if unknown:

@@ -9,8 +9,11 @@ Exit status: 0 done, 2 wrong input, 130 interrupted, 141 nobody reads the output
 
 from __future__ import annotations
 
+import contextlib
 import importlib
+import io
 import os
+import re
 import sys
 from collections.abc import Sequence
 from typing import NamedTuple, NoReturn
@@ -106,8 +109,26 @@ def run(name: str, words: Sequence[str]) -> int:
 
     command = COMMANDS[name]
     module = importlib.import_module(command.module, __package__)
-    args = tyro.cli(module.Args, args=list(words), prog=f"poise {name}", description=module.__doc__)
+    complaint = io.StringIO()
+    try:
+        with contextlib.redirect_stderr(complaint):
+            args = tyro.cli(module.Args, args=list(words), prog=f"poise {name}", description=module.__doc__)
+    except SystemExit as stop:
+        if not stop.code:
+            raise
+        return fail(unboxed(complaint.getvalue()))
     return int(module.run(args))
+
+
+def unboxed(complaint: str) -> str:
+    """What a parser says in a box of several lines, as one line."""
+    frame = str.maketrans(dict.fromkeys("─╭╮╰╯│┌┐└┘", " "))
+    lines = [line.translate(frame).strip() for line in complaint.splitlines()]
+    content = [line for line in lines if line]
+    # The first line is the title that its contents repeat.
+    return re.sub(
+        r"\.? For full helptext, (?:run|see):?", "; see", " ".join(content[1:] if len(content) > 1 else content)
+    )
 
 
 def run_command(name: str) -> NoReturn:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import functools
+import inspect
 import re
 import types
 import typing
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from numbers import Real
 from typing import Any, Literal
 
@@ -45,6 +46,24 @@ def check_parameters(maker: Callable[..., Any], given: Mapping[str, Any]) -> Non
                 raise ValueError(f"{name} {must} {reason}, got {shown(value)}")
 
 
+def arguments_of(maker: Callable[..., Any], args: Sequence[Any], kwargs: Mapping[str, Any]) -> dict[str, Any]:
+    """Name → value of the arguments of a call; none if they do not fit, which Python itself then says.
+
+    Args:
+        maker: function whose first parameter is ``self``.
+        args: without ``self``.
+        kwargs: by name.
+    """
+    signature = inspect.signature(maker)
+    try:
+        given = signature.bind(None, *args, **kwargs).arguments
+    except TypeError:
+        return {}
+    variable = (inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD)
+    kinds = {name: parameter.kind for name, parameter in signature.parameters.items()}
+    return {name: value for name, value in list(given.items())[1:] if kinds[name] not in variable}
+
+
 @functools.lru_cache
 def annotations_of(maker: Callable[..., Any]) -> dict[str, Any]:
     """Name → type, as far as it can be resolved."""
@@ -74,7 +93,10 @@ def refused(name: str, value: Any, kind: Any, default: Any = None) -> str:
         return "" if value is None else "None"
     if origin is tuple:
         return tuple_refused(name, value, typing.get_args(kind), default)
-    if isinstance(kind, type):
+    if origin is Sequence:
+        several = isinstance(value, Sequence | np.ndarray) and not isinstance(value, str | bytes)
+        return "" if several else "a sequence"
+    if isinstance(kind, type) and not getattr(kind, "_is_protocol", False):
         return "" if isinstance(value, kind) else f"of type {kind.__name__}"
     return ""
 

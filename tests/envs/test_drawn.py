@@ -124,14 +124,29 @@ def test_unknown_reset_options_are_refused(identity):
         env.reset(seed=0, options={"mood": "good"})
     for name in known:
         assert repr(name) in str(caught.value)
+    for options in ("mood", ["mood"], 3):
+        with pytest.raises(ValueError, match="options must be a mapping from name to value"):
+            env.reset(seed=0, options=options)
     env.close()
+
+
+@pytest.mark.parametrize(
+    ("argument", "accepted"), [("duration", "a finite number"), ("render_mode", r"of type str or None|\['human'")]
+)
+def test_a_wrong_type_is_refused_by_the_name_of_its_argument(identity, argument, accepted):
+    cls = type(gym.make(identity, **SHORT.get(identity, {})).unwrapped)
+    with pytest.raises(ValueError, match=f"{argument} must be .*{accepted}"):
+        cls(**{argument: {}})
 
 
 @pytest.mark.parametrize(
     ("options", "message"),
     [
         ({"foo": 1}, r"unknown option 'foo' \(options: .*score"),
-        ({"duration": "long"}, "cannot be made with .*its arguments are .*'duration'"),
+        ({"duration": "long"}, "duration must be a finite number .* or None, got 'long'"),
+        ({"duration": True}, "duration must be a finite number .* or None, got True"),
+        ({"trajectory": 3}, "trajectory must be of type Trajectory .*, got 3"),
+        ({"random_start": "yes"}, "random_start must be True or False, got 'yes'"),
     ],
 )
 def test_wrong_arguments_are_a_value_error_that_names_the_right_ones(options, message):

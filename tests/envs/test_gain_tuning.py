@@ -159,7 +159,7 @@ def test_recordings_are_read_from_files(tmp_path, trajectory):
     ("arguments", "words"),
     [
         ({"filter": "kalman"}, "unknown estimator 'kalman'"),
-        ({"filter": 3}, "filter must be a Kalman filter"),
+        ({"filter": 3}, "filter must be of type .*KalmanFilter, got 3"),
         ({"gains": ("process", "cheek")}, "gains must be distinct names from"),
         ({"gains": ()}, "gains must be distinct names from"),
         ({"quantity": "position"}, "quantity must be one of"),

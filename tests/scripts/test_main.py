@@ -84,10 +84,23 @@ def test_unknown_command_names_the_valid_ones(capsys: pytest.CaptureFixture[str]
     assert len(err.splitlines()) == 1
 
 
-def test_unknown_option_is_wrong_input() -> None:
-    with pytest.raises(SystemExit) as exit_:
-        cli.main(["fake", "--cuont", "7"])
-    assert exit_.value.code == 2
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--cuont", "7"], "--cuont"),
+        (["--count", "seven"], "'seven'"),
+        (["--count"], "--count"),
+        (["surplus"], "surplus"),
+    ],
+)
+def test_unknown_options_are_one_line(words: list[str], said: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["fake", *words]) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.startswith("poise: error: ")
+    assert said in err
+    assert err.endswith("; see poise fake --help\n")
+    assert len(err.splitlines()) == 1
 
 
 @pytest.mark.parametrize(

@@ -34,7 +34,11 @@ class Head:
     @cached_property
     def text(self) -> str:
         """First lines of a text file; empty of others."""
-        return decode(self.content) if is_text(self.content) else ""
+        if not is_text(self.content):
+            return ""
+        text = decode(self.content)
+        # The last line is cut off, perhaps within quotes.
+        return text[: text.rfind("\n") + 1] or text if len(self.content) == HEAD_LENGTH else text
 
     @cached_property
     def names(self) -> dict[str, Path]:

@@ -14,7 +14,7 @@ from ..calibration.records import CalibrationRecord, apply_calibration, as_recor
 from ..reference_clock import measured
 from ..storage import FORMAT, is_trajectory_file
 from ..trajectory import Trajectory, load_trajectory
-from .arrays import read_table
+from .arrays import PARQUET, read_table
 from .benchmarks import (
     is_archive,
     is_euroc,
@@ -72,15 +72,16 @@ def load_map(path: Path) -> list[Trajectory]:
 
 
 def is_described(head: Head) -> bool:
-    """Whether a text table names its columns and their units."""
-    if not head.text:
+    """Whether a table of text or Parquet names its columns and their units."""
+    parquet = head.content.startswith(PARQUET)
+    if not head.text and not parquet:
         return False
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            table = table_of(head.text, head.path.name)
+            table = read_table(head.path) if parquet else table_of(head.text, head.path.name)
             return complete(table, mapping_of(table))
-    except ValueError:
+    except (ValueError, ImportError):
         return False
 
 
@@ -274,7 +275,8 @@ def unknown_file(path: Path) -> str:
         seen = explanation(path)
     except ValueError as reason:
         seen = str(reason)
-    return f"{path} {state}; accepted are {accepted}. Seen: {seen}"
+    seen = "" if state == "is empty" else f": {seen}"
+    return f"{path} {state}{seen}. Known formats: {accepted}"
 
 
 def recognise(path: Path) -> RecordingFormat | None:

@@ -9,8 +9,9 @@ import numpy as np
 
 from .table import UNITS, factor
 
-WRAPS = (2**8, 2**16, 2**24, 2**32, 10**6, 60 * 10**6)
-"""Ends of counters after which they start again at 0."""
+DAY = 86_400
+WRAPS = (2**8, 2**16, 2**24, 2**32, 10**6, 60 * 10**6, DAY * 10**3, DAY * 10**6, DAY * 10**9)
+"""Ends of counters after which they start again at 0; a time of the day does at midnight."""
 FURTHEST_BACK = 2.5
 """Intervals by which rows may be out of order."""
 PLAUSIBLE = (2e-4, 0.2)

@@ -24,6 +24,9 @@ UNITS = {
             1.0: "rad/s rads^-1 rad/sec radians/s radians/sec rads-1 rad*s^-1",
             np.pi / 180: "deg/s °/s dps degs^-1 degree/s degrees/s deg/sec degs-1 degrees/sec º/s",
             np.pi / 180e3: "mdps mdeg/s",
+            1e-3: "mrad/s",
+            2.0 * np.pi: "rev/s rps turn/s turns/s",
+            np.pi / 30.0: "rpm rev/min r/min",
         }
     ),
     "acc": _spellings(

@@ -135,6 +135,9 @@ def table_of(text: str, name: str) -> Table:
     above = lines[:begin]
     heads = header_lines(above, delimiter, width)
     names, units = names_and_units([head for _, head in heads], width)
+    twice = [each for each in names if re.sub(r"\.\d+$", "", each) in names and re.search(r"\.\d+$", each)]
+    if twice:
+        warnings.warn(f"{name}: names of columns occur more than once; the later ones are called {twice}", stacklevel=4)
     used = {number for number, _ in heads}
     arrays, unreadable = {}, {}
     for column, name in enumerate(names):

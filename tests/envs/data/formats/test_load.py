@@ -28,7 +28,7 @@ def test_foreign_missing_and_truncated_files(tmp_path):
     (tmp_path / "empty").write_bytes(b"")
     scipy.io.savemat(tmp_path / "other.mat", {"x": np.zeros(3)})
     for name in ("mtw.csv", "noise", "empty", "other.mat"):
-        with pytest.raises(ValueError, match=rf"{name} is .*; accepted are poise-trajectory .*BROAD.*DOT"):
+        with pytest.raises(ValueError, match=rf"{name} is .*. Known formats: poise-trajectory .*BROAD.*DOT"):
             load_recording(tmp_path / name)
     for kind, write in WRITERS.items():
         write(tmp_path / f"{kind}.mat", broad_fields())

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from poise.envs.data.formats.arrays import read_table
+from poise.envs.data.formats.load import load_recording
 from poise.envs.data.formats.names import classify, groups, time_column
 from poise.envs.data.formats.stamps import as_seconds
 from poise.envs.data.formats.table import factor, split_unit
@@ -222,3 +223,50 @@ def test_the_finest_clock_is_the_time(tmp_path):
     rows = "".join(f"{946684800000000000 + 10**7 * k},{k / 100},{k},1\n" for k in range(5))
     table = table_of(tmp_path / "a.csv", "time,seconds_elapsed,counter,x\n" + rows)
     assert time_column(table) == "seconds_elapsed"
+
+
+HEADER = "Time [s],gyr_x [rev/s],gyr_y [rev/s],gyr_z [rev/s],acc_x [g],acc_y [g],acc_z [g]"
+ROWS = [[f"{0.01 * k:.2f}", *(f"{value:.4f}" for value in (*VALUES[k % 50, :3], 0, 0, 1))] for k in range(1000)]
+
+
+@pytest.mark.parametrize(("delimiter", "decimal"), [(",", "."), (",", ","), (";", ","), ("\t", ".")])
+def test_every_cell_in_quotes_however_long_the_file(tmp_path, delimiter, decimal):
+    lines = [HEADER.split(","), *([cell.replace(".", decimal) for cell in row] for row in ROWS)]
+    content = "\n".join(delimiter.join(f'"{cell}"' for cell in line) for line in lines)
+    (tmp_path / "quoted.csv").write_text(content + "\n")
+    recording = load_recording(tmp_path / "quoted.csv")
+    assert len(recording) == 1000
+    np.testing.assert_allclose(recording.measurements["imu/gyr"][:50], 2.0 * np.pi * VALUES[:, :3])
+
+
+@pytest.mark.parametrize(
+    ("stamps", "unit"),
+    [
+        ([f"{(23 + (3595 + k // 100) // 3600) % 24:02d}:{(3595 + k // 100) // 60 % 60:02d}:{(3595 + k // 100) % 60:02d}"
+          f".{k % 100:02d}" for k in range(1000)], ""),
+        ([str((86_399_000 + 10 * k) % 86_400_000) for k in range(1000)], "ms"),
+        ([str((86_399_000_000 + 10_000 * k) % 86_400_000_000) for k in range(1000)], "us"),
+    ],
+)  # fmt: skip
+def test_a_time_of_the_day_goes_on_after_midnight(tmp_path, stamps, unit):
+    rows = [",".join([stamp, *row[1:]]) for stamp, row in zip(stamps, ROWS, strict=True)]
+    header = HEADER.replace(" [s]", f" [{unit}]" if unit else "")
+    (tmp_path / "night.csv").write_text("\n".join([header, *rows]) + "\n")
+    np.testing.assert_allclose(load_recording(tmp_path / "night.csv").time, np.arange(1000) / 100, atol=1e-9)
+
+
+def test_names_that_occur_twice_are_named(tmp_path):
+    columns = HEADER.split(",")
+    lines = [",".join([*columns, *columns[1:]]), *(",".join([*row, *row[1:]]) for row in ROWS)]
+    (tmp_path / "twice.csv").write_text("\n".join(lines) + "\n")
+    with pytest.warns(UserWarning, match=r"twice.csv: names of columns occur more than once.*'gyr_x.1'"):
+        load_recording(tmp_path / "twice.csv")
+
+
+def test_a_parquet_table_with_units_needs_no_mapping(tmp_path):
+    pandas = pytest.importorskip("pandas")
+    pytest.importorskip("pyarrow")
+    frame = pandas.DataFrame(np.array(ROWS, dtype=float), columns=HEADER.split(","))
+    frame.to_parquet(tmp_path / "a.parquet")
+    recording = load_recording(tmp_path / "a.parquet")
+    np.testing.assert_allclose(recording.measurements["imu/acc"][0], [0.0, 0.0, 9.80665])
