@@ -24,7 +24,7 @@ E = TypeVar("E", bound="Equations")
 
 @dataclass(frozen=True)
 class Gain:
-    """A tuning constant that may be scaled at every tick, by a log factor: 0 is the published tuning.
+    """A tuning constant that may be scaled at every time step, by a log factor: 0 is the published tuning.
 
     Attributes:
         parameter: the model's field that is scaled.
@@ -48,7 +48,7 @@ class Equations:
     """What models and recurrences share: channels, outputs, parameters, the sampling interval.
 
     Measurements arrive as channel → ``(*batch, size)``. ``predict`` sees each channel's last sample (zeros if
-    there was none yet), ``prior`` too (NaN if there was none); ``residual`` and ``finish`` see NaN where this tick
+    there was none yet), ``prior`` too (NaN if there was none); ``residual`` and ``finish`` see NaN where this time step
     brought none.
     A float parameter may be an array ``(*batch,)``: use :func:`.expand` where it scales a matrix.
 
@@ -81,7 +81,7 @@ class Equations:
                 object.__setattr__(self, field.name, float(given[field.name]))
 
     def finish(self, x: Array, z: Measurement) -> Array:
-        """Last word of a tick, after the correction: normalise, remember what the next tick needs."""
+        """Last operation of a time step, after the update: normalise, remember what the next one needs."""
         return x
 
     def pose(self, x: Array) -> dict[str, Array]:
@@ -138,7 +138,7 @@ class Model(Equations):
     def predict(self, x: Array, z: Measurement, previous: Measurement) -> tuple[Array, Array, Array]:
         """State after one interval, Jacobian F ``(..., e, e)`` of its error, and process covariance Q.
 
-        ``z`` holds the samples of the tick that is predicted to, ``previous`` those of the tick before.
+        ``z`` holds the samples at the end of the interval, ``previous`` those at its beginning.
         """
         raise NotImplementedError
 
@@ -166,7 +166,7 @@ class Recurrence(Equations):
         raise NotImplementedError
 
     def predict(self, x: Array, z: Measurement, previous: Measurement) -> Array:
-        """State after one interval; ``z`` belongs to the tick that is predicted to, ``previous`` to the one before."""
+        """State after one interval; ``z`` belongs to its end, ``previous`` to its beginning."""
         raise NotImplementedError
 
 
@@ -218,7 +218,7 @@ def structure_of(model: Equations) -> tuple[Any, ...]:
 
 
 def _remembered(model: Equations) -> tuple[Mapping[str, float], tuple[Any, ...]]:
-    """Parameters and structure, found once a model: stepping asks for them at every tick."""
+    """Parameters and structure, found once a model: stepping asks for them at every sample."""
     found = model.__dict__.get("_leaves")
     if found is None:
         leaves = list(_leaves(model))

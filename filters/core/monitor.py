@@ -160,7 +160,7 @@ def inputs_of(model: Equations, places: Places, held: Array, sample: Array, pose
         model: the equations.
         places: of :func:`places_of`.
         held: ``(..., d)`` last samples, side by side.
-        sample: ``(..., d)`` of this tick; NaN where there is none.
+        sample: ``(..., d)`` of this time step; NaN where there is none.
         pose: ``(..., p)`` outputs of the model, side by side.
         age: ``(..., 1)`` s since the gyroscope's last sample.
     """

@@ -57,7 +57,7 @@ def hold(sample: Array, held: Array) -> Array:
 
 
 def aged(age: Array, sample: Array, channels: tuple[Channel, ...], dt: Array) -> Array:
-    """Seconds ``(*batch, channels)`` since each channel's last complete sample, after a tick."""
+    """Seconds ``(*batch, channels)`` since each channel's last complete sample, after a time step."""
     xp = namespace(sample)
     parts = split(sample, channels).values()
     there = xp.stack([xp.all(xp.isfinite(part), axis=-1) for part in parts], axis=-1)

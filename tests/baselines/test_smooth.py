@@ -42,6 +42,28 @@ def test_smooth_takes_names_filters_and_smoothers(trajectory):
     assert "std_roll" in by_name.to_frame()
 
 
+def test_rows_that_were_lost_are_bridged(trajectory):
+    """Smoothing is better inside of gaps than the filter, and knows it."""
+    keep = np.ones(len(trajectory), bool)
+    keep[800:840] = keep[1500:1550] = False
+    lost = poise.Trajectory(
+        trajectory.time[keep],
+        {name: values[keep] for name, values in trajectory.measurements.items()},
+        {name: values[keep] for name, values in trajectory.truth.items()},
+    )
+    filtered, smoothed = (call("bounded-motion", lost, grid=True) for call in (poise.run, poise.smooth))
+    assert len(filtered.pose["up"]) == len(smoothed.pose["up"]) == len(trajectory)
+
+    def error(estimate):
+        cosine = np.sum(estimate.pose["up"] * trajectory.truth["up"], axis=1)
+        return np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0)))
+
+    gaps = ~keep
+    assert error(smoothed)[gaps].mean() < error(filtered)[gaps].mean()
+    variance = [np.trace(each.covariance[:, :3, :3], axis1=1, axis2=2)[gaps].mean() for each in (smoothed, filtered)]
+    assert variance[0] < variance[1]
+
+
 def test_vqf_has_the_offline_form_of_its_package(trajectory):
     vqf = pytest.importorskip("vqf")
     arrays = {name: np.array(trajectory.measurements[name]) for name in ("imu/gyr", "imu/acc")}
