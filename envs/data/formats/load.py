@@ -156,7 +156,7 @@ def load_recording(
         ValueError: the file is empty, truncated, of another format, or has contents that contradict its format; the
             message names the file and what is accepted. Or an argument is none of those above.
     """
-    path = Path(path)
+    path = as_path(path, "path of a recording")
     if path.is_dir() and recognise(path) is None:
         raise FileNotFoundError(
             f"no recording at {path}: it is a folder; poise.load_recordings reads all that are in it"

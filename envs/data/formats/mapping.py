@@ -6,6 +6,7 @@ readers of formats whose columns have fixed names.
 
 from __future__ import annotations
 
+import re
 import tomllib
 import warnings
 from collections.abc import Mapping, Sequence
@@ -17,6 +18,7 @@ import numpy as np
 
 from ....filters.core import rotation
 from ....filters.support.names import unknown
+from ....filters.support.parameters import check_parameters
 from ..trajectory import Trajectory
 from .stamps import as_seconds
 from .table import UNITS, Table, factor
@@ -60,6 +62,11 @@ class Reference:
     """of angles"""
 
     def __post_init__(self) -> None:
+        names = ("conjugate", "sensor", "unit")
+        try:
+            check_parameters(Reference, {name: getattr(self, name) for name in names})
+        except ValueError as reason:
+            raise ValueError(f"reference: {reason}") from None
         choices = {"order": ("wxyz", "xyzw"), "frame": FRAMES, "role": ("truth", "onboard")}
         for name, known in choices.items():
             if getattr(self, name) not in known:
@@ -73,7 +80,16 @@ class Reference:
         elif values.shape[1] == 9:
             q = rotation.from_matrix(values.reshape(-1, 3, 3))
         elif values.shape[1] == 3:
-            roll, pitch, yaw = (values * factor("angle", self.unit)).T
+            scale = factor("angle", self.unit)
+            largest = float(np.nanmax(np.abs(values), initial=0.0))
+            if scale == 1.0 and largest > 2.5 * np.pi:
+                raise ValueError(f"reference: unit must be 'deg', got {self.unit!r}: angles reach {largest:g}")
+            if scale != 1.0 and 0.5 < largest < 1.001 * np.pi:
+                warnings.warn(
+                    f"reference: angles in {self.unit} reach {largest:g} only; are they in rad (unit='rad')?",
+                    stacklevel=5,
+                )
+            roll, pitch, yaw = (values * scale).T
             q = rotation.from_euler_zyx(yaw, pitch, roll)
         else:
             raise ValueError(f"reference columns must be four, nine or three, got {values.shape[1]}")
@@ -123,6 +139,8 @@ def as_columns(names: Columns) -> str | list[str]:
         return names
     if isinstance(names, int):
         return str(names)
+    if not isinstance(names, list | tuple):
+        raise ValueError(f"columns must be a name or a list of names or numbers of columns, got {names!r}")
     return [str(name) for name in names]
 
 
@@ -144,7 +162,14 @@ def make_map(
     if rate is not None and (isinstance(rate, bool) or not isinstance(rate, int | float) or not 0.0 < rate < np.inf):
         raise ValueError(f"rate must be a positive number of Hz, got {rate!r}")
     kinds = {channel.rpartition("/")[2] for channel in columns}
+    for channel in columns:
+        kind = str(channel).rpartition("/")[2]
+        meant = re.fullmatch(r"(gyr|acc|mag)[a-z]*", kind.lower())
+        if meant is not None and kind != meant[1]:
+            raise ValueError(f"columns: the channel is called {meant[1]!r}, got {channel!r}")
     for name, given in (("units", units), ("signs", signs)):
+        if given is not None and not isinstance(given, Mapping):
+            raise ValueError(f"{name} must be a mapping from channel to {name[:-1]}, got {given!r}")
         for key in given or {}:
             if key not in columns and key not in kinds and key != "time":
                 raise ValueError(f"{name}: {unknown('channel', key, [*columns, 'time'])}")
@@ -200,6 +225,9 @@ def apply_map(table: Table, mapping: RecordingMap, path: Path) -> list[Trajector
     """
     seconds, clock = recording_time(table, mapping)
     sensors = mapping.sensors()
+    for reference in mapping.reference:
+        if reference.sensor is not None and reference.sensor.lower() not in [name.lower() for name in sensors]:
+            raise ValueError(f"reference: {unknown('sensor', reference.sensor, sensors)}")
     trajectories = []
     for sensor, kinds in sensors.items():
         measurements, units = {}, {}
@@ -249,18 +277,33 @@ def channel(table: Table, mapping: RecordingMap, sensor: str, kind: str, names: 
         raise ValueError(f"columns[{kind!r}] must be {SIZES[kind]} columns, got {values.shape[1]}: {columns}")
     if np.isinf(values).any():
         values = np.where(np.isfinite(values), values, np.nan)
+    if kind in SIZES and not isinstance(columns, str) and len(set(columns)) < len(columns):
+        raise ValueError(f"columns[{kind!r}] must be different columns, got {columns}")
     given = first_of(mapping.units, sensor, kind)
     unit = given or table.unit(columns)
     scale = factor(kind, unit) if unit and kind in UNITS else 1.0
-    sign = np.asarray(first_of(mapping.signs, sensor, kind) or 1.0, dtype=float)
+    given_sign = first_of(mapping.signs, sensor, kind)
+    try:
+        sign = np.asarray(1.0 if given_sign is None else given_sign, dtype=float)
+    except (TypeError, ValueError):
+        sign = np.array(np.nan)
     if not np.isin(sign, (-1.0, 1.0)).all() or sign.ndim > 1 or sign.size not in (1, values.shape[1]):
-        raise ValueError(f"signs[{kind!r}] must be 1 or -1, for all axes or one an axis, got {sign.tolist()}")
+        raise ValueError(f"signs[{kind!r}] must be 1 or -1, for all axes or one an axis, got {given_sign!r}")
     return values * (scale * sign), SI.get(kind, unit or "?")
 
 
 def first_of(given: Mapping[str, Any], sensor: str, kind: str) -> Any:
     """What a channel or, failing that, its kind is given."""
     return given.get(f"{sensor}/{kind}", given.get(kind))
+
+
+def check_labels(table: Table, elapsed: np.ndarray) -> None:
+    """Refuse rows of several sensors at the same times; warn where rows only seem to be those of several."""
+    for name, told in table.labels.items():
+        what = f"rows of several sensors stand under one another (column {name}: {', '.join(told[:5])})"
+        if len(elapsed) > 1 and float((np.diff(elapsed) == 0.0).mean()) > 0.3:
+            raise ValueError(f"{what}: give each sensor a file of its own")
+        warnings.warn(f"{what}? Then give each a file of its own", stacklevel=6)
 
 
 def recording_time(table: Table, mapping: RecordingMap) -> tuple[np.ndarray, dict[str, Any]]:
@@ -271,6 +314,7 @@ def recording_time(table: Table, mapping: RecordingMap) -> tuple[np.ndarray, dic
         name = str(mapping.time)
         unit = mapping.units.get("time") or table.units.get(name, "")
         stamps = as_seconds(table.column(name), unit, name)
+        check_labels(table, stamps.elapsed)
         return stamps.elapsed, details | {"clock_start": stamps.first}
     if mapping.rate is None:
         raise ValueError("name the column of the time (time=…) or the sampling rate in Hz (rate=…)")

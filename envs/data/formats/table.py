@@ -11,6 +11,19 @@ import numpy as np
 from ....filters.support.names import unknown
 
 UNIT = re.compile(r"^(?P<name>.*?)[\s_]*(\((?P<a>(?:[^()]|\([^()]*\))*)\)|\[(?P<b>[^\[\]]*)\])$")
+SPELLED = {"deg_s": "deg/s", "degs": "deg/s", "dps": "deg/s", "mdps": "mdps", "rad_s": "rad/s", "rads": "rad/s"}
+SPELLED |= {
+    "m_s2": "m/s2",
+    "ms2": "m/s2",
+    "mps2": "m/s2",
+    "g": "g",
+    "mg": "mg",
+    "ut": "uT",
+    "nt": "nT",
+    "gauss": "gauss",
+}
+"""Units within names of columns, ``gyr_x_dps`` or ``acc_mps2_x``, which cannot hold a stroke."""
+SUFFIX = re.compile(rf"^(?P<name>\w*?[a-z])_(?P<unit>{'|'.join(SPELLED)})(?P<axis>_[xyz])?$", re.IGNORECASE)
 STANDARD_GRAVITY = 9.80665
 
 
@@ -71,17 +84,26 @@ def factor(kind: str, unit: str) -> float:
     known = UNITS.get(kind)
     if known is None:
         return 1.0
-    if plain(unit) not in known:
+    if not isinstance(unit, str) or plain(unit) not in known:
         raise ValueError(f"units[{kind!r}]: {unknown('unit', unit, known)}")
     return known[plain(unit)]
 
 
 def split_unit(name: str) -> tuple[str, str]:
-    """Name and unit of ``name (unit)``, ``name [unit]``, ``time in unit``; an index like ``Mat[1]`` is of the name."""
+    """Name and unit of ``name (unit)``, ``name [unit]``, ``name, unit``, ``name_unit`` and ``time in unit``.
+
+    An index like ``Mat[1]`` is of the name.
+    """
     match = UNIT.match(name.strip())
+    suffix = SUFFIX.match(name.strip())
+    if match is None and suffix is not None and (suffix["unit"].lower() != "g" or "acc" in suffix["name"].lower()):
+        return f"{suffix['name']}{suffix['axis'] or ''}", SPELLED[suffix["unit"].lower()]
     if match is None:
         stem, said, unit = name.strip().rpartition(" in ")
-        return (stem, unit) if said and plain(unit) in UNITS["time"] else (name.strip(), "")
+        if said and plain(unit) in UNITS["time"]:
+            return stem, unit
+        stem, said, unit = name.strip().rpartition(", ")
+        return (stem, unit) if said and plain(unit) in KNOWN_UNITS and not unit.isdigit() else (name.strip(), "")
     unit = (match["a"] if match["a"] is not None else match["b"]).strip()
     known = (plain(unit) in KNOWN_UNITS or plain(unit) in OTHER_UNITS) and not unit.isdigit()
     return (match["name"].strip(), unit) if unit == "" or known else (name.strip(), "")
@@ -105,6 +127,7 @@ class Table:
         kind: of the file, for messages.
         named: whether the columns have names of their own.
         unreadable: name → row and content of the first cell that is not a number.
+        labels: name → texts of a column that change from row to row, such as names of sensors.
     """
 
     arrays: dict[str, np.ndarray]
@@ -113,6 +136,7 @@ class Table:
     kind: str = "table"
     named: bool = True
     unreadable: dict[str, tuple[int, str]] = field(default_factory=dict)
+    labels: dict[str, tuple[str, ...]] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return max((len(values) for values in self.arrays.values()), default=0)
@@ -126,6 +150,9 @@ class Table:
         Raises:
             ValueError: there is none of that name, or one of its cells is not a number.
         """
+        if name not in self.arrays and split_unit(name)[0] in self.arrays:
+            # As the header spells it, with its unit.
+            name = split_unit(name)[0]
         if name not in self.arrays:
             raise ValueError(f"{unknown('column', name, self.arrays)}")
         if name in self.unreadable:
@@ -150,7 +177,7 @@ class Table:
             ValueError: the columns have different units.
         """
         wanted = [names] if isinstance(names, str) else list(names)
-        units = {self.units.get(name, "") for name in wanted}
+        units = {self.units.get(name if name in self.arrays else split_unit(name)[0], "") for name in wanted}
         if len(units) > 1:
             raise ValueError(f"columns {wanted} have different units {sorted(units)}")
         return units.pop()

@@ -31,6 +31,9 @@ DATE = re.compile(
 """A date with a time, or a time of the day; with a time zone or without."""
 COMMENT = ("#", "//", "%")
 DELIMITERS = (",", ";", "\t", "|", " ")
+SENSOR = re.compile(r"(^|[\W_])(id|sensor|device|node|imu|mac|address)s?([\W_]*(id|no|number|name))?$", re.IGNORECASE)
+OFTEN, MOST_SENSORS = 0.3, 64
+"""Share of rows whose label is not that of the row before, and different ones, where labels name sensors."""
 SAMPLE = 400
 """Lines that decide about the delimiter."""
 NAMES = {",": "comma", ";": "semicolon", "\t": "tab", "|": "bar", " ": "white space"}
@@ -139,9 +142,12 @@ def table_of(text: str, name: str) -> Table:
     if twice:
         warnings.warn(f"{name}: names of columns occur more than once; the later ones are called {twice}", stacklevel=4)
     used = {number for number, _ in heads}
-    arrays, unreadable = {}, {}
+    arrays, unreadable, labels = {}, {}, {}
     for column, name in enumerate(names):
         values, wrong = numeric(frame[column])
+        told = labels_of(name, frame[column], values)
+        if told:
+            labels[name] = told
         if values is None or (column >= len(names) - 2 and not name and np.isnan(values.astype(float)).all()):
             continue
         arrays[name or str(column)] = values
@@ -162,7 +168,18 @@ def table_of(text: str, name: str) -> Table:
         kind=f"text, delimited by {NAMES[delimiter]}",
         named=bool(heads),
         unreadable=unreadable,
+        labels=labels,
     )
+
+
+def labels_of(name: str, column: pandas.Series, values: np.ndarray | None) -> tuple[str, ...]:
+    """Texts (or numbers of sensors) that change from row to row; empty of all other columns."""
+    if values is not None and not SENSOR.search(name):
+        return ()
+    texts = column.dropna().astype("string").str.strip()
+    changes = float((texts.to_numpy()[1:] != texts.to_numpy()[:-1]).mean()) if len(texts) > 1 else 0.0
+    told = tuple(texts.unique()) if changes > OFTEN else ()
+    return told if 2 <= len(told) <= MOST_SENSORS else ()
 
 
 def cut_off(rows: list[list[str]], width: int, ended: bool) -> bool:
