@@ -53,7 +53,7 @@ def cache_folder() -> Path | None:
 def jit(function: Callable[..., Any]) -> Any:
     """The function compiled by numba on first use, kept in :func:`cache_folder`."""
     numba: Any = importlib.import_module("numba")
-    options = {"nogil": True, "error_model": "numpy"}
+    options = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
     folder = cache_folder()
     if folder is None:
         return numba.njit(**options)(function)

@@ -99,8 +99,7 @@ _WATCHED = """
             if restart and started[b]:
                 gather(present, z, pose_now, age[b, {c}], p[{dt}], {declination}, {always}, places, inputs)
                 watch(monitor[b], inputs, watched)
-                for i in range(watched.shape[0]):
-                    monitor[b, i] = watched[i]"""
+                copy(watched, monitor[b])"""
 
 # ``record`` is ``run`` with further lines in place of the comments: it keeps what the way back needs.
 _RECORDED = {
@@ -172,7 +171,15 @@ def _print_run(model: Equations, names: list[str], shared: str) -> str:
     channels = [channel.name for channel in model.channels]
     begins, dt, places = [*starts_of(model.channels).values()], names.index("dt"), places_of(model)
     begins.append(sum(channel.size for channel in model.channels))
-    parts = {"starts": begins, "dt": dt, "grown": "", "watched": "", "memory": "", "lost": "False", "realigned": ""}
+    parts: dict[str, Any] = {
+        "starts": begins,
+        "dt": dt,
+        "grown": "",
+        "watched": "",
+        "memory": "",
+        "lost": "False",
+        "realigned": "",
+    }
     head = []
     if model.held_inputs:
         head = [f"from {shared} import grow"]

@@ -98,6 +98,10 @@ def known(sample: Array) -> tuple[Array, Array]:
     return xp.where(there, sample, xp.ones_like(sample)), there
 
 
+LARGEST_NORM = 10.0
+"""Norm of a sample, in expected ones, as which a larger one counts for the expectation."""
+
+
 @dataclass(frozen=True)
 class MagneticHeading(Model):
     """Mix-in that adds the heading to a six-axis model; it must be the first base class.
@@ -162,6 +166,9 @@ class MagneticHeading(Model):
         field, there = known(z["imu/mag"])
         measured = norm_and_dip(x[..., :4], field)
         disturbed = is_disturbed(measured, expected, self.norm_tolerance, self.dip_tolerance)
+        # One absurd sample must not move what is expected for minutes.
+        bounded = xp.minimum(measured[..., :1], LARGEST_NORM * expected[..., :1])
+        measured = xp.concat([bounded, measured[..., 1:]], axis=-1)
         near = follow(expected, measured, self.dt, self.field_time)
         followed = xp.where(disturbed, follow(expected, measured, self.dt, self.new_field_time), near)
         return xp.concat([x[..., :-2], xp.where(there, followed, expected)], axis=-1)

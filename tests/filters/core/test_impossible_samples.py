@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from poise.envs.hand.sensing import simulate_hand
+from poise.filters.core import rotation
 from poise.filters.core.estimator import check_measurements, run, without_impossible
 from poise.filters.core.quantity import ACCELEROMETER, GYROSCOPE, MAGNETOMETER, Channel
 from poise.filters.registry import FILTERS, make
@@ -91,3 +93,15 @@ def test_what_is_masked_is_missing() -> None:
     force = np.ma.masked_greater(np.array([[0.0, 0.0, 9.8], [999.0, 0.0, 9.8]]), 900.0)
     checked = check_measurements((ACCELEROMETER,), {"imu/acc": force}, time_axis=True)["imu/acc"]
     np.testing.assert_array_equal(checked, [[0.0, 0.0, 9.8], [np.nan] * 3])
+
+
+@pytest.mark.parametrize("name", ["mekf-9", "bounded-motion-9"])
+@pytest.mark.parametrize("glitch", [1e3, 1e5, 9e7])
+def test_a_field_that_is_absurd_for_once_is_forgotten(name: str, glitch: float) -> None:
+    trajectory = simulate_hand("slow", 5, rate=100.0, duration=25.0)
+    data = {channel: array.copy() for channel, array in trajectory.measurements.items()}
+    usual = run(make(name, dt=0.01), data).pose["orientation"]
+    data["imu/mag"][900] = [glitch, -glitch, 0.5 * glitch]
+    found = run(make(name, dt=0.01), data).pose["orientation"]
+    turned = np.degrees(rotation.angle(rotation.multiply(found, rotation.conjugate(usual))))
+    assert turned[901:].max() < 1.0
