@@ -98,7 +98,7 @@ def simulate(
 def estimate(trial: Trial, model: ExternalAcceleration) -> dict[str, np.ndarray]:
     """Quantity → ``(T, trials, 3)``; each gyroscope sample is held until the next."""
     model = replace(model, dt=1.0 / RATE, gyroscope_sample="previous")
-    return run(KalmanFilter(model, keep_covariance=False), trial.measurements).pose
+    return run(KalmanFilter(model, keep_covariance=False, restart=False), trial.measurements).pose
 
 
 def reference(trial: Trial) -> np.ndarray:

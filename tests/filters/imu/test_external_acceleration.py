@@ -48,7 +48,7 @@ def waves() -> dict[str, np.ndarray]:
 @pytest.mark.parametrize("compiled", [False, True], ids=["arrays", "compiled"])
 @pytest.mark.parametrize("mode", [1, 2, 3])
 def test_fixed_numbers(mode: int, compiled: bool, waves: dict[str, np.ndarray]) -> None:
-    pose = KalmanFilter(ExternalAcceleration(mode=mode, **PRINTED), compiled=compiled).run(waves).pose
+    pose = KalmanFilter(ExternalAcceleration(mode=mode, **PRINTED), compiled=compiled, restart=False).run(waves).pose
     at_one, at_three, acceleration = GOLDEN[mode]
     np.testing.assert_allclose(pose["up"][100], at_one, atol=1e-9)
     np.testing.assert_allclose(pose["up"][300], at_three, atol=1e-9)
