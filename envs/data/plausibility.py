@@ -40,8 +40,8 @@ PLAUSIBLE_RATES = (5.0, 10_000.0)
 """Hz."""
 FASTEST_TURN = 70.0
 """rad/s (4,000 °/s): the largest range of the gyroscopes in use."""
-LARGEST_BIAS = 0.2
-"""rad/s (11 °/s): beyond what uncalibrated consumer gyroscopes show at rest."""
+LARGEST_BIAS = 0.12
+"""rad/s (7 °/s): beyond what uncalibrated consumer gyroscopes show at rest."""
 REST_WINDOW = 100
 """Samples; the quietest such window is taken for rest."""
 
@@ -78,7 +78,12 @@ def check_recording(trajectory: Trajectory) -> list[Finding]:
 
     Returns:
         Findings, warnings first; empty for a plausible recording.
+
+    Raises:
+        ValueError: ``trajectory`` is no trajectory.
     """
+    if not isinstance(trajectory, Trajectory):
+        raise ValueError(f"trajectory must be a Trajectory, such as poise.load_recording gives, got {trajectory!r}")
     findings = list(check_clock(trajectory))
     wrong_clock = any(finding.severity == "warning" for finding in findings)
     if not wrong_clock:
@@ -240,6 +245,7 @@ def check_rates(
         one = None if vector is None else rate_consistency(trajectory.time, gyr, vector)
         if one is not None:
             found[name] = one
+    yield from check_conjugate(trajectory, gyr, found)
     decided = {name: one for name, one in found.items() if one.explains} or found
     units = {name: one.other_unit for name, one in decided.items() if one.other_unit is not None}
     if units:
@@ -252,6 +258,20 @@ def check_rates(
         yield Finding("warning", channel, what, "rates in deg/s, or raw counts", "Convert to rad/s.")
         return
     yield from check_axes(site, decided)
+
+
+def check_conjugate(trajectory: Trajectory, gyr: np.ndarray, found: dict[str, RateConsistency]) -> Iterator[Finding]:
+    """Whether the reference turns as the gyroscope does only if its quaternions are conjugated."""
+    given = found.get("reference")
+    if given is None or given.as_given < 0.3 * given.at_rest or given.at_rest < 0.05:
+        return
+    other = rotation.rotate(trajectory.truth["orientation"], np.array([0.6, 0.0, 0.8]))
+    conjugate = rate_consistency(trajectory.time, gyr, other)
+    if conjugate is not None and conjugate.as_given < 0.3 * min(given.as_given, given.axes_residual):
+        what = "gyroscope and reference turn together only if it is read the other way round"
+        cause = "conjugate quaternions, which turn the world into the sensor"
+        del found["reference"]
+        yield Finding("warning", "orientation", what, cause, "Conjugate them.")
 
 
 def check_axes(site: str, found: dict[str, RateConsistency]) -> Iterator[Finding]:
@@ -318,7 +338,7 @@ def check_sign(trajectory: Trajectory, channel: str, acc: np.ndarray, mag: np.nd
         cosine = float(np.nanmedian((direction * trajectory.truth_of("up")).sum(axis=1)))
         if cosine < -0.5:
             what = f"it points down by the reference (cosine {cosine:.2f})"
-            yield Finding("warning", channel, what, apple, remedy)
+            yield Finding("warning", channel, what, f"{apple}, or the z axis of the reference points down", remedy)
         elif cosine < 0.5:
             what = f"it does not point up by the reference (cosine {cosine:.2f})"
             cause = "a reference in another frame, or conjugate quaternions"

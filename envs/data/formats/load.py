@@ -202,6 +202,8 @@ def load_recordings(
         calibration = as_record(calibration)
     if not path.exists():
         raise FileNotFoundError(f"no recording at {path}: there is no such file")
+    if not path.is_dir() and not path.is_char_device() and not path.is_file():
+        raise ValueError(f"{path} is neither a file nor a folder")
     if mapping:
         trajectories = with_path(path, lambda: mapped(path, chosen_map(path, mapping)))
     else:
@@ -313,7 +315,7 @@ def find_recordings(folder: str | Path) -> list[Path]:
         if path.is_dir():
             # A link may lead upwards.
             found += [] if path.is_symlink() else find_recordings(path)
-        elif recognise(path) is not None:
+        elif path.is_file() and recognise(path) is not None:
             found.append(path)
             if is_map(Head(path)):
                 mapped_files |= data_of(path)

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+import poise
 from poise.envs.data.plausibility import check_recording
 from poise.envs.data.rate_consistency import rate_consistency
 from poise.envs.data.trajectory import Trajectory
@@ -171,3 +172,19 @@ def test_the_comparison_of_rates_is_that_of_scipy(motions):
     assert found.as_given < 0.03
     assert spread < 0.03
     assert found.at_rest > 5.0 * found.as_given
+
+
+@pytest.mark.parametrize("seed", [0, 3])
+@pytest.mark.parametrize("other", ["imu/mag", "imu/acc"])
+def test_conjugate_reference_is_named(seed, other):
+    motion = poise.record("poise/HandMotion-v0", seed=seed)
+    truth = {"orientation": motion.truth["orientation"] * [1.0, -1.0, -1.0, -1.0]}
+    kept = {name: motion.measurements[name] for name in {"imu/gyr", other} if name in motion.measurements}
+    findings = [str(each) for each in check_recording(motion.replace(measurements=kept, truth=truth))]
+    assert any("conjugate quaternions" in each for each in findings)
+
+
+@pytest.mark.parametrize("given", ["a.csv", None, 3, {}])
+def test_what_is_no_trajectory_is_named(given):
+    with pytest.raises(ValueError, match="trajectory must be a Trajectory"):
+        check_recording(given)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+
 import numpy as np
 import pytest
 
@@ -103,3 +105,11 @@ def test_units_within_names(tmp_path, gyr, acc):
     force = 9.80665e-3 if "mg" in acc else 9.80665 if acc.endswith("_g") else 1.0
     assert recording.measurements["imu/gyr"][0, 0] == pytest.approx(2.0 * scale)
     assert recording.measurements["imu/acc"][0, 2] == pytest.approx(9.81 * force)
+
+
+def test_a_pipe_is_not_waited_for(tmp_path):
+    os.mkfifo(tmp_path / "pipe.csv")
+    with pytest.raises(ValueError, match="neither a file nor a folder"):
+        poise.load_recording(tmp_path / "pipe.csv")
+    with pytest.raises(FileNotFoundError, match="without recordings"):
+        poise.load_recordings(tmp_path)
