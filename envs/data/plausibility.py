@@ -42,6 +42,8 @@ FASTEST_TURN = 70.0
 """rad/s (4,000 °/s): the largest range of the gyroscopes in use."""
 LARGEST_BIAS = 0.12
 """rad/s (7 °/s): beyond what uncalibrated consumer gyroscopes show at rest."""
+LONGEST_ABSENCE = 0.3
+"""Share of a recording: a longer stretch without rates makes most of an estimate a guess."""
 REST_WINDOW = 100
 """Samples; the quietest such window is taken for rest."""
 
@@ -173,6 +175,11 @@ def check_alive(channel: str, values: np.ndarray) -> Iterator[Finding]:
         yield Finding("warning", channel, "no sample at all", "a channel that was not recorded", "Leave it out.")
         return
     samples = values[present]
+    longest = float(np.diff(np.flatnonzero(np.concatenate([[True], present, [True]]))).max() - 1) / len(present)
+    if channel.endswith("gyr") and longest > LONGEST_ABSENCE:
+        what = f"{100 * longest:.0f} % of the samples are missing in one stretch"
+        remedy = "Cut the recording, or choose another channel: without rates nothing follows a rotation."
+        yield Finding("warning", channel, what, "a gyroscope that failed or was switched off", remedy)
     zero = float(np.mean(~samples.any(axis=1)))
     still = len(samples) > 20 and bool((samples == samples[0]).all())
     what = f"{100 * zero:.0f} % of the samples are 0, 0, 0"

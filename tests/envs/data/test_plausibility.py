@@ -188,3 +188,12 @@ def test_conjugate_reference_is_named(seed, other):
 def test_what_is_no_trajectory_is_named(given):
     with pytest.raises(ValueError, match="trajectory must be a Trajectory"):
         check_recording(given)
+
+
+@pytest.mark.parametrize("share", [0.4, 0.6, 0.9])
+def test_a_gyroscope_that_fails_is_named(share):
+    motion = simulate_hand("mixed", seed=1, duration=10.0)
+    gyr = motion.measurements["imu/gyr"].copy()
+    gyr[int((1.0 - share) * len(gyr)) :] = np.nan
+    findings = check_recording(motion.replace(measurements={**motion.measurements, "imu/gyr": gyr}))
+    assert any(f"{100 * share:.0f} % of the samples are missing" in str(each) for each in findings)
