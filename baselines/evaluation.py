@@ -126,8 +126,11 @@ def evaluate(
     for label, name, reason in skipped:
         warnings.warn(f"{label} was not run on {name}: {reason}", stacklevel=2)
     if not rows:
-        reasons = "; ".join(dict.fromkeys(f"{label}: {reason}" for label, _, reason in skipped))
-        raise ValueError(f"nothing could be run: {reasons}")
+        alike: dict[str, list[str]] = {}
+        for label, _, reason in skipped:
+            alike.setdefault(reason, []).append(label)
+        reasons = (f"{', '.join(dict.fromkeys(labels))}: {reason}" for reason, labels in alike.items())
+        raise ValueError(f"nothing could be run: {'; '.join(reasons)}")
     frame = ErrorTable(rows, columns=list(COLUMNS))
     frame.attrs |= {"skipped": skipped, "references": references, "reference_clock": reference_clock}
     return frame
@@ -155,6 +158,8 @@ class Evaluation:
             trajectory = trajectory.on_grid()
         except ValueError as reason:
             self.skipped = dict.fromkeys(contenders, str(reason))
+        if not self.skipped and not trajectory.mask.any():
+            self.skipped = dict.fromkeys(contenders, "no sample is scored: its mask is true nowhere")
         self.trajectory = trajectory
         self.blind = without_truth(trajectory)
         if self.blind and reference is not None and not self.skipped:

@@ -311,3 +311,13 @@ def test_the_benchmark_takes_what_the_data_suit():
     assert "mekf" in six
     assert "mekf-9" not in six
     assert set(contenders(["mekf-9"], channels=())) == {"mekf-9"}
+
+
+def test_a_recording_without_a_scored_sample_is_a_reason_and_reasons_stand_once():
+    motion = simulate_hand("slow", seed=0, duration=3.0)
+    blank = motion.replace(mask=np.zeros(len(motion), bool))
+    with (
+        pytest.warns(UserWarning, match="not run on"),
+        pytest.raises(ValueError, match="nothing could be run: mekf, tilt: no sample is scored"),
+    ):
+        evaluate(["mekf", "tilt"], blank, check=False)
