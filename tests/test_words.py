@@ -18,7 +18,7 @@ MODULES = [
 ]
 TERMS = {
     r"differs? from print|\b(?:is|as|in|of) print\b|which print\b|print (?:has|lacks|leaves)": "as published, errata",
-    r"as printed|the printed (?:form|sign|first|filter|one|version)": "as published",
+    r"\bas printed|the printed (?:form|sign|first|filter|one|version)": "as published",
     r"\b(?:tell|say)s? (?:a|the|its|the true) pose\b|\btold (?:who|so)\b": "output a pose; configured with",
     r"\bmeets? (?:the|a) ride\b|never meet": "bind to a recording; decoupled",
     r"what everybody knows": "baseline, classical reference",

@@ -37,7 +37,10 @@ LARGEST_TURN = math.radians(15.0)
 PATIENCE = 1.5
 """s for which they must do so."""
 CONFIRMED = 2.0
-"""s of agreement after which a start counts as good."""
+"""s of agreement after which the inclination of a start counts as good."""
+CONFIRMED_HEADING = 8.0
+"""The same for the heading. After a start with a wrong inclination a filter takes every sample of the field for
+disturbed until it has learned the field anew, and the heading drifts away meanwhile."""
 GYROSCOPE_GAP = 0.1
 """s without a gyroscope after which averaging begins anew."""
 SHORTEST_FORCE, SHORTEST_FIELD = 0.2, 0.9
@@ -107,14 +110,16 @@ def watch(memory: Array, inputs: Array) -> Array:
         xp.logical_and(upright, xp.logical_not(leaning)), trusted(field, field_square, field_time, SHORTEST_FIELD)
     )
     turned = xp.logical_and(heading, xp.less(along, math.cos(LARGEST_TURN) * horizontal))
-    agreeing = xp.logical_and(heading, xp.greater(along, math.cos(0.5 * LARGEST_TURN) * horizontal))
+    # A heading counts as right with a right inclination only: a wrong one turns it while it is corrected.
+    agreeing = xp.logical_and(standing, xp.greater(along, math.cos(0.5 * LARGEST_TURN) * horizontal))
+    agreeing = xp.logical_and(heading, agreeing)
     off = xp.where(turned, memory[..., 11:12] + dt, xp.where(heading, zero, memory[..., 11:12]))
     agreed = xp.where(agreeing, memory[..., 12:13] + dt, memory[..., 12:13])
 
     watched = xp.logical_or(xp.greater(always, 0.5), xp.logical_not(confirmed))
     lost = xp.logical_or(
         xp.logical_and(xp.greater(leant, PATIENCE), watched),
-        xp.logical_and(xp.greater(off, PATIENCE), xp.less(agreed, CONFIRMED)),
+        xp.logical_and(xp.greater(off, PATIENCE), xp.less(agreed, CONFIRMED_HEADING)),
     )
     leant, off, agreed = (xp.where(lost, zero, value) for value in (leant, off, agreed))
     parts = [force, force_square, force_time, leant, field, field_square, field_time, off, agreed, stood]

@@ -264,5 +264,5 @@ def test_unknown_names_and_parameters_are_refused() -> None:
         make("mekf", nose=1.0)
     with pytest.raises(ValueError, match="axes"):
         make("vqf", axes=9)
-    with pytest.raises(ValueError, match="dt must be above 0"):
+    with pytest.raises(ValueError, match="dt must be positive"):
         make("mahony", dt=0.0)
