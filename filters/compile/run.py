@@ -19,7 +19,7 @@ from .printer import UntraceableError, print_model, print_shared
 _COMPILED: dict[tuple[Any, ...], CompiledEquations | None] = {}
 PARALLEL_WORK = 200_000
 """samples × batch above which several threads process a batch"""
-RECORDED = 4_000_000
+RECORDED = 25_000_000
 """numbers that a smoother keeps in memory at a time (32 MB)"""
 
 
