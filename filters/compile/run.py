@@ -20,7 +20,7 @@ _COMPILED: dict[tuple[Any, ...], CompiledEquations | None] = {}
 PARALLEL_WORK = 200_000
 """samples × batch above which several threads process a batch"""
 RECORDED = 25_000_000
-"""numbers that a smoother keeps in memory at a time (32 MB)"""
+"""numbers that a smoother keeps in memory at a time (200 MB); the filter runs twice over longer recordings"""
 
 
 def compiled_equations(model: Equations) -> CompiledEquations | None:
