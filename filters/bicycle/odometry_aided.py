@@ -33,6 +33,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from ..core.backend import Array, expand, namespace
+from ..core.held_inputs import ridden
 from ..core.matrices import block_matrix, covariance_of, diagonal_matrix, identity, vector_of, zeros
 from ..core.model import Gain, Model, check_positive
 from ..core.quantity import GRAVITY, Channel, Measurement, Quantity
@@ -111,6 +112,7 @@ class OdometryAided(RiderEquations, Model):
     state_size: ClassVar[int] = 11
     error_size: ClassVar[int] = 9
     residual_size: ClassVar[int] = 3
+    held_inputs: ClassVar = (ridden("bicycle_imu/gyr", "gyroscope_noise"),)
     gains: ClassVar[dict[str, Gain]] = {
         "process": Gain("gyroscope_noise", description="process variance σ_g² of the attitude"),
         "bias": Gain("bias_noise", description="process variance σ_b² of the gyroscope bias"),

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from ..core.backend import Array, constant, expand, namespace
+from ..core.held_inputs import ridden
 from ..core.matrices import covariance_of, diagonal, zero_where_known
 from ..core.model import Gain, Model, Recurrence, check_positive
 from ..core.quantity import Channel, Measurement, Quantity
@@ -64,6 +65,7 @@ class PlatformGyro(RiderEquations, Model):
     state_size: ClassVar[int] = 4
     error_size: ClassVar[int] = 4
     residual_size: ClassVar[int] = 1
+    held_inputs: ClassVar = (ridden("bicycle_imu/gyr", "gyroscope_noise"),)
     gains: ClassVar[dict[str, Gain]] = {
         "process": Gain("process_scale", description="process variance"),
         "measurement": Gain("pitch_rate_noise", description="variance of what violates the pseudo-measurement"),

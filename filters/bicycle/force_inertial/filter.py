@@ -38,6 +38,7 @@ from typing import Any, ClassVar, Literal, Self
 
 from ...analysis.forward_mode import Scalar, atan2, cos, gradient, sin, value, variables
 from ...core.backend import Array, constant, namespace, rows
+from ...core.held_inputs import ridden
 from ...core.matrices import diagonal
 from ...core.model import Gain, Model
 from ...core.quantity import Channel, Measurement, Quantity
@@ -105,6 +106,7 @@ class ForceInertial(ForceInertialParameters, Model):
     state_size: ClassVar[int] = 27
     error_size: ClassVar[int] = 7
     residual_size: ClassVar[int] = 4
+    held_inputs: ClassVar = (ridden("trunk_imu/gyr", "gyroscope_noise", power=2),)
     gains: ClassVar[dict[str, Gain]] = {
         "process": Gain("gyroscope_noise", description="process variance of the angles, from the gyroscopes"),
         "bias": Gain("bias_std", description="process variance of the gyroscope bias"),

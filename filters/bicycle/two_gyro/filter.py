@@ -27,6 +27,7 @@ from dataclasses import dataclass
 from typing import Any, Literal, Self
 
 from ...core.backend import Array, constant, expand, namespace
+from ...core.held_inputs import HeldInput, ridden
 from ...core.matrices import (
     block_diagonal,
     block_matrix,
@@ -193,6 +194,12 @@ class TwoGyro(RiderEquations, Model):
         camera = ("relative/orientation", 4, "1") if self.sensor == "orientation" else ("relative/distances", 3, "m")
         gyroscopes = (Channel(name, 3, "rad/s") for name in ("bicycle_imu/gyr", self.body_gyroscope))
         return (*gyroscopes, Channel(*camera))
+
+    @property
+    def held_inputs(self) -> tuple[HeldInput, ...]:  # type: ignore[override]
+        """Both gyroscopes, an axis each."""
+        pairs = (self.body_gyroscope, "body"), ("bicycle_imu/gyr", "platform")
+        return tuple(ridden(name, f"{part}_gyroscope_noise[{axis}]") for name, part in pairs for axis in range(3))
 
     @property
     def outputs(self) -> tuple[Quantity, ...]:  # type: ignore[override]

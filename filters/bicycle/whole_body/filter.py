@@ -33,6 +33,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, Literal
 
 from ...core.backend import Array, constant, expand, namespace
+from ...core.held_inputs import pedalled, ridden
 from ...core.matrices import diagonal_matrix, identity
 from ...core.model import Gain, Model, check_positive
 from ...core.quantity import STANDARD_GRAVITY, Measurement
@@ -153,6 +154,11 @@ class WholeBody(RiderLinkage, Model):
 
     state_size: ClassVar[int] = 33
     error_size: ClassVar[int] = ERROR_SIZE
+    held_inputs: ClassVar = (
+        ridden("bicycle_imu/gyr", "bicycle_gyroscope_noise"),
+        ridden("trunk_imu/gyr", "trunk_gyroscope_noise"),
+        pedalled("thigh_right/gyr", "limb_gyroscope_noise"),
+    )
     gains: ClassVar = {
         "bicycle": Gain("bicycle_gyroscope_noise", description="process variance of roll"),
         "trunk": Gain("trunk_gyroscope_noise", description="process variance of the trunk's angles"),

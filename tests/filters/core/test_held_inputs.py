@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
+from poise.baselines.speed.fixtures import plausible_measurements
 from poise.envs.hand.sensing import simulate_hand
 from poise.filters.core import rotation
 from poise.filters.core.held_inputs import HeldInput, grown
@@ -100,3 +101,23 @@ def test_the_age_is_in_the_state() -> None:
     np.testing.assert_allclose(state.age, 0.08)
     rest, _ = kalman.run_from(state, {name: samples[20:] for name, samples in data.items()})
     np.testing.assert_array_equal(rest.covariance, whole.covariance[20:])
+
+
+@pytest.mark.parametrize("name", ["odometry-aided", "platform-gyro", "two-gyro", "force-inertial", "whole-body"])
+def test_filters_of_rides_know_less_after_a_gap(name: str) -> None:
+    """A second without any sample: the covariance grows much more than by the noise of the samples."""
+    filter_ = make(name, dt=0.01)
+    samples = plausible_measurements(filter_, 0, length=250)
+    lost = {channel: array.copy() for channel, array in samples.items()}
+    for array in lost.values():
+        array[50:150] = np.nan
+    whole, gap = filter_.run(samples), filter_.run(lost)
+    for quantity, values in whole.pose.items():
+        np.testing.assert_array_equal(values[:50], gap.pose[quantity][:50])
+    trace = np.trace(gap.covariance, axis1=1, axis2=2)
+    usual = np.trace(whole.covariance, axis1=1, axis2=2)
+    assert trace[149] > 2.0 * trace[49]
+    assert trace[149] > 5.0 * usual[149]
+    assert np.isfinite(trace).all()
+    array_form = replace(filter_, compiled=False).run(lost)
+    np.testing.assert_allclose(array_form.covariance[149], gap.covariance[149], rtol=1e-6, atol=1e-9)
