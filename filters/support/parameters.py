@@ -17,7 +17,7 @@ POSITIVE = re.compile(r"(dt|gravity|interval|time|step|window|length|width|wide|
 """Names of numbers that are above zero: times, lengths of limbs."""
 NOT_NEGATIVE = re.compile(
     r"(noise|std|mass|wheelbase|deviation|variance|prior|drift|bound|range|tolerance|threshold|adaptation|rejection|decay|jerk|lag|hold"
-    r"|inflation|filter|gain|scale|share|weight|guard|follow|acceleration)$|(gain|k)_"
+    r"|inflation|filter|gain|scale|share|weight|guard|follow|acceleration)$|^(gain|k)_"
 )
 """Names of numbers that are zero or above: standard deviations, masses, limits, gains."""
 MEASURED = re.compile(r"(accelerometer|magnetometer|array|orientation|distance)_(noise|std|variance)$")

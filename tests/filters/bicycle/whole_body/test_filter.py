@@ -262,3 +262,9 @@ def test_choices_are_checked():
             WholeBody(**{name: 0.0})
     assert set(CONSTRAINTS) == {"C1", "C2", "C3", "C5", "C6", "C7"}
     assert WholeBody.for_rider(RIDER, thigh=0.4).thigh == 0.4
+
+
+def test_a_pivot_beside_the_middle_is_a_place_like_any_other() -> None:
+    """Measured geometries have coordinates of any sign."""
+    pivot = (0.26, -0.005, 1.06)
+    assert WholeBody(trunk_pivot=pivot).trunk_pivot == pivot
