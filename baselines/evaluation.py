@@ -102,8 +102,8 @@ def evaluate(
     loaded = named_trajectories(trajectories)
     if not contenders or not loaded:
         raise ValueError(f"evaluate needs estimators and trajectories, got {len(contenders)} and {len(loaded)}")
+    known = (AUTO, ONBOARD, *list_estimators())
     for name in (*contenders.values(), reference):
-        known = (AUTO, ONBOARD, *list_estimators())
         if isinstance(name, str) and name.removesuffix(SUFFIX) not in known:
             make_estimator(name)  # raises, with the names that there are
     rows: list[tuple[Any, ...]] = []

@@ -13,7 +13,7 @@ from ..envs.data.trajectory import Trajectory
 from ..filters.core.estimator import Estimator
 from ..filters.core.estimator import run as run_sequence
 from ..filters.core.model import equations_of
-from ..filters.core.offline import Offline
+from ..filters.core.offline import SUFFIX, Offline
 from ..filters.core.quantity import Estimate, Layout
 from .registry import make_estimator
 
@@ -103,9 +103,7 @@ def smooth(
         ValueError: as :func:`run`; or the estimator has no smoother.
     """
     if isinstance(estimator, str):
-        metadata = data.metadata if isinstance(data, Trajectory) else None
-        interval = data.on_grid().dt if isinstance(data, Trajectory) else checked_interval(dt)
-        estimator = make_estimator(estimator, metadata=metadata, **({} if interval is None else {"dt": interval}))
+        return run(estimator.removesuffix(SUFFIX) + SUFFIX, data, dt, grid=grid)
     return run(estimator if isinstance(estimator, Offline) else Offline(estimator), data, dt, grid=grid)
 
 
