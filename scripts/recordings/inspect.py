@@ -38,7 +38,10 @@ def run(args: Args) -> int:
             from ...envs.data.formats.draft import draft_map
             from ...filters.support.files import write_text
 
-            text = draft_map(args.recordings[0])
+            data = args.recordings[0]
+            if args.write_map.resolve().parent != data.resolve().parent:
+                raise ValueError(f"write_map must name a file beside the data, in {data.parent}, got {args.write_map}")
+            text = draft_map(data)
             out.say(f"{text}\ndraft of a mapping: {write_text(args.write_map, text)}")
             return 0
         loaded, passed_over = load_all(args.recordings, args.calibration)

@@ -51,8 +51,7 @@ def as_table(arrays: dict[str, Any], kind: str) -> Table:
         array = array.reshape(-1) if array.ndim == 2 and 1 in array.shape else array
         if array.dtype.kind not in "fiub" or array.ndim not in (1, 2) or array.size == 0:
             continue
-        # Some programs write time along the second axis.
-        found[name] = array.T if array.ndim == 2 and array.shape[0] <= 9 < array.shape[1] else array
+        found[name] = time_first(array)
     if len(found) == 1 and next(iter(found.values())).ndim == 2:
         # A single array of all columns: they go by their numbers.
         matrix = next(iter(found.values()))
@@ -61,6 +60,11 @@ def as_table(arrays: dict[str, Any], kind: str) -> Table:
         raise ValueError(f"the {kind} holds no numeric array")
     units = {name: split_unit(name)[1] for name in found if split_unit(name)[1]}
     return Table(found, units={split_unit(name)[0]: unit for name, unit in units.items()}, kind=kind)
+
+
+def time_first(array: np.ndarray) -> np.ndarray:
+    """An array with time along its first axis; some programs write it along the second."""
+    return array.T if array.ndim == 2 and array.shape[0] <= 9 < array.shape[1] else array
 
 
 def load_npy(path: Path) -> np.ndarray:

@@ -20,7 +20,7 @@ import numpy as np
 from ....filters.core import rotation
 from .. import reference_clock
 from ..trajectory import Trajectory
-from .arrays import ZIP, load_mat, load_npz, read_table
+from .arrays import ZIP, load_mat, load_npz, read_table, time_first
 from .folders import load_streams
 from .head import Head
 from .mapping import RecordingMap, Reference, apply_map
@@ -174,9 +174,9 @@ def load_archive(path: Path) -> list[Trajectory]:
     """Read an archive: ``t`` s, ``gyr`` rad/s, ``acc`` m/s², ``mag``; truth ``quat`` w, x, y, z; ``mask``."""
     arrays = load_npz(path)
     time = np.asarray(arrays["t"], dtype=float).ravel()
-    measurements = {f"imu/{kind}": arrays[kind] for kind in ("gyr", "acc", "mag") if kind in arrays}
-    truth = {"orientation": arrays["quat"]} if "quat" in arrays else {}
-    truth |= {"position": arrays["pos"]} if "pos" in arrays else {}
+    measurements = {f"imu/{kind}": time_first(arrays[kind]) for kind in ("gyr", "acc", "mag") if kind in arrays}
+    truth = {"orientation": time_first(arrays["quat"])} if "quat" in arrays else {}
+    truth |= {"position": time_first(arrays["pos"])} if "pos" in arrays else {}
     mask = np.asarray(arrays["mask"], dtype=bool).ravel() if "mask" in arrays else np.ones(len(time), bool)
     details = {"name": path.stem, "format": "NumPy archive", "group": path.parent.name}
     recorded = Trajectory(time, measurements, truth, mask, details)

@@ -1,14 +1,22 @@
-"""Time stamps of tables in seconds: units, whole numbers beyond float64, counters that wrap, rows out of order."""
+"""Time stamps of tables in seconds: dates, units, whole numbers beyond float64, counters that wrap, rows not in order."""
 
 from __future__ import annotations
 
+import re
 import warnings
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from .table import UNITS, factor
 
+if TYPE_CHECKING:
+    import pandas
+
+CLOCK = r"\d\d?:\d\d(:\d\d([.,:]\d+)?)?(\s*[ap]\.?m\.?)?"
+CALENDAR = r"(\d{4}([-/.]\d\d[-/.]\d\d|\d{4})|\d\d?[-/. ](\d\d?|[a-z]{3,9})[-/. ](\d{4}|\d\d))"
+DATE = re.compile(rf"({CALENDAR}(T|_|,?\s+))?{CLOCK}\s*(Z|UTC|GMT|[-+]\d\d:?\d\d)?", re.IGNORECASE)
+"""A date with a time, or a time of the day of 24 or twice 12 hours; with a time zone or without."""
 DAY = 86_400
 WRAPS = (2**8, 2**16, 2**24, 2**32, 10**6, 60 * 10**6, DAY * 10**3, DAY * 10**6, DAY * 10**9)
 """Ends of counters after which they start again at 0; a time of the day does at midnight."""
@@ -49,6 +57,9 @@ def as_seconds(stamps: np.ndarray, unit: str, name: str = "time") -> Stamps:
     if values.dtype.kind == "f" and np.all(values == np.rint(values)) and np.abs(values).max(initial=0.0) < 2**53:
         values = values.astype(np.int64)
     values = values.astype(np.int64) if values.dtype.kind in "iub" else values.astype(float)
+    calendar = None if unit or not len(values) else unpacked(values)
+    if calendar is not None:
+        values, unit = calendar, "ns"
     if values.dtype.kind == "f":
         elapsed = values - values[0]
     else:
@@ -97,3 +108,58 @@ def likely_unit(elapsed: np.ndarray, name: str) -> float:
             )
             return scale
     return 1.0
+
+
+def nanoseconds(texts: pandas.Series) -> np.ndarray | None:
+    """Dates or times of the day as whole ns since the first midnight; None where a text is neither.
+
+    Where day and month cannot be told apart, they are in the order in which the recording is the shorter.
+    """
+    import pandas
+
+    plain = texts.str.replace(",", ".", regex=False).str.replace(r"\s*(UTC|GMT)$", "Z", regex=True, case=False)
+    plain = plain.str.replace(r"(\d)_(\d)", r"\1 \2", regex=True).str.replace(r"(\d)\.(\s)", r"\1\2", regex=True)
+    plain = plain.str.replace(r"([ap])\.?m\.?$", r"\1m", regex=True, case=False)
+    plain = plain.str.replace(r"(:\d\d:\d\d):(\d+)", r"\1.\2", regex=True)
+    first = str(plain.iloc[0])
+    if re.fullmatch(CLOCK, first, re.IGNORECASE):
+        if not first.lower().endswith("m"):
+            return whole(pandas.to_timedelta(plain, errors="coerce"))
+        plain = "2000-01-01 " + plain
+    readings = []
+    for day_first in (True, False) if not re.match(r"\d{4}", first) else (False,):
+        with warnings.catch_warnings():
+            # pandas tells that some dates are of the other order
+            warnings.simplefilter("ignore", UserWarning)
+            read = pandas.to_datetime(plain, errors="coerce", utc=True, format="mixed", dayfirst=day_first)
+        if read.notna().all():
+            readings.append(whole(read - read.iloc[0].normalize()))
+    return min(readings, key=np.ptp, default=None)
+
+
+def whole(times: pandas.Series) -> np.ndarray | None:
+    """Whole ns; None if one is missing."""
+    return None if times.isna().any() else times.to_numpy(dtype="timedelta64[ns]").astype(np.int64)
+
+
+def unpacked(values: np.ndarray) -> np.ndarray | None:
+    """Whole ns of dates or times written as digits; None of other numbers.
+
+    ``20240305115959000`` is 5 March 2024, 11:59:59.000; ``115959.5`` half a second before noon. The latter looks like
+    seconds and is known by its jump of 40 where a minute begins.
+    """
+    import pandas
+
+    seconds, minutes = values % 100, values // 100 % 100
+    jumps = np.flatnonzero(np.diff(values) >= 40)
+    of_day = values.min() >= 0 and values.max() < 240_000 and seconds.max() < 60 and minutes.max() < 60
+    if of_day and len(jumps) and np.all(seconds[jumps] >= 59) and np.all(seconds[jumps + 1] < 1):
+        return np.rint((3600.0 * (values // 10_000) + 60.0 * minutes + seconds) * 1e9).astype(np.int64)
+    digits = len(str(abs(int(values[0]))))
+    if values.dtype.kind not in "iu" or digits not in (14, 17) or len(str(abs(int(values[-1])))) != digits:
+        return None
+    texts = pandas.Series(values).astype("string")
+    pattern = texts.str[:14] + "." + (texts.str[14:] if digits == 17 else "0")
+    return whole(
+        pandas.to_datetime(pattern, format="%Y%m%d%H%M%S.%f", errors="coerce", utc=True) - pandas.Timestamp(0, tz="utc")
+    )

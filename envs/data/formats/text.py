@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .stamps import DATE, nanoseconds
 from .table import Table, split_unit, units_row
 
 if TYPE_CHECKING:
@@ -24,11 +25,6 @@ if TYPE_CHECKING:
 
 MISSING = ("", "nan", "na", "n/a", "null", "none", "-", "--", "#n/a", "nil", "missing")
 NUMBER = re.compile(r"[-+]?(\d+[.,]?\d*|[.,]\d+)([eE][-+]?\d+)?|[-+]?(inf|infinity)", re.IGNORECASE)
-CLOCK = r"\d\d?:\d\d(:\d\d([.,]\d+)?)?"
-DATE = re.compile(
-    rf"((\d{{4}}[-/]\d\d[-/]\d\d|\d\d?[/.]\d\d?[/.]\d{{4}})[T ])?{CLOCK}\s*(Z|UTC|GMT|[-+]\d\d:?\d\d)?", re.IGNORECASE
-)
-"""A date with a time, or a time of the day; with a time zone or without."""
 COMMENT = ("#", "//", "%")
 DELIMITERS = (",", ";", "\t", "|", " ")
 SENSOR = re.compile(r"(^|[\W_])(id|sensor|device|node|imu|mac|address)s?([\W_]*(id|no|number|name))?$", re.IGNORECASE)
@@ -129,6 +125,15 @@ def table_of(text: str, name: str) -> Table:
     if begin is None:
         raise ValueError(f"no table of numbers is in it; it begins with {first[:60]!r}")
     data = [line for line in lines[begin:] if line.strip() and not line.lstrip().startswith(COMMENT)]
+    heads_above = {line.strip() for line in lines[:begin] if line.strip()}
+    repeated = sum(line.strip() in heads_above for line in data)
+    if repeated:
+        warnings.warn(
+            f"{name}: the header stands {repeated} more times between the rows, as where recordings were "
+            "appended to one another; these lines are left out",
+            stacklevel=4,
+        )
+        data = [line for line in data if line.strip() not in heads_above]
     widths = [len(fields_of(line, delimiter)) for line in data[:SAMPLE]]
     width = max(set(widths), key=widths.count)
     if len(data) > 1 and cut_off([fields_of(line, delimiter) for line in data[-30:]], width, text.endswith("\n")):
@@ -279,18 +284,3 @@ def numeric(column: pandas.Series) -> tuple[np.ndarray | None, tuple[int, str] |
         return (nanoseconds(texts), None) if DATE.fullmatch(first) else (None, None)
     row = int(np.flatnonzero(wrong)[0]) if wrong.any() else None
     return values.to_numpy(dtype=float), None if row is None else (row, str(texts.iloc[row]))
-
-
-def nanoseconds(texts: pandas.Series) -> np.ndarray | None:
-    """Dates or times of the day as whole ns; None where a text is neither."""
-    import pandas
-
-    plain = texts.str.replace(",", ".", regex=False).str.replace(r"\s*(UTC|GMT)$", "Z", regex=True, case=False)
-    if re.fullmatch(CLOCK, str(plain.iloc[0])):
-        values = pandas.to_timedelta(plain, errors="coerce")
-    else:
-        values = pandas.to_datetime(plain, errors="coerce", utc=True, format="mixed", dayfirst="-" not in plain.iloc[0])
-        values = values - values.iloc[0].normalize() if values.notna().all() else values
-    if values.isna().any():
-        return None
-    return values.to_numpy(dtype="timedelta64[ns]").astype(np.int64)

@@ -114,3 +114,16 @@ def test_a_matrix_of_many_estimators_fits_a_terminal():
     assert numbered(rows[:1]) != rows[:1]
     few = [{"estimator": "a", "to b": 1.0}]
     assert numbered(few) == few
+
+
+def test_a_drafted_mapping_lies_beside_its_data(tmp_path, capsys):
+    (tmp_path / "elsewhere").mkdir()
+    rows = "".join(f"{k / 50},0.1,0.2,0.3,0,0,9.81\n" for k in range(60))
+    data = tmp_path / "mine.csv"
+    data.write_text("clock,a,b,c,d,e,f\n" + rows)
+    away, beside = tmp_path / "elsewhere" / "mine.toml", tmp_path / "mine.toml"
+    assert main(["inspect", str(data), "--write-map", str(away)]) != 0
+    assert "write_map must name a file beside the data" in capsys.readouterr().err
+    assert not away.exists()
+    assert main(["inspect", str(data), "--write-map", str(beside)]) == 0
+    assert beside.read_text().startswith("# What the columns of mine.csv mean")

@@ -82,14 +82,16 @@ def test_euroc(tmp_path, truth_header, given, every):
     assert poise.load_recording(path).truth == {}
 
 
+@pytest.mark.parametrize("transposed", [True, False])
 @pytest.mark.parametrize("magnetometer", [True, False])
-def test_archives_of_arrays(tmp_path, magnetometer):
+def test_archives_of_arrays(tmp_path, magnetometer, transposed):
     quat = Q.copy()
     quat[30:40] = np.nan
     arrays = {"t": TIME, "gyr": GYR, "acc": ACC, "quat": quat, "mask": TIME > 1.0} | (
         {"mag": MAG} if magnetometer else {}
     )
-    np.savez(tmp_path / "trial.npz", **{name: np.asarray(values) for name, values in arrays.items()})
+    turned = {name: values.T if transposed else values for name, values in arrays.items()}
+    np.savez(tmp_path / "trial.npz", **turned)
     recording = poise.load_recording(tmp_path / "trial.npz")
     assert ("imu/mag" in recording.measurements) == magnetometer
     np.testing.assert_array_equal(recording.truth["orientation"], quat)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from datetime import datetime, timedelta
 from pathlib import Path
 
 import numpy as np
@@ -121,6 +122,24 @@ def test_what_holds_no_table_is_refused(tmp_path, content):
         lambda k: f"31/05/2024 12:00:{k / 100:06.3f}",
         lambda k: f"12:00:{k / 100:06.3f}",
         lambda k: f"2024-05-01T23:59:{k / 100 + 59.8:06.3f}Z" if k < 20 else f"2024-05-02T00:00:{k / 100 - 0.2:06.3f}Z",
+        *(
+            lambda k, form=form: (datetime(2024, 3, 12, 23, 59, 59, 800000) + k * timedelta(milliseconds=10)).strftime(
+                form
+            )
+            for form in (
+                "%m/%d/%Y %I:%M:%S.%f %p",
+                "%d/%m/%Y %I:%M:%S.%f %p",
+                "%d/%m/%y %H:%M:%S.%f",
+                "%d-%b-%Y %H:%M:%S.%f",
+                "%Y%m%d %H:%M:%S.%f",
+                "%Y%m%d_%H:%M:%S:%f",
+                "%Y/%m/%d %I:%M:%S.%f%p",
+                "%d.%m.%Y %H:%M:%S.%f",
+            )
+        ),
+        lambda k: (
+            f"11:{59 + (k >= 20)}:{(k / 100 + 59.8) % 60:06.3f} AM" if k < 20 else f"12:00:{k / 100 - 0.2:06.3f} p.m."
+        ),
     ],
 )
 def test_dates_are_times(tmp_path, stamp):
@@ -128,6 +147,21 @@ def test_dates_are_times(tmp_path, stamp):
     table = table_of(tmp_path / "a.csv", "timestamp,x,y,z\n" + rows)
     seconds = as_seconds(table.column("timestamp"), table.units["timestamp"]).elapsed
     np.testing.assert_allclose(seconds, np.arange(50) / 100.0, atol=1e-6)
+
+
+@pytest.mark.parametrize("form", ["%Y%m%d%H%M%S%f", "%H%M%S.%f"])
+def test_digits_of_a_calendar_are_times(form):
+    moments = [datetime(2024, 3, 5, 11, 59, 59) + k * timedelta(milliseconds=20) for k in range(100)]
+    stamps = [moment.strftime(form)[: 17 if "Y" in form else None] for moment in moments]
+    values = np.array([int(stamp) if "Y" in form else float(stamp) for stamp in stamps])
+    np.testing.assert_allclose(as_seconds(values, "").elapsed, 0.02 * np.arange(100.0), atol=1e-9)
+
+
+def test_a_header_between_the_rows_is_left_out_with_a_warning(tmp_path):
+    head, rows = "time,gx,gy,gz", [f"{k / 100},{k},1,2" for k in range(60)]
+    with pytest.warns(UserWarning, match="header stands 2 more times"):
+        table = table_of(tmp_path / "a.csv", "\n".join([head, *rows[:20], head, *rows[20:40], head, *rows[40:]]) + "\n")
+    np.testing.assert_array_equal(table.column("gx"), np.arange(60))
 
 
 def test_whole_nanoseconds_keep_their_digits(tmp_path):
