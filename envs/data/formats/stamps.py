@@ -1,4 +1,4 @@
-"""Time stamps of tables in seconds: dates, units, whole numbers beyond float64, counters that wrap, rows not in order."""
+"""Time stamps of tables in seconds: dates, units, whole numbers beyond float64, counters that wrap, order of rows."""
 
 from __future__ import annotations
 
