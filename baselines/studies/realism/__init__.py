@@ -1,0 +1,1 @@
+"""How true the simulators are: statistics of simulated episodes beside those of recordings and publications."""
