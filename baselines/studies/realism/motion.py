@@ -32,11 +32,11 @@ UNITS = {
     "acc_sinusoids": "",
     "slow_velocity": "m/s",
 }
-"""Statistic → unit. ``gyr``: angular rate without its mean. ``force``: specific force in sensor axes above 0.5 Hz, where
-gravity turns little. ``acc``: acceleration in the world, gravity removed, where the orientation is known. ``f95``,
-``f99``: frequency below which so much of the power lies; ``above_3``, ``above_10``: power above 3 and 10 Hz (of the
-specific force: rms above 2 and 10 Hz); ``sinusoids``: share of the variance in the four strongest sinusoids of 20 s;
-``slow_velocity``: rms velocity below 0.2 Hz, where the position is known."""
+"""Statistic → unit. ``gyr``: angular rate without its mean. ``force``: specific force in sensor axes above 0.5 Hz,
+where gravity hardly counts. ``acc``: acceleration in the world, gravity removed, where the orientation is known.
+``f95``, ``f99``: frequency below which so much of the power lies; ``above_3``, ``above_10``: share of the power above
+3 and 10 Hz (of the specific force: rms above 2 and 10 Hz); ``sinusoids``: share of the variance in the four strongest
+sinusoids of 20 s; ``slow_velocity``: rms velocity below 0.2 Hz, where the position is known."""
 HIGH_PASS = 0.5
 """Hz, from which specific force is taken"""
 SLOW = 0.2

@@ -103,7 +103,8 @@ def sinusoid_share(
         values: ``(T, size)``, NaN where missing.
         rate: Hz.
         count: how many sinusoids a window and axis.
-        low, high: Hz, band whose variance counts.
+        low: Hz, lower end of the band whose variance counts.
+        high: Hz, its upper end.
         window: s; a Hann window is used, under which a sinusoid is three lines of the periodogram.
 
     Returns:
