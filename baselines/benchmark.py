@@ -41,7 +41,7 @@ PLAIN_PYTHON = ("ahrs-mahony", "ahrs-mahony-9", "ahrs-ekf", "ahrs-ekf-9")
 
 
 def simulated(seed: int, episodes: int, gestures: Sequence[str] = GESTURES, **options: Any) -> list[Trajectory]:
-    """Record episodes of ``poise/HandMotion-v0`` with the dynamic driver.
+    """Record episodes of ``poise/HandMotion-v0``.
 
     Args:
         seed: root seed; each episode has a child.

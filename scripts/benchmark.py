@@ -67,7 +67,7 @@ def run(args: Args) -> int:
         channels = {*HAND_CHANNELS, *(name for each in recorded for name in each.measurements)}
         chosen = contenders(args.estimators, channels)
         folder = start_run("benchmark", args, args.seed, args.runs)
-        out.say(f"simulating {4 * args.episodes} episodes of poise/HandMotion-v0 in PyBullet")
+        out.say(f"simulating {4 * args.episodes} episodes of poise/HandMotion-v0")
         data = {"simulation": simulated(args.seed, args.episodes, sensors=args.sensors)}
         if args.rides:
             out.say("simulating rides of poise/RiderBicycle-v0")

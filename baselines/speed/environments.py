@@ -28,8 +28,8 @@ def environment_speeds() -> Iterator[Speed]:
     bare = measure(bare_steps(STEPS * PHYSICS_PER_STEP), STEPS * PHYSICS_PER_STEP)
     yield Speed(group, "bare stepSimulation of one free body, 10 a step", bare / PHYSICS_PER_STEP, "steps/s", 1.0)
     for what, identity, options in (
-        ("HandMotion, dynamic", "poise/HandMotion-v0", {"gesture": "fast"}),
-        ("HandMotion, kinematic", "poise/HandMotion-v0", {"gesture": "fast", "drive": "kinematic"}),
+        ("HandMotion, kinematic", "poise/HandMotion-v0", {"gesture": "fast"}),
+        ("HandMotion, dynamic", "poise/HandMotion-v0", {"gesture": "fast", "drive": "dynamic"}),
         ("Replay", "poise/Replay-v0", {}),
         ("HandMotionGain, 100 ms a step", "poise/HandMotionGain-v0", {}),
     ):

@@ -27,9 +27,9 @@ class HandMotionEnv(PoseEnv):
 
     ## Description
 
-    A rigid controller of 0.25 kg follows a random gesture. With ``drive="dynamic"`` a virtual hand pulls and twists it
-    in PyBullet at about 1 kHz (computed force and torque plus feedback); with ``drive="kinematic"`` it follows the
-    gesture exactly and no physics engine is stepped. The sensors follow the actual motion of the device, and so does
+    A rigid controller of 0.25 kg follows a random gesture. With ``drive="kinematic"`` it follows the gesture exactly
+    and no physics engine is stepped; with ``drive="dynamic"`` a virtual hand pulls and twists it in PyBullet at about
+    1 kHz (computed force and torque plus feedback). The sensors follow the actual motion of the device, and so does
     the truth. World: x east, y north, z up; quaternions w, x, y, z.
 
     ## Action Space
@@ -104,7 +104,7 @@ class HandMotionEnv(PoseEnv):
             ``mixed``, ``walk``, ``pointing``, ``shaking``, ``rate-table``; in the plane ``planar-walk``, ``infinity``)
             or a configuration; None for ``slow``, with a planar device for ``infinity``.
             ``reset(options={"gesture": …})`` replaces it for one episode.
-        drive: ``dynamic`` or ``kinematic``.
+        drive: ``kinematic`` or ``dynamic``.
         sensors: name of a preset (:func:`poise.envs.sensors.presets.list_sensor_presets`), a preset, or a whole
             :class:`.SensorSuite` on one body; its mountings count from the site that ``lever_arm`` and
             ``mounting`` describe, whose pose is to be estimated. None for ``xsens-mtw-awinda``, or
@@ -135,7 +135,7 @@ class HandMotionEnv(PoseEnv):
     def __init__(
         self,
         gesture: str | GestureConfig | None = None,
-        drive: DriveKind = "dynamic",
+        drive: DriveKind = "kinematic",
         sensors: str | SensorPreset | SensorSuite | None = None,
         rate: float | None = None,
         duration: float | None = None,
