@@ -7,6 +7,7 @@ everything is compiled in memory, at every start, after one warning.
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import importlib
 import os
@@ -23,6 +24,7 @@ from typing import Any
 import numpy as np
 
 from ..support.files import write_text
+from ..support.version import ROOT
 
 _LOCK = threading.RLock()
 _WARNED: set[Path] = set()
@@ -50,13 +52,31 @@ def cache_folder() -> Path | None:
         return None
 
 
+@functools.cache
+def _digest(layer: str) -> str:
+    """Digest of all source files of a layer whose functions are compiled: they may call each other across files."""
+    digest = hashlib.sha256()
+    for path in sorted((ROOT / layer).rglob("*.py")):
+        source = path.read_bytes()
+        if b"compile.cache import" in source:
+            digest.update(path.relative_to(ROOT).as_posix().encode() + b"\0" + source + b"\0")
+    return digest.hexdigest()[:12]
+
+
 def jit(function: Callable[..., Any]) -> Any:
-    """The function compiled by numba on first use, kept in :func:`cache_folder`."""
+    """The function compiled by numba on first use, kept in :func:`cache_folder`.
+
+    Numba compiles a function anew when its own file changes. Simulators call compiled functions of other files too,
+    so theirs are kept in a folder that is named by the digest of all of them.
+    """
     numba: Any = importlib.import_module("numba")
     options = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
     folder = cache_folder()
     if folder is None:
         return numba.njit(**options)(function)
+    source = Path(function.__code__.co_filename)
+    if source.is_relative_to(ROOT / "envs"):
+        folder = folder / f"envs_{_digest('envs')}"
     with _LOCK:
         # numba reads the place when it decorates; other code that uses numba keeps its own.
         before, numba.config.CACHE_DIR = numba.config.CACHE_DIR, str(folder)

@@ -1,37 +1,110 @@
-"""Analytic ground: height and slope everywhere, in closed form, for plain floats (one wheel, every physics step)."""
+"""Analytic ground: height and slope everywhere, in closed form, compiled (each wheel needs them in every physics step).
+
+A ground is a table ``(rows, COLUMNS)`` of pieces whose heights add up; the first column of a row says what piece it is,
+the others hold its numbers. :func:`height_and_slope` evaluates a table.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from functools import cached_property
 
 import numpy as np
 
+from ....filters.compile.cache import jit
 
-class Ground(Protocol):
-    """Height of the ground over the horizontal plane."""
+COLUMNS = 9
+"""of a table"""
+LEVEL, BUMP, RAMP, WAVE = 0.0, 1.0, 2.0, 3.0
+"""first column: height · middle x, y, cos and sin of the direction, height, length · start x, y, cos, sin, tangent of
+the angle, rounding, steep, top · wave numbers along x and y, amplitude, phase"""
+
+
+@jit
+def _climb(s, r, steep):  # type: ignore[no-untyped-def]
+    """Height and slope ``s`` metres after the beginning of one rise of slope 1."""
+    if s <= 0.0:
+        return 0.0, 0.0
+    if s < r:
+        return 0.5 * (s - r / math.pi * math.sin(math.pi * s / r)), 0.5 * (1.0 - math.cos(math.pi * s / r))
+    if s < r + steep:
+        return 0.5 * r + s - r, 1.0
+    s -= r + steep
+    if s < r:
+        rise = 0.5 * (s + r / math.pi * math.sin(math.pi * s / r))
+        return 0.5 * r + steep + rise, 0.5 * (1.0 + math.cos(math.pi * s / r))
+    return r + steep, 0.0
+
+
+@jit
+def height_and_slope(table, x, y):  # type: ignore[no-untyped-def]
+    """Height (m) and its derivatives along x and y (1) of a table ``(rows, COLUMNS)`` at the world point (x, y)."""
+    height = slope_x = slope_y = 0.0
+    for index in range(table.shape[0]):
+        row = table[index]
+        kind = row[0]
+        if kind == WAVE:
+            angle = row[1] * x + row[2] * y + row[4]
+            height += row[3] * math.sin(angle)
+            rise = row[3] * math.cos(angle)
+            slope_x += row[1] * rise
+            slope_y += row[2] * rise
+        elif kind == LEVEL:
+            height += row[1]
+        else:
+            along, slope = (x - row[1]) * row[3] + (y - row[2]) * row[4], 0.0
+            if kind == BUMP:
+                tall, length = row[5], row[6]
+                if abs(along) < 0.5 * length:
+                    phase = 2.0 * math.pi * along / length
+                    height += 0.5 * tall * (1.0 + math.cos(phase))
+                    slope = -math.pi * tall / length * math.sin(phase)
+            else:
+                rounding, steep = row[6], row[7]
+                up, up_slope = _climb(along, rounding, steep)
+                down, down_slope = _climb(along - 2.0 * rounding - steep - row[8], rounding, steep)
+                height += row[5] * (up - down)
+                slope = row[5] * (up_slope - down_slope)
+            slope_x += slope * row[3]
+            slope_y += slope * row[4]
+    return height, slope_x, slope_y
+
+
+class Ground:
+    """Height of the ground over the horizontal plane: a sum of the pieces in :attr:`table`."""
+
+    @cached_property
+    def table(self) -> np.ndarray:
+        """Its pieces ``(rows, COLUMNS)``."""
+        raise NotImplementedError
 
     def height_and_slope(self, x: float, y: float) -> tuple[float, float, float]:
         """Height (m) and its derivatives along x and y (1) at the world point (x, y)."""
-        ...
+        found: tuple[float, float, float] = height_and_slope(self.table, float(x), float(y))
+        return found
+
+
+def _row(kind: float, *numbers: float) -> list[float]:
+    return [kind, *numbers, *[0.0] * (COLUMNS - 1 - len(numbers))]
 
 
 @dataclass(frozen=True)
-class FlatGround:
+class FlatGround(Ground):
     """A level plane."""
 
     height: float = 0.0
     """m"""
 
-    def height_and_slope(self, x: float, y: float) -> tuple[float, float, float]:
+    @cached_property
+    def table(self) -> np.ndarray:
         """See :class:`Ground`."""
-        return self.height, 0.0, 0.0
+        return np.array([_row(LEVEL, self.height)])
 
 
 @dataclass(frozen=True)
-class Bump:
+class Bump(Ground):
     """A straight cosine bump across a road.
 
     Raises:
@@ -51,19 +124,15 @@ class Bump:
         if not (self.length > 0.0 and math.pi * abs(self.height) < self.length):
             raise ValueError(f"a bump needs π |height| < length, got {self.height} m over {self.length} m")
 
-    def height_and_slope(self, x: float, y: float) -> tuple[float, float, float]:
+    @cached_property
+    def table(self) -> np.ndarray:
         """See :class:`Ground`."""
         c, s = math.cos(self.direction), math.sin(self.direction)
-        along = (x - self.start[0]) * c + (y - self.start[1]) * s
-        if abs(along) >= 0.5 * self.length:
-            return 0.0, 0.0, 0.0
-        phase = 2.0 * math.pi * along / self.length
-        slope = -math.pi * self.height / self.length * math.sin(phase)
-        return 0.5 * self.height * (1.0 + math.cos(phase)), slope * c, slope * s
+        return np.array([_row(BUMP, *self.start, c, s, self.height, self.length)])
 
 
 @dataclass(frozen=True)
-class Ramp:
+class Ramp(Ground):
     """A road that climbs and comes down again along one direction, its slope rounded.
 
     The slope rises smoothly over ``rounding`` metres to tan(angle), stays, and falls back to zero; after ``top`` level
@@ -93,34 +162,16 @@ class Ramp:
                 f"{self.top} m and {math.degrees(self.angle):.0f}°"
             )
 
-    def _climb(self, s: float) -> tuple[float, float]:
-        """Height and slope ``s`` metres after the beginning of one rise of slope 1."""
-        r, steep = self.rounding, self.steep
-        if s <= 0.0:
-            return 0.0, 0.0
-        if s < r:
-            return 0.5 * (s - r / math.pi * math.sin(math.pi * s / r)), 0.5 * (1.0 - math.cos(math.pi * s / r))
-        if s < r + steep:
-            return 0.5 * r + s - r, 1.0
-        s -= r + steep
-        if s < r:
-            rise = 0.5 * (s + r / math.pi * math.sin(math.pi * s / r))
-            return 0.5 * r + steep + rise, 0.5 * (1.0 + math.cos(math.pi * s / r))
-        return r + steep, 0.0
-
-    def height_and_slope(self, x: float, y: float) -> tuple[float, float, float]:
+    @cached_property
+    def table(self) -> np.ndarray:
         """See :class:`Ground`."""
         c, s = math.cos(self.direction), math.sin(self.direction)
-        along = (x - self.start[0]) * c + (y - self.start[1]) * s
-        up, up_slope = self._climb(along)
-        down, down_slope = self._climb(along - 2.0 * self.rounding - self.steep - self.top)
-        steepness = math.tan(self.angle)
-        slope = steepness * (up_slope - down_slope)
-        return steepness * (up - down), slope * c, slope * s
+        numbers = (*self.start, c, s, math.tan(self.angle), self.rounding, self.steep, self.top)
+        return np.array([_row(RAMP, *numbers)])
 
 
 @dataclass(frozen=True)
-class RoughGround:
+class RoughGround(Ground):
     """Random uneven paving: plane waves of random directions and phases.
 
     Elevation falls with wave number as 1/n² in power density, as on roads (ISO 8608, waviness 2).
@@ -167,30 +218,21 @@ class RoughGround:
         vectors = numbers[:, None] * np.stack([np.cos(directions), np.sin(directions)], axis=1)
         return cls(tuple(map(tuple, vectors.tolist())), tuple(amplitudes.tolist()), tuple(phases.tolist()))
 
-    def height_and_slope(self, x: float, y: float) -> tuple[float, float, float]:
+    @cached_property
+    def table(self) -> np.ndarray:
         """See :class:`Ground`."""
-        height = slope_x = slope_y = 0.0
-        for (kx, ky), amplitude, phase in zip(self.wave_numbers, self.amplitudes, self.phases, strict=True):
-            angle = kx * x + ky * y + phase
-            height += amplitude * math.sin(angle)
-            rise = amplitude * math.cos(angle)
-            slope_x += kx * rise
-            slope_y += ky * rise
-        return height, slope_x, slope_y
+        waves = zip(self.wave_numbers, self.amplitudes, self.phases, strict=True)
+        return np.array([_row(WAVE, *numbers, amplitude, phase) for numbers, amplitude, phase in waves])
 
 
-class GroundSum:
+class GroundSum(Ground):
     """Several grounds on top of each other, for instance bumps on paving."""
 
     def __init__(self, grounds: Sequence[Ground]) -> None:
         self.grounds = tuple(grounds)
 
-    def height_and_slope(self, x: float, y: float) -> tuple[float, float, float]:
+    @cached_property
+    def table(self) -> np.ndarray:
         """See :class:`Ground`."""
-        height = slope_x = slope_y = 0.0
-        for ground in self.grounds:
-            h, sx, sy = ground.height_and_slope(x, y)
-            height += h
-            slope_x += sx
-            slope_y += sy
-        return height, slope_x, slope_y
+        tables = [ground.table for ground in self.grounds]
+        return np.concatenate([np.zeros((0, COLUMNS)), *tables])
