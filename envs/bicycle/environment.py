@@ -125,7 +125,8 @@ class RiderBicycleEnv(PoseEnv):
         physics_rate: physics steps per second, Hz; a multiple of 250 Hz and of ``rate``.
         score: one quantity or several of ``info["pose"]``; by default the orientations of bicycle and trunk.
         noise_scale: factor on all errors, 0 for none.
-        sampling: ``interval`` or ``instant``, of gyroscopes and accelerometers.
+        sampling: ``interval`` or ``instant``, of gyroscopes, accelerometers and contact forces: the mean over the
+            interval that ends with the sample, or what acts at its end (forces: in the last physics step).
         render_mode: ``human`` (a window), ``rgb_array`` or None.
 
     Raises:
@@ -190,7 +191,7 @@ class RiderBicycleEnv(PoseEnv):
                 raise ValueError(f"physics_rate must be a multiple of {name} of {value:g} Hz, got {physics_rate:g} Hz")
         quantities = _quantities(score)
         self._source = RideSource(
-            self.parameters, style, self.duration, made.rate, self.physics_rate, fidelity, self.tyre
+            self.parameters, style, self.duration, made.rate, self.physics_rate, fidelity, self.tyre, sampling
         )
         bounds = [{"rotation": 1.0, "angle": math.pi}.get(quantity.kind, 20.0) for quantity in quantities]
         super().__init__(made, quantities, made.rate, render_mode, bounds)

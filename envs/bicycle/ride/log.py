@@ -8,7 +8,7 @@ import numpy as np
 
 from ....filters.core import rotation
 from ...physics.multibody import CentreMotion, LinkState, newton_euler
-from ...sensors.ideal import BodyState
+from ...sensors.ideal import BodyState, Sampling
 from ..rider.limbs import LimbPosture, reach_to, three_turns
 from ..rider.posture import KNEE_OUT, LIMBS, SIDES, SIGNS
 from .contact_forces import Contact
@@ -24,7 +24,7 @@ class RideLog:
     frames: dict[str, BodyState]
     """link name → motion of its body frame; with accelerations over the last physics step"""
     contact: Contact
-    """forces of the rider on the bicycle"""
+    """forces of the rider on the bicycle, over the interval that ends with the sample or in the last physics step"""
     limbs: dict[str, LimbPosture]
     """limb name → posture in its root's frame (trunk, or bicycle for the legs)"""
     trunk_angles: np.ndarray
@@ -49,10 +49,13 @@ class RideRecorder:
     Args:
         ride: the ride.
         steps: physics steps per sample.
+        sampling: of the contact forces. ``interval``: their mean in bicycle axes over all physics steps of a sample,
+            turned into the world at its end, so that a force sensor on the bicycle reads the mean of what acts on it;
+            ``instant``: those of the last physics step.
     """
 
-    def __init__(self, ride: Ride, steps: int) -> None:
-        self.ride, self.steps = ride, steps
+    def __init__(self, ride: Ride, steps: int, sampling: Sampling = "interval") -> None:
+        self.ride, self.steps, self.sampling = ride, steps, sampling
         rider, links = ride.rider, ride.bicycle.links
         self._links = [links["front_assembly"], links["crank"], *rider.mass_links]
         self._names = ["front_assembly", "crank", "pelvis", "trunk"]
@@ -68,14 +71,12 @@ class RideRecorder:
     def record(self, samples: int) -> RideLog:
         """Ride on for some samples; stops early after the one in which the rider fell."""
         ride, rider = self.ride, self.ride.rider
-        before, after, forces, joints, torques, times, fallen, swivels = [], [], [], [], [], [], [], []
+        looks, forces, joints, torques, times, fallen, swivels = [self._look()], [], [], [], [], [], []
         for _ in range(samples):
-            for _ in range(self.steps - 1):
+            for _ in range(self.steps):
                 ride.step()
-            before.append(self._look())
-            ride.step()
-            after.append(self._look())
-            forces.append(rider.raw_forces())
+                looks.append(self._look())
+                forces.append(rider.raw_forces())
             joints.append(ride.bicycle.body.joint_tuples(self._joints))
             torques.append(rider.torques)
             times.append(ride.physics.time)
@@ -84,8 +85,7 @@ class RideRecorder:
             if fallen[-1]:
                 break
         return self._compute(
-            self._motion(before),
-            self._motion(after),
+            self._motion(looks),
             np.array(forces),
             np.array(joints),
             np.array(torques),
@@ -116,8 +116,7 @@ class RideRecorder:
 
     def _compute(
         self,
-        before: CentreMotion,
-        after: CentreMotion,
+        motion: CentreMotion,
         forces: np.ndarray,
         joints: np.ndarray,
         torques: np.ndarray,
@@ -127,11 +126,13 @@ class RideRecorder:
     ) -> RideLog:
         rider = self.ride.rider
         names = ["rear_frame", *self._names]
+        # the last physics step of each sample
+        before = CentreMotion(*(field[self.steps - 1 : -1 : self.steps] for field in motion))
+        after = CentreMotion(*(field[self.steps :: self.steps] for field in motion))
         frames = {name: self._frame(index, name, before, after, time) for index, name in enumerate(names)}
-        start = {name: self._frame(index, name, before, before, time) for index, name in enumerate(names[:3])}
         angles, rates = joints[..., 0], joints[..., 1]
         steer, crank, trunk = angles[:, 0], angles[:, 1], angles[:, 3:6]
-        contact = self._contact(start, before, after, forces)
+        contact = self._contact(motion, forces, frames["rear_frame"].orientation)
         limbs = {}
         trunk_turn = three_turns(trunk[:, 0], trunk[:, 1], trunk[:, 2])
         for index, name in enumerate(LIMBS):
@@ -167,12 +168,31 @@ class RideRecorder:
         target = target * np.minimum(1.0, 0.9999 * posture.arm.reach / length)
         return reach_to(posture.arm, target, posture.elbow_out(side, trunk), swivel)
 
-    def _contact(
-        self, start: dict[str, BodyState], before: CentreMotion, after: CentreMotion, forces: np.ndarray
-    ) -> Contact:
-        """Contact forces in the last physics step of each sample."""
+    def _contact(self, motion: CentreMotion, forces: np.ndarray, ends: np.ndarray) -> Contact:
+        """Contact forces of each sample; ``ends``: orientations of the bicycle at the samples."""
+        if self.sampling == "instant":
+            last = np.arange(self.steps, len(motion.position), self.steps)
+            before, after = (CentreMotion(*(field[rows] for field in motion)) for rows in (last - 1, last))
+            return self._step_contact(before, after, forces[last - 1])
+        before, after = (CentreMotion(*(field[rows] for field in motion)) for rows in (slice(-1), slice(1, None)))
+        contact = self._step_contact(before, after, forces)
+        axes = self._frame(0, "rear_frame", after, after, np.zeros(len(forces))).orientation
+
+        def mean(vectors: np.ndarray) -> np.ndarray:
+            """Mean in bicycle axes over the steps of each sample, in the world at the sample."""
+            extra = (1,) * (vectors.ndim - 2)
+            local = rotation.rotate_back(axes.reshape(-1, *extra, 4), vectors)
+            local = local.reshape(-1, self.steps, *local.shape[1:]).mean(axis=1)
+            return rotation.rotate(ends.reshape(-1, *extra, 4), local)
+
+        return Contact(*map(mean, contact))
+
+    def _step_contact(self, before: CentreMotion, after: CentreMotion, forces: np.ndarray) -> Contact:
+        """Contact forces in physics steps, from the motion before and after each."""
         rider, physics = self.ride.rider, self.ride.physics
-        posture, frame, front, crank = rider.posture, start["rear_frame"], start["front_assembly"], start["crank"]
+        names, unused = ("rear_frame", *self._names[:2]), np.zeros(len(forces))
+        frame, front, crank = (self._frame(index, name, before, before, unused) for index, name in enumerate(names))
+        posture = rider.posture
         saddle = frame.position + rotation.rotate(frame.orientation, np.array(posture.bicycle.saddle))
         rows = slice(3, 3 + len(rider.masses))
         then, now = (CentreMotion(*(field[:, rows] for field in motion)) for motion in (before, after))

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...sensors.ideal import BodyState
+from ...sensors.ideal import BodyState, Sampling
 from ..course.scenarios import Scenario
 from ..course.terrain import Ground
 from ..frame.parameters import BicycleParameters
@@ -60,6 +60,7 @@ class RideSource:
         physics_rate: physics steps per second, Hz; a multiple of ``rate``.
         fidelity: ``full`` or ``lumped``.
         tyre: of both wheels.
+        sampling: of the contact forces, see :class:`.RideRecorder`.
     """
 
     def __init__(
@@ -71,10 +72,11 @@ class RideSource:
         physics_rate: float,
         fidelity: Fidelity,
         tyre: TyreParameters,
+        sampling: Sampling = "interval",
     ) -> None:
         self.bicycle, self.style, self.duration, self.rate = bicycle, style, duration, rate
         self.physics_rate, self.fidelity = physics_rate, fidelity
-        self.tyre = tyre
+        self.tyre, self.sampling = tyre, sampling
         self.ride: Ride | None = None
         self.fallen_at = math.inf
         self._kept: dict[str, RideMemory] = {}
@@ -101,7 +103,7 @@ class RideSource:
         else:
             self.ride.restore(self._first)
         assert self.ride is not None
-        self._recorder = RideRecorder(self.ride, round(self.physics_rate / self.rate))
+        self._recorder = RideRecorder(self.ride, round(self.physics_rate / self.rate), self.sampling)
         self._began = self.ride.physics.time + 1.0 / self.rate
         self._samples, self.fallen_at = 0, math.inf
         self._quaternions: Quaternions = {}
