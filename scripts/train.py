@@ -100,12 +100,12 @@ def run(args: Args) -> int:
 
 def training_config(args: Args) -> TrainingConfig:
     """The configuration that the arguments ask for."""
-    from ..baselines.learned.domain_randomisation import DomainRandomisation
     from ..baselines.learned.training import TrainingConfig
+    from ..envs.recipes.hand import HandRecipe
 
     config = TrainingConfig()
     if args.preset == "quick":
-        quick = DomainRandomisation(duration=60.0)
+        quick = HandRecipe(duration=60.0)
         config = replace(config, episodes=96, validation_episodes=16, epochs=4, units=32, batch=16, domain=quick)
     given = {name: getattr(args, name) for name in ("episodes", "epochs", "units")}
     return replace(config, seed=args.seed, **{name: value for name, value in given.items() if value is not None})

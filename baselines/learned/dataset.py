@@ -12,13 +12,13 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from ...envs.data.trajectory import Trajectory
+from ...envs.recipes.recipe import Recipe
 from ...filters.core import rotation
 from ...filters.core.estimator import run
 from ...filters.core.observer import Observer
 from ...filters.support.files import replacing
 from ...filters.support.parallel import progress_bar
 from ...filters.support.version import code_version
-from .domain_randomisation import DomainRandomisation
 from .gravity_aligned_frame import FEATURES, VECTORS, GravityAlignedFrame
 
 
@@ -88,7 +88,7 @@ class LearnedDataset:
     @classmethod
     def from_simulation(
         cls,
-        domain: DomainRandomisation,
+        domain: Recipe,
         seed: int,
         episodes: int,
         frame: GravityAlignedFrame | None = None,
@@ -166,11 +166,11 @@ class LearnedDataset:
                 yield Window(features[:, part], up[:, part], self.mask[chosen, part], begin == 0)
 
 
-def simulate(domain: DomainRandomisation, seed: int, episodes: int, progress: str = "") -> Iterator[Trajectory]:
+def simulate(domain: Recipe, seed: int, episodes: int, progress: str = "") -> Iterator[Trajectory]:
     """Episodes one after the other, named ``randomised-<seed>-<index>``."""
     with progress_bar(episodes, progress, "episode", show=bool(progress)) as bar:
-        for index, child in enumerate(np.random.SeedSequence(seed).spawn(episodes)):
-            yield domain.draw(child, f"randomised-{seed}-{index}")
+        for index in range(episodes):
+            yield domain.episode(seed, index, f"randomised-{seed}-{index}")
             bar.update()
 
 
@@ -204,8 +204,8 @@ def rotated(features: np.ndarray, up: np.ndarray, angles: np.ndarray) -> tuple[n
     return copies[0], copies[1]
 
 
-def simulation_digest(domain: DomainRandomisation, seed: int, episodes: int, frame: GravityAlignedFrame) -> str:
+def simulation_digest(domain: Recipe, seed: int, episodes: int, frame: GravityAlignedFrame) -> str:
     """Name of a data set that depends on its settings and on the code that simulates it."""
-    settings = {"domain": asdict(domain), "seed": seed, "episodes": episodes, "frame": asdict(frame)}
+    settings = {"domain": domain.describe(), "seed": seed, "episodes": episodes, "frame": asdict(frame)}
     settings["code"] = code_version()
     return hashlib.sha256(json.dumps(settings, sort_keys=True).encode()).hexdigest()[:16]

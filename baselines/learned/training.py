@@ -11,11 +11,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...envs.recipes.hand import HandRecipe
 from ...filters.support.optional import extra
 from ...filters.support.seeds import child_seed, child_seeds
 from ..checkpoint import load_checkpoint, save_checkpoint
 from .dataset import LearnedDataset
-from .domain_randomisation import DomainRandomisation
 from .gravity_aligned_frame import GravityAlignedFrame
 from .gru_module import GruModule, inclination_loss
 
@@ -58,7 +58,7 @@ class TrainingConfig:
     """largest norm of a gradient"""
     seed: int = 0
     """root seed: its children are training data, validation data, initial weights, order and headings"""
-    domain: DomainRandomisation = field(default_factory=DomainRandomisation)
+    domain: HandRecipe = field(default_factory=HandRecipe)
     """distribution of the episodes"""
     frame: GravityAlignedFrame = field(default_factory=GravityAlignedFrame)
     """front end"""

@@ -9,14 +9,15 @@ import numpy as np
 import pytest
 
 from poise.baselines.learned.dataset import LearnedDataset, rotated, sequence_of, simulation_digest
-from poise.baselines.learned.domain_randomisation import DomainRandomisation, Shaking, VariedMotion
 from poise.baselines.learned.gravity_aligned_frame import FEATURES, GravityAlignedFrame
 from poise.envs.data.trajectory import Trajectory
+from poise.envs.recipes.hand import HandRecipe
+from poise.envs.recipes.hand_motion import Shaking, VariedMotion
 from poise.filters.core import rotation
 from poise.filters.core.estimator import run
 from poise.filters.core.observer import Observer
 
-SHORT = DomainRandomisation(duration=12.0, motion=VariedMotion(first_rest=(0.3, 2.0), longest=(4.0, 6.0)))
+SHORT = HandRecipe(duration=12.0, motion=VariedMotion(first_rest=(0.3, 2.0), longest=(4.0, 6.0)))
 
 
 @pytest.fixture(scope="module")

@@ -1,0 +1,76 @@
+"""Random inertial sensors."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..sensors.noise import NoiseModel
+from ..sensors.presets import SensorPreset
+from .ranges import Checked, Range, log_uniform
+
+DEG = math.pi / 180.0
+
+
+@dataclass(frozen=True)
+class VariedSensors(Checked):
+    """Gyroscopes and accelerometers from laboratory to phone grade, calibrated to small biases.
+
+    Ranges of the fields of :class:`~poise.envs.sensors.noise.NoiseModel`, drawn from log-uniformly.
+    """
+
+    gyroscope_noise: Range = (0.003 * DEG, 0.05 * DEG)
+    gyroscope_bias: Range = (0.03 * DEG, 0.8 * DEG)
+    gyroscope_walk: Range = (1e-4 * DEG, 3e-3 * DEG)
+    gyroscope_scale: Range = (5e-4, 1e-2)
+    gyroscope_misalignment: Range = (5e-4, 1e-2)
+    accelerometer_noise: Range = (5e-4, 1e-2)
+    accelerometer_bias: Range = (0.01, 0.1)
+    accelerometer_scale: Range = (5e-4, 1e-2)
+    accelerometer_misalignment: Range = (5e-4, 5e-3)
+    bandwidth: Range = (30.0, 300.0)
+    gyroscope_full_scale: float = 2000.0 * DEG
+    """rad/s"""
+    accelerometer_full_scale: float = 156.9
+    """m/s²"""
+    lossy_share: float = 0.15
+    """of devices, which lose single samples"""
+    dropout: Range = (0.005, 0.2)
+    """share of the samples that they lose"""
+    silent_share: float = 0.1
+    """of devices, whose accelerometer pauses"""
+    pauses: Range = (0.01, 0.2)
+    """1/s, how often"""
+    pause: Range = (0.05, 2.0)
+    """s, mean length"""
+
+    def draw(self, generator: np.random.Generator) -> SensorPreset:
+        """Draw a device."""
+        bandwidth = log_uniform(generator, self.bandwidth)
+        dropout, burst_rate = log_uniform(generator, self.dropout), log_uniform(generator, self.pauses)
+        lossy, silent = generator.random(2) < (self.lossy_share, self.silent_share)
+        gyroscope = NoiseModel(
+            white_noise=log_uniform(generator, self.gyroscope_noise),
+            turn_on_bias=log_uniform(generator, self.gyroscope_bias),
+            bias_random_walk=log_uniform(generator, self.gyroscope_walk),
+            scale_factor=log_uniform(generator, self.gyroscope_scale),
+            misalignment=log_uniform(generator, self.gyroscope_misalignment),
+            resolution=float(generator.choice([0.0, DEG / 16.4])),
+            full_scale=self.gyroscope_full_scale,
+            bandwidth=bandwidth,
+            dropout=dropout * float(lossy),
+        )
+        accelerometer = NoiseModel(
+            white_noise=log_uniform(generator, self.accelerometer_noise),
+            turn_on_bias=log_uniform(generator, self.accelerometer_bias),
+            scale_factor=log_uniform(generator, self.accelerometer_scale),
+            misalignment=log_uniform(generator, self.accelerometer_misalignment),
+            full_scale=self.accelerometer_full_scale,
+            bandwidth=bandwidth,
+            dropout=dropout * float(lossy),
+            burst_rate=burst_rate * float(silent),
+            burst_duration=log_uniform(generator, self.pause),
+        )
+        return SensorPreset("varied", "domain randomisation", gyroscope, accelerometer)

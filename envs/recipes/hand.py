@@ -1,0 +1,82 @@
+"""Hand motions, sensors and mountings, drawn wider than test data so that recordings lie inside.
+
+Rests of any length, motions from tremor to shaking, at 50 to 300 Hz, with random sensor, mounting and motion parameters
+in each episode.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+
+from ...filters.core import rotation
+from ..data.trajectory import Trajectory
+from ..sensors.ideal import Mounting, mounted
+from ..sensors.suite import imu_suite
+from .devices import VariedSensors
+from .hand_motion import Shaking, VariedMotion
+from .ranges import Range, log_uniform
+from .recipe import Recipe, unspawned
+
+
+@dataclass(frozen=True)
+class HandRecipe(Recipe):
+    """A distribution of hand motions, devices and mountings; no physics engine is used.
+
+    An episode has the channels ``imu/gyr`` (rad/s) and ``imu/acc`` (m/s²), NaN where a sample is lost, and the truth
+    ``orientation`` (sensor to world) and ``position`` (of the sensor, m). The defaults are the distribution on which
+    the shipped network was trained.
+    """
+
+    kind: ClassVar[str] = "hand"
+
+    duration: float = 150.0
+    """s"""
+    rates: Range = (50.0, 300.0)
+    """Hz"""
+    instant_share: float = 0.3
+    """of the episodes at ``instant_rate`` or more, whose sensors report instants instead of means"""
+    instant_rate: float = 120.0
+    """Hz; below it instants alias what means do not"""
+    lever_arm: Range = (0.005, 0.2)
+    """m, standard deviation per axis of the sensor's position on the hand"""
+    motion: VariedMotion = field(default_factory=VariedMotion)
+    sensors: VariedSensors = field(default_factory=VariedSensors)
+    shaking: Shaking = field(default_factory=Shaking)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not self.duration * self.rates[0] >= 2.0:
+            raise ValueError(f"duration must be two samples at least, got {self.duration} s")
+
+    def draw(self, seed: int | np.random.SeedSequence, name: str = "randomised") -> Trajectory:
+        """Simulate one episode; separate children of the seed are used for motion, setting, shaking and errors.
+
+        Args:
+            seed: of this episode.
+            name: for the metadata.
+        """
+        sequence = unspawned(seed)
+        motion, setting, shaking, noise = (np.random.default_rng(child) for child in sequence.spawn(4))
+        rate = log_uniform(setting, self.rates)
+        means = rate < self.instant_rate or setting.random() >= self.instant_share
+        sampling: Literal["interval", "instant"] = "interval" if means else "instant"
+        lever = tuple(setting.standard_normal(3) * log_uniform(setting, self.lever_arm))
+        mounting = Mounting(lever, tuple(rotation.random(setting)))
+        suite = imu_suite(self.sensors.draw(setting), rate, lever, mounting.rotation, sampling=sampling)
+        suite.reset(noise)
+        gesture = self.motion.draw(motion, self.duration)
+        times = np.arange(1, math.floor(self.duration * rate) + 1) / rate
+        states = gesture.sample(times)
+        before = gesture.sample(times - 1.0 / rate)
+        measurements = suite.simulate(states, before=before).measurements
+        shaken = measurements["imu/acc"] + self.shaking.draw(shaking, times, mean=means)
+        limit = self.sensors.accelerometer_full_scale
+        measurements["imu/acc"] = np.clip(shaken, -limit, limit)
+        metadata: dict[str, Any] = {"name": name, "source": "simulation", "rate": rate, "sampling": sampling}
+        sensor = mounted(states, mounting)
+        truth = {"orientation": sensor.orientation, "position": sensor.position}
+        return Trajectory(times, measurements, truth, metadata=metadata)
