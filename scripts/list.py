@@ -31,8 +31,8 @@ class Args:
     """Arguments of ``poise list``."""
 
     lists: tyro.conf.Positional[tuple[str, ...]] = ()
-    """which lists: estimators, environments, sensors, sensor-kinds, gestures, scenarios, formats, benchmark,
-    benchmark-heading, benchmark-limits; all if none is named"""
+    """which lists: estimators, environments, sensors, sensor-kinds, gestures, scenarios, surfaces, formats,
+    benchmark, benchmark-heading, benchmark-limits; all if none is named"""
     markdown: bool = False
     """print the tables in Markdown, as the documentation has them"""
     update: tuple[Path, ...] = ()
@@ -187,6 +187,23 @@ def scenarios() -> Rows:
     return [{"name": name, "description": each.summary} for name, each in SCENARIOS.items()]
 
 
+def surfaces() -> Rows:
+    """Every road surface of a ride, from smooth to rough."""
+    from ..envs.bicycle.course.surfaces import SURFACES
+
+    return [
+        {
+            "name": name,
+            "description": each.summary,
+            "G(0.1 cycles/m), 1e-6 m³": round(1e6 * each.roughness, 3),
+            "waviness": each.waviness,
+            "stones, m": each.stone or None,
+            "relief, mm": 1e3 * each.relief or None,
+        }
+        for name, each in SURFACES.items()
+    ]
+
+
 def formats() -> Rows:
     """Every file format that :func:`poise.load_recording` reads."""
     from ..envs.data.formats.load import FORMATS
@@ -197,7 +214,7 @@ def formats() -> Rows:
 LISTS: Mapping[str, Callable[[], Rows]] = {
     function.__name__.replace("_", "-"): function
     for function in (
-        *(estimators, environments, sensors, sensor_kinds, gestures, scenarios, formats),
+        *(estimators, environments, sensors, sensor_kinds, gestures, scenarios, surfaces, formats),
         *(benchmark, benchmark_heading, benchmark_limits),
     )
 }

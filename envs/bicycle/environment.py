@@ -16,6 +16,8 @@ from ..sensors.ideal import STANDARD_GRAVITY, Sampling
 from ..sensors.sensor import Sensor
 from .course.scenarios import Scenario
 from .course.scenarios import scenario as named_scenario
+from .course.surfaces import Surface
+from .course.surfaces import surface as named_surface
 from .course.terrain import Ground
 from .frame.parameters import BICYCLES, BicycleParameters
 from .frame.tyre import TyreParameters
@@ -127,6 +129,9 @@ class RiderBicycleEnv(PoseEnv):
         noise_scale: factor on all errors, 0 for none.
         sampling: ``interval`` or ``instant``, of gyroscopes, accelerometers and contact forces: the mean over the
             interval that ends with the sample, or what acts at its end (forces: in the last physics step).
+        surface: of the road: a name of :func:`poise.envs.bicycle.course.surfaces.list_surfaces` or a
+            :class:`poise.envs.bicycle.course.surfaces.Surface`; ``smooth`` is exact, ``random`` draws one for each
+            ride, and None takes that of the scenario.
         render_mode: ``human`` (a window), ``rgb_array`` or None.
 
     Raises:
@@ -156,11 +161,14 @@ class RiderBicycleEnv(PoseEnv):
         *,
         noise_scale: float = 1.0,
         sampling: Sampling = "interval",
+        surface: str | Surface | None = None,
         render_mode: str | None = None,
     ) -> None:
         self.scenario, self.subject, self.style = named_scenario(scenario), subject, style
         if style is not None:
             rider_style(style)
+        if surface not in (None, "random"):
+            named_surface(surface)  # type: ignore[arg-type]
         self.parameters = _bicycle(bicycle)
         if fidelity not in ("full", "lumped"):
             raise ValueError(f"fidelity must be 'full' or 'lumped', got {fidelity!r}")
@@ -191,7 +199,7 @@ class RiderBicycleEnv(PoseEnv):
                 raise ValueError(f"physics_rate must be a multiple of {name} of {value:g} Hz, got {physics_rate:g} Hz")
         quantities = _quantities(score)
         self._source = RideSource(
-            self.parameters, style, self.duration, made.rate, self.physics_rate, fidelity, self.tyre, sampling
+            self.parameters, style, self.duration, made.rate, self.physics_rate, fidelity, self.tyre, sampling, surface
         )
         bounds = [{"rotation": 1.0, "angle": math.pi}.get(quantity.kind, 20.0) for quantity in quantities]
         super().__init__(made, quantities, made.rate, render_mode, bounds)

@@ -17,6 +17,7 @@ from .inclinations import inclination_rows
 from .plots import example_ride, ride_signals
 from .reports import comparison
 from .statistics import KINDS, UNITS, ride
+from .vibration import vibration_checks
 
 SHOWN = {
     "scenario": "scenario",
@@ -76,7 +77,7 @@ def draw(
 
 def checks(study: Study, report: Report) -> None:
     """Physical checks, and what filters of a single IMU make of some rides (minutes)."""
-    report.table("Physical checks", [each._asdict() for each in all_checks()])
+    report.table("Physical checks", [each._asdict() for each in (*all_checks(), *vibration_checks())])
     report.table("RMS errors of inclination, deg, of filters of one IMU", list(inclination_rows()))
 
 

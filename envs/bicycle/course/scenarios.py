@@ -10,7 +10,9 @@ from functools import partial
 import numpy as np
 
 from .path import Path, smooth_curvature, wandering_path
-from .terrain import Bump, FlatGround, Ground, GroundSum, Ramp, RoughGround
+from .surfaces import SURFACES, Surface
+from .surfaces import surface as named_surface
+from .terrain import Bump, FlatGround, Ground, GroundSum, Ramp
 
 Factory = Callable[[np.random.Generator, float], "SpeedProfile"]
 
@@ -49,6 +51,8 @@ class Course:
     path: Path
     speed: SpeedProfile
     ground: Ground
+    """bumps and slopes, with the surface on them"""
+    surface: Surface
 
 
 @dataclass(frozen=True)
@@ -62,17 +66,33 @@ class Scenario:
     path: Callable[[np.random.Generator, float], Path]
     """generator, length (m) → path"""
     ground: Callable[[np.random.Generator, Path, SpeedProfile], Ground]
-    """generator, path, speed → ground"""
+    """generator, path, speed → bumps and slopes, without the roughness of the surface"""
     style: str = "normal"
     """default riding style"""
+    surface: str | Surface = "smooth"
+    """default surface"""
 
-    def draw(self, rng: np.random.Generator, duration: float) -> Course:
-        """Draw a course for a ride of ``duration`` seconds."""
-        for_speed, for_path, for_ground = rng.spawn(3)
+    def draw(self, rng: np.random.Generator, duration: float, surface: str | Surface | None = None) -> Course:
+        """Draw a course for a ride of ``duration`` seconds.
+
+        Args:
+            rng: source of randomness.
+            duration: s.
+            surface: in place of the scenario's own; ``"random"`` draws one.
+
+        Raises:
+            ValueError: an unknown surface.
+        """
+        for_speed, for_path, for_ground, for_surface = rng.spawn(4)
         speed = self.speed(for_speed, duration)
         longest = float(speed.levels.max()) * duration + 10.0
         path = self.path(for_path, longest)
-        return Course(path, speed, self.ground(for_ground, path, speed))
+        laid = self.surface if surface is None else surface
+        if laid == "random":
+            laid = list(SURFACES)[int(for_surface.integers(1, len(SURFACES)))]
+        laid = named_surface(laid)
+        ground = GroundSum([self.ground(for_ground, path, speed), laid.draw(for_surface)])
+        return Course(path, speed, ground, laid)
 
 
 def _steady_speed(rng: np.random.Generator, duration: float, low: float, high: float) -> SpeedProfile:
@@ -88,10 +108,6 @@ def _varied_speed(rng: np.random.Generator, duration: float, low: float, high: f
 
 def _flat(rng: np.random.Generator, path: Path, speed: SpeedProfile) -> Ground:
     return FlatGround()
-
-
-def _paving(rng: np.random.Generator, path: Path, speed: SpeedProfile, deviation: float) -> Ground:
-    return RoughGround.random(rng, deviation)
 
 
 def _all_of(rng: np.random.Generator, path: Path, speed: SpeedProfile, scenes: tuple[Scenario, ...]) -> Ground:
@@ -160,21 +176,24 @@ SCENARIOS = {
             partial(_steady_speed, low=0.9, high=1.1),
             _circle,
             _flat,
+            surface="hall",
         ),
         Scenario(
             "outdoor",
-            "an arbitrary path in 50 × 40 m at 0.5 to 6 m/s on uneven paving",
+            "an arbitrary path in 50 × 40 m at 0.5 to 6 m/s on worn tarmac",
             partial(_varied_speed, low=0.6, high=6.4, hold=10.0),
             _wander,
-            partial(_paving, deviation=0.0015),
+            _flat,
+            surface="rough-tarmac",
         ),
         Scenario(
             "straight",
             "nearly straight at 2.5 to 3.5 m/s, turning only now and then",
             partial(_steady_speed, low=2.5, high=3.5),
             _nudged,
-            partial(_paving, deviation=0.0007),
+            _flat,
             "mild",
+            "tarmac",
         ),
         Scenario(
             "bumps",
@@ -183,6 +202,7 @@ SCENARIOS = {
             _straight,
             _two_bumps,
             "mild",
+            "tarmac",
         ),
         Scenario(
             "pitch",
@@ -191,6 +211,7 @@ SCENARIOS = {
             _straight,
             _hill,
             "mild",
+            "tarmac",
         ),
         Scenario(
             "slalom",
@@ -198,6 +219,7 @@ SCENARIOS = {
             partial(_steady_speed, low=2.5, high=3.5),
             _weave,
             _flat,
+            surface="tarmac",
         ),
         Scenario(
             "slow",
@@ -206,6 +228,7 @@ SCENARIOS = {
             _straight,
             _flat,
             "mild",
+            "tarmac",
         ),
     )
 }
@@ -219,6 +242,8 @@ def list_scenarios() -> list[str]:
 
 def scenario(name: str | Scenario) -> Scenario:
     """A scenario by name, as given, or composed: ``"slalom+bumps"`` rides the first on the ground of both.
+
+    The rougher surface of both is on it.
 
     Raises:
         ValueError: there is none of that name.
@@ -235,4 +260,6 @@ def scenario(name: str | Scenario) -> Scenario:
 
     scenes = (first, *others)
     summary = "; ".join(each.summary for each in scenes)
-    return replace(first, name=str(name), summary=summary, ground=partial(_all_of, scenes=scenes))
+    # the roughest surface of all
+    rough = max((each.surface for each in scenes), key=lambda each: named_surface(each).roughness)
+    return replace(first, name=str(name), summary=summary, ground=partial(_all_of, scenes=scenes), surface=rough)

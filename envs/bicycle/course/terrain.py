@@ -1,7 +1,7 @@
-"""Analytic ground: height and slope everywhere, in closed form, compiled (each wheel needs them in every physics step).
+"""The ground: height and slope everywhere, compiled (each wheel needs them in every physics step).
 
-A ground is a table ``(rows, COLUMNS)`` of pieces whose heights add up; the first column of a row says what piece it is,
-the others hold its numbers. :func:`height_and_slope` evaluates a table.
+A ground is a table of pieces whose heights add up; :func:`height_and_slope` evaluates it. Slopes are the
+exact derivatives of the height, so that a wheel neither gains nor loses energy on an undulation.
 """
 
 from __future__ import annotations
@@ -16,10 +16,19 @@ import numpy as np
 from ....filters.compile.cache import jit
 
 COLUMNS = 9
-"""of a table"""
-LEVEL, BUMP, RAMP, WAVE = 0.0, 1.0, 2.0, 3.0
+"""of the pieces of a table"""
+LEVEL, BUMP, RAMP = 0.0, 1.0, 2.0
 """first column: height · middle x, y, cos and sin of the direction, height, length · start x, y, cos, sin, tangent of
-the angle, rounding, steep, top · wave numbers along x and y, amplitude, phase"""
+the angle, rounding, steep, top"""
+CELLS = 512
+"""cells of a tile of rough surface along each side"""
+SPACING = 0.02
+"""m: side of a cell. A tile of 10.24 m repeats itself in both directions"""
+
+
+GroundTable = tuple[np.ndarray, np.ndarray]
+"""Pieces ``(rows, COLUMNS)``, whose first column says what piece it is and the others hold its numbers, and tiles
+``(n, CELLS, CELLS)`` in m: coefficients of cubic B-splines, one every :data:`SPACING` along x and y."""
 
 
 @jit
@@ -39,19 +48,46 @@ def _climb(s, r, steep):  # type: ignore[no-untyped-def]
 
 
 @jit
-def height_and_slope(table, x, y):  # type: ignore[no-untyped-def]
-    """Height (m) and its derivatives along x and y (1) of a table ``(rows, COLUMNS)`` at the world point (x, y)."""
+def _rough(tile, x, y):  # type: ignore[no-untyped-def]
+    """Height and its derivatives of a tile ``(CELLS, CELLS)``: uniform cubic B-splines along x and along y."""
+    place_x, place_y = x / SPACING, y / SPACING
+    i, j = math.floor(place_x), math.floor(place_y)
+    u, v = place_x - i, place_y - j
+    # the four splines around the point, and their derivatives
+    rises = ((1.0 - v) ** 3 / 6.0, 2.0 / 3.0 - v**2 + 0.5 * v**3, 0.0, v**3 / 6.0)
+    rises = (rises[0], rises[1], 1.0 - rises[0] - rises[1] - rises[3], rises[3])
+    tilts = (-0.5 * (1.0 - v) ** 2, 1.5 * v**2 - 2.0 * v, 0.5 + v - 1.5 * v**2, 0.5 * v**2)
+    along = ((1.0 - u) ** 3 / 6.0, 2.0 / 3.0 - u**2 + 0.5 * u**3, 0.0, u**3 / 6.0)
+    along = (along[0], along[1], 1.0 - along[0] - along[1] - along[3], along[3])
+    slopes = (-0.5 * (1.0 - u) ** 2, 1.5 * u**2 - 2.0 * u, 0.5 + u - 1.5 * u**2, 0.5 * u**2)
     height = slope_x = slope_y = 0.0
-    for index in range(table.shape[0]):
-        row = table[index]
+    for a in range(4):
+        row = tile[(i - 1 + a) % CELLS]
+        value = tilt = 0.0
+        for b in range(4):
+            knot = row[(j - 1 + b) % CELLS]
+            value += rises[b] * knot
+            tilt += tilts[b] * knot
+        height += along[a] * value
+        slope_x += slopes[a] * value / SPACING
+        slope_y += along[a] * tilt / SPACING
+    return height, slope_x, slope_y
+
+
+@jit
+def height_and_slope(table, x, y):  # type: ignore[no-untyped-def]
+    """Height (m) and its derivatives along x and y (1) of a :data:`GroundTable` at the world point (x, y)."""
+    pieces, tiles = table
+    height = slope_x = slope_y = 0.0
+    for index in range(tiles.shape[0]):
+        rough, tilt_x, tilt_y = _rough(tiles[index], x, y)
+        height += rough
+        slope_x += tilt_x
+        slope_y += tilt_y
+    for index in range(pieces.shape[0]):
+        row = pieces[index]
         kind = row[0]
-        if kind == WAVE:
-            angle = row[1] * x + row[2] * y + row[4]
-            height += row[3] * math.sin(angle)
-            rise = row[3] * math.cos(angle)
-            slope_x += row[1] * rise
-            slope_y += row[2] * rise
-        elif kind == LEVEL:
+        if kind == LEVEL:
             height += row[1]
         else:
             along, slope = (x - row[1]) * row[3] + (y - row[2]) * row[4], 0.0
@@ -76,9 +112,9 @@ class Ground:
     """Height of the ground over the horizontal plane: a sum of the pieces in :attr:`table`."""
 
     @cached_property
-    def table(self) -> np.ndarray:
-        """Its pieces ``(rows, COLUMNS)``."""
-        raise NotImplementedError
+    def table(self) -> GroundTable:
+        """Its pieces."""
+        raise NotImplementedError(f"{type(self).__name__} must define its table")
 
     def height_and_slope(self, x: float, y: float) -> tuple[float, float, float]:
         """Height (m) and its derivatives along x and y (1) at the world point (x, y)."""
@@ -86,8 +122,9 @@ class Ground:
         return found
 
 
-def _row(kind: float, *numbers: float) -> list[float]:
-    return [kind, *numbers, *[0.0] * (COLUMNS - 1 - len(numbers))]
+def _piece(kind: float, *numbers: float) -> GroundTable:
+    row = [kind, *numbers, *[0.0] * (COLUMNS - 1 - len(numbers))]
+    return np.array([row]), np.zeros((0, CELLS, CELLS))
 
 
 @dataclass(frozen=True)
@@ -98,9 +135,9 @@ class FlatGround(Ground):
     """m"""
 
     @cached_property
-    def table(self) -> np.ndarray:
+    def table(self) -> GroundTable:
         """See :class:`Ground`."""
-        return np.array([_row(LEVEL, self.height)])
+        return _piece(LEVEL, self.height)
 
 
 @dataclass(frozen=True)
@@ -125,10 +162,10 @@ class Bump(Ground):
             raise ValueError(f"a bump needs π |height| < length, got {self.height} m over {self.length} m")
 
     @cached_property
-    def table(self) -> np.ndarray:
+    def table(self) -> GroundTable:
         """See :class:`Ground`."""
         c, s = math.cos(self.direction), math.sin(self.direction)
-        return np.array([_row(BUMP, *self.start, c, s, self.height, self.length)])
+        return _piece(BUMP, *self.start, c, s, self.height, self.length)
 
 
 @dataclass(frozen=True)
@@ -163,66 +200,31 @@ class Ramp(Ground):
             )
 
     @cached_property
-    def table(self) -> np.ndarray:
+    def table(self) -> GroundTable:
         """See :class:`Ground`."""
         c, s = math.cos(self.direction), math.sin(self.direction)
-        numbers = (*self.start, c, s, math.tan(self.angle), self.rounding, self.steep, self.top)
-        return np.array([_row(RAMP, *numbers)])
+        return _piece(RAMP, *self.start, c, s, math.tan(self.angle), self.rounding, self.steep, self.top)
 
 
-@dataclass(frozen=True)
-class RoughGround(Ground):
-    """Random uneven paving: plane waves of random directions and phases.
+class RoughTile(Ground):
+    """A height map that repeats itself every ``CELLS · SPACING`` metres along x and y.
 
-    Elevation falls with wave number as 1/n² in power density, as on roads (ISO 8608, waviness 2).
+    Args:
+        coefficients: ``(CELLS, CELLS)`` m, of cubic B-splines; :mod:`.surfaces` draws them.
+
+    Raises:
+        ValueError: another shape, or a number that is not finite.
     """
 
-    wave_numbers: tuple[tuple[float, float], ...]
-    """rad/m along x and y, one pair a wave"""
-    amplitudes: tuple[float, ...]
-    """m"""
-    phases: tuple[float, ...]
-    """rad"""
-
-    @classmethod
-    def random(
-        cls,
-        rng: np.random.Generator,
-        deviation: float = 0.002,
-        shortest: float = 0.3,
-        longest: float = 5.0,
-        waves: int = 12,
-    ) -> RoughGround:
-        """Draw a ground.
-
-        Args:
-            rng: source of randomness.
-            deviation: root mean square of the height, m.
-            shortest: shortest wavelength, m; below the length of a tyre's contact a point contact is too rough.
-            longest: longest wavelength, m.
-            waves: how many.
-
-        Raises:
-            ValueError: no waves, a negative deviation, or wavelengths that are not ordered and positive.
-        """
-        if not (waves > 0 and deviation >= 0.0 and 0.0 < shortest < longest):
-            raise ValueError(
-                f"need waves > 0, deviation ≥ 0 and 0 < shortest < longest, got {waves}, {deviation}, {shortest}, "
-                f"{longest}"
-            )
-        edges = np.geomspace(2.0 * math.pi / longest, 2.0 * math.pi / shortest, waves + 1)
-        numbers = np.exp(rng.uniform(np.log(edges[:-1]), np.log(edges[1:])))
-        directions, phases = rng.uniform(0.0, 2.0 * math.pi, (2, waves))
-        amplitudes = np.sqrt(np.diff(edges)) / numbers
-        amplitudes *= deviation / math.sqrt(0.5 * float(amplitudes @ amplitudes))
-        vectors = numbers[:, None] * np.stack([np.cos(directions), np.sin(directions)], axis=1)
-        return cls(tuple(map(tuple, vectors.tolist())), tuple(amplitudes.tolist()), tuple(phases.tolist()))
+    def __init__(self, coefficients: np.ndarray) -> None:
+        if np.shape(coefficients) != (CELLS, CELLS) or not np.all(np.isfinite(coefficients)):
+            raise ValueError(f"coefficients must be {CELLS} × {CELLS} finite heights, got {np.shape(coefficients)}")
+        self.coefficients = np.ascontiguousarray(coefficients, dtype=float)
 
     @cached_property
-    def table(self) -> np.ndarray:
+    def table(self) -> GroundTable:
         """See :class:`Ground`."""
-        waves = zip(self.wave_numbers, self.amplitudes, self.phases, strict=True)
-        return np.array([_row(WAVE, *numbers, amplitude, phase) for numbers, amplitude, phase in waves])
+        return np.zeros((0, COLUMNS)), self.coefficients[None]
 
 
 class GroundSum(Ground):
@@ -232,7 +234,10 @@ class GroundSum(Ground):
         self.grounds = tuple(grounds)
 
     @cached_property
-    def table(self) -> np.ndarray:
+    def table(self) -> GroundTable:
         """See :class:`Ground`."""
-        tables = [ground.table for ground in self.grounds]
-        return np.concatenate([np.zeros((0, COLUMNS)), *tables])
+        pieces, tiles = zip(*(ground.table for ground in self.grounds), strict=True) if self.grounds else ((), ())
+        return (
+            np.concatenate([np.zeros((0, COLUMNS)), *pieces]),
+            np.concatenate([np.zeros((0, CELLS, CELLS)), *tiles]),
+        )

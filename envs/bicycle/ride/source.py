@@ -12,6 +12,7 @@ import numpy as np
 
 from ...sensors.ideal import BodyState, Sampling
 from ..course.scenarios import Scenario
+from ..course.surfaces import Surface
 from ..course.terrain import Ground
 from ..frame.parameters import BicycleParameters
 from ..frame.tyre import TyreParameters
@@ -61,6 +62,7 @@ class RideSource:
         fidelity: ``full`` or ``lumped``.
         tyre: of both wheels.
         sampling: of the contact forces, see :class:`.RideRecorder`.
+        surface: of the road; None for that of each scenario.
     """
 
     def __init__(
@@ -73,10 +75,11 @@ class RideSource:
         fidelity: Fidelity,
         tyre: TyreParameters,
         sampling: Sampling = "interval",
+        surface: str | Surface | None = None,
     ) -> None:
         self.bicycle, self.style, self.duration, self.rate = bicycle, style, duration, rate
         self.physics_rate, self.fidelity = physics_rate, fidelity
-        self.tyre, self.sampling = tyre, sampling
+        self.tyre, self.sampling, self.surface = tyre, sampling, surface
         self.ride: Ride | None = None
         self.fallen_at = math.inf
         self._kept: dict[str, RideMemory] = {}
@@ -93,7 +96,7 @@ class RideSource:
         person, or a previous fall, requires a new world. All three give the same ride, bit for bit.
         """
         seed = str(motion.bit_generator.seed_seq.state)  # type: ignore[attr-defined]
-        key = (scenario, subject, self.style, self.duration, self.physics_rate, self.tyre, seed)
+        key = (scenario, subject, self.style, self.duration, self.physics_rate, self.tyre, self.surface, seed)
         if self.ride is not None and self.ride.fallen:
             self.close()
         if self.ride is None or key != self._motion_key:
@@ -115,7 +118,7 @@ class RideSource:
         world = (body, self.physics_rate, self.tyre)
         same = self.ride is not None and world == self._world_key
         posture = self.posture if same else sit(self.bicycle, body)
-        course = scenario.draw(for_course, self.duration + SETTLING + 1.0)
+        course = scenario.draw(for_course, self.duration + SETTLING + 1.0, self.surface)
         movement = RiderMotion(rider_style(scenario.style if self.style is None else self.style), for_movement)
         crank = float(for_crank.uniform(0.0, 2.0 * math.pi))
         if self.ride is not None and same:

@@ -9,7 +9,8 @@ import pytest
 from scipy.optimize import brentq
 
 from poise.baselines.studies.rides.checks import GRAVITY, by_kind, measured_eigenvalues
-from poise.envs.bicycle.course.terrain import Bump, FlatGround, GroundSum, Ramp, RoughGround
+from poise.envs.bicycle.course.surfaces import surface
+from poise.envs.bicycle.course.terrain import Bump, FlatGround, Ground, GroundSum, Ramp
 from poise.envs.bicycle.frame.bicycle import Bicycle
 from poise.envs.bicycle.frame.parameters import (
     BENCHMARK,
@@ -204,7 +205,7 @@ def test_chain_pulls_and_the_freewheel_slips():
     [
         Bump((0.3, 0.0), 0.4),
         Ramp((-3.0, 0.0), -0.3),
-        RoughGround.random(np.random.default_rng(1)),
+        surface("cobbles").draw(np.random.default_rng(1)),
         GroundSum([Bump((0.3, 0.0), 0.4), FlatGround(0.2)]),
     ],
     ids=["bump", "ramp", "rough", "sum"],
@@ -218,10 +219,9 @@ def test_slopes_of_the_ground_are_its_derivatives(ground):
             assert rise / (2.0 * step) == pytest.approx(slope, abs=1e-4)
 
 
-def test_rough_ground_has_the_deviation_asked_for():
-    ground = RoughGround.random(np.random.default_rng(3), deviation=0.003)
-    heights = [ground.height_and_slope(x, y)[0] for x, y in np.random.default_rng(4).uniform(-500.0, 500.0, (4000, 2))]
-    assert np.std(heights) == pytest.approx(0.003, rel=0.05)
+def test_a_ground_without_a_table_is_refused():
+    with pytest.raises(NotImplementedError, match="Ground must define its table"):
+        Ground().height_and_slope(0.0, 0.0)
 
 
 def test_ramp_reaches_its_angle():
@@ -296,7 +296,6 @@ def test_parts_combine_like_rigid_bodies():
         (lambda: TyreParameters(stiffness=0.0), "stiffness"),
         (lambda: Bump((0.0, 0.0), 0.0, height=0.5, length=0.4), "bump"),
         (lambda: Ramp((0.0, 0.0), 0.0, angle=1.2), "ramp"),
-        (lambda: RoughGround.random(np.random.default_rng(0), waves=0), "waves"),
         (lambda: whipple_model(BENCHMARK, 0.0), "gravity"),
     ],
 )

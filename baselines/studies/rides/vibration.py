@@ -1,0 +1,68 @@
+"""Vibration of a ridden bicycle on named road surfaces, beside what was measured on cargo bicycles."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+from scipy.signal import welch
+
+from ....envs.bicycle.course.scenarios import SpeedProfile, scenario
+from ....envs.bicycle.course.surfaces import SURFACES, Surface
+from ....envs.bicycle.environment import RiderBicycleEnv
+from ....envs.bicycle.rider.rider import Fidelity
+from ....envs.record import record
+from .checks import Check
+
+RATE = 250.0
+"""Hz"""
+MEASURED = {"tarmac": (0.9, 1.8), "pavers": (4.5, 7.0)}
+"""m/s² vertical root mean square at the seat pan of cargo bicycles at 12 km/h"""
+BANDWIDTH = (19.0, 63.0)
+"""Hz: of the same measurements"""
+
+
+def vibration(
+    surface: str | Surface, duration: float = 6.0, speed: float = 12.0 / 3.6, fidelity: Fidelity = "full", seed: int = 3
+) -> tuple[float, float]:
+    """Vertical acceleration of the bicycle at the seat tube while subject 0 rides straight on.
+
+    Args:
+        surface: of the road.
+        duration: s.
+        speed: m/s.
+        fidelity: of the rider.
+        seed: of the ride.
+
+    Returns:
+        Root mean square (m/s²) without gravity, and the frequency (Hz) below which 95 % of its power lies.
+
+    Raises:
+        RuntimeError: the rider fell.
+    """
+    steady = replace(scenario("slow"), name="steady", speed=lambda generator, duration: SpeedProfile(np.array([speed])))
+    env = RiderBicycleEnv(steady, 0, "still", ["bicycle_imu/acc"], "ideal", RATE, duration, fidelity, surface=surface)
+    try:
+        ride = record(env, seed=seed)
+    finally:
+        env.close()
+    if ride.time[-1] < duration - 1.5 / RATE:
+        raise RuntimeError(f"the rider fell on {surface!r} after {ride.time[-1]:.1f} s")
+    up = ride.measurements["bicycle_imu/acc"][1:, 2]
+    frequency, power = welch(up - up.mean(), RATE, nperseg=512)
+    return float(up.std()), float(frequency[np.searchsorted(np.cumsum(power) / power.sum(), 0.95)])
+
+
+def vibration_checks() -> Iterator[Check]:
+    """Every surface at 12 km/h."""
+    for name in SURFACES:
+        deviation, bandwidth = vibration(name)
+        found = f"{deviation:.2f} m/s², {bandwidth:.0f} Hz"
+        what = f"vertical rms and 95 % frequency of the bicycle on {name}, 12 km/h"
+        if name not in MEASURED:
+            yield Check(what, "–", found)
+            continue
+        low, high = MEASURED[name]
+        holds = low <= deviation <= high and BANDWIDTH[0] <= bandwidth <= BANDWIDTH[1]
+        yield Check(what, f"{low:g} … {high:g} m/s², {BANDWIDTH[0]:.0f} … {BANDWIDTH[1]:.0f} Hz", found, holds)
