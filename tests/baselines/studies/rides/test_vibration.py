@@ -25,4 +25,4 @@ def test_the_level_of_each_surface(name, low, high):
 
 def test_rougher_is_more_and_smooth_is_nothing():
     smooth, hall = (vibration(name, 3.0, fidelity="lumped")[0] for name in ("smooth", "hall"))
-    assert smooth < 0.1 < 2.0 * smooth < hall < 0.5
+    assert smooth < 0.1 < hall < 0.5
