@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...filters.support.ranges import Checked, Range, log_uniform
 from ..sensors.noise import NoiseModel
 from ..sensors.presets import SensorPreset
-from .ranges import Checked, Range, log_uniform
 
 DEG = math.pi / 180.0
 

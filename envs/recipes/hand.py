@@ -13,12 +13,12 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from ...filters.core import rotation
+from ...filters.support.ranges import Range, log_uniform
 from ..data.trajectory import Trajectory
 from ..sensors.ideal import Mounting, mounted
 from ..sensors.suite import imu_suite
 from .devices import VariedSensors
 from .hand_motion import Shaking, VariedMotion
-from .ranges import Range, log_uniform
 from .recipe import Recipe, unspawned
 
 

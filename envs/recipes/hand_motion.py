@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...filters.core import rotation
+from ...filters.support.ranges import Checked, Range, log_uniform
 from ..hand.motion import Segment, SegmentedGesture
-from .ranges import Checked, Range, log_uniform
 
 
 @dataclass(frozen=True)

@@ -12,8 +12,8 @@ import numpy as np
 
 from ...filters.support.names import unknown
 from ...filters.support.parameters import annotations_of
+from ...filters.support.ranges import Checked
 from ..data.trajectory import Trajectory
-from .ranges import Checked
 
 T = TypeVar("T")
 

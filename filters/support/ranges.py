@@ -1,4 +1,4 @@
-"""Ranges from which recipes draw, and the checks of their fields."""
+"""Ranges from which recipes and gestures draw, and the checks of their fields."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ...filters.support.parameters import annotations_of, check_parameters
+from .parameters import annotations_of, check_parameters
 
 Range = tuple[float, float]
 """Lowest and highest value, both above zero: drawn from log-uniformly"""
@@ -21,7 +21,7 @@ def log_uniform(generator: np.random.Generator, bounds: Range) -> float:
 
 
 class Checked:
-    """Base of the parts of a recipe: types and ranges of their fields follow from annotations and names.
+    """Base of configurations that are drawn from: types and ranges of their fields follow from annotations and names.
 
     Fields that are :data:`Range` must rise and be positive; those whose names end in ``share`` lie in [0, 1].
 
