@@ -31,7 +31,7 @@ class Args:
     """Arguments of ``poise list``."""
 
     lists: tyro.conf.Positional[tuple[str, ...]] = ()
-    """which lists: estimators, environments, sensors, sensor-kinds, gestures, scenarios, surfaces, formats,
+    """which lists: estimators, environments, sensors, sensor-kinds, gestures, scenarios, surfaces, recipes, formats,
     benchmark, benchmark-heading, benchmark-limits; all if none is named"""
     markdown: bool = False
     """print the tables in Markdown, as the documentation has them"""
@@ -204,6 +204,13 @@ def surfaces() -> Rows:
     ]
 
 
+def recipes() -> Rows:
+    """Every recipe of domain randomisation."""
+    from ..envs.recipes.registry import RECIPES
+
+    return [{"name": name, "kind": each.kind, "description": each.summary} for name, each in RECIPES.items()]
+
+
 def formats() -> Rows:
     """Every file format that :func:`poise.load_recording` reads."""
     from ..envs.data.formats.load import FORMATS
@@ -214,7 +221,7 @@ def formats() -> Rows:
 LISTS: Mapping[str, Callable[[], Rows]] = {
     function.__name__.replace("_", "-"): function
     for function in (
-        *(estimators, environments, sensors, sensor_kinds, gestures, scenarios, surfaces, formats),
+        *(estimators, environments, sensors, sensor_kinds, gestures, scenarios, surfaces, recipes, formats),
         *(benchmark, benchmark_heading, benchmark_limits),
     )
 }

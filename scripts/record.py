@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import ast
 import re
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -32,6 +34,8 @@ class Args:
     """number of parallel processes"""
     options: tuple[str, ...] = ()
     """arguments of the environment, as name=value (gesture=fast rate=200)"""
+    recipe: str | None = None
+    """instead of an environment: a recipe of domain randomisation, by name (`poise list recipes`) or as a JSON file"""
     json: bool = False
     """print one JSON document instead of tables"""
 
@@ -70,6 +74,35 @@ def option(text: str) -> tuple[str, Any]:
 
 def run(args: Args) -> int:
     """Record and say where the files are."""
+    record, what = recorder(args)
+    with Output("record", args) as out:
+        with progress_bar(args.episodes, f"record {what}", "episode") as bar:
+            paths = record(
+                args.folder,
+                episodes=args.episodes,
+                seed=args.seed,
+                processes=args.processes,
+                report=lambda path: bar.update(),
+            )
+        out.rows({"episode": index, "file": str(path)} for index, path in enumerate(paths))
+        out.say(f"{len(paths)} episodes in {args.folder}")
+    return 0
+
+
+def recorder(args: Args) -> tuple[Callable[..., list[Path]], str]:
+    """What records episodes of the recipe or environment, and its name.
+
+    Raises:
+        ValueError: an unknown recipe, environment or option, or options beside a recipe, which has its own fields.
+    """
+    if args.recipe is not None:
+        from ..envs.recipes.recording import record_recipe
+        from ..envs.recipes.registry import recipe
+
+        if args.options:
+            raise ValueError(f"options belong to an environment, but --recipe is {args.recipe}: edit its JSON instead")
+        made = recipe(args.recipe)
+        return partial(record_recipe, made), made.name
     from ..envs.record import record_episodes
     from ..envs.registration import make_environment
 
@@ -77,20 +110,7 @@ def run(args: Args) -> int:
     options = dict(option(text) for text in args.options)
     # once, here, where a wrong option is explained in one line
     make_environment(env_id, **options).close()
-    with Output("record", args) as out:
-        with progress_bar(args.episodes, f"record {env_id}", "episode") as bar:
-            paths = record_episodes(
-                env_id,
-                args.folder,
-                episodes=args.episodes,
-                seed=args.seed,
-                options=options,
-                processes=args.processes,
-                report=lambda path: bar.update(),
-            )
-        out.rows({"episode": index, "file": str(path)} for index, path in enumerate(paths))
-        out.say(f"{len(paths)} episodes in {args.folder}")
-    return 0
+    return partial(record_episodes, env_id, options=options), env_id
 
 
 if __name__ == "__main__":

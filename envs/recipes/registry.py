@@ -2,36 +2,47 @@
 
 from __future__ import annotations
 
+import importlib
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from ...filters.support.files import write_text
-from ...filters.support.names import look_up, unknown
+from ...filters.support.names import look_up
 from ..data.trajectory import Trajectory
-from .hand import HandRecipe
 from .recipe import Recipe
 
-KINDS: dict[str, type[Recipe]] = {kind.kind: kind for kind in (HandRecipe,)}
-"""Kind → class of its recipes."""
+KINDS = {"hand": (".hand", "HandRecipe"), "rider": (".rider", "RiderRecipe")}
+"""Kind → module and class of its recipes; those of riders need PyBullet and are loaded when they are asked for."""
 
 
 class ShippedRecipe(NamedTuple):
-    """A recipe of this package."""
+    """A recipe of this package: the fields of its kind that differ from their defaults."""
 
+    kind: str
     summary: str
     """what it is for"""
-    make: Callable[[], Recipe]
+    fields: Mapping[str, Any]
 
 
 RECIPES: dict[str, ShippedRecipe] = {
     "hand-held": ShippedRecipe(
-        "a sensor moved by hand in place, at rest or shaken, from laboratory to phone grade",
-        lambda: HandRecipe("hand-held"),
+        "hand", "a sensor moved by hand in place, at rest or shaken, from laboratory to phone grade", {}
     ),
+    "rider": ShippedRecipe("rider", "rides of anybody anywhere with sensors of several grades", {}),
 }
 """Name → recipe."""
+
+
+def kind_of(name: str) -> type[Recipe]:
+    """The class of the recipes of a kind.
+
+    Raises:
+        ValueError: an unknown kind.
+    """
+    module, cls = look_up("kind", name, KINDS)
+    return getattr(importlib.import_module(module, __package__), cls)  # type: ignore[no-any-return]
 
 
 def list_recipes() -> list[str]:
@@ -56,7 +67,8 @@ def recipe(of: str | Path | Mapping[str, Any] | Recipe) -> Recipe:
             return described_recipe(json.loads(text))
         except ValueError as reason:
             raise ValueError(f"{of}: {reason}") from None
-    return look_up("recipe", of, RECIPES).make()
+    shipped = look_up("recipe", of, RECIPES)
+    return described_recipe({"kind": shipped.kind, "name": of, **shipped.fields})
 
 
 def described_recipe(described: Any) -> Recipe:
@@ -67,9 +79,7 @@ def described_recipe(described: Any) -> Recipe:
     """
     if not isinstance(described, Mapping) or "kind" not in described:
         raise ValueError(f"a recipe must be a mapping with its kind, one of {list(KINDS)}, got {described!r}")
-    if described["kind"] not in KINDS:
-        raise ValueError(unknown("kind", described["kind"], KINDS))
-    return KINDS[described["kind"]].read(described)
+    return kind_of(described["kind"]).read(described)
 
 
 def save_recipe(made: Recipe, path: str | Path) -> Path:

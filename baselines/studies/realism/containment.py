@@ -1,0 +1,167 @@
+"""Whether recordings lie inside what a recipe simulates: each statistic against the 5 to 95 % range of episodes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ....envs.data.trajectory import Trajectory
+from ....envs.recipes.hand import HandRecipe
+from ....envs.recipes.recipe import Recipe
+from ....envs.recipes.registry import recipe
+from ..kit import Study
+from .motion import SHARE_OF_RATE, UNITS, MotionSpectra, motion_spectra, statistics_of
+from .spectra import Spectrum
+
+LOW, HIGH = 5.0, 95.0
+"""Percentiles of the simulated episodes between which a recorded value is inside"""
+DRAWN = np.geomspace(0.1, 100.0, 61)
+"""Hz, edges of the bands in which spectra are averaged for figures"""
+
+
+class Summary(NamedTuple):
+    """One sensor's motion in numbers.
+
+    Attributes:
+        name: of the trajectory.
+        rate: Hz.
+        statistics: bandwidth (Hz) → statistic → value.
+        spectra: ``gyr``, ``force``, ``acc`` → mean density in the bands of :data:`DRAWN`, NaN in bands without a line.
+    """
+
+    name: str
+    rate: float
+    statistics: dict[float, dict[str, float]]
+    spectra: dict[str, list[float]]
+
+
+def summary(trajectory: Trajectory, site: str, bandwidths: Sequence[float], orientation: str) -> Summary:
+    """Statistics of one sensor at several bandwidths, and its spectra in bands.
+
+    Args:
+        trajectory: simulated or recorded.
+        site: of the sensor.
+        bandwidths: Hz; the smallest one that the sampling rate allows stands for those beyond.
+        orientation: name of the sensor's true orientation.
+    """
+    spectra = motion_spectra(trajectory, site, orientation=orientation)
+    own = SHARE_OF_RATE * spectra.rate
+    found = {each: statistics_of(spectra, min(each, own)) for each in bandwidths}
+    return Summary(trajectory.name, spectra.rate, found, banded_spectra(spectra))
+
+
+def banded_spectra(spectra: MotionSpectra) -> dict[str, list[float]]:
+    """Densities in the bands of :data:`DRAWN`, by signal."""
+    known = {"gyr": spectra.gyr, "force": spectra.force, "acc": spectra.acc}
+    return {name: banded(each).tolist() for name, each in known.items() if each is not None}
+
+
+def banded(spectrum: Spectrum) -> np.ndarray:
+    """Mean density in each band of :data:`DRAWN`; NaN in a band without a line."""
+    place = np.searchsorted(DRAWN, spectrum.frequency, side="right") - 1
+    inside = (place >= 0) & (place < len(DRAWN) - 1)
+    total = np.bincount(place[inside], spectrum.density[inside], len(DRAWN) - 1)
+    count = np.bincount(place[inside], minlength=len(DRAWN) - 1)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return total / count
+
+
+def episode_summary(
+    described: Mapping[str, Any], seed: int, index: int, site: str, bandwidths: Sequence[float]
+) -> dict[str, Any]:
+    """Simulate one episode of a recipe and summarise it, for :meth:`.Study.map`.
+
+    Args:
+        described: of the recipe.
+        seed: root seed.
+        index: of the episode.
+        site: of the sensor.
+        bandwidths: Hz.
+    """
+    episode = recipe(described).episode(seed, index)
+    found = summary(episode, site, bandwidths, orientation_of(site))
+    return found._asdict() | {"statistics": [found.statistics[each] for each in bandwidths]}
+
+
+def orientation_of(site: str) -> str:
+    """Name of the truth that is the orientation of a sensor itself: of a hand-held one only."""
+    return "orientation" if site == "imu" else ""
+
+
+def simulated_summaries(
+    study: Study, made: Recipe, episodes: int, site: str, bandwidths: Sequence[float], rate: float | None = None
+) -> list[Summary]:
+    """Summaries of the first episodes of a recipe, computed once a run folder.
+
+    Args:
+        study: its seed is the root seed of the episodes.
+        made: the recipe.
+        episodes: how many.
+        site: of the sensor.
+        bandwidths: Hz.
+        rate: Hz, of all episodes of a hand, so that the bandwidths of recordings are within theirs; None for the
+            rates of the recipe.
+    """
+    if rate is not None and isinstance(made, HandRecipe):
+        made = replace(made, rates=(rate, rate))
+    seed = study.seed_of("realism", made.name)
+    jobs = [(made.describe(), seed, index, site, tuple(bandwidths)) for index in range(episodes)]
+    found = study.map(f"episodes of {made.name} at {site}", episode_summary, jobs)
+    return [
+        Summary(**(each | {"statistics": dict(zip(bandwidths, each["statistics"], strict=True))})) for each in found
+    ]
+
+
+def ranges(summaries: Sequence[Summary], bandwidth: float) -> dict[str, tuple[float, float, float]]:
+    """Statistic → 5 %, median and 95 % of the simulated episodes; NaN where none knows it."""
+    found = {}
+    for name in UNITS:
+        values = np.array([each.statistics[bandwidth][name] for each in summaries], dtype=float)
+        values = values[np.isfinite(values)]
+        quantiles = np.percentile(values, [LOW, 50.0, HIGH]) if len(values) else np.full(3, np.nan)
+        found[name] = (float(quantiles[0]), float(quantiles[1]), float(quantiles[2]))
+    return found
+
+
+def containment_rows(recorded: Sequence[Summary], simulated: Sequence[Summary]) -> list[dict[str, Any]]:
+    """One row a statistic: the simulated range, the recorded values, and which recordings lie outside.
+
+    Every recording is compared at its own bandwidth; the range shown is that at the widest one.
+
+    Args:
+        recorded: each with its own bandwidth as the only one.
+        simulated: with the bandwidths of all recordings.
+    """
+    by_width = {width: ranges(simulated, width) for each in recorded for width in each.statistics}
+    widest = by_width[max(by_width)]
+    rows = []
+    for name, unit in UNITS.items():
+        low, middle, high = widest[name]
+        values, outside = [], []
+        for each in recorded:
+            ((width, statistics),) = each.statistics.items()
+            value = statistics[name]
+            if np.isfinite(value):
+                values.append(value)
+                least, _, most = by_width[width][name]
+                if not least <= value <= most:
+                    outside.append(f"{each.name} ({value:.3g} {'below' if value < least else 'above'})")
+        if not values:
+            continue
+        rows.append(
+            {
+                "statistic": name,
+                "unit": unit,
+                "simulated 5 %": low,
+                "median": middle,
+                "95 %": high,
+                "recorded from": min(values),
+                "to": max(values),
+                "inside": f"{len(values) - len(outside)}/{len(values)}",
+                "outside": ", ".join(outside) or "none",
+            }
+        )
+    return rows

@@ -1,0 +1,76 @@
+"""Data sets of recipes on disk: one file an episode, several at a time, resumed where they stopped."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from ...filters.support.parallel import in_parallel
+from ..data.trajectory import load_trajectory
+from .recipe import Recipe
+from .registry import described_recipe
+
+
+def record_recipe(
+    made: Recipe,
+    folder: str | Path,
+    *,
+    episodes: int,
+    seed: int = 0,
+    processes: int = 1,
+    report: Callable[[Path], None] | None = None,
+) -> list[Path]:
+    """Record the first episodes of a recipe; what is finished stays, and a second call continues there.
+
+    Args:
+        made: the recipe, which every file carries.
+        folder: where the files ``<recipe>_<index>.h5`` go.
+        episodes: how many there shall be; a larger number keeps the first ones.
+        seed: root seed.
+        processes: how many are simulated at a time; the numbers do not depend on it.
+        report: called with the path of every finished episode, also with those that were there.
+
+    Returns:
+        The paths, in order.
+
+    Raises:
+        ValueError: a number is out of its range, or a file in the folder is an episode of another recipe or seed
+            (nothing is overwritten).
+    """
+    for name, value, least in (("episodes", episodes, 1), ("processes", processes, 1), ("seed", seed, 0)):
+        if value < least:
+            raise ValueError(f"{name} must be at least {least}, got {value}")
+    folder = Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    paths = [folder / f"{made.name}_{index:04d}.h5" for index in range(episodes)]
+    described, missing = made.describe(), []
+    for index, path in enumerate(paths):
+        if path.exists():
+            check_same(path, {"definition": described, "seed": seed, "index": index})
+            if report is not None:
+                report(path)
+        else:
+            missing.append((described, seed, index, path))
+    for path in in_parallel(record_one, missing, processes):
+        if report is not None:
+            report(path)
+    return paths
+
+
+def record_one(described: Mapping[str, Any], seed: int, index: int, path: Path) -> Path:
+    """Simulate one episode and write it; the file appears whole or not at all."""
+    return described_recipe(described).episode(seed, index, path.stem).save(path)
+
+
+def check_same(path: Path, origin: Mapping[str, Any]) -> None:
+    """Refuse to mix episodes of different origin in one folder.
+
+    Raises:
+        ValueError: the file holds another episode.
+    """
+    found = load_trajectory(path).metadata.get("recipe") or {}
+    for name in ("seed", "index", "definition"):
+        if found.get(name) != origin[name]:
+            what = "recipe" if name == "definition" else name
+            raise ValueError(f"{path} holds an episode of another {what}; choose another folder")

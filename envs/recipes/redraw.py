@@ -1,0 +1,162 @@
+"""Another draw of the sensors of a recorded ride: errors, tape-measured geometry, and left and right exchanged.
+
+Learners need several draws a ride, and riding is what costs time. A ride is recorded with ideal sensors once; each draw
+then applies the errors of other devices, as the environment would have with the same random numbers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ...filters.bicycle.geometry import RiderGeometry
+from ..bicycle.sensors.measured_geometry import measured
+from ..bicycle.sensors.sites import sensor_sites
+from ..bicycle.sensors.suites import rider_bicycle_suite
+from ..data.trajectory import Trajectory
+from ..sensors.sensor import Sensor, due
+from ..sensors.suite import SensorSuite
+from .mirror import mirrored
+from .ranges import Checked
+from .recipe import unspawned
+
+TRUE_GEOMETRY = "true_geometry"
+"""Key of the metadata: the geometry itself, where ``geometry`` is what was measured of it"""
+
+
+@dataclass(frozen=True)
+class TapeMeasure(Checked):
+    """Standard deviations with which a rider's geometry is measured, see :func:`.measured`."""
+
+    lengths: float = 0.02
+    """of each segment's length, relative"""
+    places: float = 0.01
+    """of each coordinate of a joint or sensor on the body, m"""
+    mass: float = 0.03
+    """of the trunk's mass, relative"""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for name in ("lengths", "places", "mass"):
+            if not getattr(self, name) >= 0.0:
+                raise ValueError(f"{name} must not be negative, got {getattr(self, name)}")
+
+
+def redrawn(
+    ride: Trajectory,
+    seed: int | np.random.SeedSequence,
+    *,
+    sensors: str = "paper",
+    noise_scale: float = 1.0,
+    mirror: bool = False,
+    geometry: TapeMeasure | None = None,
+) -> Trajectory:
+    """A ride with sensor errors drawn anew: biases, zeros, camera alignment, scale, noise, lost samples.
+
+    Args:
+        ride: recorded in ``poise/RiderBicycle-v0`` with ``sensors="ideal"``.
+        seed: of the draw; the ride itself does not depend on it.
+        sensors: ``paper``, or a device for all inertial sensors, see :func:`.rider_bicycle_suite`.
+        noise_scale: factor on all errors.
+        mirror: exchange left and right, see :func:`.mirrored`.
+        geometry: measure the rider anew: ``metadata["geometry"]``, with which filters are configured, is then
+            measured, and ``metadata["true_geometry"]`` the geometry itself. None leaves the true one.
+
+    Returns:
+        Measurements with errors, and the true biases; everything else as in ``ride``.
+
+    Raises:
+        ValueError: the ride's sensors were not ideal, or a channel is none of the environment's.
+    """
+    described = ideal_sensors(ride)
+    ride = mirrored(ride) if mirror else ride
+    errors, tape = (np.random.default_rng(child) for child in unspawned(seed).spawn(2))
+    suite = suite_of(ride, described, sensors, noise_scale)
+    measurements, biases = with_errors(suite, ride, errors)
+    metadata: dict[str, Any] = ride.metadata | {"sensors": suite.describe(), "devices": sensors}
+    metadata |= {"noise_scale": float(noise_scale), "mirrored": bool(mirror)}
+    if geometry is not None and "geometry" in metadata:
+        true = RiderGeometry.read(metadata["geometry"])
+        told = measured(true, tape, lengths=geometry.lengths, places=geometry.places, mass=geometry.mass)
+        metadata |= {"geometry": told.describe(), TRUE_GEOMETRY: metadata["geometry"]}
+    return ride.replace(measurements=measurements, truth=ride.truth | biases, metadata=metadata)
+
+
+def ideal_sensors(ride: Trajectory) -> Mapping[str, Any]:
+    """What the metadata say about the sensors.
+
+    Raises:
+        ValueError: they are not those of a simulated ride with ideal sensors.
+    """
+    described = ride.metadata.get("sensors")
+    if not isinstance(described, Mapping) or "sensors" not in described:
+        raise ValueError(f"{ride.name} does not describe its sensors: only simulated rides can be drawn again")
+    kept = ("full_scale", "bandwidth", "bias_correlation_time", "burst_duration")
+    for sensor in described["sensors"]:
+        wrong = [name for name, value in sensor["noise"].items() if value and name not in kept]
+        if wrong or sensor["noise"].get("bandwidth") is not None:
+            raise ValueError(
+                f"{ride.name} must be recorded with sensors='ideal' to be drawn again, but {sensor['channel']} has "
+                f"{', '.join(wrong) or 'a bandwidth'}"
+            )
+    return described
+
+
+def suite_of(ride: Trajectory, described: Mapping[str, Any], sensors: str, noise_scale: float) -> SensorSuite:
+    """The suite with errors, at the rate of the ride, with its wheel."""
+    from ..bicycle.frame.parameters import MOUNTAIN_BIKE
+    from ..bicycle.rider.anthropometry import RiderBody
+    from ..bicycle.rider.posture import sit
+
+    sites = sensor_sites(sit(MOUNTAIN_BIKE, RiderBody()))
+    sites = replace(sites, wheel_radius=RiderGeometry.of(ride.metadata).wheel_radius)
+    return rider_bicycle_suite(
+        list(ride.measurements),
+        sensors=sensors,
+        rate=float(described["rate"]),
+        noise_scale=noise_scale,
+        sites=sites,
+        sampling=described["sensors"][0]["sampling"],
+    )
+
+
+def with_errors(
+    suite: SensorSuite, ride: Trajectory, generator: np.random.Generator
+) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
+    """Measurements and true biases of a suite on the ideal readings of a ride.
+
+    With the generator of an environment's sensors these are the errors that the environment would have added.
+    """
+    children = generator.spawn(len(suite.sensors))
+    steps = np.arange(len(ride))
+    measurements, biases = {}, {}
+    for sensor, child in zip(suite.sensors, children, strict=True):
+        name, noise = sensor.channel.name, sensor.errors(child)
+        ideal = ride.measurements[name]
+        rows = due(sensor.rate, steps, suite.rate)
+        # an interval sensor has no sample before its first interval is over
+        rows = rows[np.isfinite(ideal[rows]).all(axis=1)]
+        start = noise.bias
+        values, found = noise.sequence(ideal[rows], force_at(sensor, ride, rows))
+        measurements[name] = np.full_like(ideal, np.nan)
+        measurements[name][rows] = values
+        latest = np.searchsorted(rows, steps, side="right")
+        biases[sensor.truth_name] = np.concatenate([start[None], found])[latest]
+    return measurements, biases
+
+
+def force_at(sensor: Sensor, ride: Trajectory, rows: np.ndarray) -> np.ndarray | None:
+    """Specific force at a gyroscope that is sensitive to it.
+
+    Raises:
+        ValueError: there is no accelerometer at its site.
+    """
+    if not sensor.noise.g_sensitivity:
+        return None
+    name = f"{sensor.channel.name.rpartition('/')[0]}/acc"
+    if name not in ride.measurements:
+        raise ValueError(f"{sensor.channel.name} of {sensor.device!r} is sensitive to acceleration: it needs {name}")
+    return ride.measurements[name][rows]

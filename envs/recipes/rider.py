@@ -1,0 +1,164 @@
+"""Rides of random people on random courses, with random sensors."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any, ClassVar
+
+import numpy as np
+
+from ..bicycle.course.scenarios import list_scenarios, scenario
+from ..bicycle.frame.parameters import BICYCLES
+from ..bicycle.rider.style import rider_style
+from ..bicycle.sensors.suites import suite_channels
+from ..data.trajectory import Trajectory
+from ..sensors.presets import list_sensor_presets
+from .ranges import Checked, Range, log_uniform
+from .recipe import Recipe, unspawned
+from .redraw import TapeMeasure, redrawn
+
+
+@dataclass(frozen=True)
+class RideSensors(Checked):
+    """Devices of a ride, and what filters are told of the rider."""
+
+    devices: tuple[str, ...] = ("paper", "xsens-mtw-awinda", "bosch-bmi160", "st-lsm6dsox")
+    """``paper`` or names of sensor presets, drawn evenly: the inertial sensors"""
+    noise_scale: Range = (0.5, 2.0)
+    """1: factor on all errors"""
+    tape: TapeMeasure = field(default_factory=TapeMeasure)
+    """with which the rider's geometry is measured"""
+    mirrored_share: float = 0.5
+    """of the episodes, in which left and right are exchanged"""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        known = ("paper", *list_sensor_presets())
+        for name in self.devices:
+            if name not in known:
+                raise ValueError(f"devices must be among {list(known)}, got {name!r}")
+        check_some("devices", self.devices)
+
+
+@dataclass(frozen=True)
+class RiderRecipe(Recipe):
+    """A distribution of rides in ``poise/RiderBicycle-v0``.
+
+    An episode is a ride with ideal sensors (:meth:`ride`), to which the errors of one draw of devices are added
+    (:func:`.redrawn`), so that one ride serves for several draws. Everything else is as the environment describes.
+    """
+
+    kind: ClassVar[str] = "rider"
+
+    duration: float = 60.0
+    """s"""
+    suite: tuple[str, ...] = ("all",)
+    """a suite, or channels, see :mod:`poise.envs.bicycle.sensors.suites`"""
+    rate: float = 100.0
+    """Hz"""
+    fidelity: tuple[str, ...] = ("full",)
+    """``full``, ``lumped``, or both, drawn evenly like all names below"""
+    scenarios: tuple[str, ...] = tuple(list_scenarios())
+    """names of scenarios, also composed"""
+    subjects: tuple[int | str, ...] = ("random",)
+    """numbers of riders, ``random`` among them"""
+    styles: tuple[str, ...] = ("mild", "normal", "aggressive")
+    """names of riding styles"""
+    bicycles: tuple[str, ...] = ("mountain-bike",)
+    """names of bicycles"""
+    sensors: RideSensors = field(default_factory=RideSensors)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for name in ("suite", "fidelity", "scenarios", "subjects", "styles", "bicycles"):
+            check_some(name, getattr(self, name))
+        suite_channels(self.channels)
+        for name in self.scenarios:
+            scenario(name)
+        for name in self.styles:
+            rider_style(name)
+        for what, values, known in (
+            ("fidelity", self.fidelity, ("full", "lumped")),
+            ("bicycles", self.bicycles, tuple(BICYCLES)),
+            ("subjects", self.subjects, ("random", 0, 1, 2, 3, 4)),
+        ):
+            for value in values:
+                if value not in known:
+                    raise ValueError(f"{what} must be among {list(known)}, got {value!r}")
+        if not self.duration >= 0.1:
+            raise ValueError(f"duration must be at least 0.1 s, got {self.duration}")
+
+    @property
+    def channels(self) -> str | tuple[str, ...]:
+        """The suite, as the environment takes it."""
+        return self.suite if len(self.suite) > 1 or "/" in self.suite[0] else self.suite[0]
+
+    def options(self, generator: np.random.Generator) -> dict[str, Any]:
+        """Draw the arguments of the environment."""
+
+        def one(values: tuple[Any, ...]) -> Any:
+            return values[int(generator.integers(len(values)))]
+
+        return {
+            "scenario": one(self.scenarios),
+            "subject": one(self.subjects),
+            "style": one(self.styles),
+            "bicycle": one(self.bicycles),
+            "fidelity": one(self.fidelity),
+        }
+
+    def ride(self, seed: int | np.random.SeedSequence, name: str = "ride") -> Trajectory:
+        """The ride of an episode with ideal sensors, before any errors.
+
+        Args:
+            seed: of the episode.
+            name: for the metadata.
+        """
+        from ..bicycle.environment import RiderBicycleEnv
+        from ..record import record
+
+        setting, motion, _ = unspawned(seed).spawn(3)
+        options = self.options(np.random.default_rng(setting))
+        env = RiderBicycleEnv(**options, suite=self.channels, sensors="ideal", rate=self.rate, duration=self.duration)
+        try:
+            trajectory = record(env, seed=int(motion.generate_state(1)[0]))
+        finally:
+            env.close()
+        return trajectory.replace(metadata=trajectory.metadata | options | {"name": name})
+
+    def draw(self, seed: int | np.random.SeedSequence, name: str = "randomised") -> Trajectory:
+        """Ride, and add the errors of one draw of sensors.
+
+        Args:
+            seed: of the episode: separate children are used for the setting, the ride and the sensors.
+            name: for the metadata.
+        """
+        return self.sensed(self.ride(seed, name), unspawned(seed).spawn(3)[2])
+
+    def sensed(self, ride: Trajectory, seed: int | np.random.SeedSequence) -> Trajectory:
+        """A draw of devices, their errors and the measured geometry on a ride; any number of them a ride.
+
+        Args:
+            ride: of :meth:`ride`.
+            seed: of this draw.
+        """
+        setting, errors = unspawned(seed).spawn(2)
+        generator, sensors = np.random.default_rng(setting), self.sensors
+        return redrawn(
+            ride,
+            errors,
+            sensors=sensors.devices[int(generator.integers(len(sensors.devices)))],
+            noise_scale=log_uniform(generator, sensors.noise_scale),
+            mirror=bool(generator.random() < sensors.mirrored_share),
+            geometry=sensors.tape,
+        )
+
+
+def check_some(name: str, values: tuple[Any, ...]) -> None:
+    """Refuse an empty choice.
+
+    Raises:
+        ValueError: with the name.
+    """
+    if not values:
+        raise ValueError(f"{name} must hold one name at least, got none")
