@@ -1,11 +1,13 @@
 """Fast, exact access to a multibody in PyBullet, including closed loops, for use in every physics step.
 
 Everything here belongs to *centre-of-mass frames* (principal axes), which PyBullet keeps in double precision. Numbers
-leave this file with quaternions scalar first.
+leave this file with quaternions scalar first. A multibody is read once between two changes of the world; the frames of
+its links follow by compiled kinematics (:mod:`.kinematics`).
 """
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -13,12 +15,14 @@ import numpy as np
 
 from ...filters.core import rotation
 from ...filters.support.optional import extra
+from .kinematics import BASE_SIZE, MATRIX, POSITION, TREE_COLUMNS, TURNING, VELOCITY, add_force, move_links
 from .world import BASE, Physics, Vector, floats
 
 with extra("sim"):
     import pybullet
 
 Tuple3 = tuple[float, float, float]
+
 LinkState = tuple[Tuple3, tuple[float, float, float, float], Tuple3, Tuple3]
 """Position, quaternion (w, x, y, z), velocity and angular velocity of a centre-of-mass frame, world axes."""
 
@@ -34,6 +38,12 @@ class CentreMotion(NamedTuple):
     """(..., n, 3) m/s"""
     angular_velocity: np.ndarray
     """(..., n, 3) rad/s"""
+
+    @classmethod
+    def of_frames(cls, frames: np.ndarray) -> CentreMotion:
+        """From the rows of :mod:`.kinematics` ``(..., n, 18)``."""
+        matrices = frames[..., MATRIX].reshape(*frames.shape[:-1], 3, 3)
+        return cls(frames[..., POSITION], rotation.from_matrix(matrices), frames[..., VELOCITY], frames[..., TURNING])
 
 
 class Multibody:
@@ -53,6 +63,32 @@ class Multibody:
             dynamics = pybullet.getDynamicsInfo(body, link, physicsClientId=physics.client)
             self.masses[name] = float(dynamics[0])
             self.moments[name] = np.array(dynamics[2])
+        self._all = list(range(len(self.links) - 1))
+        self.tree = self._tree()
+        """(n, TREE_COLUMNS) of :mod:`.kinematics`"""
+        count = len(self._all)
+        self._state, self._frames = np.zeros(BASE_SIZE + 2 * count), np.zeros((count + 1, 18))
+        self.forces = np.zeros(6 + count)
+        """generalised forces (6 + n,) of :mod:`.kinematics` that :meth:`apply` hands to PyBullet for the next step"""
+        self._pack = struct.Struct(f"{BASE_SIZE + 2 * count}d").pack_into
+        self._rows: Sequence[Sequence[float]] = ()
+        self._read_at = self._moved_at = -1
+
+    def _tree(self) -> np.ndarray:
+        tree = np.zeros((len(self._all), TREE_COLUMNS))
+        for link, row in enumerate(tree):
+            info = pybullet.getJointInfo(self.body, link, physicsClientId=self.physics.client)
+            offset, axes = self.physics.inertial_frame(self.body, link)
+            if info[2] == pybullet.JOINT_SPHERICAL:
+                raise ValueError(
+                    f"joints must turn about one axis or slide along it, {info[1].decode()!r} is spherical"
+                )
+            # PyBullet turns the parent's coordinates into the child's
+            turn = rotation.conjugate(rotation.from_xyzw(np.array(info[15])))
+            row[:5] = info[16], info[2] == pybullet.JOINT_PRISMATIC, *info[13]
+            row[5:14] = rotation.to_matrix(turn).ravel()
+            row[14:17], row[17:20] = info[14], rotation.rotate_back(axes, offset)
+        return tree
 
     @property
     def mass(self) -> float:
@@ -63,6 +99,25 @@ class Multibody:
         """Numbers of links, for the fast calls below."""
         return [self.links[name] for name in names]
 
+    @property
+    def state(self) -> np.ndarray:
+        """State ``(13 + 2 n,)`` of :mod:`.kinematics` now; overwritten when it is read after a change."""
+        if self._read_at != self.physics.changes:
+            position, orientation, velocity, turning = self.physics.base_tuples(self.body)
+            self._rows = rows = pybullet.getJointStates(self.body, self._all, physicsClientId=self.physics.client)
+            angles, rates = [row[0] for row in rows], [row[1] for row in rows]
+            self._pack(self._state, 0, *position, *orientation, *velocity, *turning, *angles, *rates)
+            self._read_at = self.physics.changes
+        return self._state
+
+    @property
+    def frames(self) -> np.ndarray:
+        """Frames ``(n + 1, 18)`` of :mod:`.kinematics` now, base first; overwritten likewise."""
+        if self._moved_at != self.physics.changes:
+            move_links(self.tree, self.state, self._frames)
+            self._moved_at = self.physics.changes
+        return self._frames
+
     def link_tuples(self, links: Sequence[int]) -> list[LinkState]:
         """Position, quaternion (w, x, y, z), velocity and angular velocity of links (not the base) as plain tuples."""
         rows = pybullet.getLinkStates(
@@ -72,40 +127,42 @@ class Multibody:
 
     def centre_motion(self, links: Sequence[int]) -> CentreMotion:
         """Motion of the centre-of-mass frames of links; the base may be among them."""
-        moving = [link for link in links if link != BASE]
-        rows = iter(self.link_tuples(moving) if moving else ())
-        base = self.physics.base_tuples(self.body)
-        states = [base if link == BASE else next(rows) for link in links]
-        return CentreMotion(*(np.array(field) for field in zip(*states, strict=True)))
+        return CentreMotion.of_frames(self.frames[np.array(links) + 1])
 
     def joint_tuples(self, links: Sequence[int]) -> list[tuple[float, float]]:
         """Angle (rad) and rate (rad/s) of the joints above ``links``."""
-        rows = pybullet.getJointStates(self.body, links, physicsClientId=self.physics.client)
-        return [(row[0], row[1]) for row in rows]
+        if self._read_at != self.physics.changes:
+            _ = self.state
+        rows = self._rows
+        return [(rows[link][0], rows[link][1]) for link in links]
 
     def set_joint(self, link: int, angle: float, rate: float = 0.0) -> None:
         """Put the joint above ``link`` at an angle with a rate."""
+        self.physics.changes += 1
         pybullet.resetJointState(self.body, link, angle, rate, physicsClientId=self.physics.client)
 
     def set_joint_damping(self, link: int, damping: float) -> None:
         """Viscous damping of the joint above ``link``, N·m·s/rad, integrated implicitly by PyBullet."""
         pybullet.changeDynamics(self.body, link, jointDamping=damping, physicsClientId=self.physics.client)
 
-    def drive_joints(self, links: Sequence[int], torques: Sequence[float]) -> None:
-        """Act on the joints above ``links`` with torques (N·m) during the next step."""
+    def apply(self) -> None:
+        """Let :attr:`forces` act during the next step, and begin anew with zeros."""
+        client, values = self.physics.client, self.forces.tolist()
+        centre = self.state[:3].tolist()
+        pybullet.applyExternalForce(self.body, BASE, values[:3], centre, pybullet.WORLD_FRAME, physicsClientId=client)
+        pybullet.applyExternalTorque(self.body, BASE, values[3:6], pybullet.WORLD_FRAME, physicsClientId=client)
         pybullet.setJointMotorControlArray(
-            self.body, links, pybullet.TORQUE_CONTROL, forces=torques, physicsClientId=self.physics.client
+            self.body, self._all, pybullet.TORQUE_CONTROL, forces=values[6:], physicsClientId=client
         )
+        self.forces[:] = 0.0
 
     def release(self, constraint: int) -> None:
         """Remove a constraint between points."""
         pybullet.removeConstraint(constraint, physicsClientId=self.physics.client)
 
     def push(self, link: int, force: Vector, point: Vector) -> None:
-        """Act on a link with a force (N) at a point (m), world axes, during the next step."""
-        pybullet.applyExternalForce(
-            self.body, link, force, point, pybullet.WORLD_FRAME, physicsClientId=self.physics.client
-        )
+        """Add to :attr:`forces` a force (N) on a link at a point (m), world axes."""
+        add_force(self.tree, self.frames, link, (*force,), (*point,), self.forces)
 
 
 def newton_euler(

@@ -67,6 +67,8 @@ class Physics:
         self.time_step = float(time_step)
         self.gravity = float(gravity)
         self.steps = 0
+        self.changes = 0
+        """of the state: what was read from PyBullet is valid as long as this number stays"""
         self._inertial: dict[tuple[int, int], tuple[np.ndarray, np.ndarray]] = {}
         if gui and sys.platform.startswith("linux") and not os.environ.get("DISPLAY"):
             # PyBullet would end the whole process
@@ -230,6 +232,7 @@ class Physics:
     ) -> None:
         """Undo :meth:`base_tuples`; ``turning`` is the angular velocity."""
         w, x, y, z = orientation
+        self.changes += 1
         pybullet.resetBasePositionAndOrientation(body, position, (x, y, z, w), physicsClientId=self.client)
         pybullet.resetBaseVelocity(body, velocity, turning, physicsClientId=self.client)
 
@@ -287,6 +290,7 @@ class Physics:
         """Set the state of the base's body frame; the joints keep their positions and rates."""
         offset, axes = self.inertial_frame(body)
         lever = rotation.rotate(state.orientation, offset)
+        self.changes += 1
         pybullet.resetBasePositionAndOrientation(
             body,
             floats(state.position + lever),
@@ -308,6 +312,7 @@ class Physics:
         """Advance by one time step; forces applied before act in it and end with it."""
         pybullet.stepSimulation(physicsClientId=self.client)
         self.steps += 1
+        self.changes += 1
 
     def save(self) -> tuple[int, int]:
         """Keep the whole state in memory; :meth:`restore` returns to it bitwise, :meth:`forget` frees it."""
@@ -324,6 +329,7 @@ class Physics:
         except pybullet.error as error:
             raise PhysicsError(f"no state {saved[0]} in this world") from error
         self.steps = saved[1]
+        self.changes += 1
 
     def forget(self, saved: tuple[int, int]) -> None:
         """Free a saved state."""

@@ -15,22 +15,18 @@ import numpy as np
 
 from ....filters.core import rotation
 from ...physics.multibody import CentreMotion, Multibody, newton_euler
-from ...physics.straight_line import straight_line
 from ...physics.urdf import Tree
 from ...physics.world import BASE, Physics
 from ...sensors.ideal import BodyState
 from ..course.terrain import FlatGround, Ground
 from .drivetrain import Drivetrain
+from .forces import bicycle_forces, bicycle_state
 from .parameters import BicycleParameters, RigidPart
 from .shapes import bicycle_shapes
-from .tyre import AIRBORNE, Tyre, TyreForce, TyreParameters
+from .tyre import Tyre, TyreForce, TyreParameters, tyre_force_of
 
 AIR_DENSITY = 1.2
 """kg/m³"""
-BRAKED_SHARE = 0.7
-"""1: part of the friction limit that a brake uses at most"""
-BRAKE_FADE = 0.1
-"""m/s at which a brake has lost a quarter of its force"""
 WHEELS = ("rear_wheel", "front_wheel")
 BICYCLE_LINKS = ("rear_frame", "rear_wheel", "front_assembly", "front_wheel", "crank")
 
@@ -68,7 +64,8 @@ class BicycleMemory:
 
     bristles: tuple[tuple[float, float], ...]
     drivetrain: tuple[float, float, float] | None
-    tyre_forces: tuple[TyreForce, ...]
+    contacts: tuple[tuple[float, ...], ...]
+    """of the tyres in the last step, see :func:`.bicycle_forces`"""
 
 
 def bicycle_tree(bicycle: BicycleParameters) -> Tree:
@@ -121,26 +118,22 @@ class Bicycle:
             extend(tree)
         self.body = Multibody(physics, physics.load_urdf(tree.text()))
         wheels = (parameters.rear_wheel, parameters.front_wheel)
+        self._bristles = np.zeros((2, 2))
         self.tyres = [
-            Tyre(
-                wheel.radius,
-                wheel.crown_radius,
-                TyreParameters() if tyre is None else tyre,
-                FlatGround(),
-                physics.time_step,
-                parameters.rolling_resistance,
-            )
-            for wheel in wheels
+            Tyre(wheel.radius, wheel.crown_radius, tyre or TyreParameters(), parameters.rolling_resistance, memory)
+            for wheel, memory in zip(wheels, self._bristles, strict=True)
         ]
+        self._tyres = np.stack([each.numbers for each in self.tyres])
         self.lay(ground)
-        self.tyre_forces: list[TyreForce] = [AIRBORNE, AIRBORNE]
         self.drivetrain = None if parameters.drive is None else Drivetrain(parameters.drive)
         self.links = self.body.links
-        self._pose = self._pose_lines()
-        self._wheels = self.body.index(WHEELS)
-        self._driven = [self.links[name] for name in ("rear_wheel", "crank") if name in self.links]
-        self._joints = [self.links["front_assembly"], *self._driven]
-        self._turned = [self.links["front_assembly"], *self._wheels, *self._driven[1:]]
+        self._turned = [self.links[name] for name in ("front_assembly", *WHEELS, "crank") if name in self.links]
+        self._wheels = self._turned[1:3]
+        self._numbers = np.array([*self._wheels, self._turned[0], self.links.get("crank", BASE)])
+        self._chain = np.zeros(5) if self.drivetrain is None else self.drivetrain.chain
+        self._contacts, self._seen = np.zeros((2, 7)), np.zeros(15)
+        centre, axes = physics.inertial_frame(self.body.body)
+        self._frame = np.concatenate([rotation.to_matrix(rotation.conjugate(axes)).ravel(), -centre])
         self.own_links = [self.links[name] for name in BICYCLE_LINKS if name in self.links]
         own = [name for name in BICYCLE_LINKS if name in self.links]
         self.own_masses = np.array([self.body.masses[name] for name in own])
@@ -150,6 +143,13 @@ class Bicycle:
         masses = np.array([part.mass for part in whole.parts])
         self._total_mass = float(masses.sum())
         self._centre = masses @ centres / self._total_mass
+        drag, weight = 0.5 * AIR_DENSITY * parameters.drag_area, self._total_mass * physics.gravity
+        self._body = np.array([drag, weight, self._centre[0], self._centre[2], parameters.wheelbase])
+
+    @property
+    def tyre_forces(self) -> list[TyreForce]:
+        """Of rear and front tyre in the last step."""
+        return [tyre_force_of(contact) for contact in self._contacts]
 
     @property
     def ratio(self) -> float:
@@ -159,8 +159,6 @@ class Bicycle:
     def lay(self, ground: Ground | None) -> None:
         """Put another ground (None: a level plane at height 0) under the wheels; :meth:`start` anew afterwards."""
         self.ground: Ground = FlatGround() if ground is None else ground
-        for tyre in self.tyres:
-            tyre.ground = self.ground
 
     def static_loads(self) -> tuple[float, float]:
         """Weight (N) on the rear and the front tyre, at rest on level ground with the tyres' deflection."""
@@ -226,7 +224,7 @@ class Bicycle:
             ratio = self.drivetrain.gear_for(rates[0])
             self.body.set_joint(self.links["crank"], crank, rates[0] / ratio)
             self.drivetrain.engage(crank, 0.0, ratio)
-        self.tyre_forces = [AIRBORNE, AIRBORNE]
+        self._contacts[:] = 0.0
 
     def act(
         self,
@@ -245,108 +243,30 @@ class Bicycle:
             crank_torque: N·m between rear frame and crank, forward positive, besides the chain's.
             joints: further joints to drive (a rider's), by the links below them.
             torques: N·m on these.
-            brake: wanted force (N, not negative) of both brakes at the ground, see :meth:`brake_torques`.
+            brake: wanted force (N, not negative) of both brakes at the ground.
         """
         body = self.body
-        for number, (link, state) in enumerate(zip(self._wheels, body.link_tuples(self._wheels), strict=True)):
-            centre, (w, x, y, z), velocity, turning = state
-            # second column of the rotation matrix: the axle
-            axle = (2.0 * (x * y - w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z + w * x))
-            result = self.tyres[number].force(centre, axle, velocity, turning)
-            self.tyre_forces[number] = result
-            if result.load > 0.0:
-                body.push(link, result.force, result.point)
-        if self.parameters.drag_area:
-            position, _, velocity, _ = self.physics.base_tuples(body.body)
-            speed = math.sqrt(velocity[0] ** 2 + velocity[1] ** 2 + velocity[2] ** 2)
-            factor = -0.5 * AIR_DENSITY * self.parameters.drag_area * speed
-            body.push(BASE, [factor * part for part in velocity], position)
-        rear, front = self.brake_torques(brake) if brake > 0.0 else (0.0, 0.0)
-        own = [steer_torque, wheel_torque + rear, front]
-        if self.drivetrain is not None:
-            (wheel, wheel_rate), (crank, crank_rate) = body.joint_tuples(self._driven)
-            pull = self.drivetrain.torque(crank, crank_rate, wheel, wheel_rate)
-            own[1] += pull
-            own.append(crank_torque - self.ratio * pull)
-        body.drive_joints([*self._turned, *joints], [*own, *torques])
-
-    def brake_torques(self, force: float) -> tuple[float, float]:
-        """Torques (N·m, not positive) of the brakes on rear and front wheel that together brake with a force (N).
-
-        They share it in proportion to the load on the wheels during deceleration. Each is limited before its wheel
-        would skid, and fades below walking pace, so that brakes never turn a wheel backwards.
-        """
-        wheels = (self.parameters.rear_wheel, self.parameters.front_wheel)
-        height, wheelbase = self._centre[2], self.parameters.wheelbase
-        ahead = (self._centre[0] + force / (self._total_mass * self.physics.gravity) * height) / wheelbase
-        found = []
-        for part, wheel, tyre, state, (_, rate) in zip(
-            (1.0 - ahead, ahead),
-            wheels,
-            self.tyres,
-            self.tyre_forces,
-            self.body.joint_tuples(self._wheels),
-            strict=True,
-        ):
-            held = min(max(0.0, part) * force, BRAKED_SHARE * tyre.parameters.friction * state.load)
-            found.append(-held * wheel.radius * max(0.0, math.tanh(rate * wheel.radius / BRAKE_FADE)))
-        return found[0], found[1]
+        forces, own, first = body.forces, self._turned, 6
+        bicycle_forces(
+            body.tree, body.state, body.frames, self._numbers, self._body, self._tyres, self.ground.table,
+            self.physics.time_step, self._chain, self._bristles, brake, self._contacts, forces,
+        )  # fmt: skip
+        for link, torque in zip((*own[:2], *own[3:]), (steer_torque, wheel_torque, crank_torque), strict=False):
+            forces[first + link] += torque
+        if len(joints):
+            forces[first + np.asarray(joints)] += torques
+        body.apply()
 
     def shift(self) -> None:
         """Change the gear if the cadence requires it."""
         if self.drivetrain is not None:
-            (wheel, wheel_rate), (crank, _) = self.body.joint_tuples(self._driven)
+            (wheel, wheel_rate), (crank, _) = self.body.joint_tuples([self._wheels[0], self._turned[3]])
             self.drivetrain.shift(self.physics.time, crank, wheel, wheel_rate)
 
     def state(self) -> BicycleState:
         """Present state of the bicycle."""
-        motion, angles = self._pose(*self.physics.base_tuples(self.body.body))
-        x, y, z, speed, roll_rate, pitch_rate, yaw_rate = motion
-        roll, pitch, yaw = angles
-        joints = self.body.joint_tuples(self._joints)
-        (steer, steer_rate), (_, wheel_rate) = joints[0], joints[1]
-        crank, crank_rate = joints[2] if len(joints) > 2 else (0.0, 0.0)
-        return BicycleState(
-            self.physics.time,
-            x,
-            y,
-            z,
-            roll,
-            pitch,
-            yaw,
-            roll_rate,
-            pitch_rate,
-            yaw_rate,
-            speed,
-            steer,
-            steer_rate,
-            crank,
-            crank_rate,
-            wheel_rate,
-        )
-
-    def _pose_lines(self) -> Callable[..., list[list[float]]]:
-        """Function of the centre-of-mass motion: position, speed, rates ``(7,)``; roll, pitch and yaw ``(3,)``."""
-        centre, axes = self.physics.inertial_frame(self.body.body)
-
-        def compute(position, orientation, velocity, turning):  # type: ignore[no-untyped-def]
-            xp = rotation.namespace(position)
-            frame = rotation.multiply(orientation, rotation.conjugate(axes))
-            lever = rotation.rotate(frame, centre)
-            origin, velocity = position - lever, velocity - rotation.cross(turning, lever)
-            yaw, pitch, roll = rotation.to_euler_zyx(frame)
-            rate = rotation.rotate_back(frame, turning)
-            p, q, r = rate[..., 0], rate[..., 1], rate[..., 2]
-            turn = q * xp.sin(roll) + r * xp.cos(roll)
-            speed = velocity[..., 0] * xp.cos(yaw) + velocity[..., 1] * xp.sin(yaw)
-            roll_rate = p + xp.sin(pitch) / xp.cos(pitch) * turn
-            pitch_rate = q * xp.cos(roll) - r * xp.sin(roll)
-            rates = [speed, roll_rate, pitch_rate, turn / xp.cos(pitch)]
-            return xp.stack([origin[..., 0], origin[..., 1], origin[..., 2], *rates], axis=-1), xp.stack(
-                [roll, pitch, yaw], axis=-1
-            )
-
-        return straight_line(compute, position=3, orientation=4, velocity=3, turning=3)
+        bicycle_state(self.body.frames, self.body.state, self._numbers, self._frame, self._seen)
+        return BicycleState(self.physics.time, *self._seen.tolist())
 
     def ground_wrench(self, point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Force (N) of the ground on both tyres in the last step and its moment (N·m) about ``point``, world axes."""
@@ -366,12 +286,12 @@ class Bicycle:
     def save(self) -> BicycleMemory:
         """Tyre and chain memory; the rest is in :meth:`Physics.save`."""
         drivetrain = None if self.drivetrain is None else self.drivetrain.save()
-        return BicycleMemory(tuple(tyre.bristles for tyre in self.tyres), drivetrain, tuple(self.tyre_forces))
+        return BicycleMemory(
+            tuple(tyre.bristles for tyre in self.tyres), drivetrain, tuple(map(tuple, self._contacts.tolist()))
+        )
 
     def restore(self, memory: BicycleMemory) -> None:
         """Undo :meth:`save`."""
-        for tyre, bristles in zip(self.tyres, memory.bristles, strict=True):
-            tyre.bristles = bristles
+        self._bristles[:], self._contacts[:] = memory.bristles, memory.contacts
         if self.drivetrain is not None and memory.drivetrain is not None:
             self.drivetrain.restore(memory.drivetrain)
-        self.tyre_forces = list(memory.tyre_forces)

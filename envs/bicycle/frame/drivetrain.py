@@ -4,12 +4,34 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
+from ....filters.compile.cache import jit
 from .parameters import DriveParameters
 
 SLOW_CADENCE, FAST_CADENCE = 4.2, 8.5
 """rad/s (40 and 81 a minute): where a rider shifts down and up"""
 SHIFT_PAUSE = 1.0
 """s between two shifts"""
+
+
+@jit
+def chain_torque(chain, crank, crank_rate, wheel, wheel_rate):  # type: ignore[no-untyped-def]
+    """Torque on the rear wheel (N·m, not negative); the crank feels −ratio times it. To be called once a step.
+
+    Args:
+        chain: ratio, angle by which the wheel has run ahead (rad, updated), time of the last shift (s), stiffness
+            (N·m/rad) and damping (N·m·s/rad).
+        crank: angle, rad, growing when pedalling forward.
+        crank_rate: rad/s.
+        wheel: angle, rad, growing when rolling forward.
+        wheel_rate: rad/s.
+    """
+    twist = chain[0] * crank - wheel - chain[1]
+    if twist <= 0.0:
+        chain[1] += twist
+        return 0.0
+    return max(0.0, chain[3] * twist + chain[4] * (chain[0] * crank_rate - wheel_rate))
 
 
 class Drivetrain:
@@ -24,17 +46,19 @@ class Drivetrain:
 
     def __init__(self, parameters: DriveParameters) -> None:
         self.parameters = parameters
-        self.ratio = parameters.gears[0]
-        """revolutions of the wheel per revolution of the crank"""
-        self.slipped = 0.0
-        """rad: angle by which the wheel has run ahead"""
-        self._shifted = -math.inf
+        stiffness, damping = parameters.chain_stiffness, parameters.chain_damping
+        self.chain = np.array([parameters.gears[0], 0.0, -math.inf, stiffness, damping])
+        """of :func:`chain_torque`"""
+
+    @property
+    def ratio(self) -> float:
+        """Revolutions of the wheel per revolution of the crank."""
+        return float(self.chain[0])
 
     def engage(self, crank: float, wheel: float, ratio: float | None = None) -> None:
         """Begin with the chain just taut, at these angles (rad), in a gear (None: the present one)."""
-        self.ratio = self.ratio if ratio is None else ratio
-        self.slipped = self.ratio * crank - wheel
-        self._shifted = -math.inf
+        ratio = self.ratio if ratio is None else ratio
+        self.chain[:3] = ratio, ratio * crank - wheel, -math.inf
 
     def gear_for(self, wheel_rate: float) -> float:
         """Ratio that brings the cadence nearest to the middle of the comfortable range."""
@@ -43,7 +67,7 @@ class Drivetrain:
 
     def shift(self, time: float, crank: float, wheel: float, wheel_rate: float) -> None:
         """Change the gear by one if the cadence is too slow or fast; the chain falls just taut on the new sprocket."""
-        if time < self._shifted + SHIFT_PAUSE:
+        if time < self.chain[2] + SHIFT_PAUSE:
             return
         gears, cadence = self.parameters.gears, wheel_rate / self.ratio
         index = gears.index(self.ratio)
@@ -51,28 +75,13 @@ class Drivetrain:
         index = max(0, min(len(gears) - 1, index))
         if gears[index] != self.ratio:
             self.engage(crank, wheel, gears[index])
-            self._shifted = time
-
-    def torque(self, crank: float, crank_rate: float, wheel: float, wheel_rate: float) -> float:
-        """Torque on the rear wheel (N·m, not negative); the crank feels −ratio times it. Call once a step.
-
-        Args:
-            crank: angle, rad, growing when pedalling forward.
-            crank_rate: rad/s.
-            wheel: angle, rad, growing when rolling forward.
-            wheel_rate: rad/s.
-        """
-        twist = self.ratio * crank - wheel - self.slipped
-        if twist <= 0.0:
-            self.slipped += twist
-            return 0.0
-        rate = self.ratio * crank_rate - wheel_rate
-        return max(0.0, self.parameters.chain_stiffness * twist + self.parameters.chain_damping * rate)
+            self.chain[2] = time
 
     def save(self) -> tuple[float, float, float]:
         """Memory."""
-        return self.ratio, self.slipped, self._shifted
+        ratio, slipped, shifted = self.chain[:3].tolist()
+        return ratio, slipped, shifted
 
     def restore(self, memory: tuple[float, float, float]) -> None:
         """Undo :meth:`save`."""
-        self.ratio, self.slipped, self._shifted = memory
+        self.chain[:3] = memory

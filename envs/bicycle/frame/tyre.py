@@ -12,8 +12,11 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
+import numpy as np
+
+from ....filters.compile.cache import jit
 from ...physics.multibody import Tuple3
-from ..course.terrain import Ground
+from ..course.terrain import Ground, height_and_slope
 
 ROLLING_SPEED = 0.05
 """m/s: rolling drag is full well above this speed"""
@@ -73,6 +76,77 @@ class TyreForce(NamedTuple):
 AIRBORNE = TyreForce((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0)
 
 
+@jit
+def tyre_force(tyre, ground, time_step, centre, axle, velocity, turning, bristles, found):  # type: ignore[no-untyped-def]
+    """Force of the ground on a tyre during the next step.
+
+    Args:
+        tyre: :attr:`Tyre.numbers`.
+        ground: table of the ground.
+        time_step: s.
+        centre: of the wheel, m, world.
+        axle: unit vector along the axle, to the left of the wheel, world.
+        velocity: of the centre, m/s, world.
+        turning: angular velocity of the wheel, rad/s, world.
+        bristles: ``(2,)`` deflections forward and sideways, m; advanced by one step.
+        found: ``(7,)`` force (N), point where it acts (m) and load (N), overwritten.
+    """
+    radius, crown, rolling_resistance, camber_thrust = tyre[0], tyre[1], tyre[2], tyre[3]
+    stiffness, damping, shear_stiffness, shear_damping = tyre[4], tyre[5], tyre[6], tyre[7]
+    relaxation_length, friction = tyre[8], tyre[9]
+    cx, cy, cz = centre
+    ax, ay, az = axle
+    height, slope_x, slope_y = height_and_slope(ground, cx, cy)
+    # normal of the ground, and sine of the wheel's lean against it
+    length = 1.0 / math.sqrt(1.0 + slope_x * slope_x + slope_y * slope_y)
+    nx, ny, nz = -slope_x * length, -slope_y * length, length
+    lean = nx * ax + ny * ay + nz * az
+    # down the wheel's plane to the circle of crown centres, then along the normal to the tread
+    upright = math.sqrt(max(1e-9, 1.0 - lean * lean))
+    arm = (radius - crown) / upright
+    rx = -arm * (nx - lean * ax) - crown * nx
+    ry = -arm * (ny - lean * ay) - crown * ny
+    rz = -arm * (nz - lean * az) - crown * nz
+    px, py, pz = cx + rx, cy + ry, cz + rz
+    if slope_x != 0.0 or slope_y != 0.0 or height != 0.0:
+        height = height_and_slope(ground, px, py)[0]
+    # normal force: spring and damper along the normal, never pulling
+    penetration = (height - pz) * nz
+    if penetration <= 0.0:
+        bristles[:] = 0.0
+        found[:] = 0.0
+        return
+    vx, vy, vz = velocity
+    wx, wy, wz = turning
+    ux, uy, uz = vx + wy * rz - wz * ry, vy + wz * rx - wx * rz, vz + wx * ry - wy * rx
+    load = max(0.0, stiffness * penetration - damping * (ux * nx + uy * ny + uz * nz))
+    # forward = axle × normal, sideways = normal × forward
+    tx, ty, tz = (ay * nz - az * ny) / upright, (az * nx - ax * nz) / upright, (ax * ny - ay * nx) / upright
+    sx, sy, sz = ny * tz - nz * ty, nz * tx - nx * tz, nx * ty - ny * tx
+    # velocities of the tread point and of the wheel's centre along these axes; lateral deflection by camber
+    slip, side_slip = ux * tx + uy * ty + uz * tz, ux * sx + uy * sy + uz * sz
+    rolling = vx * tx + vy * ty + vz * tz
+    camber = lean / upright * load / shear_stiffness * camber_thrust
+    # implicit Euler: stable however short the relaxation length
+    rate = abs(rolling) / relaxation_length
+    forward = (bristles[0] + time_step * slip) / (1.0 + time_step * rate)
+    sideways = (bristles[1] + time_step * (side_slip + rate * camber)) / (1.0 + time_step * rate)
+    # shear force of the bristles, limited by Coulomb friction; beyond it they slide
+    along = -(shear_stiffness * forward + shear_damping * slip)
+    across = -(shear_stiffness * sideways + shear_damping * side_slip)
+    shear, limit = math.hypot(along, across), friction * load
+    if shear > limit:
+        along, across = along * limit / shear, across * limit / shear
+        forward, sideways = -along / shear_stiffness, -across / shear_stiffness
+    bristles[0], bristles[1] = forward, sideways
+    # the load acts a little ahead of the contact: its moment brakes the wheel
+    ahead = rolling_resistance * radius * math.tanh(rolling / ROLLING_SPEED)
+    found[0] = load * nx + along * tx + across * sx
+    found[1] = load * ny + along * ty + across * sy
+    found[2] = load * nz + along * tz + across * sz
+    found[3], found[4], found[5], found[6] = px + ahead * tx, py + ahead * ty, pz + ahead * tz, load
+
+
 class Tyre:
     """One tyre with its state: the deflections of the bristles.
 
@@ -80,9 +154,8 @@ class Tyre:
         radius: to the tread of the unloaded tyre, m.
         crown_radius: of the cross-section, m; 0 for a knife edge.
         parameters: the tyre.
-        ground: what it rolls on.
-        time_step: s.
         rolling_resistance: ratio of rolling drag to load.
+        memory: ``(2,)`` array to keep the bristles' deflections in; None for a new one.
     """
 
     def __init__(
@@ -90,75 +163,35 @@ class Tyre:
         radius: float,
         crown_radius: float,
         parameters: TyreParameters,
-        ground: Ground,
-        time_step: float,
         rolling_resistance: float = 0.0,
+        memory: np.ndarray | None = None,
     ) -> None:
-        self.radius, self.crown_radius, self.parameters = radius, crown_radius, parameters
-        self.ground, self.time_step, self.rolling_resistance = ground, time_step, rolling_resistance
-        self.bristles = (0.0, 0.0)
+        self.parameters, p = parameters, parameters
+        shape = (radius, crown_radius, rolling_resistance, float(p.camber_thrust))
+        shear = (p.shear_stiffness, p.shear_damping, p.relaxation_length, p.friction)
+        self.numbers = np.array([*shape, p.stiffness, p.damping, *shear])
+        self.memory = np.zeros(2) if memory is None else memory
 
-    def force(self, centre: Tuple3, axle: Tuple3, velocity: Tuple3, turning: Tuple3) -> TyreForce:
-        """Force during the next step; call once a step.
+    @property
+    def bristles(self) -> tuple[float, float]:
+        """Deflections forward and sideways, m."""
+        forward, sideways = self.memory.tolist()
+        return forward, sideways
 
-        Args:
-            centre: of the wheel, m, world.
-            axle: unit vector along the axle, to the left of the wheel, world.
-            velocity: of the centre, m/s, world.
-            turning: angular velocity of the wheel, rad/s, world.
-        """
-        tyre, dt = self.parameters, self.time_step
-        cx, cy, cz = centre
-        ax, ay, az = axle
-        height, slope_x, slope_y = self.ground.height_and_slope(cx, cy)
-        # normal of the ground, and sine of the wheel's lean against it
-        length = 1.0 / math.sqrt(1.0 + slope_x * slope_x + slope_y * slope_y)
-        nx, ny, nz = -slope_x * length, -slope_y * length, length
-        lean = nx * ax + ny * ay + nz * az
-        # down the wheel's plane to the circle of crown centres, then along the normal to the tread
-        upright = math.sqrt(max(1e-9, 1.0 - lean * lean))
-        arm = (self.radius - self.crown_radius) / upright
-        rx = -arm * (nx - lean * ax) - self.crown_radius * nx
-        ry = -arm * (ny - lean * ay) - self.crown_radius * ny
-        rz = -arm * (nz - lean * az) - self.crown_radius * nz
-        px, py, pz = cx + rx, cy + ry, cz + rz
-        if slope_x or slope_y or height != 0.0:
-            height = self.ground.height_and_slope(px, py)[0]
-        # normal force: spring and damper along the normal, never pulling
-        penetration = (height - pz) * nz
-        if penetration <= 0.0:
-            self.bristles = (0.0, 0.0)
-            return AIRBORNE
-        vx, vy, vz = velocity
-        wx, wy, wz = turning
-        ux, uy, uz = vx + wy * rz - wz * ry, vy + wz * rx - wx * rz, vz + wx * ry - wy * rx
-        load = max(0.0, tyre.stiffness * penetration - tyre.damping * (ux * nx + uy * ny + uz * nz))
-        # forward = axle × normal, sideways = normal × forward
-        tx, ty, tz = (ay * nz - az * ny) / upright, (az * nx - ax * nz) / upright, (ax * ny - ay * nx) / upright
-        sx, sy, sz = ny * tz - nz * ty, nz * tx - nx * tz, nx * ty - ny * tx
-        # velocities of the tread point and of the wheel's centre along these axes; lateral deflection by camber
-        slip, side_slip = ux * tx + uy * ty + uz * tz, ux * sx + uy * sy + uz * sz
-        rolling = vx * tx + vy * ty + vz * tz
-        camber = lean / upright * load / tyre.shear_stiffness if tyre.camber_thrust else 0.0
-        # implicit Euler: stable however short the relaxation length
-        rate = abs(rolling) / tyre.relaxation_length
-        forward = (self.bristles[0] + dt * slip) / (1.0 + dt * rate)
-        sideways = (self.bristles[1] + dt * (side_slip + rate * camber)) / (1.0 + dt * rate)
-        # shear force of the bristles, limited by Coulomb friction; beyond it they slide
-        along = -(tyre.shear_stiffness * forward + tyre.shear_damping * slip)
-        across = -(tyre.shear_stiffness * sideways + tyre.shear_damping * side_slip)
-        shear, limit = math.hypot(along, across), tyre.friction * load
-        if shear > limit:
-            along, across = along * limit / shear, across * limit / shear
-            forward, sideways = -along / tyre.shear_stiffness, -across / tyre.shear_stiffness
-        self.bristles = (forward, sideways)
-        force = (
-            load * nx + along * tx + across * sx,
-            load * ny + along * ty + across * sy,
-            load * nz + along * tz + across * sz,
-        )
-        if self.rolling_resistance:
-            # the load acts a little ahead of the contact: its moment brakes the wheel
-            ahead = self.rolling_resistance * self.radius * math.tanh(rolling / ROLLING_SPEED)
-            px, py, pz = px + ahead * tx, py + ahead * ty, pz + ahead * tz
-        return TyreForce(force, (px, py, pz), load)
+    @bristles.setter
+    def bristles(self, deflections: tuple[float, float]) -> None:
+        self.memory[:] = deflections
+
+    def force(
+        self, ground: Ground, time_step: float, centre: Tuple3, axle: Tuple3, velocity: Tuple3, turning: Tuple3
+    ) -> TyreForce:
+        """:func:`tyre_force` during the next step (s) on some ground; advances the bristles by this step."""
+        found = np.zeros(7)
+        tyre_force(self.numbers, ground.table, time_step, centre, axle, velocity, turning, self.memory, found)
+        return tyre_force_of(found)
+
+
+def tyre_force_of(numbers: np.ndarray) -> TyreForce:
+    """The force in the numbers ``(7,)`` that :func:`tyre_force` wrote."""
+    x, y, z, px, py, pz, load = numbers.tolist()
+    return TyreForce((x, y, z), (px, py, pz), load)

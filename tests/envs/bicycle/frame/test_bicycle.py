@@ -234,28 +234,40 @@ def test_ramp_reaches_its_angle():
 
 def test_tyre_alone():
     """Static load, grip in the wheel's plane when leaning, saturation, and flight."""
-    tyre = Tyre(0.34, 0.02, TyreParameters(), FlatGround(), 1e-3)
+    tyre = Tyre(0.34, 0.02, TyreParameters())
     lean = 0.3
     axle = (0.0, math.cos(lean), math.sin(lean))  # leaning to the right
     height = 0.32 * math.cos(lean) + 0.02 - 0.005
     for _ in range(200):
-        rolling = tyre.force((0.0, 0.0, height), axle, (3.0, 0.0, 0.0), (0.0, 3.0 / 0.34, 0.0))
+        rolling = tyre.force(FlatGround(), 1e-3, (0.0, 0.0, height), axle, (3.0, 0.0, 0.0), (0.0, 3.0 / 0.34, 0.0))
     assert rolling.load == pytest.approx(1.2e5 * 0.005, rel=1e-6)
     # camber alone carries the load down the wheel's plane: the ground pushes to the right, as the wheel leans
     assert rolling.force[1] == pytest.approx(-rolling.load * math.tan(lean), rel=0.02)
-    sliding = [tyre.force((0.0, 0.0, 0.335), (0.0, 1.0, 0.0), (3.0, 2.0, 0.0), (0.0, 0.0, 0.0)) for _ in range(300)][-1]
+    sliding = [
+        tyre.force(FlatGround(), 1e-3, (0.0, 0.0, 0.335), (0.0, 1.0, 0.0), (3.0, 2.0, 0.0), (0.0, 0.0, 0.0))
+        for _ in range(300)
+    ][-1]
     assert math.hypot(*sliding.force[:2]) == pytest.approx(0.9 * sliding.load, rel=1e-6)
     assert sliding.force[0] < 0.0
-    assert tyre.force((0.0, 0.0, 0.4), (0.0, 1.0, 0.0), (3.0, 0.0, 0.0), (0.0, 0.0, 0.0)).load == 0.0
+    assert (
+        tyre.force(FlatGround(), 1e-3, (0.0, 0.0, 0.4), (0.0, 1.0, 0.0), (3.0, 0.0, 0.0), (0.0, 0.0, 0.0)).load == 0.0
+    )
     assert tyre.bristles == (0.0, 0.0)
 
 
 def test_cornering_stiffness_is_shear_stiffness_times_relaxation_length():
     parameters = TyreParameters()
-    tyre = Tyre(0.34, 0.0, parameters, FlatGround(), 1e-3)
+    tyre = Tyre(0.34, 0.0, parameters)
     speed, slip = 4.0, 0.005
     for _ in range(500):
-        result = tyre.force((0.0, 0.0, 0.335), (0.0, 1.0, 0.0), (speed, slip * speed, 0.0), (0.0, speed / 0.335, 0.0))
+        result = tyre.force(
+            FlatGround(),
+            1e-3,
+            (0.0, 0.0, 0.335),
+            (0.0, 1.0, 0.0),
+            (speed, slip * speed, 0.0),
+            (0.0, speed / 0.335, 0.0),
+        )
     stiffness = parameters.shear_stiffness * parameters.relaxation_length + parameters.shear_damping * speed
     assert -result.force[1] / slip == pytest.approx(stiffness, rel=1e-3)
 
