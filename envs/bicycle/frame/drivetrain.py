@@ -55,6 +55,11 @@ class Drivetrain:
         """Revolutions of the wheel per revolution of the crank."""
         return float(self.chain[0])
 
+    @property
+    def slipped(self) -> float:
+        """Angle by which the wheel has run ahead, rad."""
+        return float(self.chain[1])
+
     def engage(self, crank: float, wheel: float, ratio: float | None = None) -> None:
         """Begin with the chain just taut, at these angles (rad), in a gear (None: the present one)."""
         ratio = self.ratio if ratio is None else ratio
