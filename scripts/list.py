@@ -31,8 +31,8 @@ class Args:
     """Arguments of ``poise list``."""
 
     lists: tyro.conf.Positional[tuple[str, ...]] = ()
-    """which lists: estimators, environments, sensors, sensor-kinds, gestures, scenarios, surfaces, recipes, formats,
-    benchmark, benchmark-heading, benchmark-limits; all if none is named"""
+    """which lists: estimators, environments, sensors, sensor-drift, sensor-kinds, gestures, scenarios, surfaces,
+    recipes, formats, benchmark, benchmark-heading, benchmark-limits; all if none is named"""
     markdown: bool = False
     """print the tables in Markdown, as the documentation has them"""
     update: tuple[Path, ...] = ()
@@ -156,6 +156,13 @@ def sensors() -> Rows:
     return [{"name": each.name, "kind": kind, "description": each.source} for some, kind in kinds for each in some]
 
 
+def sensor_drift() -> Rows:
+    """The Allan deviation of every preset of a device at 1000 s, °/h and µg, and which of its errors are assumed."""
+    from ..envs.sensors.allan import allan_floors
+
+    return allan_floors()
+
+
 def sensor_kinds() -> Rows:
     """Every kind of sensor that a preset or a user may give by name."""
     from ..envs.sensors.kinds import KINDS
@@ -221,7 +228,7 @@ def formats() -> Rows:
 LISTS: Mapping[str, Callable[[], Rows]] = {
     function.__name__.replace("_", "-"): function
     for function in (
-        *(estimators, environments, sensors, sensor_kinds, gestures, scenarios, surfaces, recipes, formats),
+        *(estimators, environments, sensors, sensor_drift, sensor_kinds, gestures, scenarios, surfaces, recipes, formats),
         *(benchmark, benchmark_heading, benchmark_limits),
     )
 }

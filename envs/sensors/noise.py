@@ -25,6 +25,8 @@ the reading is a unit quaternion and is rotated by the error, a rotation vector 
 ``counted``: additive, quantised with carry to the next sample, like an incremental encoder."""
 
 FORMS: tuple[Form, ...] = ("additive", "angle", "rotation", "counted")
+TIMES = ("bias_correlation_time", "warm_up_time", "burst_duration")
+"""fields that must be positive and have nothing to do with the size of the errors"""
 
 
 @dataclass(frozen=True)
@@ -47,6 +49,12 @@ class NoiseModel:
     """s: correlation time of the Gauss-Markov bias"""
     turn_on_bias: float = 0.0
     """u: standard deviation of the bias from episode to episode"""
+    temperature_coefficient: float = 0.0
+    """u/K: standard deviation of the change of the bias with the temperature of the device"""
+    warm_up: float = 0.0
+    """K: rise of that temperature from the first sample, exponentially with ``warm_up_time``"""
+    warm_up_time: float = 300.0
+    """s: time constant of warming; assumed for all devices"""
     scale_factor: float = 0.0
     """1: standard deviation of the relative scale error"""
     misalignment: float = 0.0
@@ -70,7 +78,7 @@ class NoiseModel:
         for field in fields(self):
             value = getattr(self, field.name)
             unbounded = field.name in ("full_scale", "bandwidth")
-            positive = unbounded or field.name in ("bias_correlation_time", "burst_duration")
+            positive = unbounded or field.name in TIMES
             low_enough = value <= 1.0 if field.name == "dropout" else (unbounded or value < math.inf)
             if not ((value > 0.0 if positive else value >= 0.0) and low_enough):
                 wanted = "in [0, 1]" if field.name == "dropout" else "positive" if positive else "not negative"
@@ -86,7 +94,7 @@ class NoiseModel:
         """
         if not 0.0 <= noise_scale < math.inf:
             raise ValueError(f"noise_scale must lie in [0, inf), got {noise_scale}")
-        kept = ("full_scale", "bandwidth", "dropout", "bias_correlation_time", "burst_duration")
+        kept = ("full_scale", "bandwidth", "dropout", "warm_up", *TIMES)
         larger = {
             field.name: noise_scale * getattr(self, field.name) for field in fields(self) if field.name not in kept
         }
@@ -111,6 +119,10 @@ class NoiseState:
     """(W,) Gauss-Markov bias of the last sample, u"""
     walk: np.ndarray
     """(W,) random-walk bias of the last sample, u"""
+    warming: np.ndarray
+    """(W,) change of the bias when the device is warm, u"""
+    age: int
+    """samples so far"""
     matrix: np.ndarray
     """(W, W) scale factors and cross-axis sensitivities"""
     force_matrix: np.ndarray
@@ -182,6 +194,8 @@ class NoiseProcess:
         crosstalk = generator.standard_normal((width, width))
         force_matrix = model.g_sensitivity * generator.standard_normal((width, 3))
         np.fill_diagonal(crosstalk, 0.0)
+        # a child of its own, so that the other numbers do not depend on this term
+        warming = generator.spawn(1)[0].standard_normal(width) if model.temperature_coefficient else np.zeros(width)
         turn_on *= model.turn_on_bias
         wander *= model.bias_instability
         self._state = NoiseState(
@@ -189,6 +203,8 @@ class NoiseProcess:
             turn_on=turn_on,
             wander=wander,
             walk=np.zeros(width),
+            warming=model.temperature_coefficient * model.warm_up * warming,
+            age=0,
             matrix=np.diag(1.0 + model.scale_factor * scale) + model.misalignment * crosstalk,
             force_matrix=force_matrix,
             bias=turn_on + wander,
@@ -201,7 +217,7 @@ class NoiseProcess:
 
     @property
     def bias(self) -> np.ndarray:
-        """True bias (turn-on, wander and walk) of the last sample, in units of the channel; before it, of the start.
+        """True bias (turn-on, wander, walk and warming) of the last sample, in units of the channel; before it, of the start.
 
         ``(size,)``; a rotation vector ``(3,)`` (rad) for rotations.
         """
@@ -244,7 +260,7 @@ class NoiseProcess:
 
     def _draw(self, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """White noise plus bias ``(count, W)`` of the next samples, their biases ``(count, W)``, and which are lost."""
-        state, width = self._state, self.width
+        state, width, model = self._state, self.width, self.model
         normal = state.generator.standard_normal((count, 3 * width + 2))
         white = self._white * normal[:, :width]
         if self._filtered:
@@ -255,9 +271,13 @@ class NoiseProcess:
         walk = np.cumsum(np.concatenate([state.walk[None], steps]), axis=0)[1:]
         state.walk = walk[-1]
         biases = state.turn_on + wander + walk
+        if model.temperature_coefficient > 0.0:
+            ages = (state.age + np.arange(count)) / (self.rate * model.warm_up_time)
+            biases = biases - np.expm1(-ages)[:, None] * state.warming
+        state.age += count
         state.bias = biases[-1]
         lost = normal[:, -2] > self._lost_above
-        if self.model.burst_rate > 0.0:
+        if model.burst_rate > 0.0:
             lost |= self._bursts(normal[:, -1])
         return white + biases, biases, lost
 

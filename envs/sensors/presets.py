@@ -6,7 +6,8 @@ Three things are choices of this project, because data sheets do not give them:
 * In-run bias stability is the floor of the Allan deviation. It becomes a Gauss-Markov bias whose Allan deviation peaks
   there (standard deviation = stability / 0.617), with a correlation time of 200 s.
 * A tolerance or repeatability that a data sheet gives as ± x is taken as one standard deviation.
-* Where no value is published, the field is 0.
+* Where a data sheet is silent, the value is an assumption by the grade of the device, never 0
+  (:mod:`poise.envs.sensors.assumptions`); :attr:`SensorPreset.assumed` names these fields.
 """
 
 from __future__ import annotations
@@ -17,18 +18,14 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Self
 
 from ...filters.support.names import look_up
+from .assumptions import CONSUMER, DEG, DEG_PER_HOUR, INDUSTRIAL, MICRO_G, Grade, completed, model
 from .ideal import STANDARD_GRAVITY
 from .kinds import KINDS
 from .noise import NoiseModel
 
-DEG = math.pi / 180.0
 G = STANDARD_GRAVITY
-MICRO_G = 1e-6 * G
-DEG_PER_HOUR = DEG / 3600.0
 GAUSS = 100.0
 """µT"""
-PEAK = 0.617
-"""largest Allan deviation of a first-order Gauss-Markov process, relative to its standard deviation (IEEE Std 952)"""
 
 
 @dataclass(frozen=True)
@@ -44,6 +41,8 @@ class SensorPreset:
     """None for a device without one"""
     others: Mapping[str, NoiseModel] = field(default_factory=dict, hash=False)
     """further sensors of the device: kind (:data:`poise.envs.sensors.kinds.KINDS`) → noise, in the kind's unit"""
+    assumed: Mapping[str, tuple[str, ...]] = field(default_factory=dict, hash=False)
+    """kind → fields of its noise that no data sheet states, but that are assumed by the grade of the device"""
 
     def noise_of(self, kind: str) -> NoiseModel | None:
         """The noise of its sensor of a kind; None where it has none."""
@@ -65,9 +64,21 @@ class SensorPreset:
         )
 
 
-def model(stability: float = 0.0, **values: Any) -> NoiseModel:
-    """A noise model from the in-run bias stability of a data sheet and other values."""
-    return NoiseModel(bias_instability=stability / PEAK, **values)
+def device(
+    grade: Grade,
+    name: str,
+    source: str,
+    gyroscope: NoiseModel,
+    accelerometer: NoiseModel,
+    magnetometer: NoiseModel | None = None,
+) -> SensorPreset:
+    """A device by its data sheet, with what the sheet does not state assumed by its grade."""
+    stated = {"gyroscope": gyroscope, "accelerometer": accelerometer, "magnetometer": magnetometer}
+    models, assumed = {}, {}
+    for kind, noise in stated.items():
+        if noise is not None:
+            models[kind], assumed[kind] = completed(noise, getattr(grade, kind))
+    return SensorPreset(name, f"{source}; what it does not state as of {grade.name} grade", **models, assumed=assumed)
 
 
 PRESETS = (
@@ -87,7 +98,8 @@ PRESETS = (
         NoiseModel(white_noise=1e-3, turn_on_bias=0.2 * DEG, scale_factor=5e-3, full_scale=2000.0 * DEG),
         NoiseModel(white_noise=1e-3, turn_on_bias=0.02, scale_factor=2e-3, full_scale=16.0 * G),
     ),
-    SensorPreset(
+    device(
+        INDUSTRIAL,
         "xsens-mti-100",
         "Xsens MTi 100-series data sheet and user manual MT0605P, typical; bias repeatability 0.5 °/s (gyroscope) and "
         "0.03 m/s² (accelerometer) in one year; magnetometer 0.5 mG rms taken over its band of 100 Hz",
@@ -102,7 +114,8 @@ PRESETS = (
         model(15.0 * MICRO_G, white_noise=60.0 * MICRO_G, turn_on_bias=0.03, bandwidth=375.0, full_scale=20.0 * G),
         model(white_noise=0.5e-3 * GAUSS / math.sqrt(100.0), resolution=0.25e-3 * GAUSS, full_scale=8.0 * GAUSS),
     ),
-    SensorPreset(
+    device(
+        INDUSTRIAL,
         "xsens-mtw-awinda",
         "Xsens MTw Awinda user manual, typical; turn-on biases as of the MTi-100",
         model(
@@ -115,14 +128,16 @@ PRESETS = (
         model(100.0 * MICRO_G, white_noise=200.0 * MICRO_G, turn_on_bias=0.03, bandwidth=184.0, full_scale=160.0),
         model(white_noise=0.2e-3 * GAUSS, full_scale=1.9 * GAUSS),
     ),
-    SensorPreset(
+    device(
+        INDUSTRIAL,
         "vectornav-vn-100",
         "VectorNav VN-100 data sheet, typical: in-run stability below 0.04 mg and 10 °/h (upper bounds)",
         model(10.0 * DEG_PER_HOUR, white_noise=0.0035 * DEG, bandwidth=256.0, full_scale=2000.0 * DEG),
         model(40.0 * MICRO_G, white_noise=140.0 * MICRO_G, bandwidth=260.0, full_scale=16.0 * G),
         model(white_noise=140e-6 * GAUSS, resolution=1.5e-3 * GAUSS, bandwidth=200.0, full_scale=2.5 * GAUSS),
     ),
-    SensorPreset(
+    device(
+        INDUSTRIAL,
         "adis16470",
         "Analog Devices ADIS16470 data sheet, typical: 8 °/h, 0.008 °/s/√Hz, 13 µg, velocity random walk "
         "0.037 m/s/√h, 16-bit registers of 0.1 °/s and 1.25 mg; no magnetometer",
@@ -135,7 +150,8 @@ PRESETS = (
         ),
         model(13.0 * MICRO_G, white_noise=0.037 / 60.0, resolution=1.25e-3 * G, bandwidth=600.0, full_scale=40.0 * G),
     ),
-    SensorPreset(
+    device(
+        CONSUMER,
         "bosch-bmi160",
         "Bosch Sensortec BMI160 data sheet BST-BMI160-DS000, typical, ± 2000 °/s and ± 16 g: 0.007 °/s/√Hz, "
         "180 µg/√Hz, offsets ± 3 °/s and ± 40 mg, 16.4 LSB/(°/s), 2048 LSB/g; in-run stability not published; "
@@ -147,7 +163,8 @@ PRESETS = (
             white_noise=180.0 * MICRO_G, turn_on_bias=0.04 * G, resolution=G / 2048.0, full_scale=32767.0 / 2048.0 * G
         ),
     ),
-    SensorPreset(
+    device(
+        CONSUMER,
         "invensense-mpu-9250",
         "InvenSense MPU-9250 product specification PS-MPU-9250A-01 rev. 1.0, ± 2000 °/s and ± 16 g, uncalibrated part: "
         "0.01 °/s/√Hz, ± 5 °/s, ± 3 %, cross-axis ± 2 %; 300 µg/√Hz, ± 60 mg, ± 3 %, ± 2 %; magnetometer AK8963 "
@@ -172,7 +189,8 @@ PRESETS = (
         ),
         NoiseModel(resolution=0.15, full_scale=4800.0),
     ),
-    SensorPreset(
+    device(
+        CONSUMER,
         "st-lsm6dsox",
         "STMicroelectronics LSM6DSOX data sheet, typical, high-performance mode, ± 2000 °/s and ± 16 g: 3.8 mdps/√Hz, "
         "± 1 °/s, 70 mdps/LSB; 110 µg/√Hz, ± 20 mg, 0.488 mg/LSB; sensitivity ± 1 %; in-run stability not published; "

@@ -2,14 +2,27 @@
 
 from __future__ import annotations
 
+import operator
 import zlib
 
 import numpy as np
 
 
 def root_seed(seed: int | None) -> int:
-    """Return ``seed``, or one from the operating system's entropy if it is None."""
-    return _number(np.random.SeedSequence()) if seed is None else int(seed)
+    """Return ``seed``, or one from the operating system's entropy if it is None.
+
+    Raises:
+        ValueError: it is not a whole number of at least 0.
+    """
+    if seed is None:
+        return _number(np.random.SeedSequence())
+    try:
+        number = operator.index(seed)
+    except TypeError:
+        number = -1
+    if number < 0:
+        raise ValueError(f"seed must be None or a whole number of at least 0, got {seed!r}")
+    return number
 
 
 def child_seed(root: int, index: int) -> int:

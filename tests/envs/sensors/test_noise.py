@@ -7,8 +7,9 @@ import allantools
 import numpy as np
 import pytest
 
+from poise.envs.sensors.assumptions import PEAK
 from poise.envs.sensors.noise import NoiseModel, NoiseProcess
-from poise.envs.sensors.presets import PEAK, list_sensor_presets, sensor_preset
+from poise.envs.sensors.presets import list_sensor_presets, sensor_preset
 
 EVERYTHING = NoiseModel(
     white_noise=0.01,
@@ -18,6 +19,9 @@ EVERYTHING = NoiseModel(
     scale_factor=0.01,
     misalignment=0.01,
     g_sensitivity=0.01,
+    temperature_coefficient=0.02,
+    warm_up=5.0,
+    warm_up_time=2.0,
     full_scale=3.0,
     resolution=1e-3,
     dropout=0.1,
@@ -81,6 +85,15 @@ def test_constant_errors_have_their_deviations():
         others.append(response[~np.eye(3, dtype=bool)])
     for sample, deviation in ((biases, 0.2), (diagonals, 0.03), (others, 0.01)):
         assert np.std(sample) == pytest.approx(deviation, rel=0.08)
+
+
+def test_the_bias_warms_up_exponentially():
+    model = NoiseModel(temperature_coefficient=0.04, warm_up=5.0, warm_up_time=1.0)
+    measured, biases = process(model, width=2000).sequence(np.zeros((500, 2000)))
+    assert np.std(measured[-1]) == pytest.approx(0.2, rel=0.05)
+    np.testing.assert_allclose(measured[100] / measured[-1], (1.0 - math.exp(-1.0)) / (1.0 - math.exp(-4.99)))
+    np.testing.assert_array_equal(measured, biases)
+    np.testing.assert_array_equal(measured[0], 0.0)
 
 
 def test_specific_force_leaks_into_a_g_sensitive_gyroscope():

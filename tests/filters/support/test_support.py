@@ -148,3 +148,10 @@ def test_other_missing_modules_stay_what_they_are() -> None:
     assert "numpy" not in set().union(*EXTRAS.values())
     with pytest.raises(ModuleNotFoundError, match="no_such_module"), extra("sim"):
         import no_such_module  # type: ignore[import-not-found]  # noqa: F401
+
+
+def test_a_seed_that_is_no_whole_number_is_named() -> None:
+    assert root_seed(np.int64(3)) == 3
+    for seed in ("a", 1.5, -1):
+        with pytest.raises(ValueError, match=f"seed must be None or a whole number of at least 0, got {seed!r}"):
+            root_seed(seed)  # type: ignore[arg-type]
