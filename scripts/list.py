@@ -228,7 +228,18 @@ def formats() -> Rows:
 LISTS: Mapping[str, Callable[[], Rows]] = {
     function.__name__.replace("_", "-"): function
     for function in (
-        *(estimators, environments, sensors, sensor_drift, sensor_kinds, gestures, scenarios, surfaces, recipes, formats),
+        *(
+            estimators,
+            environments,
+            sensors,
+            sensor_drift,
+            sensor_kinds,
+            gestures,
+            scenarios,
+            surfaces,
+            recipes,
+            formats,
+        ),
         *(benchmark, benchmark_heading, benchmark_limits),
     )
 }
