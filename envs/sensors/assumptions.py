@@ -1,9 +1,9 @@
 """Errors that data sheets do not state, assumed by the grade of a device: :data:`INDUSTRIAL`, :data:`CONSUMER`.
 
-A data sheet that is silent about an error does not say that there is none. :func:`completed` therefore fills what is left
-at zero with the value of the device's grade and names what it filled. The values are choices of this project, of the
-order that Allan deviations and temperature tests of such parts show; those of consumer parts are never below those of
-industrial parts, which are calibrated one by one over temperature.
+A data sheet that is silent about an error does not say that there is none. :func:`completed` therefore fills what is
+left at zero with the value of the device's grade and names what it filled. The values are choices of this project, of
+the order that Allan deviations and temperature tests of such parts show; those of consumer parts are never below those
+of industrial parts, which are calibrated one by one over temperature.
 """
 
 from __future__ import annotations

@@ -217,7 +217,7 @@ class NoiseProcess:
 
     @property
     def bias(self) -> np.ndarray:
-        """True bias (turn-on, wander, walk and warming) of the last sample, in units of the channel; before it, of the start.
+        """True bias (turn-on, wander, walk, warming) of the last sample, in units of the channel; before it, the first.
 
         ``(size,)``; a rotation vector ``(3,)`` (rad) for rotations.
         """

@@ -15,7 +15,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any, Self
+from typing import Self
 
 from ...filters.support.names import look_up
 from .assumptions import CONSUMER, DEG, DEG_PER_HOUR, INDUSTRIAL, MICRO_G, Grade, completed, model
