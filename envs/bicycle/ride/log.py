@@ -1,4 +1,4 @@
-"""A ride as arrays: each sample is read from PyBullet as plain tuples, everything else is computed for many at once."""
+"""A ride as arrays: the state after every physics step is kept, everything else is computed for many at once."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ....filters.core import rotation
-from ...physics.multibody import CentreMotion, LinkState, newton_euler
+from ...physics.kinematics import BASE_SIZE, move_links_of_many
+from ...physics.multibody import CentreMotion, newton_euler
 from ...sensors.ideal import BodyState, Sampling
 from ..rider.limbs import LimbPosture, reach_to, three_turns
 from ..rider.posture import KNEE_OUT, LIMBS, SIDES, SIGNS
@@ -64,40 +65,42 @@ class RideRecorder:
             self._names += [f"{part}_{limb[4:]}" for limb in LIMBS for part in kinds[limb[:3]]]
         self._joints = [links["front_assembly"], links["crank"], links["rear_wheel"], *rider.joints, rider.seat]
 
-    def _look(self) -> list[LinkState]:
-        body = self.ride.bicycle.body
-        return [self.ride.physics.base_tuples(body.body), *body.link_tuples(self._links)]
-
     def record(self, samples: int) -> RideLog:
         """Ride on for some samples; stops early after the one in which the rider fell."""
-        ride, rider = self.ride, self.ride.rider
-        looks, forces, joints, torques, times, fallen, swivels = [self._look()], [], [], [], [], [], []
+        ride, rider, body = self.ride, self.ride.rider, self.ride.bicycle.body
+        states = np.empty((samples * self.steps + 1, len(body.state)))
+        states[0] = body.state
+        forces, torques, times, fallen, swivels = [], [], [], [], []
         for _ in range(samples):
             for _ in range(self.steps):
                 ride.step()
-                looks.append(self._look())
                 forces.append(rider.raw_forces())
-            joints.append(ride.bicycle.body.joint_tuples(self._joints))
+                states[len(forces)] = body.state
             torques.append(rider.torques)
             times.append(ride.physics.time)
             swivels.append(rider.swivel)
             fallen.append(ride.fallen)
             if fallen[-1]:
                 break
+        states = states[: len(forces) + 1]
+        first, rates = BASE_SIZE + np.array(self._joints), (states.shape[1] - BASE_SIZE) // 2
+        ends = states[self.steps :: self.steps]
         return self._compute(
-            self._motion(looks),
+            self._motion(states),
             np.array(forces),
-            np.array(joints),
+            np.stack([ends[:, first], ends[:, first + rates]], axis=-1),
             np.array(torques),
             np.array(times),
             np.array(fallen),
             np.array(swivels),
         )
 
-    @staticmethod
-    def _motion(rows: list[list[LinkState]]) -> CentreMotion:
-        fields = (np.array([[state[field] for state in row] for row in rows]) for field in range(4))
-        return CentreMotion(*fields)
+    def _motion(self, states: np.ndarray) -> CentreMotion:
+        """Motion of base and links from the states of all physics steps."""
+        tree = self.ride.bicycle.body.tree
+        frames = np.empty((len(states), len(tree) + 1, 18))
+        move_links_of_many(tree, states, frames)
+        return CentreMotion.of_frames(frames[:, [0, *(link + 1 for link in self._links)]])
 
     def _frame(self, index: int, name: str, before: CentreMotion, after: CentreMotion, time: np.ndarray) -> BodyState:
         """Motion of a body frame after the last step, with its accelerations in it."""
