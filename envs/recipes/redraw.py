@@ -13,14 +13,17 @@ from typing import Any
 import numpy as np
 
 from ...filters.bicycle.geometry import RiderGeometry
+from ...filters.core import rotation
+from ...filters.support.ranges import Checked
 from ..bicycle.sensors.measured_geometry import measured
 from ..bicycle.sensors.sites import sensor_sites
 from ..bicycle.sensors.suites import rider_bicycle_suite
 from ..data.trajectory import Trajectory
+from ..sensors.ideal import STANDARD_GRAVITY
+from ..sensors.noise import TIMES
 from ..sensors.sensor import Sensor, due
 from ..sensors.suite import SensorSuite
 from .mirror import mirrored
-from .ranges import Checked
 from .recipe import unspawned
 
 TRUE_GEOMETRY = "true_geometry"
@@ -94,7 +97,7 @@ def ideal_sensors(ride: Trajectory) -> Mapping[str, Any]:
     described = ride.metadata.get("sensors")
     if not isinstance(described, Mapping) or "sensors" not in described:
         raise ValueError(f"{ride.name} does not describe its sensors: only simulated rides can be drawn again")
-    kept = ("full_scale", "bandwidth", "bias_correlation_time", "burst_duration")
+    kept = ("full_scale", "bandwidth", *TIMES)
     for sensor in described["sensors"]:
         wrong = [name for name, value in sensor["noise"].items() if value and name not in kept]
         if wrong or sensor["noise"].get("bandwidth") is not None:
@@ -149,14 +152,17 @@ def with_errors(
 
 
 def force_at(sensor: Sensor, ride: Trajectory, rows: np.ndarray) -> np.ndarray | None:
-    """Specific force at a gyroscope that is sensitive to it.
+    """Specific force at a gyroscope that is sensitive to it; that of gravity where there is no accelerometer.
 
     Raises:
-        ValueError: there is no accelerometer at its site.
+        ValueError: the ride knows neither the accelerometer at its site nor the orientation of its body.
     """
     if not sensor.noise.g_sensitivity:
         return None
-    name = f"{sensor.channel.name.rpartition('/')[0]}/acc"
-    if name not in ride.measurements:
+    name, carrier = f"{sensor.channel.name.rpartition('/')[0]}/acc", f"{sensor.body}/orientation"
+    if name in ride.measurements:
+        return ride.measurements[name][rows]
+    if carrier not in ride.truth:
         raise ValueError(f"{sensor.channel.name} of {sensor.device!r} is sensitive to acceleration: it needs {name}")
-    return ride.measurements[name][rows]
+    orientation = rotation.multiply(ride.truth[carrier][rows], np.array(sensor.mounting.rotation))
+    return STANDARD_GRAVITY * rotation.up_in_body(orientation)

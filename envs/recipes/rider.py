@@ -7,13 +7,13 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from ...filters.support.ranges import Checked, Range, log_uniform
 from ..bicycle.course.scenarios import list_scenarios, scenario
 from ..bicycle.frame.parameters import BICYCLES
 from ..bicycle.rider.style import rider_style
 from ..bicycle.sensors.suites import suite_channels
 from ..data.trajectory import Trajectory
 from ..sensors.presets import list_sensor_presets
-from .ranges import Checked, Range, log_uniform
 from .recipe import Recipe, unspawned
 from .redraw import TapeMeasure, redrawn
 
