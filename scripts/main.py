@@ -47,6 +47,9 @@ COMMANDS: dict[str, Command] = {
     "list": Command(".list", "estimators, environments, sensors, gestures, scenarios, file formats by name"),
     "record": Command(".record", "record trajectories of an environment into files"),
     "rides": Command(".rides", "simulate every scenario with every rider; statistics beside those of the papers"),
+    "realism": Command(
+        ".realism", "compare simulated motion with recordings and publications: how true simulators are"
+    ),
     "train": Command(".train", "train a learned estimator"),
     "tune": Command(".tune", "fit the gains of a filter: constant ones, or a policy that sets them"),
     "inspect": Command(".recordings.inspect", "what a recording holds; whether units, signs and clock are plausible"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zlib
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
@@ -9,7 +10,9 @@ import numpy as np
 
 from ...filters.support.ranges import Checked, Range, log_uniform
 from ..bicycle.course.scenarios import list_scenarios, scenario
+from ..bicycle.course.surfaces import list_surfaces
 from ..bicycle.frame.parameters import BICYCLES
+from ..bicycle.rider.anthropometry import SUBJECTS
 from ..bicycle.rider.style import rider_style
 from ..bicycle.sensors.suites import suite_channels
 from ..data.trajectory import Trajectory
@@ -66,11 +69,13 @@ class RiderRecipe(Recipe):
     """names of riding styles"""
     bicycles: tuple[str, ...] = ("mountain-bike",)
     """names of bicycles"""
+    surfaces: tuple[str, ...] = ("scenario", "random")
+    """names of road surfaces; ``scenario``: that of the scenario, ``random``: any"""
     sensors: RideSensors = field(default_factory=RideSensors)
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        for name in ("suite", "fidelity", "scenarios", "subjects", "styles", "bicycles"):
+        for name in ("suite", "fidelity", "scenarios", "subjects", "styles", "bicycles", "surfaces"):
             check_some(name, getattr(self, name))
         suite_channels(self.channels)
         for name in self.scenarios:
@@ -80,7 +85,8 @@ class RiderRecipe(Recipe):
         for what, values, known in (
             ("fidelity", self.fidelity, ("full", "lumped")),
             ("bicycles", self.bicycles, tuple(BICYCLES)),
-            ("subjects", self.subjects, ("random", 0, 1, 2, 3, 4)),
+            ("subjects", self.subjects, ("random", *range(len(SUBJECTS)))),
+            ("surfaces", self.surfaces, ("scenario", "random", *list_surfaces())),
         ):
             for value in values:
                 if value not in known:
@@ -93,18 +99,21 @@ class RiderRecipe(Recipe):
         """The suite, as the environment takes it."""
         return self.suite if len(self.suite) > 1 or "/" in self.suite[0] else self.suite[0]
 
-    def options(self, generator: np.random.Generator) -> dict[str, Any]:
-        """Draw the arguments of the environment."""
+    def options(self, seed: np.random.SeedSequence) -> dict[str, Any]:
+        """Draw the arguments of the environment, each from a child of the seed of its own name."""
 
-        def one(values: tuple[Any, ...]) -> Any:
-            return values[int(generator.integers(len(values)))]
+        def one(name: str, values: tuple[Any, ...]) -> Any:
+            child = np.random.SeedSequence(seed.entropy, spawn_key=(*seed.spawn_key, zlib.crc32(name.encode())))
+            return values[int(np.random.default_rng(child).integers(len(values)))]
 
+        surface = one("surface", self.surfaces)
         return {
-            "scenario": one(self.scenarios),
-            "subject": one(self.subjects),
-            "style": one(self.styles),
-            "bicycle": one(self.bicycles),
-            "fidelity": one(self.fidelity),
+            "scenario": one("scenario", self.scenarios),
+            "subject": one("subject", self.subjects),
+            "style": one("style", self.styles),
+            "bicycle": one("bicycle", self.bicycles),
+            "fidelity": one("fidelity", self.fidelity),
+            "surface": None if surface == "scenario" else surface,
         }
 
     def ride(self, seed: int | np.random.SeedSequence, name: str = "ride") -> Trajectory:
@@ -118,7 +127,7 @@ class RiderRecipe(Recipe):
         from ..record import record
 
         setting, motion, _ = unspawned(seed).spawn(3)
-        options = self.options(np.random.default_rng(setting))
+        options = self.options(setting)
         env = RiderBicycleEnv(**options, suite=self.channels, sensors="ideal", rate=self.rate, duration=self.duration)
         try:
             trajectory = record(env, seed=int(motion.generate_state(1)[0]))

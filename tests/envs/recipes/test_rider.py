@@ -142,11 +142,16 @@ def test_an_episode_is_rebuilt_bit_for_bit() -> None:
 
 
 def test_settings_are_drawn_from_what_the_recipe_names() -> None:
-    generator = np.random.default_rng(0)
     made = replace(SHORT, scenarios=("straight", "slalom"), styles=("mild", "normal"), subjects=(0, "random"))
-    drawn = [made.options(generator) for _ in range(40)]
+    drawn = [made.options(np.random.SeedSequence(index)) for index in range(40)]
     for name, values in (("scenario", made.scenarios), ("style", made.styles), ("subject", made.subjects)):
         assert {each[name] for each in drawn} == set(values)
+    # what is added to one choice leaves the others as they are
+    more = replace(made, surfaces=("tarmac", "cobbles"))
+    for index, each in enumerate(drawn):
+        other = more.options(np.random.SeedSequence(index))
+        assert other.pop("surface") in more.surfaces
+        assert other == {name: value for name, value in each.items() if name != "surface"}
 
 
 @pytest.mark.parametrize(
@@ -155,6 +160,7 @@ def test_settings_are_drawn_from_what_the_recipe_names() -> None:
         ({"scenarios": ["ice"]}, "scenario must be one of"),
         ({"scenarios": []}, "scenarios must hold one name at least"),
         ({"bicycles": ["tricycle"]}, "bicycles must be among .*got 'tricycle'"),
+        ({"surfaces": ["ice"]}, "surfaces must be among .*got 'ice'"),
         ({"subjects": [7]}, "subjects must be among .*got 7"),
         ({"sensors": {"devices": ["phone"]}}, "devices must be among .*got 'phone'"),
         ({"sensors": {"tape": {"lengths": -1.0}}}, "recipe.sensors.tape: lengths"),

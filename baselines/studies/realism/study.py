@@ -1,0 +1,131 @@
+"""``poise realism``: simulated motion beside recordings and publications, part by part."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ....envs.recipes.registry import recipe
+from ...scoring import COLUMNS
+from ..kit import Study
+from ..report import Report
+from .containment import HIGH, LOW, Summary, containment_rows, simulated_summaries, summary
+from .figures import spectra
+from .motion import SHARE_OF_RATE, UNITS
+from .ranks import agreement, inclination_errors, installed, matrix, simulated_errors
+from .roles import ROLES, Recorded, by_recipe
+
+CONTAINED = (
+    f"Every recording is compared at 0.45 of its own sampling rate; inside is between {LOW:g} and {HIGH:g} % of the "
+    "simulated episodes. The range shown is that at the widest bandwidth."
+)
+RANKED = (
+    "Mean over trajectories of the RMS error of the inclination, deg. τ is Kendall's rank correlation of the "
+    "estimators' order; its interval is 5 to 95 % over bootstrap draws of episodes and recordings."
+)
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How much is simulated."""
+
+    episodes: int = 60
+    """of each recipe of hands"""
+    rides: int = 20
+    """of each recipe of riders"""
+
+    def __post_init__(self) -> None:
+        for name in ("episodes", "rides"):
+            if getattr(self, name) < 2:
+                raise ValueError(f"{name} must be at least 2, got {getattr(self, name)}")
+
+    def of(self, kind: str) -> int:
+        """Episodes of a recipe of a kind."""
+        return self.rides if kind == "rider" else self.episodes
+
+
+def containment(study: Study, report: Report, settings: Settings, groups: Sequence[Recorded]) -> None:
+    """Statistics and spectra of every group of recordings beside its recipe."""
+    if groups:
+        report.text(CONTAINED, "Recordings inside of recipes")
+    for (name, site), members in by_recipe(groups).items():
+        made = recipe(name)
+        found: dict[str, list[Summary]] = {}
+        for group in members:
+            label = f"{group.group} ({group.role})"
+            found.setdefault(label, []).extend(
+                summary(each, "imu", [SHARE_OF_RATE / each.dt], "orientation") for each in group.load()
+            )
+        each_one = [each for summaries in found.values() for each in summaries]
+        widths = sorted({width for each in each_one for width in each.statistics})
+        rate = max(each.rate for each in each_one)
+        simulated = simulated_summaries(study, made, settings.of(made.kind), site, widths, rate)
+        for label, summaries in found.items():
+            title = f"{label} in {name} at {site}"
+            report.table(title, containment_rows(summaries, simulated))
+            report.numbers(results(label, summaries))
+        report.figure(f"spectra {name} {site}", spectra(simulated, found), f"Spectra: recipe {name} at {site}")
+        report.numbers(results(name, simulated))
+
+
+def results(label: str, summaries: Sequence[Summary]) -> list[dict[str, Any]]:
+    """Rows of ``results.csv``, at the widest bandwidth of each."""
+    return [
+        dict(zip(COLUMNS, ("truth", f"{label}/{each.name}", "motion", name, value, UNITS[name] or "1"), strict=True))
+        for each in summaries
+        for name, value in each.statistics[max(each.statistics)].items()
+        if np.isfinite(value)
+    ]
+
+
+def ranks(study: Study, report: Report, settings: Settings, groups: Sequence[Recorded]) -> None:
+    """Order of the estimators on every group of recordings and on its recipe."""
+    names, rows = installed(), []
+    for group in groups:
+        role = ROLES[group.role]
+        known = [each for each in group.load() if "up" in each.quantities] if role.ranked else []
+        if not known:
+            continue
+        simulated = matrix(simulated_errors(study, recipe(role.recipe), settings.episodes, names), names)
+        recorded = matrix([inclination_errors(each, names) for each in known], names)
+        tau, (low, high) = agreement(simulated, recorded, study.seed_of("bootstrap", group.group))
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", RuntimeWarning)
+            means = (np.nanmean(simulated, axis=0), np.nanmean(recorded, axis=0))
+        order = np.argsort(means[1])
+        report.table(
+            f"Estimators on {group.group} ({group.role}) and {role.recipe}",
+            [{"estimator": names[i], group.group: means[1][i], f"recipe {role.recipe}": means[0][i]} for i in order],
+            f"τ = {tau:.2f} ({low:.2f} … {high:.2f}) over {len(known)} recordings and {len(simulated)} episodes.",
+        )
+        rows.append({"recordings": group.group, "recipe": role.recipe, "τ": tau, "from": low, "to": high})
+    if rows:
+        report.table("Rank agreement of the estimators", rows, RANKED)
+
+
+PARTS: Mapping[str, Callable[[Study, Report, Settings, Sequence[Recorded]], None]] = {
+    "motion": containment,
+    "ranks": ranks,
+}
+"""Name → part of the report."""
+
+
+def realism(
+    study: Study, report: Report, settings: Settings, groups: Sequence[Recorded], parts: Sequence[str] = ()
+) -> None:
+    """Report the chosen parts; all if none is named.
+
+    Args:
+        study: where rides and results are kept.
+        report: what is found.
+        settings: how much is simulated.
+        groups: recordings with their roles.
+        parts: names of :data:`PARTS`.
+    """
+    for name, part in PARTS.items():
+        if not parts or name in parts:
+            part(study, report, settings, groups)

@@ -1,0 +1,53 @@
+"""How true the simulators are: motion, roads, control, saddle and sensors beside recordings and publications."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from .main import run_command
+from .reproduce import studying
+
+
+@dataclass
+class Args:
+    """Arguments of ``poise realism``."""
+
+    recordings: tuple[str, ...] = ()
+    """recorded data as role=path, where path is a file or folder and role one of hand, carried, chest, head"""
+    parts: tuple[str, ...] = ()
+    """parts of the report: motion, ranks; all if none is named"""
+    episodes: int = 60
+    """simulated episodes of each recipe of hands"""
+    rides: int = 20
+    """simulated rides of each recipe of riders"""
+    processes: int = 2
+    """number of parallel processes"""
+    seed: int = 0
+    """root seed; every recipe and ride has a separate child"""
+    resume: Path | None = None
+    """folder of an interrupted run; finished episodes are kept"""
+    runs: Path = Path("runs")
+    """parent of the run folder"""
+    json: bool = False
+    """print one JSON document instead of tables"""
+
+
+def run(args: Args) -> int:
+    """Simulate, compare, and leave a run folder."""
+    from ..baselines.studies.realism import study as work
+    from ..baselines.studies.realism.roles import recorded
+    from ..filters.support.names import look_up
+
+    for name in args.parts:
+        look_up("part", name, work.PARTS)
+    groups = recorded(args.recordings)
+    amounts = work.Settings(args.episodes, args.rides)
+    settings = {"seed": args.seed, "subjects": (0,), "processes": args.processes}
+    with studying("realism", args, settings, "poise realism", 200) as (study, _, report):
+        work.realism(study, report, amounts, groups, args.parts)
+    return 0
+
+
+if __name__ == "__main__":
+    run_command("realism")
