@@ -322,7 +322,7 @@ class TracedNamespace:
 
 LARGEST_DEPTH = 8
 """Nested operations in one printed line."""
-INFIX = {"+", "-", "*", "/", ">", ">=", "<", "<=", "and", "or"}
+INFIX = {"+", "-", "*", "/", ">", ">=", "<", "<=", "==", "and", "or"}
 
 
 def print_code(outputs: dict[str, np.ndarray], *, indent: str = "    ") -> list[str]:

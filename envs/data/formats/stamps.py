@@ -126,15 +126,15 @@ def nanoseconds(texts: pandas.Series) -> np.ndarray | None:
         if not first.lower().endswith("m"):
             return whole(pandas.to_timedelta(plain, errors="coerce"))
         plain = "2000-01-01 " + plain
-    readings = []
+    readings: list[np.ndarray] = []
     for day_first in (True, False) if not re.match(r"\d{4}", first) else (False,):
         with warnings.catch_warnings():
             # pandas tells that some dates are of the other order
             warnings.simplefilter("ignore", UserWarning)
             read = pandas.to_datetime(plain, errors="coerce", utc=True, format="mixed", dayfirst=day_first)
-        if read.notna().all():
-            readings.append(whole(read - read.iloc[0].normalize()))
-    return min(readings, key=np.ptp, default=None)
+        found = whole(read - read.iloc[0].normalize()) if read.notna().all() else None
+        readings += [] if found is None else [found]
+    return min(readings, key=lambda stamps: int(np.ptp(stamps)), default=None)
 
 
 def whole(times: pandas.Series) -> np.ndarray | None:
