@@ -182,9 +182,11 @@ def sensor_kinds() -> Rows:
 
 def gestures() -> Rows:
     """Every motion of a hand with the first sentence of its configuration."""
+    from ..envs.hand.everyday import SUMMARIES
     from ..envs.hand.gestures import GESTURES
 
-    return [{"name": name, "description": first_sentence(type(each).__doc__)} for name, each in GESTURES.items()]
+    described = {name: SUMMARIES.get(name) or first_sentence(type(each).__doc__) for name, each in GESTURES.items()}
+    return [{"name": name, "description": words} for name, words in described.items()]
 
 
 def scenarios() -> Rows:

@@ -20,25 +20,12 @@ import numpy as np
 
 from ...filters.core import rotation
 from ...filters.support.names import look_up
-from ..sensors.ideal import BodyState
 from .controller_gestures import Infinity, Pointing, RateTable, Shaking, Walk
-from .motion import Segment, SegmentedGesture, TurnGesture, match_levels
+from .everyday import EVERYDAY
+from .motion import Gesture, Segment, SegmentedGesture, TurnGesture, match_levels
 
 MOST_DRAWS = 200
 """Attempts to draw a trial with a small enough ratio of peak to mean; one in five succeeds for ``fast``."""
-
-
-class Gesture(Protocol):
-    """A motion of a rigid body as a function of time."""
-
-    @property
-    def duration(self) -> float:
-        """Length, s."""
-        ...
-
-    def sample(self, times: np.ndarray) -> BodyState:
-        """The motion at ``times`` ``(T,)``, seconds from the start, each in [0, duration]."""
-        ...
 
 
 class GestureConfig(Protocol):
@@ -287,9 +274,10 @@ GESTURES: Mapping[str, GestureConfig] = MappingProxyType(
         "rate-table": RateTable(),
         "planar-walk": Walk(planar=True),
         "infinity": Infinity(),
+        **EVERYDAY,
     }
 )
-"""Name → configuration; the last two stay in the vertical plane."""
+"""Name → configuration; ``planar-walk`` and ``infinity`` stay in the vertical plane."""
 
 
 def gesture_config(gesture: str | GestureConfig) -> GestureConfig:

@@ -6,6 +6,7 @@ World: x east, y north, z up; quaternions w, x, y, z, body to world. All derivat
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Protocol, Self
 
 import numpy as np
 from scipy.optimize import brentq
@@ -18,6 +19,31 @@ BURST_HALF_WIDTH = 0.6
 """Half the length of the burst that carries the peak of a trial, s."""
 GRID = 0.01
 """Interval at which mean and peak of a trial are evaluated, s; 0.2 % below the true peak at 3.5 Hz."""
+
+
+class Gesture(Protocol):
+    """A motion of a rigid body as a function of time."""
+
+    @property
+    def duration(self) -> float:
+        """Length, s."""
+        ...
+
+    def sample(self, times: np.ndarray) -> BodyState:
+        """The motion at ``times`` ``(T,)``, seconds from the start, each in [0, duration]."""
+        ...
+
+
+class RandomFunction(Protocol):
+    """A smooth random function of time, for instance a :class:`.Series`."""
+
+    def sample(self, times: np.ndarray) -> Jet:
+        """The jet ``(T, n)`` at ``times`` ``(T,)``, s."""
+        ...
+
+    def scaled(self, factor: np.ndarray | float) -> Self:
+        """The same function times ``factor`` (a number, or one for each component)."""
+        ...
 
 
 def euler_motion(angles: Jet) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -60,8 +86,8 @@ class Segment:
     start: float
     end: float
     ramp: float
-    position: Series
-    angles: Series
+    position: RandomFunction
+    angles: RandomFunction
     shift: np.ndarray
     turn: np.ndarray
     bursts: tuple[tuple[float, float], ...] = ()

@@ -20,6 +20,11 @@ def log_uniform(generator: np.random.Generator, bounds: Range) -> float:
     return float(np.exp(generator.uniform(*np.log(bounds))))
 
 
+def log_uniforms(generator: np.random.Generator, bounds: Range, count: int) -> np.ndarray:
+    """``count`` of them, ``(count,)``."""
+    return np.exp(generator.uniform(math.log(bounds[0]), math.log(bounds[1]), count))
+
+
 class Checked:
     """Base of configurations that are drawn from: types and ranges of their fields follow from annotations and names.
 

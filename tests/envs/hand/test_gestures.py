@@ -20,7 +20,8 @@ def draw(name, seed=0, duration=None):
 @pytest.mark.parametrize("seed", [0, 1])
 def test_derivatives_are_exact(name, seed):
     gesture = draw(name, seed, 12.0)
-    h = 2e-5
+    # taps of a millisecond need a small step
+    h = 1e-6
     middle = np.linspace(0.5, 11.5, 400)
     left, here, right = (gesture.sample(middle + shift) for shift in (-h, 0.0, h))
     np.testing.assert_allclose((right.position - left.position) / (2 * h), here.velocity, atol=1e-4)
@@ -80,8 +81,9 @@ def test_motion_happens_in_the_intervals_of_the_paper(config, name):
 def test_gestures_begin_at_rest_and_differ_by_seed(name):
     gesture, other = draw(name, 0), draw(name, 1)
     early = np.arange(0.0, 1.0, 0.01)
-    assert np.abs(gesture.sample(early).velocity).max() == 0.0
-    assert np.abs(gesture.sample(early).angular_velocity).max() == 0.0
+    # the equation of soft tissue is solved to rounding
+    assert np.abs(gesture.sample(early).velocity).max() < 1e-12
+    assert np.abs(gesture.sample(early).angular_velocity).max() < 1e-12
     if getattr(GESTURES[name], "planar", False):
         return
     starts = [g.sample(np.zeros(1)).orientation[0] for g in (gesture, other)]
