@@ -87,16 +87,19 @@ def test_the_likelihood_prefers_the_right_noise():
     data = {"imu/gyr": gyr, "imu/acc": acc}
     through = DifferentiableFilter(kalman, ["measurement"])
     factor = torch.zeros(1, dtype=torch.float64, requires_grad=True)
-    optimizer = torch.optim.Adam([factor], lr=0.1)
-
     def loss(log_factor):
         state = through.init({key: array[0] for key, array in data.items()})
         return through.run(state, data, log_factor.expand(400, 4, 1))[1].innovation_loss().mean()
 
-    for _ in range(100):
+    optimizer = torch.optim.LBFGS([factor], lr=0.5, max_iter=60, line_search_fn="strong_wolfe")
+
+    def closure():
         optimizer.zero_grad()
-        loss(factor).backward()
-        optimizer.step()
+        value = loss(factor)
+        value.backward()
+        return value
+
+    optimizer.step(closure)
     power = kalman.gains["measurement"].power
     learned = kalman.model.accelerometer_noise * np.exp(power * factor.item())
     assert learned == pytest.approx(deviation, rel=0.05)
