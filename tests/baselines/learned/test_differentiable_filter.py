@@ -87,6 +87,7 @@ def test_the_likelihood_prefers_the_right_noise():
     data = {"imu/gyr": gyr, "imu/acc": acc}
     through = DifferentiableFilter(kalman, ["measurement"])
     factor = torch.zeros(1, dtype=torch.float64, requires_grad=True)
+
     def loss(log_factor):
         state = through.init({key: array[0] for key, array in data.items()})
         return through.run(state, data, log_factor.expand(400, 4, 1))[1].innovation_loss().mean()
