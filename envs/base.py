@@ -254,7 +254,7 @@ class PoseEnv(DrawnEnv):
 
 
 def pose_error(quantity: Quantity, estimate: np.ndarray, truth: np.ndarray) -> float:
-    """:func:`.error` of one time step, in plain floats for orientations, where it is 20 times faster.
+    """:func:`.error` of one time step, in plain floats for rotations, where it is 20 times faster.
 
     Args:
         quantity: what is compared.
@@ -264,7 +264,7 @@ def pose_error(quantity: Quantity, estimate: np.ndarray, truth: np.ndarray) -> f
     Returns:
         The error in rad or the quantity's unit; NaN where the truth is.
     """
-    if quantity.name not in (ORIENTATION.name, RELATIVE_ORIENTATION.name):
+    if quantity.kind != "rotation":
         return float(metrics.error(quantity, estimate, truth))
     (a, b, c, d), (w, x, y, z) = estimate.tolist(), truth.tolist()
     # estimate ⊗ conjugate(truth)

@@ -8,6 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ....filters.compile.cache import jit
+
 SPACING = 0.02
 """m between the points that a path keeps"""
 
@@ -159,22 +161,51 @@ def wandering_path(
         return goal, max(smallest_radius, min(float(rng.uniform(smallest_radius, widest)), 0.4 * room))
 
     # the straight beginning has used some of the length
-    goal, radius, curvature = next_goal()[0], smallest_radius, 0.0
+    goal, radius = next_goal()[0], smallest_radius
     values = np.empty(max(2, math.ceil(length / SPACING) + 1))
-    for index in range(len(values)):
-        values[index] = curvature
-        dx, dy = float(goal[0]) - x, float(goal[1]) - y
-        if dx * dx + dy * dy < (1.2 * smallest_radius) ** 2:
-            goal, radius = next_goal()
-        bearing = math.remainder(math.atan2(dy, dx) - heading, 2.0 * math.pi)
+    index, curvature, reached = 0, 0.0, goal
+    while index < len(values):
+        limits = (radius, smallest_radius, *inner.tolist())
+        index, curvature, x, y, heading = _ride_to(values, index, curvature, x, y, heading, goal, reached, limits)
+        if index < len(values):
+            reached, (goal, radius) = goal, next_goal()
+    return Path(values, start)
+
+
+@jit
+def _ride_to(values, index, curvature, x, y, heading, goal, reached, limits):  # type: ignore[no-untyped-def]
+    """Ride towards a goal until it is near; returns the index reached, and curvature, position and heading there.
+
+    Args:
+        values: ``(n,)`` curvatures, written from ``index`` on.
+        index: where the ride goes on.
+        curvature: there, 1/m.
+        x: there, m.
+        y: there, m.
+        heading: there, rad.
+        goal: ``(2,)`` m.
+        reached: the goal that is left here, towards which the first step still goes; the same at the start of a ride.
+        limits: wanted and smallest radius of turns, half length and half width of the inner rectangle, m.
+    """
+    radius, smallest, inner_x, inner_y = limits
+    for place in range(index, len(values)):
+        dx, dy = goal[0] - x, goal[1] - y
+        if place == index and index > 0:
+            dx, dy = reached[0] - x, reached[1] - y
+        elif dx * dx + dy * dy < (1.2 * smallest) ** 2:
+            return place, curvature, x, y, heading
+        values[place] = curvature
+        bearing = math.atan2(dy, dx) - heading
+        bearing -= 2.0 * math.pi * np.round(bearing / (2.0 * math.pi))
         # a ride begins straight
-        sharpest = min(1.0, index * SPACING / RUN_UP) / radius
+        onset = min(1.0, place * SPACING / RUN_UP)
+        sharpest = onset / radius
         # near a wall, or for a goal inside the circle of the present turn, a tighter turn is needed
-        if dx * dx + dy * dy < (2.0 * radius) ** 2 or abs(x) > inner[0] or abs(y) > inner[1]:
-            sharpest = max(sharpest, min(1.0, index * SPACING / RUN_UP) / smallest_radius)
+        if dx * dx + dy * dy < (2.0 * radius) ** 2 or abs(x) > inner_x or abs(y) > inner_y:
+            sharpest = max(sharpest, onset / smallest)
         wanted = max(-sharpest, min(sharpest, 0.5 * bearing))
         # a rider changes the steering angle over one or two metres
         curvature += (wanted - curvature) * SPACING / 1.2
         heading += curvature * SPACING
         x, y = x + math.cos(heading) * SPACING, y + math.sin(heading) * SPACING
-    return Path(values, start)
+    return len(values), curvature, x, y, heading
