@@ -10,7 +10,7 @@ import copy
 import functools
 import math
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple, TypeVar, cast
 
@@ -44,6 +44,15 @@ class Block(NamedTuple):
     pose: Mapping[str, np.ndarray]
     truth: Mapping[str, np.ndarray]
     scored: np.ndarray
+
+    def rows(self, part: slice) -> Block:
+        """Some of its time steps."""
+
+        def cut(arrays: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+            return {name: values[part] for name, values in arrays.items()}
+
+        time, measurements, pose, truth, scored = self
+        return Block(time[part], cut(measurements), cut(pose), cut(truth), scored[part])
 
 
 @dataclass(frozen=True)
@@ -120,6 +129,10 @@ class PoseEnv(DrawnEnv):
         """The next time steps of the episode: at least one, at most ``most``; the first block begins with step 0."""
         raise NotImplementedError
 
+    def ending(self) -> tuple[int, bool]:
+        """The step after which the episode is over, as far as it is known, and whether it is terminated there."""
+        return self._last_step, False
+
     def save_source(self) -> Any:
         """The state of :meth:`next_block`, as plain data that later calls do not change."""
         return None
@@ -165,7 +178,33 @@ class PoseEnv(DrawnEnv):
         if self._row == len(self._block.time):
             self._block, self._row = self.next_block(self._last_step + 1 - self._step), 0
         self._show(self._step)
-        return self._observe(), reward, False, self._step >= self._last_step, self._info()
+        last, terminates = self.ending()
+        over = self._step >= last
+        if over:
+            self._last_step = self._step
+        return self._observe(), reward, over and terminates, over and not terminates, self._info()
+
+    def rest(self) -> Iterator[Block]:
+        """The time steps from the present one to the last, in blocks: stepping through them without an agent.
+
+        The episode is over then.
+
+        Raises:
+            RuntimeError: :meth:`reset` was not called.
+        """
+        if self._block is None:
+            raise RuntimeError("call reset first: there is no episode")
+        while True:
+            left = self.ending()[0] + 1 - self._step
+            block = self._block.rows(slice(self._row, self._row + left))
+            yield block
+            count = len(block.time)
+            if count == left:
+                self._step, self._row = self._step + count - 1, self._row + count - 1
+                self._last_step = self._step
+                return
+            self._step += count
+            self._block, self._row = self.next_block(self._last_step + 1 - self._step), 0
 
     def _checked(self, action: np.ndarray) -> np.ndarray:
         estimate = np.array(action, dtype=float)

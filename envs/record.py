@@ -15,6 +15,7 @@ import numpy as np
 from ..filters.support.parallel import in_parallel, progress_bar
 from ..filters.support.seeds import child_seeds, root_seed
 from ..filters.support.version import poise_version
+from .base import Block, PoseEnv
 from .data.trajectory import Trajectory, load_trajectory
 from .registration import make_environment
 
@@ -54,6 +55,13 @@ def record(
         # environments of this package give the measurement itself, others an observation to be undone
         measured = getattr(env.unwrapped, "measurement", None)
         observation, info = env.reset(seed=seed)
+        if policy is None and steps is None and plays_alone(env):
+            trajectory = joined(list(env.unwrapped.rest()), describe(env, seed))
+            bar.update(len(trajectory) - 1)
+            terminated = env.unwrapped.ending()[1]
+            return trajectory.replace(
+                metadata=trajectory.metadata | {"ended": "terminated" if terminated else "truncated"}
+            )
         rows, infos, ended = [measured() if measured else suite.to_measurement(observation)], [info], "steps"
         for _ in itertools.count() if steps is None else range(steps):
             observation, _, terminated, truncated, info = env.step(choose(observation))
@@ -64,6 +72,40 @@ def record(
                 ended = "terminated" if terminated else "truncated"
                 break
         return join(rows, infos, describe(env, seed) | {"ended": ended})
+
+
+def plays_alone(env: Any) -> bool:
+    """Whether nobody looks at the single steps of an episode, so that it can be played a block at a time."""
+    from gymnasium.wrappers import OrderEnforcing, PassiveEnvChecker
+
+    while isinstance(env, OrderEnforcing | PassiveEnvChecker):
+        env = env.env
+    return isinstance(env, PoseEnv) and env.render_mode is None
+
+
+def joined(blocks: list[Block], metadata: dict[str, Any]) -> Trajectory:
+    """A trajectory from the blocks of an episode."""
+
+    def stacked(part: str) -> dict[str, np.ndarray]:
+        names = getattr(blocks[0], part)
+        return {name: np.concatenate([getattr(block, part)[name] for block in blocks]) for name in names}
+
+    return rated(
+        Trajectory(
+            time=np.concatenate([block.time for block in blocks]),
+            measurements=stacked("measurements"),
+            truth=stacked("pose") | stacked("truth"),
+            mask=np.concatenate([block.scored for block in blocks]),
+            metadata=metadata,
+        )
+    )
+
+
+def rated(trajectory: Trajectory) -> Trajectory:
+    """The same with the rate of its samples (Hz) in the metadata, where there are several."""
+    if len(trajectory) < 2:
+        return trajectory
+    return trajectory.replace(metadata=trajectory.metadata | {"rate": 1.0 / trajectory.dt})
 
 
 @contextmanager
@@ -114,7 +156,7 @@ def join(rows: list[Mapping[str, Any]], infos: list[Mapping[str, Any]], metadata
         mask=np.array([bool(info.get("scored", True)) for info in infos]),
         metadata=metadata,
     )
-    return trajectory.replace(metadata=metadata | {"rate": 1.0 / trajectory.dt}) if len(trajectory) > 1 else trajectory
+    return rated(trajectory)
 
 
 def describe(env: Any, seed: int) -> dict[str, Any]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...filters.bicycle.geometry import RiderGeometry
 from ...filters.core.quantity import Quantity
-from ..base import Block, Observation, PoseEnv, renamed
+from ..base import Block, PoseEnv, renamed
 from ..drawn import Scene
 from ..sensors.ideal import STANDARD_GRAVITY, Sampling
 from ..sensors.sensor import Sensor
@@ -260,18 +260,10 @@ class RiderBicycleEnv(PoseEnv):
         truth = {**other_truth(log), **biases}
         return Block(log.time, measurements, pose, truth, np.ones(len(log.time), bool))
 
-    def step(self, action: np.ndarray) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
-        """Score ``action``, the estimate for the last observation, then advance by one time step; a fall terminates.
-
-        Raises:
-            ValueError: the action has another shape than the action space, or is not finite.
-            RuntimeError: :meth:`reset` was not called, or the episode is over.
-        """
-        observation, reward, _, truncated, info = super().step(action)
-        terminated = self._step >= self._source.fallen_at
-        if terminated:
-            self._last_step = self._step
-        return observation, reward, terminated, truncated and not terminated, info
+    def ending(self) -> tuple[int, bool]:
+        """The last step, or that of a fall, which terminates the episode."""
+        fallen_at = self._source.fallen_at
+        return (int(fallen_at), True) if fallen_at <= self._last_step else (self._last_step, False)
 
     def save_source(self) -> tuple[SavedRide, Any]:
         """The ride, and the sensors' state."""

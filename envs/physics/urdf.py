@@ -61,7 +61,7 @@ class Tree:
 
     def __init__(self, name: str) -> None:
         self.name = name
-        self._links: list[str] = []
+        self._links: list[tuple[str, Sequence[str]]] = []
         self._joints: list[str] = []
 
     def link(self, name: str, mass: float, inertia: Vector, centre: Vector, shapes: Sequence[str] = ()) -> None:
@@ -81,7 +81,7 @@ class Tree:
             f'<mass value="{float(mass)!r}"/>'
             f'<inertia ixx="{xx!r}" iyy="{yy!r}" izz="{zz!r}" ixy="0" ixz="0" iyz="0"/></inertial>'
         )
-        self._links.append("\n".join([head, *shapes, "</link>"]))
+        self._links.append((head, shapes))
 
     def joint(
         self, parent: str, child: str, origin: Vector, axis: Vector | None = None, *, slides: bool = False
@@ -100,6 +100,11 @@ class Tree:
             f'<origin xyz="{_row(origin)}"/>{turn}</joint>'
         )
 
-    def text(self) -> str:
-        """The URDF, in short lines: PyBullet reads no more than 8 KiB of a line."""
-        return "\n".join([f'<robot name="{self.name}">', *self._links, *self._joints, "</robot>"])
+    def text(self, *, shapes: bool = True) -> str:
+        """The URDF, in short lines: PyBullet reads no more than 8 KiB of a line.
+
+        Args:
+            shapes: whether to have something to draw, which takes most of the time of loading.
+        """
+        links = [line for head, drawn in self._links for line in (head, *(drawn if shapes else ()), "</link>")]
+        return "\n".join([f'<robot name="{self.name}">', *links, *self._joints, "</robot>"])

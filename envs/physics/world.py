@@ -64,7 +64,7 @@ class Physics:
         self.client = -1
         if not time_step > 0.0:
             raise ValueError(f"time_step must be positive, got {time_step}")
-        self.time_step = float(time_step)
+        self.time_step, self.gui = float(time_step), gui
         self.gravity = float(gravity)
         self.steps = 0
         self.changes = 0

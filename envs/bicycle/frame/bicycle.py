@@ -116,7 +116,7 @@ class Bicycle:
         tree = bicycle_tree(parameters)
         if extend is not None:
             extend(tree)
-        self.body = Multibody(physics, physics.load_urdf(tree.text()))
+        self.body = Multibody(physics, physics.load_urdf(tree.text(shapes=physics.gui)))
         wheels = (parameters.rear_wheel, parameters.front_wheel)
         self._bristles = np.zeros((2, 2))
         self.tyres = [
