@@ -143,7 +143,7 @@ class Carried(Checked):
 
     Attributes:
         duration: length where none is asked for, s.
-        running: whether they run.
+        running_share: of episodes in which they run.
         carriages: names of :data:`CARRIAGES`; an episode draws one.
         first_rest: at the start, standing, s.
         cadence: steps a second, 1/s; walking.
@@ -160,7 +160,7 @@ class Carried(Checked):
     """
 
     duration: float = 60.0
-    running: bool = False
+    running_share: float = 0.0
     carriages: tuple[str, ...] = ("hand", "swinging", "pocket")
     first_rest: Range = (1.0, 1.0)
     cadence: Range = (1.4, 2.2)
@@ -186,15 +186,16 @@ class Carried(Checked):
         duration = self.duration if duration is None else duration
         motion, over = generator.spawn(2)
         carriage = CARRIAGES[self.carriages[motion.integers(len(self.carriages))]]
-        if self.running:
+        runs = motion.random() < self.running_share
+        if runs:
             carriage = running(carriage)
         start, cadence = (
             log_uniform(motion, self.first_rest),
-            log_uniform(motion, self.running_cadence if self.running else self.cadence),
+            log_uniform(motion, self.running_cadence if runs else self.cadence),
         )
         walks = self._walks(motion, start, duration)
         steps = Steps.draw(motion, duration, cadence, log_uniform(motion, self.step_jitter))
-        speed = log_uniform(motion, self.speed) * (3.0 if self.running else 1.0)
+        speed = log_uniform(motion, self.speed) * (3.0 if runs else 1.0)
         path = Path.draw(motion, duration, speed, log_uniform(motion, self.turning), walks)
         swing = self._swing(motion, carriage, steps, cadence, walks, duration)
         lever = (0.0, 0.0, -log_uniform(motion, carriage.limb))

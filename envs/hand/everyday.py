@@ -30,7 +30,7 @@ EVERYDAY: Mapping[str, HandHeld | Carried] = MappingProxyType(
             CALM, rest_shares=(0.5,) * 4, in_hand_share=0.0, longest=(2.0, 8.0), over=replace(ALONE, set_down_share=1.0)
         ),
         "carried-walking": Carried(),
-        "carried-running": Carried(running=True),
+        "carried-running": Carried(running_share=1.0),
         "worn-walking": Carried(carriages=("pocket",), over=replace(ALONE, tissue_share=1.0)),
     }
 )
@@ -38,7 +38,7 @@ EVERYDAY: Mapping[str, HandHeld | Carried] = MappingProxyType(
 
 SUMMARIES: Mapping[str, str] = MappingProxyType(
     {
-        "hand-held": "A device in the hand, as broad as recordings: all of the following seven at random",
+        "hand-held": "A device in the hand, as broad as recordings: turns, shakes and rests at random, with every part below",
         "rotation": "Rotation by hand about all axes, 1 to 8 rad/s rms, as in BROAD",
         "tremor": "A still hand with physiological tremor, 8 to 12 Hz",
         "drifting": "A still hand that wanders slowly, up to 0.3 m/s rms below 0.2 Hz",

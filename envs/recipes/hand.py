@@ -1,7 +1,7 @@
-"""Hand motions, sensors and mountings, drawn wider than test data so that recordings lie inside.
+"""Motions of hand-held and carried devices, sensors and mountings, drawn wider than test data: recordings lie inside.
 
-Rests of any length, motions from tremor to shaking, at 50 to 300 Hz, with random sensor, mounting and motion parameters
-in each episode.
+Rests of any length, motions from tremor to shaking and running, at 50 to 300 Hz, with random sensor, mounting and
+motion parameters in each episode.
 """
 
 from __future__ import annotations
@@ -15,10 +15,11 @@ import numpy as np
 from ...filters.core import rotation
 from ...filters.support.ranges import Range, log_uniform
 from ..data.trajectory import Trajectory
+from ..hand.carried import Carried
+from ..hand.hand_held import HandHeld
 from ..sensors.ideal import Mounting, mounted
 from ..sensors.suite import imu_suite
 from .devices import VariedSensors
-from .hand_motion import Shaking, VariedMotion
 from .recipe import Recipe, unspawned
 
 
@@ -27,8 +28,7 @@ class HandRecipe(Recipe):
     """A distribution of hand motions, devices and mountings; no physics engine is used.
 
     An episode has the channels ``imu/gyr`` (rad/s) and ``imu/acc`` (m/s²), NaN where a sample is lost, and the truth
-    ``orientation`` (sensor to world) and ``position`` (of the sensor, m). The defaults are the distribution on which
-    the shipped network was trained.
+    ``orientation`` (sensor to world) and ``position`` (of the sensor, m).
     """
 
     kind: ClassVar[str] = "hand"
@@ -43,9 +43,11 @@ class HandRecipe(Recipe):
     """Hz; below it instants alias what means do not"""
     lever_arm: Range = (0.005, 0.2)
     """m, standard deviation per axis of the sensor's position on the hand"""
-    motion: VariedMotion = field(default_factory=VariedMotion)
+    held: HandHeld = field(default_factory=lambda: HandHeld(first_rest=(0.3, 40.0), moving_start_share=0.15))
+    carried: Carried = field(default_factory=lambda: Carried(first_rest=(0.3, 20.0), running_share=0.15))
+    carried_share: float = 0.25
+    """of the episodes in which the device is carried, not moved by the hand alone"""
     sensors: VariedSensors = field(default_factory=VariedSensors)
-    shaking: Shaking = field(default_factory=Shaking)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -53,14 +55,14 @@ class HandRecipe(Recipe):
             raise ValueError(f"duration must be two samples at least, got {self.duration} s")
 
     def draw(self, seed: int | np.random.SeedSequence, name: str = "randomised") -> Trajectory:
-        """Simulate one episode; separate children of the seed are used for motion, setting, shaking and errors.
+        """Simulate one episode; separate children of the seed are used for motion, setting and errors.
 
         Args:
             seed: of this episode.
             name: for the metadata.
         """
         sequence = unspawned(seed)
-        motion, setting, shaking, noise = (np.random.default_rng(child) for child in sequence.spawn(4))
+        motion, setting, noise = (np.random.default_rng(child) for child in sequence.spawn(3))
         rate = log_uniform(setting, self.rates)
         means = rate < self.instant_rate or setting.random() >= self.instant_share
         sampling: Literal["interval", "instant"] = "interval" if means else "instant"
@@ -68,14 +70,12 @@ class HandRecipe(Recipe):
         mounting = Mounting(lever, tuple(rotation.random(setting)))
         suite = imu_suite(self.sensors.draw(setting), rate, lever, mounting.rotation, sampling=sampling)
         suite.reset(noise)
-        gesture = self.motion.draw(motion, self.duration)
+        carried = setting.random() < self.carried_share
+        gesture = (self.carried if carried else self.held).draw(motion, self.duration)
         times = np.arange(1, math.floor(self.duration * rate) + 1) / rate
         states = gesture.sample(times)
         before = gesture.sample(times - 1.0 / rate)
         measurements = suite.simulate(states, before=before).measurements
-        shaken = measurements["imu/acc"] + self.shaking.draw(shaking, times, mean=means)
-        limit = self.sensors.accelerometer_full_scale
-        measurements["imu/acc"] = np.clip(shaken, -limit, limit)
         metadata: dict[str, Any] = {"name": name, "source": "simulation", "rate": rate, "sampling": sampling}
         sensor = mounted(states, mounting)
         truth = {"orientation": sensor.orientation, "position": sensor.position}

@@ -28,7 +28,14 @@ class ShippedRecipe(NamedTuple):
 
 RECIPES: dict[str, ShippedRecipe] = {
     "hand-held": ShippedRecipe(
-        "hand", "a sensor moved by hand in place, at rest or shaken, from laboratory to phone grade", {}
+        "hand",
+        "a sensor in the hand, at rest or shaken, tapped, put down, from laboratory to phone grade",
+        {"carried_share": 0.0},
+    ),
+    "carried": ShippedRecipe(
+        "hand",
+        "a phone carried by somebody who walks or runs: in the hand, swinging, in a pocket",
+        {"carried_share": 1.0},
     ),
     "rider": ShippedRecipe("rider", "rides of anybody anywhere with sensors of several grades", {}),
 }

@@ -27,7 +27,7 @@ class Role:
 
 ROLES = {
     "hand": Role("a sensor or device moved by hand", "hand-held", "imu", True),
-    "carried": Role("a phone carried by somebody who walks or runs", "hand-held", "imu", True),
+    "carried": Role("a phone carried by somebody who walks or runs", "carried", "imu", True),
     "chest": Role("a sensor on the chest of a rider", "rider", "trunk_imu", False),
     "head": Role("a sensor on the head of a rider", "rider", "trunk_imu", False),
 }

@@ -11,13 +11,13 @@ import pytest
 from poise.baselines.learned.dataset import LearnedDataset, rotated, sequence_of, simulation_digest
 from poise.baselines.learned.gravity_aligned_frame import FEATURES, GravityAlignedFrame
 from poise.envs.data.trajectory import Trajectory
+from poise.envs.hand.hand_held import HandHeld
 from poise.envs.recipes.hand import HandRecipe
-from poise.envs.recipes.hand_motion import Shaking, VariedMotion
 from poise.filters.core import rotation
 from poise.filters.core.estimator import run
 from poise.filters.core.observer import Observer
 
-SHORT = HandRecipe(duration=12.0, motion=VariedMotion(first_rest=(0.3, 2.0), longest=(4.0, 6.0)))
+SHORT = HandRecipe(duration=12.0, carried_share=0.0, held=HandHeld(first_rest=(0.3, 2.0), longest=(4.0, 6.0)))
 
 
 @pytest.fixture(scope="module")
@@ -46,17 +46,6 @@ def test_rates_differ_and_the_hand_goes_nowhere(episodes: list[Trajectory]) -> N
         force = rotation.rotate(episode.truth["orientation"], episode.measurements["imu/acc"])
         # a velocity of some decimetres a second after 12 s, and the errors of the sensor
         np.testing.assert_allclose(np.nanmean(force, axis=0), [0.0, 0.0, 9.80665], atol=0.6)
-
-
-def test_shaking_has_no_net_velocity() -> None:
-    times = np.arange(1, 3001) / 100.0
-    shaking = Shaking(vibrating_share=1.0, tapped_share=1.0)
-    for seed in range(5):
-        shaken = shaking.draw(np.random.default_rng(seed), times, mean=True)
-        assert np.abs(shaken).max() > 0.3
-        velocity = np.cumsum(shaken, axis=0) / 100.0
-        bound = 3 * shaking.vibration[1] / (2.0 * np.pi * shaking.frequency[0]) + 2 * shaking.tap[1] * shaking.width[1]
-        assert np.abs(velocity).max() < 2.0 * bound
 
 
 def test_the_vertical_in_the_level_frame_is_nearly_vertical(dataset: LearnedDataset) -> None:

@@ -20,8 +20,8 @@ from poise.baselines.learned.gru_module import GruModule
 from poise.baselines.weights_io import save_weights
 from poise.envs.data.trajectory import Trajectory
 from poise.envs.hand.gestures import make_gesture
+from poise.envs.hand.hand_held import HandHeld
 from poise.envs.recipes.hand import HandRecipe
-from poise.envs.recipes.hand_motion import VariedMotion
 from poise.envs.sensors.suite import imu_suite
 from poise.filters.core import rotation
 from poise.filters.core.estimator import Estimator, run, run_by_steps
@@ -49,7 +49,9 @@ def network(module: GruModule) -> GruNetwork:
 @pytest.fixture(scope="module")
 def episode() -> Trajectory:
     """Some seconds at a rate that is no multiple of the network's, with drop-outs, also at the start."""
-    trajectory = HandRecipe(duration=6.0, rates=(137.0, 137.0), motion=VariedMotion(first_rest=(0.3, 0.4))).draw(5)
+    trajectory = HandRecipe(
+        duration=6.0, rates=(137.0, 137.0), carried_share=0.0, held=HandHeld(first_rest=(0.3, 0.4))
+    ).draw(5)
     measurements = {name: values.copy() for name, values in trajectory.measurements.items()}
     measurements["imu/acc"][:4] = np.nan
     measurements["imu/acc"][200:230] = np.nan

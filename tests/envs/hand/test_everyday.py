@@ -73,7 +73,7 @@ def test_a_device_on_the_table_lies_still_and_one_in_the_hand_does_not():
 @pytest.mark.parametrize("running", [False, True])
 def test_walkers_bounce_once_a_step(carriage, running):
     config = Carried(
-        running=running,
+        running_share=float(running),
         carriages=(carriage,),
         cadence=(1.9, 1.9),
         running_cadence=(2.7, 2.7),

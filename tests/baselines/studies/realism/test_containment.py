@@ -13,11 +13,11 @@ from poise.baselines.studies.kit import Study
 from poise.baselines.studies.realism.containment import containment_rows, ranges, simulated_summaries, summary
 from poise.baselines.studies.realism.ranks import agreement, kendall
 from poise.baselines.studies.realism.roles import recorded
+from poise.envs.hand.hand_held import HandHeld
 from poise.envs.recipes.hand import HandRecipe
-from poise.envs.recipes.hand_motion import VariedMotion
 from poise.scripts.main import main
 
-SHORT = HandRecipe("short", duration=30.0, motion=VariedMotion(first_rest=(0.3, 2.0)))
+SHORT = HandRecipe("short", duration=30.0, carried_share=0.0, held=HandHeld(first_rest=(0.3, 2.0)))
 WIDTHS = (25.0, 40.0)
 
 
@@ -30,7 +30,8 @@ def test_episodes_of_the_recipe_lie_inside_and_a_stronger_motion_outside(tmp_pat
         inside, count = map(int, row["inside"].split("/"))
         # two of twenty values lie beyond 5 and 95 %
         assert count - inside == 2, row
-    violent = replace(SHORT, rates=(100.0, 100.0), motion=VariedMotion(acceleration=(40.0, 50.0), rate=(20.0, 30.0)))
+    fierce = HandHeld(acceleration=(40.0, 50.0), rate=(20.0, 30.0), largest_acceleration=50.0, largest_rate=30.0)
+    violent = replace(SHORT, rates=(100.0, 100.0), held=fierce)
     outside = summary(violent.episode(1, 0), "imu", [25.0], "orientation")
     rows = {row["statistic"]: row for row in containment_rows([outside], simulated)}
     assert rows["gyr_rms"]["inside"] == "0/1"
