@@ -38,7 +38,7 @@ EVERYDAY: Mapping[str, HandHeld | Carried] = MappingProxyType(
 
 SUMMARIES: Mapping[str, str] = MappingProxyType(
     {
-        "hand-held": "A device in the hand, as broad as recordings: turns, shakes and rests at random, with every part below",
+        "hand-held": "A device in the hand, as broad as recordings: turns, shakes, rests, every part below",
         "rotation": "Rotation by hand about all axes, 1 to 8 rad/s rms, as in BROAD",
         "tremor": "A still hand with physiological tremor, 8 to 12 Hz",
         "drifting": "A still hand that wanders slowly, up to 0.3 m/s rms below 0.2 Hz",
