@@ -98,7 +98,7 @@ def motion_spectra(
     signals = {"gyr": trajectory.measurements[f"{site}/gyr"], "force": trajectory.measurements[f"{site}/acc"]}
     if orientation in trajectory.truth:
         turned = trajectory.truth[orientation]
-        if trajectory.metadata.get("sampling", "instant") == "interval":
+        if reports_means(trajectory, site):
             # a mean over the interval is in the axes of its middle
             turned = rotation.multiply(turned, rotation.exp(-0.5 / rate * signals["gyr"]))
         signals["acc"] = rotation.rotate(turned, signals["force"]) - np.array([0.0, 0.0, STANDARD_GRAVITY])
@@ -113,6 +113,14 @@ def motion_spectra(
         )
     except ValueError as reason:
         raise ValueError(f"{trajectory.name}, {site}: {reason}") from None
+
+
+def reports_means(trajectory: Trajectory, site: str) -> bool:
+    """Whether the accelerometer reports means over its interval, as far as the metadata say."""
+    described = trajectory.metadata.get("sensors")
+    sensors = described.get("sensors", []) if isinstance(described, dict) else []
+    sampling = [each.get("sampling") for each in sensors if each.get("channel") == f"{site}/acc"]
+    return (sampling or [trajectory.metadata.get("sampling")])[0] == "interval"
 
 
 def velocity_spectrum(position: np.ndarray, rate: float, segment: float = 20.0) -> Spectrum | None:

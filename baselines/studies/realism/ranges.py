@@ -1,0 +1,63 @@
+"""Ranges within which simulated numbers are believable, each with its source."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Believable:
+    """The range of a number."""
+
+    low: float
+    high: float
+    unit: str
+    source: str
+
+    def holds(self, value: float) -> bool:
+        """Whether a value is inside."""
+        return self.low <= value <= self.high
+
+    @property
+    def text(self) -> str:
+        """``3 … 10 Hz``, ``≥ -5 N``."""
+        if math.isinf(self.high):
+            return f"≥ {self.low:g} {self.unit}".strip()
+        if math.isinf(self.low):
+            return f"≤ {self.high:g} {self.unit}".strip()
+        return f"{self.low:g} … {self.high:g} {self.unit}".strip()
+
+
+CHEST = "chest sensor of a recorded ride of 307 s (imt, head_chest_bike), with a margin for other riders and roads"
+SADDLE = "a saddle is about 280 mm long and 140 to 280 mm wide, and nothing holds a rider down"
+BELIEVABLE = {
+    "trunk gyroscope rms": Believable(20.0, 45.0, "deg/s", CHEST),
+    "trunk gyroscope 95 % frequency": Believable(3.0, 10.0, "Hz", CHEST),
+    "least force of a load cell": Believable(-5.0, math.inf, "N", SADDLE),
+    "centre of pressure across": Believable(-140.0, 140.0, "mm", SADDLE),
+    "centre of pressure along": Believable(-130.0, 130.0, "mm", SADDLE),
+}
+"""Quantity → range."""
+
+
+def judged(quantity: str, values: Mapping[str, float]) -> dict[str, Any]:
+    """A row of a table: the range, how many values are inside, which are not, and the source of the range.
+
+    Args:
+        quantity: a key of :data:`BELIEVABLE`.
+        values: where → value.
+    """
+    within = BELIEVABLE[quantity]
+    outside = [f"{where} ({value:.3g})" for where, value in values.items() if not within.holds(value)]
+    return {
+        "quantity": quantity,
+        "found from": min(values.values()),
+        "to": max(values.values()),
+        "accepted": within.text,
+        "inside": f"{len(values) - len(outside)}/{len(values)}",
+        "outside": ", ".join(outside) or "none",
+        "source": within.source,
+    }
