@@ -25,7 +25,7 @@ from .ride import Ride, RideMemory
 from .truth import Quaternions, continuous_pose, segment_states, true_pose
 
 SETTLING = 1.0
-"""s of riding before the first sample"""
+"""s of riding before time 0, at which every suite of sensors takes its first sample"""
 KEPT = 8
 """snapshots that can be restored without riding again"""
 
@@ -63,6 +63,9 @@ class RideSource:
         tyre: of both wheels.
         sampling: of the contact forces, see :class:`.RideRecorder`.
         surface: of the road; None for that of each scenario.
+
+    Raises:
+        ValueError: a sample takes longer than the ride before time 0.
     """
 
     def __init__(
@@ -80,6 +83,9 @@ class RideSource:
         self.bicycle, self.style, self.duration, self.rate = bicycle, style, duration, rate
         self.physics_rate, self.fidelity = physics_rate, fidelity
         self.tyre, self.sampling, self.surface = tyre, sampling, surface
+        if rate * SETTLING < 1.0:
+            raise ValueError(f"rate must be at least {1.0 / SETTLING:g} Hz, got {rate:g}")
+        self._settling, self._each = round(SETTLING * physics_rate), round(physics_rate / rate)
         self.ride: Ride | None = None
         self.fallen_at = math.inf
         self._kept: dict[str, RideMemory] = {}
@@ -90,7 +96,7 @@ class RideSource:
         self.ground: Ground
 
     def begin(self, scenario: Scenario, subject: Any, motion: np.random.Generator) -> None:
-        """Begin a ride at the end of its first second; what was drawn is kept to ride it again.
+        """Begin a ride one sample before its first second is over; what was drawn is kept to ride it again.
 
         The same draw restores the state kept there. Another draw of the same person begins in the same world; another
         person, or a previous fall, requires a new world. All three give the same ride, bit for bit.
@@ -106,8 +112,8 @@ class RideSource:
         else:
             self.ride.restore(self._first)
         assert self.ride is not None
-        self._recorder = RideRecorder(self.ride, round(self.physics_rate / self.rate), self.sampling)
-        self._began = self.ride.physics.time + 1.0 / self.rate
+        self._recorder = RideRecorder(self.ride, self._each, self.sampling)
+        self._began = self._settling * self.ride.physics.time_step
         self._samples, self.fallen_at = 0, math.inf
         self._quaternions: Quaternions = {}
 
@@ -141,7 +147,7 @@ class RideSource:
             )
             self._world_key, self.posture = world, posture
         self.ground = course.ground
-        for _ in range(round(SETTLING * self.rate) * round(self.physics_rate / self.rate)):
+        for _ in range(self._settling - self._each):
             self.ride.step()
         self._first = self.ride.save()
 

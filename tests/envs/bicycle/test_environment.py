@@ -185,6 +185,22 @@ def test_two_processes_agree_bitwise():
     assert len(hashes[0]) == 64
 
 
+@pytest.mark.parametrize("fidelity", ["full", "lumped"])
+def test_time_zero_is_one_instant_whatever_the_rate_of_the_sensors(fidelity):
+    rides = []
+    for rate in (50.0, 100.0, 250.0 / 3.0, 250.0):
+        env = make(rate=rate, duration=0.5, suite="two-gyro", fidelity=fidelity)
+        rides.append(poise.record(env, seed=3))
+        env.close()
+    fastest = rides[-1]
+    for ride in rides:
+        assert ride.time[0] == 0.0
+        shared = np.isin(np.round(fastest.time, 6), np.round(ride.time, 6))
+        assert shared.sum() >= 6
+        place = ride.truth["bicycle/position"][np.isin(np.round(ride.time, 6), np.round(fastest.time, 6))]
+        assert np.array_equal(place, fastest.truth["bicycle/position"][shared])
+
+
 def test_a_fall_terminates():
     env = make(duration=10.0, suite="two-gyro")
     env.reset(seed=0)
