@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 from ...filters.core.kalman import KalmanFilter
+from ...filters.support.seeds import child_seeds, root_seed
 from ..base import renamed
 from ..data.trajectory import Trajectory
 from ..drawn import Scene, Shown
+from ..episodes import EpisodeStore
 from ..gain_tuning import GainTuningEnv
 from ..record import record
 from ..sensors.ideal import Sampling
@@ -25,8 +28,8 @@ Scenarios = str | Scenario | Sequence[str | Scenario]
 class RiderBicycleGainEnv(GainTuningEnv):
     """An agent tunes the gains of a filter on a ride: of one IMU's attitude, or of rider and bicycle.
 
-    Every episode is a new ride of ``poise/RiderBicycle-v0`` with new sensor errors, simulated at reset and then
-    filtered: a step runs the filter over ``interval`` seconds (several samples) with the gains of the action. A bicycle
+    Every episode is a ride of ``poise/RiderBicycle-v0`` with its sensor errors, one of ``rides`` different ones: a step
+    runs the filter over ``interval`` seconds (several samples) with the gains of the action. A bicycle
     is difficult for filters with an accelerometer: it leans into its turns, so that the mean specific force points
     along the bicycle's upward axis and not along the world's. Observations do not contain the truth, and actions do not
     change the ride.
@@ -67,9 +70,9 @@ class RiderBicycleGainEnv(GainTuningEnv):
 
     ## Cost
 
-    A reset simulates the whole ride: with the lumped rider a tenth of its duration or so, with the full one a
-    quarter. For long trainings, record rides once and pass their :func:`.imu_of` to
-    ``poise/ReplayGain-v0``, whose resets need no simulation.
+    A ride is simulated when it is first drawn and kept in the user's cache folder (``POISE_CACHE`` names another one),
+    so that later resets, also those of other processes and sessions, read it. With ``rides=None`` every reset
+    simulates a ride. The folder keeps at most 1 GB of the rides used last, and none of another version of the code.
 
     ## Arguments
 
@@ -87,6 +90,8 @@ class RiderBicycleGainEnv(GainTuningEnv):
         physics_rate: physics steps per second, Hz; a multiple of 250 Hz and of ``rate``.
         noise_scale: factor on all sensor errors.
         sampling: ``interval`` or ``instant``.
+        rides: number of different rides, each as likely as any other; None for a new one in every episode.
+        rides_seed: root seed of these rides; evaluate with another one than in training.
         common: ``gains``, ``quantity``, ``interval`` (s), ``reward``, ``consistency`` of
             :class:`poise.envs.gain_tuning.GainTuningEnv`, and ``render_mode``.
 
@@ -98,7 +103,7 @@ class RiderBicycleGainEnv(GainTuningEnv):
     * v0: first release.
     """
 
-    _episode_fields = (*GainTuningEnv._episode_fields, "_ridden", "_scenery")
+    _episode_fields = (*GainTuningEnv._episode_fields, "_ridden", "_rider")
 
     @renamed(grade="noise_scale", place="site")
     def __init__(
@@ -116,9 +121,13 @@ class RiderBicycleGainEnv(GainTuningEnv):
         physics_rate: float = 500.0,
         noise_scale: float = 1.0,
         sampling: Sampling = "interval",
+        rides: int | None = 200,
+        rides_seed: int = 0,
         **common: Any,
     ) -> None:
         super().__init__(filter, **common)
+        if rides is not None and rides < 1:
+            raise ValueError(f"rides must be None or at least 1, got {rides}")
         if site not in SITES:
             raise ValueError(f"site must be one of {list(SITES)}, got {site!r}")
         self.site = site
@@ -130,6 +139,9 @@ class RiderBicycleGainEnv(GainTuningEnv):
         scenarios = [scenario] if isinstance(scenario, str | Scenario) else list(scenario)
         if not scenarios:
             raise ValueError("scenario must name at least one scenario, got none")
+        self._seeds = None if rides is None else child_seeds(root_seed(rides_seed), rides)
+        settings = (subject, style, names, sensors, rate, duration, fidelity, physics_rate, noise_scale, sampling)
+        self._store = EpisodeStore("rides", (scenarios, *settings))
         self.rides = tuple(
             RiderBicycleEnv(
                 each,
@@ -151,11 +163,16 @@ class RiderBicycleGainEnv(GainTuningEnv):
             raise ValueError(f"duration must be one interval at least ({longest:g} s), got {duration}")
 
     def next_trajectory(self) -> Trajectory:
-        """A new ride and new sensor errors."""
+        """A ride and its sensor errors."""
         generator = self.np_random.spawn(1)[0]
-        ride = self.rides[int(generator.integers(len(self.rides)))]
-        self._ridden = record(ride, seed=int(generator.integers(2**32)))
-        self._scenery = ride.scenery
+        number = int(generator.integers(len(self.rides)))
+        ride = self.rides[number]
+        if self._seeds is None:
+            self._ridden = record(ride, seed=int(generator.integers(2**32)))
+        else:
+            seed = self._seeds[int(generator.integers(len(self._seeds)))]
+            self._ridden = self._store.episode((number, seed), partial(record, ride, seed=seed))
+        self._rider = number
         # another person or another ground: the scene is recreated on demand
         super().close()
         return self._ridden if self.of_rides else imu_of(self._ridden, self.site)
@@ -164,7 +181,10 @@ class RiderBicycleGainEnv(GainTuningEnv):
         """Rider, bicycle and ground of the episode."""
         from .course.scene import RideScene
 
-        return RideScene(*self._scenery, gui=gui)
+        ride = self.rides[self._rider]
+        # a ride that was read has no world yet
+        ride.reset(seed=self._ridden.metadata["seed"])
+        return RideScene(*ride.scenery, gui=gui)
 
     def shown(self) -> Shown | None:
         """The whole ride."""

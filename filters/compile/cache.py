@@ -10,7 +10,6 @@ from __future__ import annotations
 import functools
 import hashlib
 import importlib
-import os
 import pickle
 import sys
 import tempfile
@@ -23,7 +22,7 @@ from typing import Any
 
 import numpy as np
 
-from ..support.files import write_text
+from ..support.files import user_cache, write_text
 from ..support.version import ROOT
 
 _LOCK = threading.RLock()
@@ -34,9 +33,7 @@ PATIENCE = 1.0
 
 def cache_folder() -> Path | None:
     """Folder of the printed and compiled filters; None, with one warning, where it cannot be written."""
-    import platformdirs
-
-    folder = Path(os.environ.get("POISE_CACHE") or platformdirs.user_cache_dir("poise")) / "compiled"
+    folder = user_cache("compiled")
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):

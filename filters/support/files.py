@@ -22,6 +22,13 @@ def as_path(value: Any, name: str = "path") -> Path:
     return Path(value)
 
 
+def user_cache(name: str) -> Path:
+    """Folder ``name`` below the one that ``POISE_CACHE`` names, or below the user's cache folder; it may not exist."""
+    import platformdirs
+
+    return Path(os.environ.get("POISE_CACHE") or platformdirs.user_cache_dir("poise")) / name
+
+
 @contextmanager
 def replacing(path: str | Path) -> Iterator[Path]:
     """Give a path to write to; it takes the place of ``path`` at the end, and is removed after an exception.

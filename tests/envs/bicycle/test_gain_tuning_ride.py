@@ -108,6 +108,26 @@ def test_the_geometry_of_the_episode_reaches_the_filter():
     env.close()
 
 
+def test_kept_rides_are_the_same_rides(tmp_path, monkeypatch):
+    monkeypatch.setenv("POISE_CACHE", str(tmp_path))
+    options = {"scenario": "slow", "duration": 0.5}
+    few = [RiderBicycleGainEnv(rides=2, **options) for _ in range(2)]
+    simulated, read = (rewards_of(env, seed=2)[0] for env in few)
+    assert simulated == read
+    assert few[0].trajectory.metadata == few[1].trajectory.metadata
+    seeds = set()
+    for seed in range(8):
+        few[0].reset(seed=seed)
+        seeds.add(few[0].trajectory.metadata["seed"])
+    assert len(seeds) == 2
+    others = [RiderBicycleGainEnv(rides=2, rides_seed=1, **options), RiderBicycleGainEnv(rides=None, **options)]
+    for env in others:
+        env.reset(seed=2)
+        assert env.trajectory.metadata["seed"] not in seeds
+    for env in (*few, *others):
+        env.close()
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -120,6 +140,7 @@ def test_the_geometry_of_the_episode_reaches_the_filter():
         ({"fidelity": "rough"}, "fidelity must be"),
         ({"rate": 33.0}, "physics_rate must be a multiple"),
         ({"noise_scale": -1.0}, "noise_scale"),
+        ({"rides": 0}, "rides must be None or at least 1"),
         ({"render_mode": "ascii"}, "render_mode must be None or one of"),
     ],
 )
