@@ -13,7 +13,9 @@ from ...filters.core.quantity import Quantity
 from ..base import Block, PoseEnv, renamed
 from ..drawn import Scene
 from ..sensors.ideal import STANDARD_GRAVITY, Sampling
+from ..sensors.magnetics import Magnetics
 from ..sensors.sensor import Sensor
+from ..sensors.timing import Timings
 from .course.scenarios import Scenario
 from .course.scenarios import scenario as named_scenario
 from .course.surfaces import Surface
@@ -132,6 +134,11 @@ class RiderBicycleEnv(PoseEnv):
         surface: of the road: a name of :func:`poise.envs.bicycle.course.surfaces.list_surfaces` or a
             :class:`poise.envs.bicycle.course.surfaces.Surface`; ``smooth`` is exact, ``random`` draws one for each
             ride, and None takes that of the scenario.
+        timing: delay, jitter, clock drift and lost packets of all sensors, or of each site (``trunk_imu``,
+            ``relative``, ``seat`` …): a name of :data:`poise.envs.sensors.timing.TIMINGS` or a
+            :class:`poise.envs.sensors.timing.Timing`; None for none.
+        magnetics: disturbances of the magnetic field: a name of :data:`poise.envs.sensors.magnetics.MAGNETICS` or a
+            :class:`poise.envs.sensors.magnetics.Magnetics`; None for none.
         render_mode: ``human`` (a window), ``rgb_array`` or None.
 
     Raises:
@@ -162,6 +169,8 @@ class RiderBicycleEnv(PoseEnv):
         noise_scale: float = 1.0,
         sampling: Sampling = "interval",
         surface: str | Surface | None = None,
+        timing: Timings | None = None,
+        magnetics: str | Magnetics | None = None,
         render_mode: str | None = None,
     ) -> None:
         self.scenario, self.subject, self.style = named_scenario(scenario), subject, style
@@ -184,6 +193,8 @@ class RiderBicycleEnv(PoseEnv):
             "rate": rate,
             "noise_scale": noise_scale,
             "sampling": sampling,
+            "timing": timing,
+            "magnetics": magnetics,
         }
         self.tyre = TyreParameters()
         self._fit(sit(self.parameters, RiderBody() if subject == "random" else rider_body(subject)))

@@ -24,10 +24,12 @@ from ...filters.core import rotation
 from ...filters.core.quantity import GYROSCOPE, Channel
 from ..sensors.ideal import Mounting, Sampling, vector
 from ..sensors.kinds import SensorKind, SiteMotion, sensor_kind
+from ..sensors.magnetics import Magnetics
 from ..sensors.noise import NoiseModel
 from ..sensors.presets import SensorPreset, list_sensor_presets, sensor_preset
 from ..sensors.sensor import Sensor
 from ..sensors.suite import SensorSuite
+from ..sensors.timing import Timings, check_sites, timing_of
 from .drivers import Device
 from .gestures import GestureConfig
 
@@ -252,6 +254,8 @@ def device_suite(
     rate: float | None = None,
     magnetometer: bool | float | None = None,
     sampling: Sampling = "instant",
+    timing: Timings | None = None,
+    magnetics: str | Magnetics | None = None,
 ) -> SensorSuite:
     """The sensors of a device.
 
@@ -261,6 +265,9 @@ def device_suite(
         rate: Hz; None for 100.
         magnetometer: False, True or its rate in Hz; None for what the device has.
         sampling: ``instant`` or ``interval``.
+        timing: of all sensors or for each site (``imu``, ``array``, ``planar``), or a name of :data:`.TIMINGS`; None
+            for that of the errors.
+        magnetics: disturbances of the field, or their name (:data:`.MAGNETICS`); None for none.
 
     Raises:
         ValueError: ``sensors`` is a whole suite, or a magnetometer is wanted whose errors the preset does not know.
@@ -270,7 +277,8 @@ def device_suite(
     preset, rate = array_preset(device.noise if sensors is None else sensors), 100.0 if rate is None else rate
 
     def sensor(channel: Channel, kind: str | SensorKind, noise: NoiseModel, its_rate: float) -> Sensor:
-        return Sensor(channel, kind, its_rate, noise, sampling=sampling, device=preset.name)
+        late = preset.timing if timing is None else timing_of(timing, channel.name.split("/")[0])
+        return Sensor(channel, kind, its_rate, noise, sampling=sampling, device=preset.name, timing=late)
 
     chosen = [sensor(device.array.channel, ARRAY, replace(preset.accelerometer, g_sensitivity=0.0), rate)]
     if device.gyroscope and device.planar:
@@ -286,7 +294,8 @@ def device_suite(
     for name, noise in preset.others.items():
         kind = sensor_kind(name)
         chosen.append(sensor(Channel(f"imu/{kind.suffix}", kind.size or 1, kind.unit), kind, noise, rate))
-    return SensorSuite(chosen, rate, field=device.magnetic_field)
+    check_sites(timing, {one.site for one in chosen})
+    return SensorSuite(chosen, rate, field=device.magnetic_field, magnetics=magnetics)
 
 
 def check_planar(device: HandDevice, config: GestureConfig, mounting: Mounting) -> None:

@@ -14,8 +14,10 @@ from ...filters.support.seeds import root_seed
 from ..base import Block
 from ..data.trajectory import Trajectory
 from ..sensors.ideal import BodyState, Mounting, Sampling, mounted, vector
+from ..sensors.magnetics import Magnetics
 from ..sensors.presets import SensorPreset, sensor_preset
 from ..sensors.suite import SensorSuite, imu_suite
+from ..sensors.timing import Timings
 from .devices import HandDevice, actual_array, array_preset, check_planar, device_suite, hand_device
 from .drivers import KinematicDriver, States
 from .gestures import GestureConfig, gesture_config, gesture_name, make_gesture
@@ -89,23 +91,28 @@ def hand_suite(
     magnetometer: bool | float | None = None,
     sampling: Sampling | None = None,
     device: HandDevice | None = None,
+    timing: Timings | None = None,
+    magnetics: str | Magnetics | None = None,
 ) -> SensorSuite:
     """Sensors at the origin of their own frame; arguments as of :class:`.HandMotionEnv`.
 
     Raises:
-        ValueError: ``rate`` or ``magnetometer`` contradicts a whole suite, or a suite a device.
+        ValueError: ``rate``, ``magnetometer``, ``timing`` or ``magnetics`` contradicts a whole suite, or a suite a
+            device.
     """
     if device is not None:
-        return device_suite(device, sensors, rate, magnetometer, sampling or "instant")
+        return device_suite(device, sensors, rate, magnetometer, sampling or "instant", timing, magnetics)
     sensors, sampling = DEFAULT_SENSORS if sensors is None else sensors, sampling or "interval"
     if not isinstance(sensors, SensorSuite):
         preset = sensor_preset(sensors) if isinstance(sensors, str) else sensors
         wanted = preset.magnetometer is not None if magnetometer is None else magnetometer
-        return imu_suite(preset, 100.0 if rate is None else rate, magnetometer=wanted, sampling=sampling)
+        rate = 100.0 if rate is None else rate
+        return imu_suite(preset, rate, magnetometer=wanted, sampling=sampling, timing=timing, magnetics=magnetics)
     if rate is not None and rate != sensors.rate:
         raise ValueError(f"rate must be None or that of the suite, {sensors.rate:g} Hz, got {rate}")
-    if magnetometer is not None:
-        raise ValueError("magnetometer must be None where a whole suite is given: the suite has its own")
+    for name, value in (("magnetometer", magnetometer), ("timing", timing), ("magnetics", magnetics)):
+        if value is not None:
+            raise ValueError(f"{name} must be None where a whole suite is given: the suite has its own, got {value!r}")
     return sensors
 
 
@@ -121,7 +128,7 @@ def sense(suite: SensorSuite, states: States, mounting: Mounting, array: Acceler
     now, earlier = (mounted(part, mounting) for part in states)
     first = suite.sensors[0]
     # where the first sensor sits at this site and runs at this rate, its motion serves for the truth too
-    site = (first.body, Mounting(), first.sampling, suite.rate)
+    site = (first.body, Mounting(), first.sampling, suite.rate, None)
     measurements, biases, motions = suite.simulate(now, array, before=earlier, reference=site)
     truth = {
         "position": now.position,
@@ -173,6 +180,8 @@ def simulate_hand(
     magnetometer: bool | float | None = None,
     lever_arm: Sequence[float] = (0.0, 0.0, 0.0),
     mounting: Sequence[float] = (1.0, 0.0, 0.0, 0.0),
+    timing: Timings | None = None,
+    magnetics: str | Magnetics | None = None,
 ) -> Trajectory:
     """Record an episode of ``HandMotionEnv(drive="kinematic")`` at once, without stepping an environment.
 
@@ -189,6 +198,8 @@ def simulate_hand(
         magnetometer: as for the environment.
         lever_arm: ``(3,)`` m.
         mounting: ``(4,)`` quaternion.
+        timing: as for the environment.
+        magnetics: as for the environment.
 
     Returns:
         Measurements and truth as :func:`poise.record` would give them.
@@ -199,7 +210,7 @@ def simulate_hand(
     check_duration(duration)
     seed = root_seed(seed)
     held = hand_device(device)
-    config, suite = gesture_config(gesture), hand_suite(sensors, rate, magnetometer, sampling, held)
+    config, suite = gesture_config(gesture), hand_suite(sensors, rate, magnetometer, sampling, held, timing, magnetics)
     where = Mounting(vector("lever_arm", lever_arm, 3), vector("mounting", mounting, 4))
     if held is not None:
         check_planar(held, config, where)

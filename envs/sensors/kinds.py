@@ -27,8 +27,9 @@ class SiteMotion:
         earlier: ``instant``: states ``(n, …)`` one physics step before each sample; None where accelerations are known.
         sampling: ``interval`` or ``instant``.
         gravity: m/s².
-        field: ``(3,)`` magnetic field in the world, µT.
+        field: ``(3,)`` the Earth's magnetic field in the world, µT.
         surroundings: further quantities of the environment, for kinds that read them.
+        disturbed: states → magnetic field there ``(n, 3)``, µT; None where it is ``field`` everywhere.
     """
 
     now: BodyState
@@ -38,6 +39,12 @@ class SiteMotion:
     gravity: float
     field: tuple[float, ...]
     surroundings: Any = None
+    disturbed: Callable[[BodyState], np.ndarray] | None = None
+
+    @property
+    def local_field(self) -> np.ndarray:
+        """Magnetic field at the sensor, ``(3,)`` or ``(n, 3)``, world axes, µT."""
+        return np.array(self.field) if self.disturbed is None else self.disturbed(self.now)
 
     @cached_property
     def _mean(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -58,8 +65,18 @@ class SiteMotion:
 
     @cached_property
     def external_acceleration(self) -> np.ndarray:
-        """``(m, 3)`` m/s², sensor axes, of the last m samples: what an accelerometer reads without gravity."""
+        """``(m, 3)`` m/s², sensor axes, of the last m samples: what an accelerometer reads without gravity.
+
+        With ``interval`` the reading has gravity in the attitude half way through the interval, see
+        :func:`.interval_readings`; :attr:`mean_up` is the upward direction there.
+        """
         return self._force(0.0)
+
+    @property
+    def mean_up(self) -> np.ndarray:
+        """``(m, 3)`` upward direction, sensor axes, with which specific force − external acceleration = g · up."""
+        orientation = self.now.orientation if self.sampling == "instant" else self._mean[1]
+        return rotation.up_in_body(orientation)
 
     def _force(self, gravity: float) -> np.ndarray:
         if self.sampling == "instant":
@@ -143,7 +160,7 @@ KINDS: dict[str, SensorKind] = {
             3,
             "µT",
             "mag",
-            lambda motion: magnetometer_reading(motion.now, motion.field),
+            lambda motion: magnetometer_reading(motion.now, motion.local_field),
             1000.0,
             vector=True,
             bias_name="magnetometer_bias",

@@ -278,7 +278,8 @@ class NoiseProcess:
         state.bias = biases[-1]
         lost = normal[:, -2] > self._lost_above
         if model.burst_rate > 0.0:
-            lost |= self._bursts(normal[:, -1])
+            burst, state.in_burst = burst_chain(normal[:, -1], self._burst_above, self._recovery_above, state.in_burst)
+            lost |= burst
         return white + biases, biases, lost
 
     def _recurrence(self, start: np.ndarray, pushes: np.ndarray) -> np.ndarray:
@@ -291,15 +292,6 @@ class NoiseProcess:
             for first, column in zip(start.tolist(), pushes.T.tolist(), strict=True)
         ]
         return np.array(columns).T
-
-    def _bursts(self, normal: np.ndarray) -> np.ndarray:
-        """Samples ``(N,)`` inside bursts: a two-state Markov chain driven by ``normal`` ``(N,)``."""
-        inside, lost = self._state.in_burst, []
-        for number in normal.tolist():
-            inside = number <= self._recovery_above if inside else number > self._burst_above
-            lost.append(inside)
-        self._state.in_burst = inside
-        return np.array(lost)
 
     def _chain(self, values: np.ndarray, specific_force: np.ndarray | None, errors: np.ndarray) -> np.ndarray:
         """The part of the chain that depends on the signal: ``(T, W)``."""
@@ -350,3 +342,22 @@ def upper_quantile(probability: float) -> float:
     if probability <= 0.0:
         return math.inf
     return -math.inf if probability >= 1.0 else -NormalDist().inv_cdf(probability)
+
+
+def burst_chain(normal: np.ndarray, begin_above: float, recover_above: float, inside: bool) -> tuple[np.ndarray, bool]:
+    """Samples inside bursts: a two-state Markov chain driven by normal numbers.
+
+    Args:
+        normal: ``(N,)``.
+        begin_above: what such a number must exceed for a burst to begin.
+        recover_above: and for one to end.
+        inside: whether the sample before was in a burst.
+
+    Returns:
+        Which samples ``(N,)`` are in a burst, and whether the last one is.
+    """
+    lost = []
+    for number in normal.tolist():
+        inside = number <= recover_above if inside else number > begin_above
+        lost.append(inside)
+    return np.array(lost, bool), inside

@@ -22,6 +22,7 @@ from .assumptions import CONSUMER, DEG, DEG_PER_HOUR, INDUSTRIAL, MICRO_G, Grade
 from .ideal import STANDARD_GRAVITY
 from .kinds import KINDS
 from .noise import NoiseModel
+from .timing import PUNCTUAL, Timing
 
 G = STANDARD_GRAVITY
 GAUSS = 100.0
@@ -41,6 +42,8 @@ class SensorPreset:
     """None for a device without one"""
     others: Mapping[str, NoiseModel] = field(default_factory=dict, hash=False)
     """further sensors of the device: kind (:data:`poise.envs.sensors.kinds.KINDS`) → noise, in the kind's unit"""
+    timing: Timing = PUNCTUAL
+    """when its samples are taken and lost"""
     assumed: Mapping[str, tuple[str, ...]] = field(default_factory=dict, hash=False)
     """kind → fields of its noise that no data sheet states, but that are assumed by the grade of the device"""
 
@@ -60,6 +63,7 @@ class SensorPreset:
             gyroscope=self.gyroscope.scaled(noise_scale),
             accelerometer=self.accelerometer.scaled(noise_scale),
             magnetometer=None if self.magnetometer is None else self.magnetometer.scaled(noise_scale),
+            timing=self.timing.scaled(noise_scale),
             others={kind: noise.scaled(noise_scale) for kind, noise in self.others.items()},
         )
 
@@ -74,11 +78,17 @@ def device(
 ) -> SensorPreset:
     """A device by its data sheet, with what the sheet does not state assumed by its grade."""
     stated = {"gyroscope": gyroscope, "accelerometer": accelerometer, "magnetometer": magnetometer}
-    models, assumed = {}, {}
-    for kind, noise in stated.items():
-        if noise is not None:
-            models[kind], assumed[kind] = completed(noise, getattr(grade, kind))
-    return SensorPreset(name, f"{source}; what it does not state as of {grade.name} grade", **models, assumed=assumed)
+    filled = {kind: completed(noise, getattr(grade, kind)) for kind, noise in stated.items() if noise is not None}
+    models, assumed = {kind: pair[0] for kind, pair in filled.items()}, {kind: pair[1] for kind, pair in filled.items()}
+    source = f"{source}; what it does not state as of {grade.name} grade"
+    return SensorPreset(
+        name,
+        source,
+        models["gyroscope"],
+        models["accelerometer"],
+        models.get("magnetometer"),
+        assumed=assumed,
+    )
 
 
 PRESETS = (

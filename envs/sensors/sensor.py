@@ -12,11 +12,13 @@ from ...filters.core.quantity import Channel
 from .ideal import SAMPLINGS, Mounting, Sampling
 from .kinds import SensorKind, sensor_kind
 from .noise import FORMS, Form, NoiseModel, NoiseProcess, error_size
+from .timing import PUNCTUAL, Timing
 
 FIXED = Mounting()
 """A sensor in the body frame's origin, along its axes."""
-Placement = tuple[str, Mounting, Sampling, float]
-"""Body, mounting, sampling and rate (Hz): sensors that have them in common see the same motion."""
+Placement = tuple[str, Mounting, Sampling, float, tuple[str, Timing] | None]
+"""Body, mounting, sampling, rate (Hz) and clock: sensors that have them in common see the same motion. The clock is the
+site of a device and its timing; None for one that is punctual."""
 
 
 @dataclass(frozen=True)
@@ -44,6 +46,8 @@ class Sensor:
     """the error model; vectors have additive errors"""
     units: tuple[float, ...] = ()
     """size of one unit of ``noise`` on each axis of the error, for axes of different units; empty for ones"""
+    timing: Timing = PUNCTUAL
+    """when samples are taken and lost; sensors of one site share the clock"""
 
     def __post_init__(self) -> None:
         kind, name, size = self.sensing, self.channel.name, self.channel.size
@@ -69,7 +73,19 @@ class Sensor:
     @property
     def placement(self) -> Placement | None:
         """Key of sensors whose motion is computed together; None if the sensor does not measure its own motion."""
-        return (self.body, self.mounting, self.sampling, float(self.rate)) if self.sensing.on_body else None
+        if not self.sensing.on_body:
+            return None
+        return self.body, self.mounting, self.sampling, float(self.rate), self.clock
+
+    @property
+    def site(self) -> str:
+        """The part of the channel's name before the slash: sensors that have it in common are one device."""
+        return self.channel.name.partition("/")[0]
+
+    @property
+    def clock(self) -> tuple[str, Timing] | None:
+        """Site and timing; None where every sample is punctual."""
+        return None if self.timing.punctual else (self.site, self.timing)
 
     @property
     def limit(self) -> float | np.ndarray:
@@ -107,6 +123,7 @@ class Sensor:
             "noise": self.noise.describe(),
             "form": self.form,
             "units": list(self.units),
+            **({} if self.timing.punctual else {"timing": self.timing.describe()}),
         }
 
 

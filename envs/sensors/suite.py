@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
+import copy
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ...filters.core.quantity import Channel
+from ...filters.support.seeds import named_generator
 from .ideal import STANDARD_GRAVITY, BodyState, Mounting, Sampling, magnetic_field, mounted, vector
 from .kinds import SiteMotion, sensor_kind
+from .late import Past
+from .magnetics import BICYCLE, MagneticField, Magnetics, magnetics_of
 from .noise import NoiseProcess, NoiseState
 from .observation import Sensing
 from .presets import SensorPreset, sensor_preset
-from .sensor import Placement, Sensor, due
+from .sensor import FIXED, Placement, Sensor, due
+from .timing import Clock, ClockState, Timings, check_sites, timing_of
 
 Bodies = BodyState | Mapping[str, BodyState]
 """States of bodies by name, or of the only one."""
@@ -29,6 +34,9 @@ class SuiteState:
     noise: list[NoiseState]
     last: dict[Placement, BodyState]
     held: dict[str, np.ndarray]
+    clocks: dict[Any, ClockState]
+    past: Past
+    magnetic_field: MagneticField | None
 
 
 class Sensed(NamedTuple):
@@ -50,17 +58,19 @@ class SensorSuite(Sensing):
 
     The sample of a time step describes the interval that ends there. A sensor slower than the suite is sampled at the
     first time step at or after each multiple of its own interval, beginning with step 0; its interval reaches back to
-    its own last sample. At step 0 there is no interval yet, so gyroscopes and accelerometers with
-    ``sampling="interval"`` start at their second sample, unless :meth:`simulate` is given the states ``before``.
+    its own last sample. Where a device is late (:class:`.Timing`), the sample describes an earlier interval, while
+    biases and truth still belong to the time step. At step 0 there is no interval yet, so gyroscopes and accelerometers
+    with ``sampling="interval"`` start at their second sample, unless :meth:`simulate` is given the states ``before``.
 
     Args:
         sensors: in the order of ``fresh``.
         rate: time steps per second, Hz.
         gravity: m/s².
         field: magnetic field in the world (east, north, up), ``(3,)``, µT; None for that of :func:`.magnetic_field`.
+        magnetics: disturbances of that field, or their name (:data:`.MAGNETICS`); None for none.
 
     Raises:
-        ValueError: no sensors, equal names, an infinite full scale, or a sensor faster than the suite.
+        ValueError: no sensors, equal names, an infinite full scale, a sensor faster than the suite, or an unknown name.
     """
 
     def __init__(
@@ -70,6 +80,7 @@ class SensorSuite(Sensing):
         *,
         gravity: float = STANDARD_GRAVITY,
         field: Sequence[float] | np.ndarray | None = None,
+        magnetics: str | Magnetics | None = None,
     ) -> None:
         if not 0.0 < rate < math.inf:
             raise ValueError(f"rate must be positive and finite (Hz), got {rate}")
@@ -81,10 +92,14 @@ class SensorSuite(Sensing):
                 )
         self.sensors, self.rate, self.gravity = tuple(sensors), float(rate), float(gravity)
         self.field = vector("field", magnetic_field() if field is None else field, 3)
+        self.magnetics = magnetics_of(magnetics)
         limits = {sensor.channel.name: sensor.limit for sensor in sensors}
         super().__init__([sensor.channel for sensor in sensors], limits)
         self._noise: list[NoiseProcess] = []
         self._last: dict[Placement, BodyState] = {}
+        self._clocks: dict[Any, Clock] = {}
+        self._past = Past()
+        self._magnetic_field: MagneticField | None = None
         self._step = 0
 
     def reset(self, rng: np.random.Generator) -> None:
@@ -96,7 +111,19 @@ class SensorSuite(Sensing):
         super().reset(rng)
         children = rng.spawn(len(self.sensors))
         self._noise = [sensor.errors(child) for sensor, child in zip(self.sensors, children, strict=True)]
+        # descendants by name: errors do not depend on timing and field
+        base = children[0]
+        self._clocks = {
+            clock: Clock(clock[1], self.rate, named_generator(base, "clock", clock[0]))
+            for clock in dict.fromkeys(sensor.clock for sensor in self.sensors)
+            if clock is not None
+        }
+        calm = self.magnetics.calm
+        self._magnetic_field = (
+            None if calm else MagneticField(self.magnetics, self.field, named_generator(base, "field"))
+        )
         self._last.clear()
+        self._past = Past()
         self._step = 0
 
     def simulate(
@@ -127,46 +154,78 @@ class SensorSuite(Sensing):
         length = len(np.atleast_1d(some))
         steps = self._step + np.arange(length)
         self._step += length
-        motions: dict[Placement, SiteMotion] = {}
+        lags = {clock: process.advance(steps) for clock, process in self._clocks.items()}
+        seen: dict[Placement, tuple[SiteMotion, np.ndarray]] = {}
 
-        def motion_of(placement: Placement, rows: np.ndarray) -> SiteMotion:
-            if placement not in motions:
-                earlier = None if before is None else pick(before, placement[0]).at(rows)
-                state = pick(bodies, placement[0]).at(rows)
-                motions[placement] = self._motion(placement, state, earlier, surroundings)
-            return motions[placement]
+        def motion_of(placement: Placement) -> tuple[SiteMotion | None, np.ndarray]:
+            """Motion of a placement, None if it has no samples, and the rows of these."""
+            if placement not in seen:
+                body, _, _, rate, clock = placement
+                rows = due(rate, steps, self.rate)
+                states, earlier = pick(bodies, body), None if before is None else pick(before, body)
+                if clock is None:
+                    states, earlier = states.at(rows), None if earlier is None else earlier.at(rows)
+                else:
+                    lag, lost = lags[clock]
+                    reach, rows = self._clocks[clock].reach, rows[~lost[rows]]
+                    states, earlier, rows = self._past.states(placement, states, earlier, rows, lag, reach)
+                if not len(rows):
+                    return None, rows
+                seen[placement] = self._motion(placement, states, earlier, surroundings), rows
+            return seen[placement]
 
         if reference is not None:
-            motion_of(reference, np.arange(length))
+            motion_of(reference)
         measurements, truth = {}, {}
         for sensor, noise in zip(self.sensors, self._noise, strict=True):
             name, size, kind, placement = sensor.channel.name, sensor.channel.size, sensor.sensing, sensor.placement
-            rows, force = due(sensor.rate, steps, self.rate), None
+            force = None
             if placement is None:
                 values = self._handed(name, surroundings) if kind.reading is None else kind.reading(surroundings)
-                values = checked(name, values, (length, size))[rows]
-            elif len(rows):
-                motion = motion_of(placement, rows)
-                values = checked(name, kind.reading(motion), (None, size))  # type: ignore[misc]
-                if sensor.noise.g_sensitivity:
-                    force = motion.specific_force[-len(values) :]
-                    values = values[-len(force) :]
-                rows = rows[len(rows) - len(values) :]
+                values = checked(name, values, (length, size))
+                rows = due(sensor.rate, steps, self.rate)
+                if sensor.clock is None:
+                    values = values[rows]
+                else:
+                    lag, lost = lags[sensor.clock]
+                    reach, rows, times = self._clocks[sensor.clock].reach, rows[~lost[rows]], steps / self.rate
+                    values, rows = self._past.readings(name, times, values, rows, lag, reach, sensor.form)
             else:
-                values = np.zeros((0, size))
+                motion, rows = motion_of(placement)
+                if motion is None:
+                    values = np.zeros((0, size))
+                else:
+                    if self._magnetic_field is not None and kind.name not in ("gyroscope", "accelerometer"):
+                        motion = self._disturbed(motion, sensor, motion_of)
+                    values = checked(name, kind.reading(motion), (None, size))  # type: ignore[misc]
+                    if sensor.noise.g_sensitivity:
+                        force = motion.specific_force[-len(values) :] if len(values) else np.zeros((0, 3))
+                        values = values[len(values) - len(force) :]
+                    rows = rows[len(rows) - len(values) :]
             start = noise.bias
             measured, biases = noise.sequence(values, force)
             measurements[name] = np.full((length, size), np.nan)
             measurements[name][rows] = measured
             latest = np.searchsorted(rows, np.arange(length), side="right")
             truth[sensor.truth_name] = np.concatenate([start[None], biases])[latest]
-        return Sensed(measurements, truth, motions)
+        return Sensed(measurements, truth, {placement: motion for placement, (motion, _) in seen.items()})
+
+    def _disturbed(
+        self, motion: SiteMotion, sensor: Sensor, motion_of: Callable[[Placement], tuple[SiteMotion | None, np.ndarray]]
+    ) -> SiteMotion:
+        """The motion of a sensor, with the disturbed field of its place."""
+        field, carrier = self._magnetic_field, None
+        assert field is not None
+        if self.magnetics.frame:
+            bicycle, _ = motion_of((BICYCLE, FIXED, sensor.sampling, float(sensor.rate), sensor.clock))
+            carrier = None if bicycle is None else bicycle.now
+        return replace(motion, disturbed=lambda states: field.at(states, sensor.site, carrier))
 
     def _motion(
         self, placement: Placement, states: BodyState, earlier: BodyState | None, surroundings: Any
     ) -> SiteMotion:
         """Motion of a placement at its next samples; the last of them is kept for the interval that follows."""
-        body, mounting, sampling, _ = placement
+        body, mounting, sampling, _, _ = placement
         now = mounted(states, mounting)
         if sampling == "instant":
             earlier = None if earlier is None else mounted(earlier, mounting)
@@ -187,7 +246,15 @@ class SensorSuite(Sensing):
     def save(self) -> SuiteState:
         """A copy of all memory."""
         self._check_ready()
-        return SuiteState(self._step, [noise.save() for noise in self._noise], dict(self._last), super().save())
+        return SuiteState(
+            self._step,
+            [noise.save() for noise in self._noise],
+            dict(self._last),
+            super().save(),
+            {key: clock.save() for key, clock in self._clocks.items()},
+            copy.copy(self._past),
+            copy.deepcopy(self._magnetic_field),
+        )
 
     def restore(self, state: SuiteState) -> None:
         """Continue from a saved state, exactly (in this suite or in another one of the same sensors)."""
@@ -198,6 +265,9 @@ class SensorSuite(Sensing):
         self._step, self._last = state.step, dict(state.last)
         for noise, saved in zip(self._noise, state.noise, strict=True):
             noise.restore(saved)
+        for key, clock in self._clocks.items():
+            clock.restore(state.clocks[key])
+        self._past, self._magnetic_field = copy.copy(state.past), copy.deepcopy(state.magnetic_field)
         super().restore(state.held)
 
     def describe(self) -> dict[str, Any]:
@@ -207,6 +277,7 @@ class SensorSuite(Sensing):
             "gravity": self.gravity,
             "field": list(self.field),
             "sensors": [sensor.describe() for sensor in self.sensors],
+            **({} if self.magnetics.calm else {"magnetics": self.magnetics.describe()}),
         }
 
     def _check_ready(self) -> None:
@@ -259,6 +330,8 @@ def imu_suite(
     body: str = "body",
     gravity: float = STANDARD_GRAVITY,
     field: Sequence[float] | np.ndarray | None = None,
+    timing: Timings | None = None,
+    magnetics: str | Magnetics | None = None,
 ) -> SensorSuite:
     """One inertial measurement unit: channels ``imu/gyr`` (rad/s), ``imu/acc`` (m/s²) and, if wanted, ``imu/mag`` (µT).
 
@@ -275,6 +348,8 @@ def imu_suite(
         body: name of the body.
         gravity: m/s².
         field: magnetic field ``(3,)`` in the world (east, north, up), µT; None for a default.
+        timing: of the device, or its name (:data:`.TIMINGS`); None for that of the preset.
+        magnetics: disturbances of the field, or their name (:data:`.MAGNETICS`); None for none.
 
     Raises:
         ValueError: an argument out of its range; or a magnetometer is wanted and the preset has none.
@@ -287,10 +362,14 @@ def imu_suite(
             raise ValueError(f"magnetometer must be False: the preset {device.name!r} has none")
         rates["magnetometer"] = rate if magnetometer is True else float(magnetometer)
     rates |= dict.fromkeys(device.others, rate)
+    check_sites(timing, {site})
+    late = (device.timing if timing is None else timing_of(timing, site)).scaled(noise_scale)
     sensors = []
     for name, its_rate in rates.items():
         kind, noise = sensor_kind(name), device.noise_of(name)
         assert noise is not None
         channel = Channel(f"{site}/{kind.suffix}", kind.size or 1, kind.unit)
-        sensors.append(Sensor(channel, name, its_rate, noise.scaled(noise_scale), body, where, sampling, device.name))
-    return SensorSuite(sensors, rate if step_rate is None else step_rate, gravity=gravity, field=field)
+        errors = noise.scaled(noise_scale)
+        sensors.append(Sensor(channel, name, its_rate, errors, body, where, sampling, device.name, timing=late))
+    steps, field_errors = rate if step_rate is None else step_rate, magnetics_of(magnetics).scaled(noise_scale)
+    return SensorSuite(sensors, steps, gravity=gravity, field=field, magnetics=field_errors)

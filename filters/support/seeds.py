@@ -40,5 +40,14 @@ def named_seed(root: int, *names: str | int) -> int:
     return _number(np.random.SeedSequence([root, *(zlib.crc32(str(name).encode()) for name in names)]))
 
 
+def named_generator(generator: np.random.Generator, *names: str | int) -> np.random.Generator:
+    """Return a descendant of a generator by name: neither draws nor other descendants of the generator change."""
+    sequence = generator.bit_generator.seed_seq
+    key = tuple(zlib.crc32(str(name).encode()) for name in names)
+    return np.random.default_rng(
+        np.random.SeedSequence(sequence.entropy, spawn_key=(*sequence.spawn_key, *key))  # type: ignore[attr-defined]
+    )
+
+
 def _number(sequence: np.random.SeedSequence) -> int:
     return int(sequence.generate_state(1)[0])

@@ -11,10 +11,12 @@ import numpy as np
 from ....filters.core.quantity import Channel
 from ...sensors.ideal import STANDARD_GRAVITY, Mounting, Sampling
 from ...sensors.kinds import KINDS, SensorKind
+from ...sensors.magnetics import Magnetics, magnetics_of
 from ...sensors.noise import NoiseModel
 from ...sensors.presets import list_sensor_presets, sensor_preset
 from ...sensors.sensor import Sensor
 from ...sensors.suite import SensorSuite
+from ...sensors.timing import Timings, check_sites, timing_of
 from ..frame.parameters import MOUNTAIN_BIKE
 from ..rider.anthropometry import RiderBody
 from ..rider.posture import SIDES, sit
@@ -135,6 +137,8 @@ def rider_bicycle_suite(
     sampling: Sampling = "interval",
     gravity: float = STANDARD_GRAVITY,
     field: Sequence[float] | np.ndarray | None = None,
+    timing: Timings | None = None,
+    magnetics: str | Magnetics | None = None,
 ) -> SensorSuite:
     """Sensors of a published suite on one rider and bicycle; its surroundings are :class:`.RideQuantities`.
 
@@ -152,6 +156,9 @@ def rider_bicycle_suite(
         sampling: ``interval`` or ``instant``.
         gravity: m/s².
         field: magnetic field ``(3,)`` in the world (east, north, up), µT; None for a default.
+        timing: of all sensors, or for each site (``trunk_imu``, ``relative``, ``seat`` …); a name of
+            :data:`.TIMINGS`, a :class:`.Timing`, or None for none of their errors.
+        magnetics: disturbances of the field, or their name (:data:`.MAGNETICS`); None for none.
 
     Raises:
         ValueError: an unknown suite, channel or device, a rate outside (0, 1000] Hz, a camera faster than the rest, or
@@ -181,10 +188,25 @@ def rider_bicycle_suite(
         body = sites.seen if each.startswith("relative/") else channel.body
         noise = device.at_rate(its_rate).scaled(noise_scale)
         signal = Channel(each, channel.size, channel.kind.unit)
+        late = timing_of(timing, each.split("/")[0]).scaled(noise_scale)
         made.append(
             Sensor(
-                signal, channel.kind, its_rate, noise, body, mounting, sampling, device.name, device.form, device.units
+                signal,
+                channel.kind,
+                its_rate,
+                noise,
+                body,
+                mounting,
+                sampling,
+                device.name,
+                device.form,
+                device.units,
+                late,
             )
         )
     # user-defined sensors come last, so that random numbers of the others do not change
-    return SensorSuite([*made[len(own) :], *made[: len(own)]], steps, gravity=gravity, field=field)
+    ordered = [*made[len(own) :], *made[: len(own)]]
+    check_sites(timing, {sensor.site for sensor in ordered})
+    return SensorSuite(
+        ordered, steps, gravity=gravity, field=field, magnetics=magnetics_of(magnetics).scaled(noise_scale)
+    )

@@ -279,3 +279,40 @@ def test_an_ideal_wheel_tells_the_true_speed() -> None:
     env.close()
     told, true = ride.measurements["wheel/speed"].mean(), ride.truth["bicycle/speed"].mean()
     assert told == pytest.approx(true, rel=2e-3)
+
+
+def test_sites_may_be_late_and_the_frame_of_steel():
+    timing = {"relative": "camera", "seat": "wireless", "trunk_imu": "wireless", "steer": "wired"}
+    channels = ["bicycle_imu/gyr", "bicycle_imu/mag", "trunk_imu/mag", "relative/orientation", "seat/load_cells"]
+    options = {"suite": [*channels, "steer/angle", "wheel/speed"], "sensors": "ideal", "rate": 100.0, "duration": 1.0}
+    late, plain = (
+        poise.record(env, seed=4) for env in (make(**options, timing=timing, magnetics="steel-frame"), make(**options))
+    )
+    for name in QUANTITIES:
+        np.testing.assert_array_equal(late.truth[name], plain.truth[name])
+    np.testing.assert_array_equal(late.measurements["bicycle_imu/gyr"], plain.measurements["bicycle_imu/gyr"])
+    np.testing.assert_array_equal(late.measurements["wheel/speed"], plain.measurements["wheel/speed"])
+    # a camera's picture is 60 to 85 ms old, an encoder's count 3 ms
+    old = np.isfinite(late.measurements["relative/orientation"]).all(axis=1)
+    assert not old[:6].any()
+    assert old[9:].mean() > 0.5
+    steer, lag = plain.measurements["steer/angle"][:, 0], 0.0025 * 100.0
+    expected = (1.0 - lag) * steer[1:] + lag * steer[:-1]
+    np.testing.assert_allclose(late.measurements["steer/angle"][1:, 0], expected, atol=2e-3)
+    disturbed = np.abs(late.measurements["bicycle_imu/mag"] - plain.measurements["bicycle_imu/mag"])
+    assert 0.5 < np.max(disturbed) < 40.0
+    with pytest.raises(ValueError, match=r"timing must be of sites among .*, got \['seet'\]"):
+        make(**options, timing={"seet": "wired"})
+
+
+def test_a_snapshot_holds_clocks_and_fields():
+    env = make(suite="all", timing="wireless", magnetics="street", duration=2.0)
+    ride(env, seed=2, steps=70)
+    snapshot = env.snapshot()
+    ahead, _ = zip(*(env.step(env.neutral_action)[:2] for _ in range(60)), strict=True)
+    env.restore(snapshot)
+    again, _ = zip(*(env.step(env.neutral_action)[:2] for _ in range(60)), strict=True)
+    for one, other in zip(ahead, again, strict=True):
+        for name, values in one.items():
+            np.testing.assert_array_equal(other[name], values)
+    env.close()

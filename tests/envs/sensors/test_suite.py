@@ -120,7 +120,7 @@ def test_the_motion_of_a_placement_is_computed_once_and_handed_back():
     states = motion()
     suite = imu_suite("ideal", lever_arm=(0.2, 0.0, 0.1))
     suite.reset(np.random.default_rng(0))
-    reference = ("body", Mounting(), "interval", 100.0)
+    reference = ("body", Mounting(), "interval", 100.0, None)
     borders = ((1, 50), (50, LENGTH))
     parts = [
         suite.simulate(states.at(slice(a, b)), before=states.at(slice(a - 1, b - 1)), reference=reference)
