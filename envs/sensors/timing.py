@@ -80,7 +80,7 @@ TIMINGS: Mapping[str, Timing] = MappingProxyType(
         "wired": Timing(delay=0.0025, jitter=1e-4, clock_drift=2e-5),
         # assumed: a frame of a body-area radio is 10 to 30 ms, crystals are good to 50 ppm
         "wireless": Timing(delay=0.02, jitter=0.002, clock_drift=3e-5, burst_rate=0.05, burst_duration=0.15),
-        # assumed: time stamps of an operating system that is no real-time one
+        # assumed: stamps that an operating system without real-time guarantees sets
         "phone": Timing(delay=0.008, jitter=0.0015, clock_drift=2e-5, burst_rate=0.01, burst_duration=0.1),
         # assumed: exposure, transfer and recognition of a marker
         "camera": Timing(delay=0.06, jitter=0.005, clock_drift=3e-5, burst_rate=0.05, burst_duration=0.3),
