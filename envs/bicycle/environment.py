@@ -47,7 +47,7 @@ class RiderBicycleEnv(PoseEnv):
 
     Rider and bicycle are one multibody in PyBullet with the tyre model of this package. The rider steers with the arms,
     pedals with the legs, sways and leans (``fidelity="full"``), or is a rigid body with a moving trunk (``"lumped"``:
-    limb angles follow by inverse kinematics, feet exert no forces). World: x east, y north, z up; quaternions w, x, y,
+    limb angles follow by inverse kinematics). World: x east, y north, z up; quaternions w, x, y,
     z, body to world; bodies have x forward, y left, z up along the body. Actions do not change the ride.
 
     ## Action Space
@@ -104,6 +104,7 @@ class RiderBicycleEnv(PoseEnv):
     | ``truth/bicycle/position``, ``velocity``, ``acceleration`` | 3 | of the bicycle frame's origin, world |
     | ``truth/trunk/position``, ``acceleration`` | 3 | of the lumbar joint, world |
     | ``truth/…/angular_rate`` | 3 | rad/s, body axes |
+    | ``truth/pelvis/height``, ``angles`` | 1, 2 | m off the saddle; rad of forward tip and of tip to the right |
     | ``truth/seat/force``, ``moment`` | 3 | of the rider on the saddle, bicycle axes, N, N·m |
     | ``truth/handlebar/force_…``, ``pedal/force_…`` | 3 | of hands and feet, bicycle axes, N |
     | ``truth/joints/angles``, ``torques`` | 19 | rad, N·m (torques of a lumped rider: 3) |

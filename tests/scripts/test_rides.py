@@ -116,7 +116,8 @@ def test_a_full_ride_has_gaps_and_a_lumped_one_none():
     assert full["upright"]
     assert full["duration"] == pytest.approx(0.3)
     assert full["speed_min"] <= full["speed_mean"] <= full["speed_max"]
-    assert 200.0 < full["seat_force_mean"] < lumped["seat_force_mean"] < 900.0
+    assert 200.0 < full["seat_force_mean"] < 900.0
+    assert lumped["seat_force_mean"] == pytest.approx(full["seat_force_mean"], rel=0.1)
 
 
 def test_lean_is_to_the_right_of_the_heading():

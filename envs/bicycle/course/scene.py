@@ -15,7 +15,7 @@ from ...rendering import AXIS_COLOURS, TILE_COLOURS, take_picture
 from ...sensors.ideal import BodyState
 from ..frame.bicycle import bicycle_tree
 from ..frame.parameters import BicycleParameters
-from ..rider.links import TRUNK_JOINTS, add_full_rider, limb_joints
+from ..rider.links import SEAT_JOINTS, TRUNK_JOINTS, add_full_rider, limb_joints
 from ..rider.posture import LIMBS, Posture
 from .terrain import FlatGround, Ground
 
@@ -104,7 +104,7 @@ class RideScene(BicycleScene):
         add_full_rider(tree, posture)
         super().__init__(tree, ground, gui=gui)
         links = self._physics.links(self._bicycle)
-        joints = [*TRUNK_JOINTS, *(name for limb in LIMBS for name in limb_joints(limb))]
+        joints = [*SEAT_JOINTS, *TRUNK_JOINTS, *(name for limb in LIMBS for name in limb_joints(limb))]
         self._joints = [links[name] for name in ("front_assembly", "crank", "rear_wheel", "front_wheel", *joints)]
         self._wheels = posture.bicycle.rear_wheel.radius / posture.bicycle.front_wheel.radius
 
@@ -112,7 +112,8 @@ class RideScene(BicycleScene):
         """Put rider, bicycle and ground in place; the estimate is not shown."""
         wheel = float(truth["wheel/angle"][0])
         angles = [float(pose["bicycle/steer"][0]), float(pose["bicycle/crank"][0]), wheel, wheel * self._wheels]
-        for link, angle in zip(self._joints, [*angles, *truth["joints/angles"].tolist()], strict=True):
+        rider = np.concatenate([truth[name] for name in ("pelvis/angles", "pelvis/height", "joints/angles")])
+        for link, angle in zip(self._joints, [*angles, *rider.tolist()], strict=True):
             pybullet.resetJointState(self._bicycle, link, angle, 0.0, physicsClientId=self._physics.client)
         super().draw(pose, truth, estimate)
 

@@ -10,8 +10,8 @@ from ....filters.core import rotation
 from ...physics.kinematics import BASE_SIZE, move_links_of_many
 from ...physics.multibody import CentreMotion, newton_euler
 from ...sensors.ideal import BodyState, Sampling
-from ..rider.limbs import LimbPosture, reach_to, three_turns
-from ..rider.posture import KNEE_OUT, LIMBS, SIDES, SIGNS
+from ..rider.limbs import Limb, LimbPosture, reach_to
+from ..rider.posture import KNEE_OUT, LIMBS, SIDES, SIGNS, two_turns
 from .contact_forces import Contact
 from .ride import Ride
 
@@ -28,8 +28,10 @@ class RideLog:
     """forces of the rider on the bicycle, over the interval that ends with the sample or in the last physics step"""
     limbs: dict[str, LimbPosture]
     """limb name → posture in its root's frame (trunk, or bicycle for the legs)"""
-    trunk_angles: np.ndarray
-    """(n, 3) rad about y, x, z"""
+    trunk_joints: np.ndarray
+    """(n, 3) rad of the trunk's joint about y, x, z"""
+    pelvis: np.ndarray
+    """(n, 3) rad of forward tip and of tip to the right, m off the saddle"""
     steer: np.ndarray
     """(n,) rad"""
     crank: np.ndarray
@@ -42,6 +44,11 @@ class RideLog:
     """(n, joints) N·m of the rider's muscles"""
     fallen: np.ndarray
     """(n,) bool"""
+
+
+def in_reach(target: np.ndarray, limb: Limb) -> np.ndarray:
+    """The target ``(n, 3)``, or the farthest point towards it: a lumped rider may carry shoulder or hip too far."""
+    return target * np.minimum(1.0, 0.9999 * limb.reach / rotation.norm(target))
 
 
 class RideRecorder:
@@ -63,7 +70,7 @@ class RideRecorder:
         if rider.full:
             kinds = {"arm": ("upper_arm", "forearm"), "leg": ("thigh", "shank")}
             self._names += [f"{part}_{limb[4:]}" for limb in LIMBS for part in kinds[limb[:3]]]
-        self._joints = [links["front_assembly"], links["crank"], links["rear_wheel"], *rider.joints, rider.seat]
+        self._joints = [links["front_assembly"], links["crank"], links["rear_wheel"], *rider.joints, *rider.seat]
 
     def record(self, samples: int) -> RideLog:
         """Ride on for some samples; stops early after the one in which the rider fell."""
@@ -136,8 +143,9 @@ class RideRecorder:
         angles, rates = joints[..., 0], joints[..., 1]
         steer, crank, trunk = angles[:, 0], angles[:, 1], angles[:, 3:6]
         contact = self._contact(motion, forces, frames["rear_frame"].orientation)
-        limbs = {}
-        trunk_turn = three_turns(trunk[:, 0], trunk[:, 1], trunk[:, 2])
+        limbs, pelvis = {}, angles[:, -3:]
+        turn = rotation.conjugate(frames["rear_frame"].orientation)
+        trunk_turn = rotation.multiply(turn, frames["trunk"].orientation)
         for index, name in enumerate(LIMBS):
             if rider.full:
                 upper, lower = names[5 + 2 * index], names[6 + 2 * index]
@@ -148,8 +156,9 @@ class RideRecorder:
                 hinge = rotation.rotate(upper_turn, np.array([0.0, 0.0, -rider.posture.limb(name).upper]))
                 limbs[name] = LimbPosture(upper_turn, lower_turn, angles[:, 6 + 4 * index : 10 + 4 * index], hinge)
             else:
-                limbs[name] = self._solve(name, steer, crank, trunk_turn, swivels[:, index], angles[:, -1])
-        return RideLog(time, frames, contact, limbs, trunk, steer, crank, angles[:, 2], rates[:, :3], torques, fallen)
+                limbs[name] = self._solve(name, steer, crank, trunk_turn, swivels[:, index], pelvis)
+        wheel, rates = angles[:, 2], rates[:, :3]
+        return RideLog(time, frames, contact, limbs, trunk, pelvis, steer, crank, wheel, rates, torques, fallen)
 
     def _solve(
         self,
@@ -158,17 +167,17 @@ class RideRecorder:
         crank: np.ndarray,
         trunk: np.ndarray,
         swivel: np.ndarray,
-        bounce: np.ndarray,
+        pelvis: np.ndarray,
     ) -> LimbPosture:
-        """Posture of a limb by inverse kinematics; ``bounce``: height of the pelvis above its position at rest, m."""
+        """Posture of a limb by inverse kinematics; ``pelvis``: its displacement ``(n, 3)``."""
         posture, side = self.ride.rider.posture, name[4:]
-        up = bounce[:, None] * np.array([0.0, 0.0, 1.0])
         if name.startswith("leg"):
-            return reach_to(posture.leg, posture.leg_target(side, crank) - up, KNEE_OUT, swivel)
-        target = posture.arm_target(side, steer, trunk) - rotation.rotate_back(trunk, up)
-        # a lumped trunk may carry the shoulder a little too far: the arm is then straight
-        length = rotation.norm(target)
-        target = target * np.minimum(1.0, 0.9999 * posture.arm.reach / length)
+            tip = two_turns(pelvis)
+            target = rotation.rotate_back(tip, posture.leg_target(side, crank, pelvis))
+            held = reach_to(posture.leg, in_reach(target, posture.leg), rotation.rotate_back(tip, KNEE_OUT), swivel)
+            upper, lower = (rotation.multiply(tip, each) for each in (held.upper, held.lower))
+            return LimbPosture(upper, lower, held.angles, rotation.rotate(tip, held.hinge))
+        target = in_reach(posture.arm_target(side, steer, trunk, pelvis), posture.arm)
         return reach_to(posture.arm, target, posture.elbow_out(side, trunk), swivel)
 
     def _contact(self, motion: CentreMotion, forces: np.ndarray, ends: np.ndarray) -> Contact:
@@ -200,11 +209,9 @@ class RideRecorder:
         rows = slice(3, 3 + len(rider.masses))
         then, now = (CentreMotion(*(field[:, rows] for field in motion)) for motion in (before, after))
         force, moment = newton_euler(then, now, rider.masses, rider.moments, saddle, physics.time_step, physics.gravity)
-        if rider.full:
-            hands, feet = forces[:, :2], forces[:, 2:]
-        else:
-            hands = rotation.rotate(frame.orientation[:, None], forces)
-            feet = np.zeros_like(hands)
+        if not rider.full:
+            forces = rotation.rotate(frame.orientation[:, None], forces)
+        hands, feet = forces[:, :2], forces[:, 2:]
         drive = posture.bicycle.drive
         assert drive is not None
         for index, side in enumerate(SIDES):

@@ -126,9 +126,9 @@ class Ride:
         if self._count % self._each == 0:
             self._control()
         self._count += 1
-        torques, crank = rider.act()
+        torques = rider.act()
         brake = max(0.0, -self.pilot.command[1] - COASTING)
-        bicycle.act(0.0, 0.0, crank, rider.driven, torques, brake)
+        bicycle.act(joints=rider.driven, torques=torques, brake=brake)
         self.physics.step()
 
     def _control(self) -> None:

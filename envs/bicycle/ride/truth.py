@@ -12,7 +12,7 @@ import numpy as np
 from ....filters.core import rotation
 from ....filters.core.quantity import Quantity
 from ...sensors.ideal import BodyState
-from ..rider.limbs import LimbPosture, three_turns
+from ..rider.limbs import LimbPosture
 from ..rider.posture import LIMBS, SIDES
 from .log import RideLog
 
@@ -119,7 +119,8 @@ def true_pose(log: RideLog, states: dict[str, BodyState]) -> dict[str, np.ndarra
     for name, values in zip(ANGLES, (roll, pitch, yaw, log.steer, crank), strict=True):
         pose[f"bicycle/{name}"] = _column(values)
     pose["bicycle/speed"] = _column(speed)
-    pose["trunk/angles"] = isb_zxy(three_turns(*log.trunk_angles.T))
+    trunk = rotation.multiply(rotation.conjugate(frame.orientation), states["trunk"].orientation)
+    pose["trunk/angles"] = isb_zxy(trunk)
     for side in SIDES:
         arm, leg = log.limbs[f"arm_{side}"], log.limbs[f"leg_{side}"]
         pose[f"shoulder_{side}/angles"] = isb_yxy(arm.upper)
@@ -153,7 +154,7 @@ def continuous_pose(pose: dict[str, np.ndarray], last: Quaternions) -> tuple[dic
 def joint_angles(log: RideLog) -> np.ndarray:
     """Angles ``(n, 19)`` in the order of :data:`FULL_JOINTS`, rad."""
     limbs: list[LimbPosture] = [log.limbs[name] for name in LIMBS]
-    return np.concatenate([log.trunk_angles, *(limb.angles for limb in limbs)], axis=1)
+    return np.concatenate([log.trunk_joints, *(limb.angles for limb in limbs)], axis=1)
 
 
 def other_truth(log: RideLog) -> dict[str, np.ndarray]:
@@ -169,6 +170,8 @@ def other_truth(log: RideLog) -> dict[str, np.ndarray]:
         "trunk/position": trunk.position,
         "trunk/acceleration": trunk.acceleration,
         "trunk/angular_rate": rotation.rotate_back(trunk.orientation, trunk.angular_velocity),
+        "pelvis/angles": log.pelvis[:, :2],
+        "pelvis/height": log.pelvis[:, 2:],
         "seat/force": rotation.rotate_back(back, contact.seat_force),
         "seat/moment": rotation.rotate_back(back, contact.seat_moment),
         "joints/angles": joint_angles(log),

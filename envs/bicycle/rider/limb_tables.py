@@ -1,4 +1,4 @@
-"""Lookup tables of the rider control model: posture of elbows and knees over steer and crank, weight of the legs."""
+"""Lookup tables of the rider control model: elbows and knees over steer and crank, weight of the legs on the pedals."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from ....filters.core import rotation
-from .limbs import reach_to, three_turns
-from .posture import KNEE_OUT, LIMBS, SIDES, Posture
+from .limbs import forward, reach_to, three_turns
+from .posture import KNEE_OUT, LIMBS, Posture
 
 POINTS = 49
 STEERS = np.linspace(-0.6, 0.6, POINTS)
@@ -25,7 +25,7 @@ BIT = 0.01
 
 
 class LimbTables:
-    """Abduction of each limb over steer (arms) or crank (legs), and the torque of the legs' weight at the crank.
+    """Abduction of each limb over steer (arms) or crank (legs), and the legs' weight on the pedals.
 
     Args:
         posture: the person on the bicycle.
@@ -44,18 +44,7 @@ class LimbTables:
             rows.append(np.stack([now[limb][:, 1], *slopes], axis=1))
         # (point, limb, value and slopes)
         self._table = np.stack(rows, axis=1)
-        legs, lift = posture.segments(), np.array([0.0, 0.0, 1.0])
-        heights = np.zeros(POINTS - 1)
-        for side in SIDES:
-            leg = reach_to(posture.leg, posture.leg_target(side, CRANKS[:-1]), KNEE_OUT)
-            thigh, shank = legs["thigh"], legs["shank"]
-            heights += thigh.mass * (rotation.rotate(leg.upper, thigh.centre) @ lift)
-            heights += shank.mass * ((leg.hinge + rotation.rotate(leg.lower, shank.centre)) @ lift)
-        # derivative of a periodic function through its Fourier series
-        spectrum = np.fft.rfft(heights) * 1j * np.arange(POINTS // 2 + 1)
-        spectrum[-1] = 0.0
-        rising = np.fft.irfft(spectrum, POINTS - 1) * gravity
-        self._weight = np.append(rising, rising[0])
+        self._weight = weight_on_pedal(posture, gravity)
 
     def angles(
         self,
@@ -111,6 +100,38 @@ class LimbTables:
             found.append(angle + by_swivel * turn + by_lean * lean + by_twist * twist)
         return found
 
-    def leg_weight(self, crank: float) -> float:
-        """Torque on the crank (N·m) that lifts the legs' common centre of mass."""
-        return float(np.interp(crank % (2.0 * math.pi), CRANKS, self._weight))
+    def leg_weights(self, crank: float) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
+        """Forces (N, bicycle axes) of the left and the right leg's own weight on the pedals."""
+        found = []
+        for angle, side in ((crank, 1.0), (crank + math.pi, -1.0)):
+            place = (angle % (2.0 * math.pi)) / (2.0 * math.pi) * (POINTS - 1)
+            index = min(int(place), POINTS - 2)
+            first, second = self._weight[index], self._weight[index + 1]
+            x, y, z = (first + (place - index) * (second - first)).tolist()
+            found.append((x, side * y, z))
+        return found[0], found[1]
+
+
+def weight_on_pedal(posture: Posture, gravity: float) -> np.ndarray:
+    """Force ``(POINTS, 3)`` of the left leg's own weight on its pedal at the angles :data:`CRANKS`, N, bicycle axes.
+
+    Hip and pedal carry the leg. Its hip is free to bend and to turn and its knee to bend, so that the virtual work of
+    weight and pedal along these three joints vanishes: Jᵀ f = ∂V/∂q.
+    """
+    limb, segments = posture.leg, posture.segments()
+    angles = reach_to(limb, posture.leg_target("left", CRANKS), KNEE_OUT).angles
+
+    def tip_and_energy(q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        leg, tip = forward(limb, q)
+        height = 0.0
+        for part, start, turn in (("thigh", np.zeros(3), leg.upper), ("shank", leg.hinge, leg.lower)):
+            centre = start + rotation.rotate(turn, segments[part].centre)
+            height = height + segments[part].mass * centre[..., 2]
+        return tip, gravity * np.asarray(height)
+
+    free, step = (0, 2, 3), 1e-5
+    moved = [[tip_and_energy(angles + sign * step * np.eye(4)[joint]) for sign in (1.0, -1.0)] for joint in free]
+    jacobian = np.stack([(more[0] - less[0]) / (2.0 * step) for more, less in moved], axis=1)
+    slope = np.stack([(more[1] - less[1]) / (2.0 * step) for more, less in moved], axis=1)
+    # the pedal's force on the leg is the opposite of the leg's on the pedal
+    return -np.linalg.solve(jacobian, slope[..., None])[..., 0]

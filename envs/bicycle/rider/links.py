@@ -12,6 +12,8 @@ PIVOT_MASS, PIVOT_INERTIA = 1e-3, (1e-4, 1e-4, 1e-4)
 """kg, kg·m² of the links between two of a joint's three axes: negligible"""
 SHIRT, TROUSERS, SKIN, SHOE = (0.15, 0.35, 0.65), (0.18, 0.18, 0.22), (0.85, 0.65, 0.52), (0.1, 0.1, 0.1)
 AXES = {"y": (0.0, 1.0, 0.0), "x": (1.0, 0.0, 0.0), "z": (0.0, 0.0, 1.0)}
+SEAT_JOINTS = ("pelvis_y", "pelvis_x", "pelvis")
+"""the pelvis tips forwards and to the right about the saddle point, and rises off it"""
 TRUNK_JOINTS = ("trunk_y", "trunk_x", "trunk")
 NAMES = {"arm": ("upper_arm", "forearm"), "leg": ("thigh", "shank")}
 LUMPED_MASSES = ("pelvis", "trunk")
@@ -39,18 +41,29 @@ def _three_joints(tree: Tree, parent: str, child: str, origin: np.ndarray, mass:
     tree.joint(parent, child, origin, AXES["z"])
 
 
+def _seat(tree: Tree, posture: Posture, pelvis: Mass) -> None:
+    """Set a pelvis (in the bicycle frame) on the saddle; its link frame begins at the saddle point."""
+    parent, origin = "rear_frame", np.array(posture.bicycle.saddle)
+    for name, axis in zip(SEAT_JOINTS[:2], "yx", strict=True):
+        tree.link(name, PIVOT_MASS, PIVOT_INERTIA, (0.0, 0.0, 0.0))
+        tree.joint(parent, name, origin, AXES[axis])
+        parent, origin = name, np.zeros(3)
+    centre = pelvis.centre - posture.bicycle.saddle
+    tree.link("pelvis", pelvis.mass, pelvis.tensor, centre, pelvis_shapes(posture))
+    tree.joint(parent, "pelvis", origin, AXES["z"], slides=True)
+
+
 def add_full_rider(tree: Tree, posture: Posture) -> None:
-    """Pelvis that slides on the saddle, trunk, and four limbs whose ends are still free."""
-    pelvis, segments = posture.pelvis(), posture.segments()
-    tree.link("pelvis", pelvis.mass, pelvis.tensor, pelvis.centre - posture.lumbar, pelvis_shapes(posture))
-    tree.joint("rear_frame", "pelvis", posture.lumbar, AXES["z"], slides=True)
-    _three_joints(tree, "pelvis", "trunk", np.zeros(3), posture.trunk(), trunk_shapes(posture))
+    """Pelvis that rests on the saddle, trunk, and four limbs whose ends are still free."""
+    segments, saddle = posture.segments(), np.array(posture.bicycle.saddle)
+    _seat(tree, posture, posture.pelvis())
+    _three_joints(tree, "pelvis", "trunk", posture.lumbar - saddle, posture.trunk(), trunk_shapes(posture))
     shapes = limb_shapes(posture)
     for name in LIMBS:
         kind, side = name.split("_")
         flip = np.array([1.0, SIGNS[side], 1.0])
         upper, lower = NAMES[kind]
-        parent, root = ("trunk", posture.shoulder) if kind == "arm" else ("pelvis", posture.hip - posture.lumbar)
+        parent, root = ("trunk", posture.shoulder) if kind == "arm" else ("pelvis", posture.hip - saddle)
         _three_joints(tree, parent, f"{upper}_{side}", root * flip, segments[upper], shapes[upper])
         mass = segments[lower]
         tree.link(f"{lower}_{side}", mass.mass, mass.tensor, mass.centre, shapes[lower])
@@ -67,16 +80,17 @@ def add_lumped_rider(tree: Tree, posture: Posture) -> None:
         return [Mass(0.5 * mass.mass, mass.centre, 0.5 * mass.tensor) for mass in found]
 
     pelvis = join([posture.pelvis(), *mean("leg")])
-    tree.link("pelvis", pelvis.mass, pelvis.tensor, pelvis.centre - posture.lumbar, pelvis_shapes(posture))
-    tree.joint("rear_frame", "pelvis", posture.lumbar, AXES["z"], slides=True)
+    _seat(tree, posture, pelvis)
     trunk = join([posture.trunk(), *mean("arm")])
-    _three_joints(tree, "pelvis", "trunk", np.zeros(3), trunk, trunk_shapes(posture))
+    lumbar = posture.lumbar - posture.bicycle.saddle
+    _three_joints(tree, "pelvis", "trunk", lumbar, trunk, trunk_shapes(posture))
 
 
 def pelvis_shapes(posture: Posture) -> list[str]:
     """Hips, in the pelvis frame."""
-    hip = posture.hip - posture.lumbar
-    return [rod_shape(hip, hip * (1.0, -1.0, 1.0), 0.085, TROUSERS), ball_shape((0.0, 0.0, -0.02), 0.11, TROUSERS)]
+    hip, lumbar = (place - posture.bicycle.saddle for place in (posture.hip, posture.lumbar))
+    below = lumbar - np.array([0.0, 0.0, 0.02])
+    return [rod_shape(hip, hip * (1.0, -1.0, 1.0), 0.085, TROUSERS), ball_shape(below, 0.11, TROUSERS)]
 
 
 def trunk_shapes(posture: Posture) -> list[str]:

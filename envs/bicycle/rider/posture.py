@@ -30,6 +30,8 @@ HIP_ABOVE_SADDLE = 0.08
 TRUNK_IMU = (-0.10, 0.0, 0.27)
 """m: sixth thoracic vertebra in the trunk frame, likewise"""
 KNEE_OUT = np.array([1.0, 0.0, 0.0])
+AT_REST = np.zeros(3)
+"""Displacement of the pelvis: rad of forward tip and of tip to the right, m off the saddle"""
 
 
 def _root(function: Callable[[float], float], low: float, high: float, message: str) -> float:
@@ -90,14 +92,33 @@ class Posture:
         """Direction ``(..., 3)`` in which the elbow points, trunk axes: sideways in the bicycle frame."""
         return rotation.rotate_back(trunk, np.array([0.0, SIGNS[side], 0.0]))
 
-    def arm_target(self, side: str, steer: np.ndarray | float, trunk: np.ndarray) -> np.ndarray:
-        """Grip from the shoulder ``(..., 3)`` in trunk axes; ``trunk``: orientation of the trunk in the bicycle."""
-        shoulder = self.shoulder * (1.0, SIGNS[side], 1.0)
-        return rotation.rotate_back(trunk, self.grip(side, steer) - self.lumbar) - shoulder
+    def moved(self, place: np.ndarray, pelvis: np.ndarray) -> np.ndarray:
+        """Where a point of the pelvis is ``(..., 3)`` when that has moved on the saddle.
 
-    def leg_target(self, side: str, crank: np.ndarray | float) -> np.ndarray:
-        """Pedal from the hip ``(..., 3)`` in bicycle axes."""
-        return self.pedal(side, crank) - self.hip * (1.0, SIGNS[side], 1.0)
+        Args:
+            place: ``(3,)`` at rest, m.
+            pelvis: ``(..., 3)`` rad of forward tip and of tip to the right, m off the saddle.
+        """
+        saddle, up = np.array(self.bicycle.saddle), pelvis[..., 2:] * (0.0, 0.0, 1.0)
+        return saddle + rotation.rotate(two_turns(pelvis), place - saddle + up)
+
+    def arm_target(
+        self, side: str, steer: np.ndarray | float, trunk: np.ndarray, pelvis: np.ndarray = AT_REST
+    ) -> np.ndarray:
+        """Grip from the shoulder ``(..., 3)`` in trunk axes.
+
+        Args:
+            side: ``left`` or ``right``.
+            steer: rad.
+            trunk: ``(..., 4)`` orientation of the trunk in the bicycle.
+            pelvis: as of :meth:`moved`.
+        """
+        shoulder = self.shoulder * (1.0, SIGNS[side], 1.0)
+        return rotation.rotate_back(trunk, self.grip(side, steer) - self.moved(self.lumbar, pelvis)) - shoulder
+
+    def leg_target(self, side: str, crank: np.ndarray | float, pelvis: np.ndarray = AT_REST) -> np.ndarray:
+        """Pedal from the hip ``(..., 3)`` in bicycle axes; ``pelvis`` as of :meth:`moved`."""
+        return self.pedal(side, crank) - self.moved(self.hip * (1.0, SIGNS[side], 1.0), pelvis)
 
     def pelvis(self) -> Mass:
         """Pelvis in the bicycle frame."""
@@ -165,6 +186,11 @@ class Posture:
         tensor = whole.tensor
         inertia = (float(tensor[0, 0]), float(tensor[1, 1]), float(tensor[2, 2]), float(tensor[0, 2]))
         return RigidPart(whole.mass, (x, 0.0, z), inertia)
+
+
+def two_turns(pelvis: np.ndarray) -> np.ndarray:
+    """Orientation ``(..., 4)`` of the pelvis in the bicycle from its displacement ``(..., 3)``."""
+    return three_turns(pelvis[..., 0], pelvis[..., 1], np.zeros(pelvis.shape[:-1]))
 
 
 def placed(mass: Mass, origin: np.ndarray, orientation: np.ndarray) -> Mass:
@@ -235,17 +261,15 @@ def loop_closure_error(truth: Mapping[str, np.ndarray], posture: Posture) -> np.
     frame, trunk = truth["bicycle/orientation"], truth["trunk/orientation"]
     steer, crank = truth["bicycle/steer"][:, 0], truth["bicycle/crank"][:, 0]
     relative = rotation.multiply(rotation.conjugate(frame), trunk)
-    # the pelvis with shoulders and hips bounces on the saddle
-    bounce = rotation.rotate_back(frame, truth["trunk/position"] - truth["bicycle/position"]) - posture.lumbar
+    pelvis = np.concatenate([truth["pelvis/angles"], truth["pelvis/height"]], axis=1)
     errors = []
     for name in LIMBS:
         kind, side = name.split("_")
         limb = posture.limb(name)
         if kind == "arm":
-            root, parts = trunk, ("upper_arm", "forearm")
-            target = posture.arm_target(side, steer, relative) - rotation.rotate_back(relative, bounce)
+            root, parts, target = trunk, ("upper_arm", "forearm"), posture.arm_target(side, steer, relative, pelvis)
         else:
-            root, parts, target = frame, ("thigh", "shank"), posture.leg_target(side, crank) - bounce
+            root, parts, target = frame, ("thigh", "shank"), posture.leg_target(side, crank, pelvis)
         upper, lower = (truth[f"{part}_{side}/orientation"] for part in parts)
         reached = rotation.rotate(upper, np.array([0.0, 0.0, -limb.upper]))
         reached = reached + rotation.rotate(lower, np.array([limb.tip[0], 0.0, limb.tip[1]]))

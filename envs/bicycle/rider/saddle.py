@@ -1,11 +1,14 @@
-"""Compliance between pelvis and seat post: a vertical spring and damper that transmit compression only.
+"""Contact of pelvis and saddle: three points that press and never pull, over a spring and damper that only press.
 
-The pelvis moves only along the frame's z axis; otherwise rider and saddle are rigidly connected.
+The pelvis rises off the saddle point and tips forwards and to the right about it. Both sit bones and the front of the
+pelvis rest on the cover, which is stiff against tipping; saddle and buttocks below them give way together. The centre
+of pressure therefore never leaves the triangle of the three points. Friction holds the pelvis sideways and along.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from ...sensors.ideal import STANDARD_GRAVITY
 from .anthropometry import Mass
@@ -20,40 +23,117 @@ class SaddleParameters:
     resonance of the driving-point mass at 4 to 6 Hz).
 
     Raises:
-        ValueError: a stiffness that is not positive, or a negative damping.
+        ValueError: a length or stiffness that is not positive, or a negative damping.
     """
 
     stiffness: float = 4.5e4
-    """N/m"""
+    """N/m of saddle and buttocks together, vertically"""
     damping: float = 950.0
-    """N·s/m"""
+    """N·s/m, likewise"""
+    sit_bones: float = 0.05
+    """m: each sit bone's distance from the middle (ischial tuberosities are 0.10 to 0.14 m apart)"""
+    behind: float = 0.035
+    """m of the sit bones behind the saddle point"""
+    front: float = 0.12
+    """m of the foremost support ahead of the saddle point"""
+    tissue_stiffness: float = 1.2e5
+    """N/m of the cover and the tissue under each of the three points, against tipping"""
+    tissue_damping: float = 3e3
+    """N·s/m, likewise"""
 
     def __post_init__(self) -> None:
-        if not 0.0 < self.stiffness < float("inf"):
-            raise ValueError(f"stiffness must be positive and finite (N/m), got {self.stiffness}")
-        if not 0.0 <= self.damping < float("inf"):
-            raise ValueError(f"damping must not be negative and be finite (N·s/m), got {self.damping}")
+        for name in ("stiffness", "sit_bones", "behind", "front", "tissue_stiffness"):
+            if not 0.0 < getattr(self, name) < float("inf"):
+                raise ValueError(f"{name} must be positive and finite (N/m or m), got {getattr(self, name)}")
+        for name in ("damping", "tissue_damping"):
+            if not 0.0 <= getattr(self, name) < float("inf"):
+                raise ValueError(f"{name} must not be negative and be finite (N·s/m), got {getattr(self, name)}")
 
 
-class Saddle:
+class SeatContact(NamedTuple):
+    """A saddle under one rider, as numbers for :func:`press`."""
+
+    load: float
+    """N that rests on it when nothing moves"""
+    ahead: float
+    """m of the centre of pressure ahead of the saddle point then"""
+    stiffness: float
+    """N/m"""
+    damping: float
+    """N·s/m"""
+    pitch_stiffness: float
+    """N·m/rad"""
+    pitch_damping: float
+    """N·m·s/rad"""
+    roll_stiffness: float
+    """N·m/rad"""
+    roll_damping: float
+    """N·m·s/rad"""
+    front: float
+    """m ahead of the saddle point"""
+    behind: float
+    """m"""
+    sit_bones: float
+    """m from the middle"""
+
+
+def seat_contact(load: float, ahead: float, parameters: SaddleParameters | None = None) -> SeatContact:
     """The saddle under one rider.
 
     Args:
         load: what rests on it when nothing moves, N; with it the pelvis is where the posture has it.
+        ahead: of the saddle point is the centre of pressure then, m.
         parameters: None for default ones.
     """
+    p = SaddleParameters() if parameters is None else parameters
+    # three equal springs about their centroid
+    along = 2.0 / 3.0 * (p.front + p.behind) ** 2
+    across = 2.0 * p.sit_bones**2
+    return SeatContact(
+        load=load,
+        ahead=ahead,
+        stiffness=p.stiffness,
+        damping=p.damping,
+        pitch_stiffness=along * p.tissue_stiffness,
+        pitch_damping=along * p.tissue_damping,
+        roll_stiffness=across * p.tissue_stiffness,
+        roll_damping=across * p.tissue_damping,
+        front=p.front,
+        behind=p.behind,
+        sit_bones=p.sit_bones,
+    )
 
-    def __init__(self, load: float, parameters: SaddleParameters | None = None) -> None:
-        self.load, self.parameters = load, SaddleParameters() if parameters is None else parameters
 
-    def force(self, height: float, rate: float) -> float:
-        """Upward force on the pelvis, N, never negative: the contact is unilateral.
+def press(
+    seat: SeatContact, pitch: float, pitching: float, roll: float, rolling: float, rise: float, rising: float
+) -> tuple[float, float, float]:
+    """Force and moments of the saddle on the pelvis.
 
-        Args:
-            height: of the pelvis above its position at rest, m.
-            rate: of that height, m/s.
-        """
-        return max(0.0, self.load - self.parameters.stiffness * height - self.parameters.damping * rate)
+    Args:
+        seat: the saddle.
+        pitch: forward tip of the pelvis, rad.
+        pitching: its rate, rad/s.
+        roll: tip to the right, rad.
+        rolling: its rate, rad/s.
+        rise: height of the pelvis above its position at rest, m.
+        rising: its rate, m/s.
+
+    Returns:
+        Moments about the saddle point, N·m, forwards and to the right; upward force, N, never negative.
+    """
+    force = seat.load - seat.stiffness * rise - seat.damping * rising
+    if force <= 0.0:
+        return 0.0, 0.0, 0.0
+    forwards = force * seat.ahead + seat.pitch_stiffness * pitch + seat.pitch_damping * pitching
+    rightwards = seat.roll_stiffness * roll + seat.roll_damping * rolling
+    front = (forwards + seat.behind * force) / (seat.front + seat.behind)
+    left = 0.5 * (force - front - rightwards / seat.sit_bones)
+    right = force - front - left
+    # a point that would have to pull lets go, and the others carry its load
+    front, left, right = max(0.0, front), max(0.0, left), max(0.0, right)
+    share = force / (front + left + right)
+    front, left, right = share * front, share * left, share * right
+    return seat.behind * (left + right) - seat.front * front, seat.sit_bones * (left - right), force
 
 
 ARMS_ON_HANDS = 0.30
@@ -66,22 +146,21 @@ LEGS_ON_SADDLE = 0.4
 
 def balanced_hand_load(posture: Posture) -> float:
     """Load (N) of each hand besides the arm's weight with which all of the saddle carries weight."""
-    upper = _upper_body(posture)
+    upper = upper_body(posture)
     moment = STANDARD_GRAVITY * sum(part.mass * float(part.centre[0] - posture.bicycle.saddle[0]) for part in upper)
     reach = posture.bicycle.grip[0] - posture.bicycle.saddle[0]
     mass = posture.body.mass
     return max(0.0, 0.5 * ((moment - AHEAD * mass) / reach - ARMS_ON_HANDS * mass))
 
 
-def resting_load(posture: Posture, hand_load: float, pedals: bool) -> float:
-    """Weight (N) on the saddle of a rider who leans on each hand with ``hand_load`` (N), whether or not on pedals."""
-    upper = STANDARD_GRAVITY * sum(part.mass for part in _upper_body(posture))
+def resting_load(posture: Posture, hand_load: float) -> float:
+    """Weight (N) on the saddle of a rider who leans on each hand with ``hand_load`` (N)."""
+    upper = STANDARD_GRAVITY * sum(part.mass for part in upper_body(posture))
     legs = STANDARD_GRAVITY * posture.body.mass - upper
-    hands = 2.0 * hand_load + ARMS_ON_HANDS * posture.body.mass * pedals
-    return upper - hands + legs * (LEGS_ON_SADDLE if pedals else 1.0)
+    return upper - 2.0 * hand_load - ARMS_ON_HANDS * posture.body.mass + legs * LEGS_ON_SADDLE
 
 
-def _upper_body(posture: Posture) -> list[Mass]:
+def upper_body(posture: Posture) -> list[Mass]:
     """Pelvis, trunk and arms in the bicycle frame."""
     trunk = posture.trunk_orientation()
     arms = [mass for name, mass in posture.limbs_at(0.0).items() if name.startswith("arm")]

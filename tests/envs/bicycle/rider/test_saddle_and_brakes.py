@@ -11,50 +11,70 @@ from poise.envs.bicycle.course.path import Path
 from poise.envs.bicycle.course.scenarios import scenario
 from poise.envs.bicycle.frame.bicycle import Bicycle
 from poise.envs.bicycle.frame.parameters import MOUNTAIN_BIKE, RigidPart, combine
+from poise.envs.bicycle.ride.contact_forces import LoadCells
 from poise.envs.bicycle.ride.ride import Ride
 from poise.envs.bicycle.rider.anthropometry import SUBJECTS
 from poise.envs.bicycle.rider.posture import sit
-from poise.envs.bicycle.rider.saddle import Saddle, SaddleParameters, balanced_hand_load, resting_load
+from poise.envs.bicycle.rider.saddle import SaddleParameters, balanced_hand_load, press, resting_load, seat_contact
 from poise.envs.bicycle.rider.style import STYLES, RiderMotion
 from poise.envs.physics.world import Physics
 from poise.envs.sensors.ideal import STANDARD_GRAVITY
 
+SEAT = seat_contact(400.0, 0.01)
+STILL = (0.0, 0.0)
 
-def test_a_saddle_presses_and_never_pulls():
-    saddle = Saddle(400.0, SaddleParameters(4e4, 900.0))
-    assert saddle.force(0.0, 0.0) == 400.0
-    assert saddle.force(-0.005, 0.0) == pytest.approx(600.0)
-    assert saddle.force(0.0, -0.1) == pytest.approx(490.0)
-    assert saddle.force(0.011, 0.0) == 0.0
+
+def test_a_saddle_gives_way_and_never_pulls():
     p = SaddleParameters()
+    assert press(SEAT, *STILL, *STILL, *STILL)[2] == pytest.approx(400.0)
+    assert press(SEAT, *STILL, *STILL, -0.005, 0.0)[2] == pytest.approx(400.0 + 0.005 * p.stiffness)
+    assert press(SEAT, *STILL, *STILL, 0.0, -0.1)[2] == pytest.approx(400.0 + 0.1 * p.damping)
+    assert press(SEAT, 0.1, 0.0, 0.1, 0.0, 0.011, 0.0) == (0.0, 0.0, 0.0)
     # 45 kg bounce at 5 Hz, a third of critical damping
     assert math.sqrt(p.stiffness / 45.0) / (2.0 * math.pi) == pytest.approx(5.0, abs=0.1)
     assert p.damping / (2.0 * math.sqrt(p.stiffness * 45.0)) == pytest.approx(1.0 / 3.0, abs=0.01)
-    for bad in ({"stiffness": 0.0}, {"damping": -1.0}):
+    for bad in ({"stiffness": 0.0}, {"damping": -1.0}, {"front": 0.0}, {"tissue_damping": float("nan")}):
         with pytest.raises(ValueError, match=next(iter(bad))):
             SaddleParameters(**bad)
 
 
+def test_a_pelvis_tips_on_springs_until_a_point_lets_go():
+    p = SaddleParameters()
+    # three springs: their stiffness about the centroid, and about the middle
+    forwards, rightwards, force = press(SEAT, 1e-3, 0.0, 2e-3, 0.0, *STILL)
+    xs = np.array([p.front, -p.behind, -p.behind])
+    along = p.tissue_stiffness * ((xs - xs.mean()) ** 2).sum()
+    assert forwards == pytest.approx(-0.01 * force - 1e-3 * along)
+    assert rightwards == pytest.approx(-2e-3 * p.tissue_stiffness * 2.0 * p.sit_bones**2)
+    for tip in np.random.default_rng(0).normal(0.0, 0.1, (200, 3)):
+        forwards, rightwards, force = press(SEAT, tip[0], 0.0, tip[1], 0.0, 0.05 * tip[2], 0.0)
+        # tipping is resisted, whichever points still press, and no load cell below the triangle pulls
+        cells = LoadCells().share(np.array([0.0, 0.0, force]), np.array([rightwards, forwards, 0.0]))
+        assert cells.min() >= -1e-9
+        assert rightwards * tip[1] <= 0.0
+        assert -force * p.front - 1e-9 <= forwards <= force * p.behind + 1e-9
+    assert press(SEAT, 0.5, 0.0, *STILL, *STILL)[0] == pytest.approx(-400.0 * p.front)
+    assert press(SEAT, *STILL, 0.5, 0.0, *STILL)[1] == pytest.approx(-400.0 * p.sit_bones, rel=0.05)
+
+
+@pytest.mark.parametrize("fidelity", ["full", "lumped"])
 @pytest.mark.parametrize("subject", [0, 4])
-def test_a_still_rider_rests_where_the_posture_has_the_pelvis(subject):
+def test_a_still_rider_rests_where_the_posture_has_the_pelvis(subject, fidelity):
     """Statics of the balance on the saddle against what the simulated rider's links say."""
     posture = sit(MOUNTAIN_BIKE, SUBJECTS[subject])
     motion = RiderMotion(STYLES["still"], np.random.default_rng(0))
-    with Ride(posture, motion, Path(np.zeros(2)), lambda _: 2.0) as ride:
-        heights, forces = [], []
+    with Ride(posture, motion, Path(np.zeros(2)), lambda _: 2.0, fidelity=fidelity) as ride:
+        places, forces = [], []
         for step in range(1500):
             ride.step()
             if step > 700:
-                heights.append(ride.bicycle.body.joint_tuples([ride.rider.seat])[0][0])
-                forces.append(ride.rider.saddle.force(*ride.bicycle.body.joint_tuples([ride.rider.seat])[0]))
-    assert abs(np.mean(heights)) < 1.5e-3
-    load = resting_load(posture, balanced_hand_load(posture), pedals=True)
-    assert np.mean(forces) == pytest.approx(load, rel=0.15)
+                seat = [part for pair in ride.bicycle.body.joint_tuples(ride.rider.seat) for part in pair]
+                places.append(seat[::2])
+                forces.append(press(ride.rider.saddle, *seat)[2])
+    assert np.abs(np.mean(places, axis=0)).max() < 4e-3
+    load = resting_load(posture, balanced_hand_load(posture))
+    assert np.mean(forces) == pytest.approx(load, rel=0.05)
     assert 0.4 < load / (SUBJECTS[subject].mass * STANDARD_GRAVITY) < 0.65
-    # without pedals the saddle carries the legs too
-    lumped = resting_load(posture, balanced_hand_load(posture), pedals=False)
-    weight = SUBJECTS[subject].mass * STANDARD_GRAVITY
-    assert lumped == pytest.approx(weight - 2.0 * balanced_hand_load(posture))
 
 
 def test_light_riders_lean_less_on_their_hands():
