@@ -20,6 +20,8 @@ PHYSICS_PER_STEP = 10
 RIDER = "poise/RiderBicycle-v0"
 RIDER_RATE, RIDER_PHYSICS = 100.0, 500.0
 """Hz of observations and of physics"""
+RIDE_LENGTH, RIDES = 60.0, 1000
+"""s and number of the rides of a data set, for the time that recording it takes"""
 
 
 def environment_speeds() -> Iterator[Speed]:
@@ -39,6 +41,7 @@ def environment_speeds() -> Iterator[Speed]:
     yield Speed(group, "simulate_hand, whole episode at once", rate, "steps/s", rate / (bare / PHYSICS_PER_STEP))
     yield from rider_speeds("full")
     yield from rider_speeds("lumped")
+    yield from gain_speeds()
 
 
 def rider_speeds(fidelity: Literal["full", "lumped"]) -> Iterator[Speed]:
@@ -60,6 +63,52 @@ def rider_speeds(fidelity: Literal["full", "lumped"]) -> Iterator[Speed]:
     yield Speed(group, "RiderBicycle", rate, "steps/s", rate / bare)
     yield Speed(group, "RiderBicycle, real-time factor", rate / RIDER_RATE, "s of riding/s")
     yield Speed(group, "RiderBicycle, reset to another motion", reset_rate(RIDER, options), "resets/s")
+    another = options | {"subject": "random"}
+    yield Speed(group, "RiderBicycle, reset to another person", reset_rate(RIDER, another), "resets/s")
+    rate = recording_rate(options)
+    yield Speed(group, f"recording rides of {RIDE_LENGTH:.0f} s to files", rate, "s of riding/s")
+    hours = RIDES * RIDE_LENGTH / rate / 3600.0
+    yield Speed(group, f"recording {RIDES} of them in two processes", 2.0 / hours, "data sets/h")
+
+
+def gain_speeds() -> Iterator[Speed]:
+    """Resets of gain tuning on rides: to rides that were simulated before, and to new ones."""
+    group = "gain tuning on rides of 20 s, lumped"
+    identity = "poise/RiderBicycleGain-v0"
+    kept = reset_rate(identity, {"rides": 1})
+    yield Speed(group, "RiderBicycleGain, reset to a ride in memory", kept, "resets/s")
+    yield Speed(group, "RiderBicycleGain, reset to a ride on disk", stored_rate(identity), "resets/s")
+    new = reset_rate(identity, {"rides": None})
+    yield Speed(group, "RiderBicycleGain, reset to a new ride", new, "resets/s")
+    rate = environment_rate(identity, {"rides": 1})
+    yield Speed(group, "RiderBicycleGain, 100 ms a step", rate, "steps/s")
+
+
+def stored_rate(identity: str) -> float:
+    """Median rate of the first resets of environments whose ride another one has written to the cache folder."""
+    from ...envs.registration import make_environment
+
+    rates = []
+    for _ in range(REPEATS + 1):
+        env = make_environment(identity, rides=1)
+        start = time.process_time()
+        env.reset(seed=0)
+        rates.append(1.0 / (time.process_time() - start))
+        env.close()
+    return sorted(rates[1:])[REPEATS // 2]
+
+
+def recording_rate(options: dict[str, Any]) -> float:
+    """Seconds of riding per CPU second of simulating a ride and writing it to a file, all in all."""
+    import tempfile
+    from pathlib import Path
+
+    from ...envs.record import record_episode
+
+    with tempfile.TemporaryDirectory() as folder:
+        start = time.process_time()
+        record_episode(RIDER, options | {"duration": RIDE_LENGTH}, 0, Path(folder) / "ride.h5")
+        return RIDE_LENGTH / (time.process_time() - start)
 
 
 def standing_ride(fidelity: Literal["full", "lumped"]) -> Ride:

@@ -30,6 +30,46 @@ class PathPoint(NamedTuple):
     """1/m, left positive"""
 
 
+@jit
+def point_at(points, distance):  # type: ignore[no-untyped-def]
+    """x, y (m), heading (rad) and curvature (1/m) of a path ``(n, 4)`` at an arc length (m); it goes on straight."""
+    last = len(points) - 1
+    place = distance / SPACING
+    if place <= 0.0 or place >= last:
+        row = points[0 if place <= 0.0 else last]
+        over = distance if place <= 0.0 else distance - last * SPACING
+        return row[0] + over * math.cos(row[2]), row[1] + over * math.sin(row[2]), row[2], 0.0
+    index = int(place)
+    part = place - index
+    one, two = points[index], points[index + 1]
+    return (
+        one[0] + part * (two[0] - one[0]),
+        one[1] + part * (two[1] - one[1]),
+        one[2] + part * (two[2] - one[2]),
+        one[3] + part * (two[3] - one[3]),
+    )
+
+
+@jit
+def nearest(points, distance, x, y):  # type: ignore[no-untyped-def]
+    """Arc length (m) of the point of a path nearest to (x, y), and how far (m) that lies to the left of the path there.
+
+    Args:
+        points: ``(n, 4)`` of the path.
+        distance: a guess near the answer, for instance the last one.
+        x: m, world.
+        y: m, world.
+    """
+    left = 0.0
+    for _ in range(2):
+        px, py, heading, curvature = point_at(points, distance)
+        c, s = math.cos(heading), math.sin(heading)
+        dx, dy = x - px, y - py
+        left = c * dy - s * dx
+        distance += (c * dx + s * dy) / max(0.2, 1.0 - curvature * left)
+    return distance, left
+
+
 class Path:
     """A path with continuous curvature, straight beyond its end.
 
@@ -52,25 +92,15 @@ class Path:
         x = start[0] + np.concatenate([[0.0], np.cumsum(SPACING * np.cos(middle))])
         y = start[1] + np.concatenate([[0.0], np.cumsum(SPACING * np.sin(middle))])
         self.points = np.stack([x, y, heading, curvature], axis=1)
-        self._rows = self.points.tolist()
 
     @property
     def length(self) -> float:
         """Arc length, m."""
-        return SPACING * (len(self._rows) - 1)
+        return SPACING * (len(self.points) - 1)
 
     def at(self, distance: float) -> PathPoint:
         """The point at an arc length (m); beyond its ends the path is straight."""
-        last = len(self._rows) - 1
-        place = distance / SPACING
-        if place <= 0.0 or place >= last:
-            x, y, heading, _ = self._rows[0 if place <= 0.0 else last]
-            over = distance if place <= 0.0 else distance - last * SPACING
-            return PathPoint(x + over * math.cos(heading), y + over * math.sin(heading), heading, 0.0)
-        index = int(place)
-        part = place - index
-        first, second = self._rows[index], self._rows[index + 1]
-        return PathPoint(*(a + part * (b - a) for a, b in zip(first, second, strict=True)))
+        return PathPoint(*point_at(self.points, float(distance)))
 
     def curvatures(self, distances: np.ndarray) -> np.ndarray:
         """Curvature ``(n,)`` at several arc lengths (m), 1/m."""
@@ -78,21 +108,9 @@ class Path:
         return np.interp(places, np.arange(len(self.points)), self.points[:, 3], left=0.0, right=0.0)
 
     def progress(self, distance: float, x: float, y: float) -> tuple[float, float]:
-        """Arc length of the nearest point and how far (m) the point (x, y) lies to the left of the path there.
-
-        Args:
-            distance: a guess near the answer, for instance the last one.
-            x: m, world.
-            y: m, world.
-        """
-        left = 0.0
-        for _ in range(2):
-            point = self.at(distance)
-            c, s = math.cos(point.heading), math.sin(point.heading)
-            dx, dy = x - point.x, y - point.y
-            left = c * dy - s * dx
-            distance += (c * dx + s * dy) / max(0.2, 1.0 - point.curvature * left)
-        return distance, left
+        """See :func:`nearest`."""
+        found: tuple[float, float] = nearest(self.points, distance, x, y)
+        return found
 
 
 def smooth_curvature(curvature: Callable[[np.ndarray], np.ndarray], length: float, blend: float = 1.0) -> np.ndarray:
