@@ -23,6 +23,8 @@ from .data.trajectory import Trajectory
 from .drawn import DrawnEnv, Scene, Shown
 from .hand.gestures import GestureConfig
 from .hand.trajectories import HandTrajectories
+from .recipes.hand import HandRecipe
+from .recipes.registry import hand_recipe
 from .sensors.presets import SensorPreset
 
 RewardKind = Literal["error", "improvement"]
@@ -230,7 +232,8 @@ class HandMotionGainEnv(GainTuningEnv):
     Those of :class:`GainTuningEnv`, and ``gesture``, ``rate`` (Hz), ``sensors`` (preset), each a single one or
     several to draw from, ``noise_scale`` (factor on the sensor's errors, or lowest and highest), ``duration`` (s),
     ``mounting``, ``drive``; see :class:`poise.envs.hand.trajectories.HandTrajectories`. The dynamic drive costs
-    seconds a reset.
+    seconds a reset. Or ``recipe``, a :class:`poise.envs.recipes.hand.HandRecipe`, its name or JSON file, in place of
+    them all (:func:`poise.envs.recipes.registry.recipe`).
 
     ## Version history
 
@@ -249,9 +252,11 @@ class HandMotionGainEnv(GainTuningEnv):
         duration: float = 60.0,
         mounting: Literal["random", "aligned"] = "random",
         drive: Literal["kinematic", "dynamic"] = "kinematic",
+        recipe: str | Path | HandRecipe | None = None,
         **common: Any,
     ) -> None:
         super().__init__(filter, **common)
+        self.recipe = None if recipe is None else hand_recipe(recipe)
         self.motions = HandTrajectories(
             gestures=gesture,  # type: ignore[arg-type]
             rates=rate,  # type: ignore[arg-type]
@@ -261,13 +266,18 @@ class HandMotionGainEnv(GainTuningEnv):
             mounting=mounting,
             drive=drive,
         )
-        longest = max(1.0 / rate * self.tuned.features.interval_samples(1.0 / rate) for rate in self.motions.rates)
-        if duration < longest:
-            raise ValueError(f"duration must be one interval at least ({longest:g} s), got {duration}")
+        rates = self.motions.rates if self.recipe is None else self.recipe.rates
+        shortest = duration if self.recipe is None else self.recipe.duration
+        longest = max(1.0 / rate * self.tuned.features.interval_samples(1.0 / rate) for rate in rates)
+        if shortest < longest:
+            raise ValueError(f"duration must be one interval at least ({longest:g} s), got {shortest}")
 
     def next_trajectory(self) -> Trajectory:
         """A new motion and new errors."""
-        return self.motions.draw(self.np_random.spawn(1)[0])
+        generator = self.np_random.spawn(1)[0]
+        if self.recipe is None:
+            return self.motions.draw(generator)
+        return self.recipe.draw(int(generator.integers(2**32)))
 
 
 class ReplayGainEnv(GainTuningEnv):

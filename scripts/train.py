@@ -25,7 +25,7 @@ CONTENDERS = ("bounded-motion", "vqf", "mahony", "tilt", "gyroscope-integration"
 GESTURES = ("slow", "fast", "severe", "mixed")
 """Gestures of the hand-motion environment on which it is tested besides randomised episodes."""
 
-OPTIONS = ("preset", "seed", "episodes", "epochs", "units", "recordings", "test_episodes")
+OPTIONS = ("preset", "seed", "episodes", "epochs", "units", "recipe", "recordings", "test_episodes")
 """Arguments that the weights and their card depend on."""
 
 
@@ -45,6 +45,9 @@ class Args:
     """passes over the episodes, instead of the preset's"""
     units: int | None = None
     """units of the network, instead of the preset's"""
+    recipe: str | None = None
+    """recipe of hand motions to train on, by name (`poise list recipes`) or as a JSON file (default: in the hand and
+    carried)"""
     recordings: tuple[Path, ...] = ()
     """files or folders of recordings with known orientation, to train on instead of simulated episodes; of five or
     more the last fifth chooses the best epoch"""
@@ -101,11 +104,13 @@ def run(args: Args) -> int:
 def training_config(args: Args) -> TrainingConfig:
     """The configuration that the arguments ask for."""
     from ..baselines.learned.training import TrainingConfig
-    from ..envs.recipes.hand import HandRecipe
+    from ..envs.recipes.registry import hand_recipe
 
     config = TrainingConfig()
+    if args.recipe is not None:
+        config = replace(config, domain=hand_recipe(args.recipe))
     if args.preset == "quick":
-        quick = HandRecipe(duration=60.0)
+        quick = replace(config.domain, duration=min(60.0, config.domain.duration))
         config = replace(config, episodes=96, validation_episodes=16, epochs=4, units=32, batch=16, domain=quick)
     given = {name: getattr(args, name) for name in ("episodes", "epochs", "units")}
     return replace(config, seed=args.seed, **{name: value for name, value in given.items() if value is not None})
@@ -161,9 +166,7 @@ def card_of(args: Args, config: TrainingConfig, result: TrainingResult, table: p
         "estimator": "poise.baselines.learned.estimator.LearnedEstimator",
         "units": config.units,
         "front_end": {name: value for name, value in asdict(config.frame).items() if name != "dt"},
-        "command": command_line(
-            "train", args, ("preset", "seed", "episodes", "epochs", "units", "recordings", "test_episodes")
-        ),
+        "command": command_line("train", args, OPTIONS),
         "data": "simulated episodes" if not args.recordings else [path.name for path in args.recordings],
         "training": asdict(config),
         "best_epoch": result.best_epoch,

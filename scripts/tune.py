@@ -46,6 +46,9 @@ class Args:
     """decisions to train on, instead of the preset's"""
     trajectories: int | None = None
     """simulated trajectories of a minute to train on, instead of the preset's"""
+    recipe: str | None = None
+    """recipe of hand motions to train and test on, by name or as a JSON file, at 100 Hz (default: the motions of the
+    shipped policies)"""
     test_trajectories: int = 32
     """simulated trajectories that training never sees, for the comparison"""
     recordings: tuple[Path, ...] = ()
@@ -62,7 +65,6 @@ class Args:
 
 def run(args: Args) -> int:
     """Tune, compare with the published tuning and the best constant gains, and write what was found."""
-    from ..baselines.gain_policy.config import TRAINING_MOTIONS
     from ..baselines.gain_policy.constant_gains import best_constant_gains
     from ..baselines.gain_policy.policy import GainPolicy
     from ..filters.adaptation.gains import tunable_filter
@@ -70,13 +72,13 @@ def run(args: Args) -> int:
 
     config = training_config(args)
     tuned = TunedFilter.of(tunable_filter(args.filter), config.gains)
-    sets = {"simulated": TRAINING_MOTIONS.draw_many(child_seed(args.seed, TEST_SEED), args.test_trajectories)}
+    sets = {"simulated": config.motions.draw_many(child_seed(args.seed, TEST_SEED), args.test_trajectories)}
     recorded = known_recordings(args.recordings)
     if recorded:
         sets["recorded"] = recorded
     folder = open_run("tune", args, may_differ=("steps", "test_trajectories", "recordings"))
     with Output("tune", args) as out:
-        motions = TRAINING_MOTIONS.draw_many(config.seed, min(config.trajectories, 48))
+        motions = config.motions.draw_many(config.seed, min(config.trajectories, 48))
         out.say(f"searching constant gains of {args.filter} on {len(motions)} trajectories")
         samples, refinements = (64, 60) if args.preset == "shipped" else (16, 20)
         guesses = () if config.warm_start_centre is None else (config.warm_start_centre,)
@@ -112,6 +114,10 @@ def training_config(args: Args) -> TrainingConfig:
     else:
         config = replace(shipped_config(args.filter), total_timesteps=QUICK_STEPS, trajectories=48, warm_start=24)
     given: dict[str, Any] = {"total_timesteps": args.steps, "trajectories": args.trajectories}
+    if args.recipe is not None:
+        from ..envs.recipes.registry import hand_recipe
+
+        given["motions"] = replace(hand_recipe(args.recipe), rates=(100.0, 100.0))
     return replace(config, seed=args.seed, **{name: value for name, value in given.items() if value is not None})
 
 
@@ -184,8 +190,8 @@ def card_of(
         "description": f"sets the gains of the {args.filter} filter while it runs",
         "estimator": "poise.baselines.gain_policy.adaptive.AdaptiveEstimator",
         "method": args.method,
-        "command": command_line("tune", args, ("method", "preset", "seed", "steps", "trajectories")),
-        "data": "simulated hand motions",
+        "command": command_line("tune", args, ("method", "preset", "seed", "steps", "trajectories", "recipe")),
+        "data": "simulated hand motions" if args.recipe is None else f"recipe {args.recipe}",
         **policy.card,
         "best_constant": [round(float(value), 4) for value in constant.action],
         "test_inclination_deg": {name: dict(values) for name, values in summary.items()},

@@ -9,6 +9,7 @@ from typing import Any
 
 from ...envs.hand.gestures import Mixed
 from ...envs.hand.trajectories import HandTrajectories
+from ...envs.recipes.hand import HandRecipe
 from ...envs.sensors.presets import sensor_preset
 
 SUSTAINED = Mixed(lengths=(15.0, 40.0), rest_share=0.1, spread=0.5, single_share=0.25)
@@ -47,8 +48,8 @@ class TrainingConfig:
     """gains that the policy sets; None for all of the filter"""
     interval: float = 0.1
     """s between decisions"""
-    motions: HandTrajectories = TRAINING_MOTIONS
-    """what is simulated"""
+    motions: HandTrajectories | HandRecipe = TRAINING_MOTIONS
+    """what is simulated; a recipe with few rates, since the trajectories of one rate are computed together"""
     trajectories: int = 240
     """number of simulated trajectories to train on"""
     seed: int = 0

@@ -60,6 +60,10 @@ class Recipe(Checked):
         origin = {"definition": self.describe(), "seed": int(seed), "index": int(index)}
         return trajectory.replace(metadata=trajectory.metadata | {"recipe": origin})
 
+    def draw_many(self, seed: int, count: int) -> list[Trajectory]:
+        """The first episodes of the data set of root ``seed``; a larger ``count`` keeps the first ones."""
+        return [self.episode(seed, index) for index in range(count)]
+
     def describe(self) -> dict[str, Any]:
         """All fields, for JSON; the inverse is :meth:`read`."""
         return {"kind": self.kind, **lists(asdict(self))}

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 from ...filters.support.files import write_text
 from ...filters.support.names import look_up
 from ..data.trajectory import Trajectory
+from .hand import HandRecipe
 from .recipe import Recipe
 
 KINDS = {"hand": (".hand", "HandRecipe"), "rider": (".rider", "RiderRecipe")}
@@ -87,6 +88,18 @@ def described_recipe(described: Any) -> Recipe:
     if not isinstance(described, Mapping) or "kind" not in described:
         raise ValueError(f"a recipe must be a mapping with its kind, one of {list(KINDS)}, got {described!r}")
     return kind_of(described["kind"]).read(described)
+
+
+def hand_recipe(of: str | Path | Mapping[str, Any] | Recipe) -> HandRecipe:
+    """A recipe of hand motions, see :func:`recipe`.
+
+    Raises:
+        ValueError: the recipe is of another kind, or see there.
+    """
+    made = recipe(of)
+    if not isinstance(made, HandRecipe):
+        raise ValueError(f"recipe must be one of hand motions, but {made.name!r} is of the kind {made.kind!r}")
+    return made
 
 
 def save_recipe(made: Recipe, path: str | Path) -> Path:

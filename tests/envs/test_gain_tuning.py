@@ -1,5 +1,8 @@
 """Environments in which an agent tunes a filter: what is theirs beyond the contract of all environments."""
 
+from dataclasses import replace
+from pathlib import Path
+
 import gymnasium as gym
 import numpy as np
 import pytest
@@ -7,6 +10,7 @@ import pytest
 import poise
 from poise.envs.gain_tuning import GainTuningEnv, HandMotionGainEnv, ReplayGainEnv
 from poise.envs.hand.trajectories import HandTrajectories
+from poise.envs.recipes.registry import recipe, save_recipe
 from poise.filters.adaptation.features import InnovationFeatures
 from poise.filters.adaptation.gains import (
     DECADES,
@@ -309,3 +313,20 @@ def test_samples_that_are_missing_do_no_harm(trajectory):
 def test_the_package_registers_them():
     assert {"poise/HandMotionGain-v0", "poise/ReplayGain-v0"} <= set(gym.registry)
     assert poise.__version__
+
+
+def test_episodes_come_from_a_recipe(tmp_path: Path) -> None:
+    made = replace(recipe("hand-held"), duration=3.0, rates=(100.0, 100.0))
+    env = HandMotionGainEnv(recipe=save_recipe(made, tmp_path / "short.json"))
+    env.reset(seed=2)
+    first = env.trajectory
+    assert first is not None
+    assert len(first) == 300
+    env.reset(seed=2)
+    np.testing.assert_array_equal(env.trajectory.measurements["imu/gyr"], first.measurements["imu/gyr"])
+    env.reset()
+    assert not np.array_equal(env.trajectory.measurements["imu/gyr"], first.measurements["imu/gyr"])
+    with pytest.raises(ValueError, match="recipe must be one of hand motions, but 'rider' is of the kind 'rider'"):
+        HandMotionGainEnv(recipe="rider")
+    with pytest.raises(ValueError, match="duration must be one interval at least"):
+        HandMotionGainEnv(recipe=replace(made, duration=0.05))
