@@ -3,15 +3,46 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from ...filters.support.ranges import Checked, Range, log_uniform
+from ...filters.support.seeds import named_generator
 from ..sensors.noise import NoiseModel
 from ..sensors.presets import SensorPreset
+from ..sensors.timing import PUNCTUAL, Timing
 
 DEG = math.pi / 180.0
+
+
+@dataclass(frozen=True)
+class VariedTiming(Checked):
+    """Devices that are late or lose packets; ranges of the fields of :class:`~poise.envs.sensors.timing.Timing`."""
+
+    late_share: float = 0.3
+    """of devices, which have delay, jitter and a clock of their own"""
+    delay: Range = (0.0005, 0.02)
+    """s"""
+    jitter: Range = (2e-5, 1e-3)
+    """s"""
+    clock_drift: Range = (5e-6, 5e-5)
+    """1"""
+    packet_loss_share: float = 0.15
+    """of devices, which lose packets in bursts"""
+    burst_rate: Range = (0.01, 0.2)
+    """1/s"""
+    burst_duration: Range = (0.05, 0.5)
+    """s"""
+
+    def draw(self, generator: np.random.Generator) -> Timing:
+        """Draw the timing of a device from a descendant of ``generator``, which is not used up."""
+        own = named_generator(generator, "timing")
+        late, loses = own.random(2) < (self.late_share, self.packet_loss_share)
+        delay, jitter, drift = (log_uniform(own, each) for each in (self.delay, self.jitter, self.clock_drift))
+        burst_rate, duration = log_uniform(own, self.burst_rate), log_uniform(own, self.burst_duration)
+        timing = Timing(delay, jitter, drift) if late else PUNCTUAL
+        return replace(timing, burst_rate=burst_rate, burst_duration=duration) if loses else timing
 
 
 @dataclass(frozen=True)
@@ -45,6 +76,7 @@ class VariedSensors(Checked):
     """1/s, how often"""
     pause: Range = (0.05, 2.0)
     """s, mean length"""
+    timing: VariedTiming = field(default_factory=VariedTiming)
 
     def draw(self, generator: np.random.Generator) -> SensorPreset:
         """Draw a device."""
@@ -73,4 +105,5 @@ class VariedSensors(Checked):
             burst_rate=burst_rate * float(silent),
             burst_duration=log_uniform(generator, self.pause),
         )
-        return SensorPreset("varied", "domain randomisation", gyroscope, accelerometer)
+        timing = self.timing.draw(generator)
+        return SensorPreset("varied", "domain randomisation", gyroscope, accelerometer, timing=timing)

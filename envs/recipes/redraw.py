@@ -20,9 +20,11 @@ from ..bicycle.sensors.sites import sensor_sites
 from ..bicycle.sensors.suites import rider_bicycle_suite
 from ..data.trajectory import Trajectory
 from ..sensors.ideal import STANDARD_GRAVITY
+from ..sensors.late import readings_at
 from ..sensors.noise import TIMES
 from ..sensors.sensor import Sensor, due
 from ..sensors.suite import SensorSuite
+from ..sensors.timing import Timings, make_clocks
 from .mirror import mirrored
 from .recipe import unspawned
 
@@ -56,6 +58,7 @@ def redrawn(
     noise_scale: float = 1.0,
     mirror: bool = False,
     geometry: TapeMeasure | None = None,
+    timing: Timings | None = None,
 ) -> Trajectory:
     """A ride with sensor errors drawn anew: biases, zeros, camera alignment, scale, noise, lost samples.
 
@@ -67,6 +70,8 @@ def redrawn(
         mirror: exchange left and right, see :func:`.mirrored`.
         geometry: measure the rider anew: ``metadata["geometry"]``, with which filters are configured, is then
             measured, and ``metadata["true_geometry"]`` the geometry itself. None leaves the true one.
+        timing: of all sensors, or of each site, as of the environment. Late readings are interpolated between the ideal
+            ones, so that a part of their highest frequencies is lost.
 
     Returns:
         Measurements with errors, and the true biases; everything else as in ``ride``.
@@ -77,7 +82,7 @@ def redrawn(
     described = ideal_sensors(ride)
     ride = mirrored(ride) if mirror else ride
     errors, tape = (np.random.default_rng(child) for child in unspawned(seed).spawn(2))
-    suite = suite_of(ride, described, sensors, noise_scale)
+    suite = suite_of(ride, described, sensors, noise_scale, timing)
     measurements, biases = with_errors(suite, ride, errors)
     metadata: dict[str, Any] = ride.metadata | {"sensors": suite.describe(), "devices": sensors}
     metadata |= {"noise_scale": float(noise_scale), "mirrored": bool(mirror)}
@@ -108,7 +113,9 @@ def ideal_sensors(ride: Trajectory) -> Mapping[str, Any]:
     return described
 
 
-def suite_of(ride: Trajectory, described: Mapping[str, Any], sensors: str, noise_scale: float) -> SensorSuite:
+def suite_of(
+    ride: Trajectory, described: Mapping[str, Any], sensors: str, noise_scale: float, timing: Timings | None = None
+) -> SensorSuite:
     """The suite with errors, at the rate of the ride, with its wheel."""
     from ..bicycle.frame.parameters import MOUNTAIN_BIKE
     from ..bicycle.rider.anthropometry import RiderBody
@@ -123,6 +130,7 @@ def suite_of(ride: Trajectory, described: Mapping[str, Any], sensors: str, noise
         noise_scale=noise_scale,
         sites=sites,
         sampling=described["sensors"][0]["sampling"],
+        timing=timing,
     )
 
 
@@ -135,15 +143,26 @@ def with_errors(
     """
     children = generator.spawn(len(suite.sensors))
     steps = np.arange(len(ride))
+    clocks = make_clocks((sensor.clock for sensor in suite.sensors), suite.rate, children[0])
+    lags = {key: clock.advance(steps) for key, clock in clocks.items()}
     measurements, biases = {}, {}
     for sensor, child in zip(suite.sensors, children, strict=True):
         name, noise = sensor.channel.name, sensor.errors(child)
         ideal = ride.measurements[name]
         rows = due(sensor.rate, steps, suite.rate)
         # an interval sensor has no sample before its first interval is over
-        rows = rows[np.isfinite(ideal[rows]).all(axis=1)]
+        known = np.isfinite(ideal).all(axis=1)
+        if sensor.clock is None:
+            rows = rows[known[rows]]
+            readings = ideal[rows]
+        else:
+            lag, lost = lags[sensor.clock]
+            times, past = steps / suite.rate - lag, steps[known] / suite.rate
+            rows = rows[~lost[rows]]
+            rows = rows[times[rows] >= past[0]]
+            readings = readings_at(past, ideal[known], times[rows], sensor.form)
         start = noise.bias
-        values, found = noise.sequence(ideal[rows], force_at(sensor, ride, rows))
+        values, found = noise.sequence(readings, force_at(sensor, ride, rows))
         measurements[name] = np.full_like(ideal, np.nan)
         measurements[name][rows] = values
         latest = np.searchsorted(rows, steps, side="right")

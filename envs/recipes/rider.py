@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ...filters.support.ranges import Checked, Range, log_uniform
+from ...filters.support.seeds import named_generator
 from ..bicycle.course.scenarios import list_scenarios, scenario
 from ..bicycle.course.surfaces import list_surfaces
 from ..bicycle.frame.parameters import BICYCLES
@@ -17,6 +18,7 @@ from ..bicycle.rider.style import rider_style
 from ..bicycle.sensors.suites import suite_channels
 from ..data.trajectory import Trajectory
 from ..sensors.presets import list_sensor_presets
+from .devices import VariedTiming
 from .recipe import Recipe, unspawned
 from .redraw import TapeMeasure, redrawn
 
@@ -31,6 +33,8 @@ class RideSensors(Checked):
     """1: factor on all errors"""
     tape: TapeMeasure = field(default_factory=TapeMeasure)
     """with which the rider's geometry is measured"""
+    timing: VariedTiming = field(default_factory=VariedTiming)
+    """of each device on rider and bicycle"""
     mirrored_share: float = 0.5
     """of the episodes, in which left and right are exchanged"""
 
@@ -160,6 +164,10 @@ class RiderRecipe(Recipe):
             noise_scale=log_uniform(generator, sensors.noise_scale),
             mirror=bool(generator.random() < sensors.mirrored_share),
             geometry=sensors.tape,
+            timing={
+                site: sensors.timing.draw(named_generator(generator, site))
+                for site in dict.fromkeys(name.partition("/")[0] for name in ride.measurements)
+            },
         )
 
 

@@ -12,11 +12,11 @@ from ...filters.core.quantity import Channel
 from .ideal import SAMPLINGS, Mounting, Sampling
 from .kinds import SensorKind, sensor_kind
 from .noise import FORMS, Form, NoiseModel, NoiseProcess, error_size
-from .timing import PUNCTUAL, Timing
+from .timing import PUNCTUAL, ClockKey, Timing
 
 FIXED = Mounting()
 """A sensor in the body frame's origin, along its axes."""
-Placement = tuple[str, Mounting, Sampling, float, tuple[str, Timing] | None]
+Placement = tuple[str, Mounting, Sampling, float, ClockKey | None]
 """Body, mounting, sampling, rate (Hz) and clock: sensors that have them in common see the same motion. The clock is the
 site of a device and its timing; None for one that is punctual."""
 
@@ -83,7 +83,7 @@ class Sensor:
         return self.channel.name.partition("/")[0]
 
     @property
-    def clock(self) -> tuple[str, Timing] | None:
+    def clock(self) -> ClockKey | None:
         """Site and timing; None where every sample is punctual."""
         return None if self.timing.punctual else (self.site, self.timing)
 

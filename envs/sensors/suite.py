@@ -20,7 +20,7 @@ from .noise import NoiseProcess, NoiseState
 from .observation import Sensing
 from .presets import SensorPreset, sensor_preset
 from .sensor import FIXED, Placement, Sensor, due
-from .timing import Clock, ClockState, Timings, check_sites, timing_of
+from .timing import Clock, ClockKey, ClockState, Timings, check_sites, make_clocks, timing_of
 
 Bodies = BodyState | Mapping[str, BodyState]
 """States of bodies by name, or of the only one."""
@@ -34,7 +34,7 @@ class SuiteState:
     noise: list[NoiseState]
     last: dict[Placement, BodyState]
     held: dict[str, np.ndarray]
-    clocks: dict[Any, ClockState]
+    clocks: dict[ClockKey, ClockState]
     past: Past
     magnetic_field: MagneticField | None
 
@@ -97,7 +97,7 @@ class SensorSuite(Sensing):
         super().__init__([sensor.channel for sensor in sensors], limits)
         self._noise: list[NoiseProcess] = []
         self._last: dict[Placement, BodyState] = {}
-        self._clocks: dict[Any, Clock] = {}
+        self._clocks: dict[ClockKey, Clock] = {}
         self._past = Past()
         self._magnetic_field: MagneticField | None = None
         self._step = 0
@@ -113,11 +113,7 @@ class SensorSuite(Sensing):
         self._noise = [sensor.errors(child) for sensor, child in zip(self.sensors, children, strict=True)]
         # descendants by name: errors do not depend on timing and field
         base = children[0]
-        self._clocks = {
-            clock: Clock(clock[1], self.rate, named_generator(base, "clock", clock[0]))
-            for clock in dict.fromkeys(sensor.clock for sensor in self.sensors)
-            if clock is not None
-        }
+        self._clocks = make_clocks((sensor.clock for sensor in self.sensors), self.rate, base)
         calm = self.magnetics.calm
         self._magnetic_field = (
             None if calm else MagneticField(self.magnetics, self.field, named_generator(base, "field"))

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, fields, replace
 from types import MappingProxyType
 from typing import Self
@@ -16,6 +16,7 @@ from typing import Self
 import numpy as np
 
 from ...filters.support.names import look_up
+from ...filters.support.seeds import named_generator
 from .noise import burst_chain, upper_quantile
 
 LARGEST_JITTER = 3.0
@@ -88,6 +89,8 @@ TIMINGS: Mapping[str, Timing] = MappingProxyType(
 )
 """Name → timing; all numbers but the delay of ``wired`` are assumed."""
 
+ClockKey = tuple[str, Timing]
+"""Site and timing of a device"""
 Timings = str | Timing | Mapping[str, str | Timing]
 """A timing or its name; or one for each site, the part of a channel's name before the slash."""
 
@@ -186,3 +189,18 @@ class Clock:
     def restore(self, state: ClockState) -> None:
         """Continue from a saved state, exactly."""
         self._state = copy.deepcopy(state)
+
+
+def make_clocks(keys: Iterable[ClockKey | None], rate: float, generator: np.random.Generator) -> dict[ClockKey, Clock]:
+    """Clocks of an episode: one for every timing at every site.
+
+    Args:
+        keys: site and timing of each sensor; None for a punctual one.
+        rate: time steps per second, Hz.
+        generator: from whose seed they descend; it is not used up.
+    """
+    return {
+        key: Clock(key[1], rate, named_generator(generator, "clock", key[0]))
+        for key in dict.fromkeys(keys)
+        if key is not None
+    }

@@ -12,12 +12,14 @@ from poise.envs.bicycle.ride.contact_forces import LoadCells
 from poise.envs.bicycle.ride.truth import isb_yxy, isb_zxy
 from poise.envs.bicycle.rider.limbs import three_turns
 from poise.envs.data.trajectory import Trajectory
+from poise.envs.recipes.devices import VariedTiming
 from poise.envs.recipes.mirror import mirrored
 from poise.envs.recipes.recipe import unspawned
 from poise.envs.recipes.redraw import TRUE_GEOMETRY, TapeMeasure, redrawn, with_errors
 from poise.envs.recipes.registry import rebuilt, recipe
 from poise.envs.recipes.rider import RiderRecipe, RideSensors
 from poise.envs.record import record
+from poise.envs.sensors.timing import Timing
 from poise.filters.core import rotation
 
 SHORT = RiderRecipe("short", duration=2.0, scenarios=("straight",), fidelity=("lumped",))
@@ -177,3 +179,27 @@ def test_sensors_of_a_grade_have_errors_of_that_size(ride: Trajectory) -> None:
     name = "trunk_imu/gyroscope_bias"
     np.testing.assert_allclose(large.truth[name], 2.0 * small.truth[name], rtol=1e-9)
     assert RideSensors().mirrored_share == 0.5
+
+
+def test_late_readings_of_a_draw_are_those_of_the_environment(ride: Trajectory) -> None:
+    timing = {
+        "trunk_imu": Timing(delay=0.01),
+        "seat": Timing(delay=0.025, jitter=0.002, clock_drift=1e-4),
+        "relative": Timing(delay=0.06, burst_rate=2.0),
+        "steer": Timing(delay=0.0037),
+    }
+    env = RiderBicycleEnv("outdoor", 1, suite="all", duration=3.0, timing=timing)
+    try:
+        expected = record(env, seed=4)
+        found, _ = with_errors(env.suite, ride, np.random.default_rng(4).spawn(2)[1])
+    finally:
+        env.close()
+    for name, values in expected.measurements.items():
+        # ideal interval readings begin a sample later than the motion, of which the environment knows all
+        np.testing.assert_allclose(found[name][12:], values[12:], rtol=0.0, atol=1e-6, err_msg=name)
+
+
+def test_timing_is_drawn_with_its_shares() -> None:
+    drawn = [VariedTiming().draw(np.random.default_rng(seed)) for seed in range(400)]
+    assert np.mean([each.delay > 0.0 for each in drawn]) == pytest.approx(0.3, abs=0.06)
+    assert np.mean([each.burst_rate > 0.0 for each in drawn]) == pytest.approx(0.15, abs=0.05)
