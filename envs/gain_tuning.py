@@ -231,8 +231,8 @@ class HandMotionGainEnv(GainTuningEnv):
 
     Those of :class:`GainTuningEnv`, and ``gesture``, ``rate`` (Hz), ``sensors`` (preset), each a single one or
     several to draw from, ``noise_scale`` (factor on the sensor's errors, or lowest and highest), ``duration`` (s),
-    ``mounting``, ``drive``; see :class:`poise.envs.hand.trajectories.HandTrajectories`. The dynamic drive costs
-    seconds a reset. Or ``recipe``, a :class:`poise.envs.recipes.hand.HandRecipe`, its name or JSON file, in place of
+    ``mounting``, ``drive``; see :class:`poise.envs.hand.trajectories.HandTrajectories`. The dynamic drive takes
+    several times as long. Or ``recipe``, a :class:`poise.envs.recipes.hand.HandRecipe`, its name or JSON file, in place of
     them all (:func:`poise.envs.recipes.registry.recipe`).
 
     ## Version history

@@ -16,8 +16,10 @@ from ..sensors.magnetics import Magnetics
 from ..sensors.presets import SensorPreset
 from ..sensors.suite import SensorSuite
 from ..sensors.timing import Timings
+from .arm.arm import Arm
+from .arm.driver import ArmDriver
 from .devices import HandDevice, check_planar, hand_device
-from .drivers import Device, DynamicDriver, KinematicDriver, MotionDriver
+from .drivers import Device, KinematicDriver, MotionDriver
 from .gestures import GestureConfig, gesture_config, make_gesture
 from .sensing import HandVariation, built_array, check_duration, hand_gesture, hand_suite, samples_of, sense
 
@@ -29,10 +31,11 @@ class HandMotionEnv(PoseEnv):
 
     ## Description
 
-    A rigid controller of 0.25 kg follows a random gesture. With ``drive="kinematic"`` it follows the gesture exactly
-    and no physics engine is stepped; with ``drive="dynamic"`` a virtual hand pulls and twists it in PyBullet at about
-    1 kHz (computed force and torque plus feedback). The sensors follow the actual motion of the device, and so does
-    the truth. World: x east, y north, z up; quaternions w, x, y, z.
+    A rigid controller of 0.25 kg follows a random gesture. With ``drive="kinematic"`` it follows the gesture exactly.
+    With ``drive="dynamic"`` an :class:`.Arm` of finite stiffness, reflex delay and motor noise pulls it along the
+    gesture (rigid-body dynamics at 2 kHz): it lags by millimetres and degrees, trembles, and bumps into a table. The
+    sensors follow the actual motion of the device, and so does the truth. World: x east, y north, z up; quaternions w,
+    x, y, z.
 
     ## Action Space
 
@@ -110,6 +113,7 @@ class HandMotionEnv(PoseEnv):
             or a configuration; None for ``slow``, with a planar device for ``infinity``.
             ``reset(options={"gesture": …})`` replaces it for one episode.
         drive: ``kinematic`` or ``dynamic``.
+        arm: what pulls the device with ``drive="dynamic"``; None for the :class:`.Arm` of the defaults.
         sensors: name of a preset (:func:`poise.envs.sensors.presets.list_sensor_presets`), a preset, or a whole
             :class:`.SensorSuite` on one body; its mountings count from the site that ``lever_arm`` and
             ``mounting`` describe, whose pose is to be estimated. None for ``xsens-mtw-awinda``, or
@@ -153,6 +157,7 @@ class HandMotionEnv(PoseEnv):
         mounting: Sequence[float] = (1.0, 0.0, 0.0, 0.0),
         *,
         device: str | HandDevice = "imu",
+        arm: Arm | None = None,
         magnetometer: bool | float | None = None,
         sampling: Sampling | None = None,
         timing: Timings | None = None,
@@ -167,6 +172,8 @@ class HandMotionEnv(PoseEnv):
         check_duration(duration)
         if drive not in ("dynamic", "kinematic"):
             raise ValueError(f"drive must be 'dynamic' or 'kinematic', got {drive!r}")
+        if arm is not None and drive != "dynamic":
+            raise ValueError(f"arm has no effect with drive={drive!r}: it must be None, or drive 'dynamic'")
         suite = hand_suite(sensors, rate, magnetometer, sampling, held, timing, magnetics)
         quantity = choose_quantity(score, (ORIENTATION, RELATIVE_ORIENTATION))
         super().__init__(suite, [quantity], suite.rate, render_mode)
@@ -175,6 +182,7 @@ class HandMotionEnv(PoseEnv):
         self.mounting = Mounting(vector("lever_arm", lever_arm, 3), vector("mounting", mounting, 4))
         variation = HandVariation() if randomise is True else randomise
         self.variation = variation or HandVariation(0.0, 0.0, 0.0)
+        self.arm = arm
         self.hand_device, self.device, self._sensors = held, Device() if held is None else held.body, sensors
         if held is not None:
             check_planar(held, config, self.mounting)
@@ -190,11 +198,11 @@ class HandMotionEnv(PoseEnv):
         if self.hand_device is not None:
             check_planar(self.hand_device, config, self.mounting)
         duration = config.duration if self.duration is None else self.duration
-        # a child of its own, so that the variation does not change the gesture
-        setting = motion.spawn(1)[0]
         gesture = make_gesture(config, motion, duration)
+        # children of their own, so that neither variation nor noise changes the gesture
+        setting, noise = motion.spawn(2)
         self._episode_mounting, mass_factor = self.variation.draw(self.mounting, setting)
-        self._ready_driver().start(gesture, mass_factor)
+        self._ready_driver().start(gesture, mass_factor, noise)
         self._suite.reset(sensors)
         self._array = built_array(self.hand_device, self._sensors, sensors)
         return samples_of(duration, self.rate) - 1
@@ -205,7 +213,8 @@ class HandMotionEnv(PoseEnv):
             if self.drive_kind == "kinematic":
                 self._driver = KinematicDriver(self.rate)
             else:
-                self._driver = DynamicDriver(self.rate, self.device, gravity=self._suite.gravity)
+                planar = self.hand_device is not None and self.hand_device.planar
+                self._driver = ArmDriver(self.rate, self.device, self.arm, planar=planar, gravity=self._suite.gravity)
         return self._driver
 
     def next_block(self, most: int) -> Block:
@@ -230,7 +239,7 @@ class HandMotionEnv(PoseEnv):
         return DeviceScene(self.device.size, gui=gui)
 
     def close(self) -> None:
-        """Close window and physics; may be called twice."""
+        """Close the window; may be called twice."""
         super().close()
         driver, self._driver, self._block = self._driver, None, None
         if driver is not None:

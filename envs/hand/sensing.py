@@ -34,7 +34,7 @@ class HandVariation:
     Attributes:
         lever_arm: of the sensor site, m per axis.
         mounting: of the sensor's axes on the device, rad per axis.
-        mass: of the logarithm of the device's mass and inertia, which the controller does not use
+        mass: of the logarithm of the device's mass and inertia, which the arm does not know
             (``drive="dynamic"``).
     """
 

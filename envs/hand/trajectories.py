@@ -35,8 +35,7 @@ class HandTrajectories:
         lever_arm: standard deviation of the sensor site on the body, m per axis.
         mounting: ``random``: the axes of the sensor are drawn evenly from all rotations; ``aligned``: they are the
         body's.
-        drive: ``kinematic``: the body follows the gesture exactly; ``dynamic``: forces in the physics world,
-        far slower.
+        drive: ``kinematic``: the body follows the gesture exactly; ``dynamic``: an arm pulls it along.
 
     Raises:
         ValueError: a name is unknown or a number out of its range.

@@ -132,11 +132,12 @@ def test_motion_and_setting_follow_the_seed():
     assert len(settings) > 2
 
 
-def test_the_dynamic_drive_is_the_same_motion():
+def test_the_dynamic_drive_is_nearly_the_same_motion():
     kinematic, dynamic = (
         HandTrajectories(duration=2.0, drive=kind).draw_many(0, 1)[0] for kind in ("kinematic", "dynamic")
     )
-    assert np.degrees(np.max(direction_error(kinematic.truth_of("up"), dynamic.truth_of("up")))) < 0.1
+    # an arm lags and trembles by tenths of a degree
+    assert 0.01 < np.degrees(np.max(direction_error(kinematic.truth_of("up"), dynamic.truth_of("up")))) < 2.0
     env = HandMotionGainEnv(duration=1.0, drive="dynamic")
     play(env, lambda observation: np.zeros(3))
 

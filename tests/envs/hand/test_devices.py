@@ -13,6 +13,7 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 from stable_baselines3.common.env_checker import check_env as check_env_sb3
 
+from poise.envs.hand.arm.arm import Arm
 from poise.envs.hand.controller_gestures import Walk
 from poise.envs.hand.devices import ARRAY_PRESETS, DEVICES, HandDevice, actual_array, array_preset, hand_device
 from poise.envs.hand.environment import HandMotionEnv
@@ -72,7 +73,8 @@ def test_readings_are_the_path_of_each_sensor_differentiated():
 def test_both_drives_agree(name):
     recorded = []
     for drive in ("dynamic", "kinematic"):
-        with HandMotionEnv(GESTURES[name], drive, "ideal", duration=4.0, device=name) as env:
+        arm = Arm(anticipation=1.0, noise=0.0, table=None) if drive == "dynamic" else None
+        with HandMotionEnv(GESTURES[name], drive, "ideal", duration=4.0, device=name, arm=arm) as env:
             recorded.append(record(env, seed=3))
     one, other = recorded
     for channel in one.measurements:
