@@ -232,8 +232,8 @@ class HandMotionGainEnv(GainTuningEnv):
     Those of :class:`GainTuningEnv`, and ``gesture``, ``rate`` (Hz), ``sensors`` (preset), each a single one or
     several to draw from, ``noise_scale`` (factor on the sensor's errors, or lowest and highest), ``duration`` (s),
     ``mounting``, ``drive``; see :class:`poise.envs.hand.trajectories.HandTrajectories`. The dynamic drive takes
-    several times as long. Or ``recipe``, a :class:`poise.envs.recipes.hand.HandRecipe`, its name or JSON file, in place of
-    them all (:func:`poise.envs.recipes.registry.recipe`).
+    several times as long. Or ``recipe``, a :class:`poise.envs.recipes.hand.HandRecipe`, its name or JSON file, in
+    place of them all (:func:`poise.envs.recipes.registry.recipe`).
 
     ## Version history
 
