@@ -63,6 +63,7 @@ class Snapshot:
     step: int
     last_step: int
     block: Block
+    seen: Observation
     row: int
     sensors: Any
     source: Any
@@ -156,8 +157,8 @@ class PoseEnv(DrawnEnv):
         options = self.checked_options(options)
         motion, sensors = self.np_random.spawn(2)
         self._last_step = self.begin(motion, sensors, options)
-        self._block = self.next_block(self._last_step + 1)
-        self._row = self._step = 0
+        self._look_at(self.next_block(self._last_step + 1))
+        self._step = 0
         self._estimate = self.neutral_action
         self._show(self._step)
         return self._observe(), self._info()
@@ -176,7 +177,7 @@ class PoseEnv(DrawnEnv):
         self._step += 1
         self._row += 1
         if self._row == len(self._block.time):
-            self._block, self._row = self.next_block(self._last_step + 1 - self._step), 0
+            self._look_at(self.next_block(self._last_step + 1 - self._step))
         self._show(self._step)
         last, terminates = self.ending()
         over = self._step >= last
@@ -235,8 +236,13 @@ class PoseEnv(DrawnEnv):
             raise RuntimeError("call reset first: nothing was measured yet")
         return {name: values[self._row] for name, values in self._block.measurements.items()}
 
+    def _look_at(self, block: Block) -> None:
+        """Go on with another block."""
+        self._block, self._row = block, 0
+        self._seen: Observation = self.suite.observations(block.measurements, len(block.time))
+
     def _observe(self) -> Observation:
-        return self.suite.to_observation(self.measurement())
+        return {name: values[self._row].copy() for name, values in self._seen.items()}
 
     def _info(self) -> dict[str, Any]:
         block, row = self._block, self._row
@@ -261,6 +267,7 @@ class PoseEnv(DrawnEnv):
             self._step,
             self._last_step,
             self._block,
+            self._seen,
             self._row,
             self.suite.save(),
             self.save_source(),
@@ -271,7 +278,7 @@ class PoseEnv(DrawnEnv):
         """Return to a snapshot: what follows is bitwise what followed it then, under equal actions."""
         self.np_random = copy.deepcopy(snapshot.generator)
         self._step, self._last_step, self._block = snapshot.step, snapshot.last_step, snapshot.block
-        self._row, self._estimate = snapshot.row, snapshot.estimate.copy()
+        self._seen, self._row, self._estimate = snapshot.seen, snapshot.row, snapshot.estimate.copy()
         self.suite.restore(snapshot.sensors)
         self.restore_source(snapshot.source)
 

@@ -71,26 +71,34 @@ class Sensing:
         """Everything about the sensors, for JSON."""
         raise NotImplementedError
 
-    def to_observation(self, measurement: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-        """Turn one measurement into an observation.
+    def observations(self, measurements: Mapping[str, np.ndarray], count: int) -> dict[str, np.ndarray]:
+        """Turn consecutive measurements into observations.
 
         Args:
-            measurement: channel name → ``(size,)``; a channel that is missing, or in which any value is NaN, counts as
-                not sampled.
+            measurements: channel name → ``(count, size)``; a channel that is missing, or in which any value of a row is
+                NaN, counts as not sampled.
+            count: number of rows.
 
         Returns:
-            Channel name → float32 ``(size,)`` within the bounds, and ``fresh``: int8 ``(channels,)``.
+            Channel name → float32 ``(count, size)`` within the bounds, and ``fresh``: int8 ``(count, channels)``.
         """
-        fresh = np.zeros(len(self.channels), np.int8)
+        fresh, seen = np.zeros((count, len(self.channels)), np.int8), {}
         for index, channel in enumerate(self.channels):
-            values = measurement.get(channel.name)
-            # sums over Python floats: three values are too few for NumPy
-            if values is None or any(value != value for value in values.tolist()):
-                continue
-            limit = self._limits[channel.name]
-            self.held[channel.name] = np.minimum(np.maximum(values, -limit), limit).astype(np.float32)
-            fresh[index] = 1
-        return {**{name: value.copy() for name, value in self.held.items()}, FRESH: fresh}
+            values, held = measurements.get(channel.name), self.held[channel.name]
+            rows = np.tile(held, (count, 1))
+            if values is not None:
+                limit, known = self._limits[channel.name], ~np.isnan(values).any(axis=1)
+                fresh[:, index] = known
+                clipped = np.minimum(np.maximum(values, -limit), limit).astype(np.float32)
+                last = np.maximum.accumulate(np.where(known, np.arange(count), -1))
+                rows = np.where(last[:, None] >= 0, clipped[last], rows)
+            seen[channel.name], self.held[channel.name] = rows, rows[-1].copy()
+        return {**seen, FRESH: fresh}
+
+    def to_observation(self, measurement: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+        """Turn one measurement, channel name → ``(size,)``, into an observation, as :meth:`observations` several."""
+        rows = {name: np.asarray(values)[None] for name, values in measurement.items()}
+        return {name: values[0] for name, values in self.observations(rows, 1).items()}
 
     def to_measurement(self, observation: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Undo :meth:`to_observation`, over any leading (batch, time) dimensions.
