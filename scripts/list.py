@@ -31,8 +31,8 @@ class Args:
     """Arguments of ``poise list``."""
 
     lists: tyro.conf.Positional[tuple[str, ...]] = ()
-    """which lists: estimators, environments, sensors, sensor-drift, sensor-kinds, gestures, scenarios, surfaces,
-    recipes, formats, benchmark, benchmark-heading, benchmark-limits; all if none is named"""
+    """which lists: estimators, environments, sensors, sensor-drift, sensor-kinds, timings, magnetics, gestures,
+    scenarios, surfaces, recipes, formats, benchmark, benchmark-heading, benchmark-limits; all if none is named"""
     markdown: bool = False
     """print the tables in Markdown, as the documentation has them"""
     update: tuple[Path, ...] = ()
@@ -163,6 +163,34 @@ def sensor_drift() -> Rows:
     return allan_floors()
 
 
+def timings() -> Rows:
+    """Every named timing of devices: ms, ppm and bursts of lost packets a second."""
+    from ..envs.sensors.timing import TIMINGS
+
+    return [
+        {
+            "name": name,
+            "delay (ms)": 1e3 * each.delay,
+            "jitter (ms)": 1e3 * each.jitter,
+            "clock drift (ppm)": 1e6 * each.clock_drift,
+            "lost packets (1/s)": each.burst_rate,
+        }
+        for name, each in TIMINGS.items()
+    ]
+
+
+def magnetics() -> Rows:
+    """Every named disturbance of the magnetic field with the fields that differ from their defaults."""
+    from ..envs.sensors.magnetics import MAGNETICS
+
+    calm = MAGNETICS["undisturbed"].describe()
+    changed = {name: {k: v for k, v in each.describe().items() if v != calm[k]} for name, each in MAGNETICS.items()}
+    return [
+        {"name": name, "fields": ", ".join(f"{k} {v:g}" for k, v in fields.items()) or None}
+        for name, fields in changed.items()
+    ]
+
+
 def sensor_kinds() -> Rows:
     """Every kind of sensor that a preset or a user may give by name."""
     from ..envs.sensors.kinds import KINDS
@@ -235,6 +263,8 @@ LISTS: Mapping[str, Callable[[], Rows]] = {
             environments,
             sensors,
             sensor_drift,
+            timings,
+            magnetics,
             sensor_kinds,
             gestures,
             scenarios,

@@ -54,3 +54,18 @@ def test_environment():
 def test_bad_arguments_are_refused(options, message):
     with pytest.raises(ValueError, match=message):
         BicycleFixtureEnv(**options)
+
+
+def test_it_is_drawn():
+    env = BicycleFixtureEnv(duration=2.0, render_mode="rgb_array")
+    env.reset(seed=0)
+    first = env.render()
+    for _ in range(100):
+        env.step(env.neutral_action)
+    second = env.render()
+    env.close()
+    assert first is not None and second is not None
+    assert first.shape == second.shape == (360, 480, 3)
+    # the bicycle and its disk are seen, and move
+    assert np.std(first) > 20.0
+    assert np.mean(np.any(first != second, axis=-1)) > 0.01

@@ -39,4 +39,4 @@ def test_a_force_sample_is_the_mean_over_its_interval(fast):
     means = np.mean(fast[rows[:, None] + np.arange(-9, 1)], axis=1)
     np.testing.assert_allclose(slow[1:26], means, atol=1e-9)
     # over bumps the last physics step says little about the interval
-    assert np.sqrt(np.mean((instant[1:26] - means)[:, 2] ** 2)) > 3.0
+    assert np.sqrt(np.mean((instant[1:26] - means)[:, 2] ** 2)) > 5.0
