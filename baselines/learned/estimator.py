@@ -1,151 +1,224 @@
-"""A trained network with the interface of an estimator."""
+"""A trained network with the interface of an estimator: front end, network, head."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, ClassVar, NamedTuple, Self
+from typing import Any, NamedTuple, Protocol, Self
 
 import numpy as np
 
 from ...filters.core.backend import Array, is_torch, namespace
 from ...filters.core.estimator import check_measurements, run_by_steps
-from ...filters.core.observer import Observer
-from ...filters.core.quantity import ACCELEROMETER, GYROSCOPE, UP, Channel, Estimate, Measurement, Quantity
-from ...filters.core.rotation import normalize, rotate_back
-from ...filters.core.sampling import FilterState, join, zeros
-from ..weights_io import load_weights
-from .gravity_aligned_frame import GravityAlignedFrame
+from ...filters.core.quantity import Channel, Estimate, Measurement, Quantity
+from ...filters.core.sampling import zeros
+from ...filters.support.names import look_up
+from ..weights_io import load_weights, save_weights
+from .filter_features import FilterFeatures
+from .front_end import FrontEnd, RawChannels, Seen
 from .gru import GruNetwork
+from .head import AngleHead, Head, TiltHead
+from .level_frame import LevelFrame
+from .tcn import TcnNetwork
+
+FRONT_ENDS: dict[str, Any] = {kind.kind: kind for kind in (LevelFrame, FilterFeatures, RawChannels)}
+HEADS: dict[str, Any] = {kind.kind: kind for kind in (TiltHead, AngleHead)}
+NETWORKS: dict[str, Any] = {kind.kind: kind for kind in (GruNetwork, TcnNetwork)}
+"""Kind in a card → class, with ``read`` or ``from_arrays``."""
+
+
+class Network(Protocol):
+    """Interface of networks: what :class:`.gru.GruNetwork` and :class:`.torch_network.TorchNetwork` have."""
+
+    @property
+    def kind(self) -> str:
+        """Name under which cards know it."""
+        ...
+
+    @property
+    def features(self) -> int:
+        """Features F."""
+        ...
+
+    @property
+    def outputs(self) -> int:
+        """Outputs O."""
+        ...
+
+    @property
+    def memory_size(self) -> int:
+        """Numbers M that are remembered of each sequence."""
+        ...
+
+    def step(self, features: Array, memory: Array) -> tuple[Array, Array]:
+        """One update: features ``(..., F)`` and memory ``(..., M)`` → new memory and output ``(..., O)``."""
+        ...
+
+    def advance(self, features: np.ndarray, due: np.ndarray, memory: np.ndarray, output: np.ndarray) -> np.ndarray:
+        """All samples of all sequences; see :meth:`.gru.GruNetwork.advance`."""
+        ...
+
+    def arrays(self) -> dict[str, np.ndarray]:
+        """The weights."""
+        ...
 
 
 class LearnedState(NamedTuple):
     """Complete state of the estimator.
 
     Attributes:
-        frame: of the gravity-aligned frame.
-        memory: ``(*batch, H)`` of the network.
-        tilt: ``(*batch, 2)`` last output of the network: horizontal part of the up vector in the gravity-aligned frame.
+        front: of the front end.
+        memory: ``(*batch, M)`` of the network.
+        output: ``(*batch, O)`` last output of the network.
     """
 
-    frame: FilterState
+    front: Any
     memory: Array
-    tilt: Array
+    output: Array
 
 
 @dataclass(frozen=True, eq=False)
 class LearnedEstimator:
-    """Inclination from six axes, by a recurrent network behind a gravity-aligned frame.
+    """A network behind a front end, whose output a head makes a pose.
 
-    :class:`.GravityAlignedFrame` runs at the rate of the sensor. At fixed intervals, independent of that rate, the
-    network receives the features of the interval and estimates the tilt of the frame. Between them the estimate is
-    constant in the frame, where it changes slowly.
+    The front end runs at the rate of the sensors. At fixed intervals, independent of that rate, the network receives
+    the features of the interval. Between them its output stays, while what it corrects moves on.
 
     Attributes:
         network: the weights.
-        frame: the front end and the sampling interval.
+        front_end: what the network sees, and the sampling interval.
+        head: what its output means.
         compiled: use compiled loops for NumPy data; arrays give the same to rounding.
 
     Raises:
-        ValueError: the sampling interval is longer than that of the network.
+        ValueError: front end, network and head do not fit together.
     """
 
-    network: GruNetwork
-    frame: GravityAlignedFrame = field(default_factory=GravityAlignedFrame)
+    network: Network
+    front_end: FrontEnd
+    head: Head
     compiled: bool = True
 
-    channels: ClassVar[tuple[Channel, ...]] = (GYROSCOPE, ACCELEROMETER)
-    outputs: ClassVar[tuple[Quantity, ...]] = (UP,)
-
     def __post_init__(self) -> None:
-        if self.frame.dt > self.frame.interval * (1.0 + 1e-9):
+        if self.network.features != self.front_end.size or self.network.outputs != self.head.size:
             raise ValueError(
-                f"dt must be at most {self.frame.interval:g} s ({1.0 / self.frame.interval:g} Hz or more), "
-                f"got {self.frame.dt:g} s"
+                f"the network must take {self.front_end.size} features and give {self.head.size} outputs, "
+                f"got {self.network.features} and {self.network.outputs}"
             )
 
     @classmethod
-    def load(cls, path_or_name: str | Path = "gru", dt: float = 0.01) -> Self:
+    def load(cls, path_or_name: str | Path = "gru", dt: float = 0.01, network: Network | None = None) -> Self:
         """The estimator of a weights file or of shipped weights.
+
+        Args:
+            path_or_name: file, or name of shipped weights.
+            dt: sampling interval, s.
+            network: made already, of a kind that this package does not know; None: the one that the card describes.
 
         Raises:
             FileNotFoundError: there are no such weights.
             ValueError: they are damaged, or are those of something else.
         """
         arrays, card = load_weights(path_or_name)
-        network = GruNetwork.from_arrays(arrays)
         try:
-            frame = GravityAlignedFrame(**{**card.get("front_end", {}), "dt": dt})
-        except TypeError as reason:
-            raise ValueError(f"{path_or_name}: the card describes another front end ({reason})") from None
-        return cls(network, frame)
+            front, head, kind = card["front_end"], card["head"], card["network"]
+            made = look_up("kind of network", kind, NETWORKS).from_arrays(arrays) if network is None else network
+            front_end = look_up("kind of front end", front["kind"], FRONT_ENDS).read(front, dt)
+            return cls(made, front_end, look_up("kind of head", head["kind"], HEADS).read(head))
+        except (KeyError, TypeError) as reason:
+            raise ValueError(f"{path_or_name}: the card does not describe a network of this package ({reason})") from None
+
+    def save(self, path: str | Path, card: Mapping[str, Any] | None = None) -> Path:
+        """Write weights and card, for :meth:`load`.
+
+        Args:
+            path: of the weights; see :func:`poise.baselines.weights_io.save_weights`.
+            card: further entries of the card.
+        """
+        parts = {"network": self.network.kind, "front_end": self.front_end.describe(), "head": self.head.describe()}
+        return save_weights(path, self.network.arrays(), {**(card or {}), **parts})
 
     @property
     def dt(self) -> float:
         """Sampling interval, s."""
-        return self.frame.dt
+        return self.front_end.dt
 
-    def with_dt(self, dt: float) -> LearnedEstimator:
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        """Required channels."""
+        return self.front_end.channels
+
+    @property
+    def outputs(self) -> tuple[Quantity, ...]:
+        """Estimated quantities."""
+        return self.head.outputs
+
+    @property
+    def error_parts(self) -> dict[str, tuple[int, int]]:
+        """Quantity → its part of the covariance; empty where the head gives none."""
+        return getattr(self.head, "error_parts", {})
+
+    def with_dt(self, dt: float) -> Self:
         """The same estimator for another sampling interval."""
-        return replace(self, frame=self.frame.with_dt(dt))
+        return replace(self, front_end=self.front_end.with_dt(dt))
+
+    def configured(self, metadata: Mapping[str, Any]) -> Self:
+        """The same for the person, vehicle or device that a recording's metadata describe."""
+        return replace(self, front_end=self.front_end.configured(metadata))
+
+    def truth(self, truth: Mapping[str, Any]) -> dict[str, Any]:
+        """True values of outputs that only the corrected filter defines; see :meth:`.Equations.truth`."""
+        kalman = getattr(self.front_end, "kalman", None)
+        return {} if kalman is None else dict(kalman.model.truth(truth))
 
     def init(self, measurement: Measurement) -> LearnedState:
         """Initial state with the batch shape and array type of ``measurement``, which is not processed."""
-        like = join(check_measurements(self.channels, measurement, time_axis=False), self.channels)
-        return LearnedState(self._observer().init(measurement), zeros(like, self.network.size), zeros(like, 2))
+        arrays = check_measurements(self.channels, measurement, time_axis=False)
+        like = arrays[self.channels[0].name]
+        return LearnedState(
+            self.front_end.init(arrays), zeros(like, self.network.memory_size), zeros(like, self.network.outputs)
+        )
 
     def step(self, state: LearnedState, measurement: Measurement) -> tuple[LearnedState, Estimate]:
-        """Process one sample of every channel, ``(*batch, 3)``; NaN where there is none."""
-        frame, seen = self._observer().step(state.frame, measurement)
-        features, due = seen.pose["features"], seen.pose["due"]
-        memory, tilt = state.memory, state.tilt
-        if bool((due == 1.0).any()):
-            if self.compiled and not is_torch(features):
-                memory, tilt, _ = self._advance(features[None], due[None], memory, tilt)
+        """Process one sample of every channel, ``(*batch, size)``; NaN where there is none."""
+        front, seen = self.front_end.step(state.front, measurement)
+        memory, output = state.memory, state.output
+        if bool((seen.due == 1.0).any()):
+            if self.compiled and not is_torch(seen.features):
+                one = Seen(seen.features[None], seen.due[None], {}, seen.spread)
+                memory, output, _ = self._advance(one, memory, output)
             else:
-                xp = namespace(features)
-                now = due == 1.0
-                moved, leaning = self.network.step(xp.where(now, features, xp.zeros_like(features)), memory)
-                memory, tilt = xp.where(now, moved, memory), xp.where(now, leaning, tilt)
-        pose = {"up": upward(seen.pose["relative_orientation"], tilt)}
-        return LearnedState(frame, memory, tilt), Estimate(pose)
+                xp, now = namespace(seen.features), (seen.due == 1.0)[..., None]
+                moved, told = self.network.step(xp.where(now, seen.features, xp.zeros_like(seen.features)), memory)
+                memory, output = xp.where(now, moved, memory), xp.where(now, told, output)
+        return LearnedState(front, memory, output), self.head.estimate(seen, output)
 
     def run(self, measurements: Mapping[str, Any]) -> Estimate:
-        """Estimates of a whole sequence, ``(T, *batch, 3)`` in and out; equal to stepping."""
+        """Estimates of a whole sequence, ``(T, *batch, size)`` in and out; equal to stepping."""
         arrays = check_measurements(self.channels, measurements, time_axis=True)
         if not self.compiled or any(is_torch(array) for array in arrays.values()):
             return run_by_steps(self, arrays)
         state = self.init({name: array[0] for name, array in arrays.items()})
-        seen = self._observer().run(arrays).pose
-        _, _, tilts = self._advance(seen["features"], seen["due"], state.memory, state.tilt)
-        return Estimate({"up": upward(seen["relative_orientation"], tilts)})
+        seen = self.front_end.run(arrays)
+        _, _, outputs = self._advance(seen, state.memory, state.output)
+        return self.head.estimate(seen, outputs)
 
-    def _observer(self) -> Observer:
-        return Observer(self.frame, compiled=self.compiled)
-
-    def _advance(
-        self, features: np.ndarray, due: np.ndarray, memory: np.ndarray, tilt: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Memory and tilt after ``(T, *batch, …)`` samples, and the tilt of every sample."""
-        length, batch = features.shape[0], features.shape[1:-1]
-        memory, tilt = memory.copy(), tilt.copy()
+    def _advance(self, seen: Seen, memory: np.ndarray, output: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Memory and output after ``(T, *batch, …)`` samples, and the output of every sample."""
+        length, batch = seen.features.shape[0], seen.features.shape[1:-1]
+        memory, output = np.array(memory, dtype=float), np.array(output, dtype=float)
         count = int(np.prod(batch, dtype=int))
-        tilts = self.network.advance(
-            np.ascontiguousarray(features).reshape(length, count, -1),
-            np.ascontiguousarray(due).reshape(length, count),
+        outputs = self.network.advance(
+            np.ascontiguousarray(seen.features).reshape(length, count, -1),
+            np.ascontiguousarray(seen.due).reshape(length, count),
             memory.reshape(count, -1),
-            tilt.reshape(count, 2),
+            output.reshape(count, -1),
         )
-        return memory, tilt, tilts.reshape(length, *batch, 2)
+        return memory, output, outputs.reshape(length, *batch, -1)
 
 
-def upward(orientation: Array, tilt: Array) -> Array:
-    """The up vector in sensor coordinates ``(..., 3)`` from the frame's attitude and the tilt in the frame."""
-    xp = namespace(orientation, tilt)
-    return rotate_back(orientation, normalize(xp.concat([tilt, 1.0 + 0.0 * tilt[..., :1]], axis=-1)))
-
-
-def shipped(dt: float = 0.01) -> LearnedEstimator:
-    """The estimator with the weights of the package, for samples ``dt`` seconds apart."""
-    return LearnedEstimator.load("gru", dt)
+def shipped(weights: str = "gru", dt: float = 0.01, metadata: Mapping[str, Any] | None = None) -> LearnedEstimator:
+    """The estimator with weights of the package, for samples ``dt`` seconds apart."""
+    made = LearnedEstimator.load(weights, dt)
+    return made.configured(metadata) if metadata else made

@@ -1,10 +1,10 @@
-"""The recurrent network of the learned estimator: inference without torch, on any arrays or compiled.
+"""A recurrent network: inference without torch, on any arrays or compiled.
 
     u = tanh(A s + a),   h ← GRU(u, h),   t = C h + c
 
-with features s, memory h and two numbers t: the horizontal part of the up vector in the gravity-aligned frame, where
-its third coordinate is 1. The GRU is that of K. Cho et al., "Learning Phrase Representations using RNN Encoder-Decoder
-for Statistical Machine Translation", EMNLP 2014, with the reset after the product, as PyTorch has it,
+with features s, memory h and outputs t, which a head (:mod:`.head`) makes a pose. The GRU is that of K. Cho et al.,
+"Learning Phrase Representations using RNN Encoder-Decoder for Statistical Machine Translation", EMNLP 2014, with the
+reset after the product, as PyTorch has it,
 
     r = σ(W_r u + b_r + V_r h + d_r),   z = σ(W_z u + b_z + V_z h + d_z),
     n = tanh(W_n u + b_n + r ∘ (V_n h + d_n)),   h ← (1 − z) ∘ n + z ∘ h
@@ -15,13 +15,12 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Self
+from typing import ClassVar, Self
 
 import numpy as np
 
 from ...filters.compile.cache import jit
 from ...filters.core.backend import Array, constant, namespace
-from .gravity_aligned_frame import FEATURES
 
 NAMES = (
     "input.weight",
@@ -38,7 +37,7 @@ NAMES = (
 
 @dataclass(frozen=True, eq=False)
 class GruNetwork:
-    """The weights, with H units, F features.
+    """The weights, with H units, F features and O outputs.
 
     Attributes:
         input_weight: ``(H, F)`` A.
@@ -47,8 +46,8 @@ class GruNetwork:
         gru_bias: ``(3 H,)`` b.
         memory_weight: ``(3 H, H)`` V.
         memory_bias: ``(3 H,)`` d.
-        output_weight: ``(2, H)`` C.
-        output_bias: ``(2,)`` c.
+        output_weight: ``(O, H)`` C.
+        output_bias: ``(O,)`` c.
 
     Raises:
         ValueError: a shape does not fit the others.
@@ -64,16 +63,16 @@ class GruNetwork:
     output_bias: np.ndarray
 
     def __post_init__(self) -> None:
-        size = self.size
+        size, features, outputs = self.size, np.shape(self.input_weight)[-1:], np.shape(self.output_weight)[:1]
         wanted = {
-            "input_weight": (size, FEATURES.size),
+            "input_weight": (size, *features),
             "input_bias": (size,),
             "gru_weight": (3 * size, size),
             "gru_bias": (3 * size,),
             "memory_weight": (3 * size, size),
             "memory_bias": (3 * size,),
-            "output_weight": (2, size),
-            "output_bias": (2,),
+            "output_weight": (*outputs, size),
+            "output_bias": outputs,
         }
         for name, shape in wanted.items():
             array = np.array(getattr(self, name), dtype=float)
@@ -92,13 +91,36 @@ class GruNetwork:
             raise ValueError(f"weights of a network hold the arrays {list(NAMES)}, got {sorted(arrays)}")
         return cls(*(arrays[name] for name in NAMES))
 
+    kind: ClassVar[str] = "gru"
+
     @property
     def size(self) -> int:
         """Units H."""
         return len(np.atleast_1d(self.input_bias))
 
+    @property
+    def features(self) -> int:
+        """Features F."""
+        return int(self.input_weight.shape[1])
+
+    @property
+    def memory_size(self) -> int:
+        """Numbers that are remembered of each sequence: H."""
+        return self.size
+
+    @property
+    def outputs(self) -> int:
+        """Outputs O."""
+        return len(self.output_bias)
+
+    def arrays(self) -> dict[str, np.ndarray]:
+        """The inverse of :meth:`from_arrays`, float32."""
+        fields = (self.input_weight, self.input_bias, self.gru_weight, self.gru_bias)
+        fields += (self.memory_weight, self.memory_bias, self.output_weight, self.output_bias)
+        return {name: array.astype(np.float32) for name, array in zip(NAMES, fields, strict=True)}
+
     def step(self, features: Array, memory: Array) -> tuple[Array, Array]:
-        """One update: features ``(..., F)`` and memory ``(..., H)`` → new memory and tilt ``(..., 2)``."""
+        """One update: features ``(..., F)`` and memory ``(..., H)`` → new memory and output ``(..., O)``."""
         xp, size = namespace(features, memory), self.size
 
         def affine(weight: np.ndarray, bias: np.ndarray, x: Array) -> Array:
@@ -113,21 +135,21 @@ class GruNetwork:
         memory = (1.0 - z) * n + z * memory
         return memory, affine(self.output_weight, self.output_bias, memory)
 
-    def advance(self, features: np.ndarray, due: np.ndarray, memory: np.ndarray, tilt: np.ndarray) -> np.ndarray:
+    def advance(self, features: np.ndarray, due: np.ndarray, memory: np.ndarray, output: np.ndarray) -> np.ndarray:
         """All samples of all sequences, compiled.
 
         Args:
             features: ``(T, B, F)``.
-            due: ``(T, B)``, 1 where the network is updated; elsewhere memory and tilt stay.
+            due: ``(T, B)``, 1 where the network is updated; elsewhere memory and output stay.
             memory: ``(B, H)``, changed in place.
-            tilt: ``(B, 2)``, changed in place.
+            output: ``(B, O)``, changed in place.
 
         Returns:
-            The tilt of every sample, ``(T, B, 2)``.
+            The output of every sample, ``(T, B, O)``.
         """
-        tilts = np.empty((*due.shape, 2))
-        compiled_kernel()(features, due, memory, tilt, tilts, *self._columns())
-        return tilts
+        outputs = np.empty((*due.shape, self.outputs))
+        compiled_kernel()(features, due, memory, output, outputs, *self._columns())
+        return outputs
 
     def _columns(self) -> tuple[np.ndarray, ...]:
         """The arrays with the matrices by column, so that the inner loops run along memory; made once."""
@@ -153,7 +175,7 @@ def compiled_kernel() -> Callable[..., None]:
     return jit(advance_all)
 
 
-def advance_all(features, due, memory, tilt, tilts, A, a, W, b, V, d, C, c):  # type: ignore[no-untyped-def]  # noqa: D103, ANN
+def advance_all(features, due, memory, output, outputs, A, a, W, b, V, d, C, c):  # type: ignore[no-untyped-def]  # noqa: D103, ANN
     T, B, F = features.shape
     H = memory.shape[1]
     u, new, old = np.empty(H), np.empty(3 * H), np.empty(3 * H)
@@ -178,10 +200,10 @@ def advance_all(features, due, memory, tilt, tilts, A, a, W, b, V, d, C, c):  # 
                     z = 1.0 / (1.0 + np.exp(-(new[H + i] + old[H + i])))
                     n = np.tanh(new[2 * H + i] + r * old[2 * H + i])
                     h[i] = (1.0 - z) * n + z * h[i]
-                for o in range(2):
+                for o in range(c.shape[0]):
                     total = c[o]
                     for j in range(H):
                         total += C[o, j] * h[j]
-                    tilt[k, o] = total
-            tilts[t, k, 0] = tilt[k, 0]
-            tilts[t, k, 1] = tilt[k, 1]
+                    output[k, o] = total
+            for o in range(c.shape[0]):
+                outputs[t, k, o] = output[k, o]

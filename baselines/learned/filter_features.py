@@ -1,0 +1,186 @@
+"""Front end of a network that corrects any Kalman filter: what it estimates, how certain it is, what surprised it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, NamedTuple, Self
+
+import numpy as np
+
+from ...filters.core.estimator import check_measurements
+from ...filters.core.kalman import KalmanFilter
+from ...filters.core.model import parameters_of
+from ...filters.core.quantity import Channel, Estimate, Measurement, Quantity
+from ...filters.core.sampling import FilterState
+from ...filters.registry import make, name_of
+from .front_end import Seen, check_interval, interval_ends
+
+
+class FeatureState(NamedTuple):
+    """Memory of :class:`FilterFeatures`.
+
+    Attributes:
+        filter: of the filter.
+        count: ``()`` samples so far.
+        sums: ``(*batch, M)`` of what is averaged, over the interval.
+        known: ``(*batch, M)`` of how many samples.
+    """
+
+    filter: FilterState
+    count: np.ndarray
+    sums: np.ndarray
+    known: np.ndarray
+
+
+@dataclass(frozen=True)
+class FilterFeatures:
+    """Features of a Kalman filter's run, each the mean over an interval.
+
+    In this order: the filter's outputs (angles as sine and cosine, which have means where angles wrap), the logarithms
+    of the standard deviations of its error state, its whitened innovations, and the channels of the sensors. Networks
+    learn the scale of each feature from the training data.
+
+    Attributes:
+        kalman: the filter; the head corrects its outputs.
+        interval: s between updates of the network.
+        channels_seen: names of the channels that are features; None for all of the filter.
+
+    Raises:
+        ValueError: sampling slower than the network, or a channel that the filter does not read.
+    """
+
+    kalman: KalmanFilter
+    interval: float = 0.04
+    channels_seen: tuple[str, ...] | None = None
+
+    kind: ClassVar[str] = "filter-features"
+
+    def __post_init__(self) -> None:
+        check_interval(self.kalman.dt, self.interval)
+        object.__setattr__(self, "kalman", replace(self.kalman, keep_covariance=True))
+        names = [channel.name for channel in self.kalman.channels]
+        unknown = sorted(set(self.channels_seen or ()) - set(names))
+        if unknown:
+            raise ValueError(f"channels_seen must be channels of the filter, {names}, got {unknown}")
+
+    @property
+    def dt(self) -> float:
+        """Sampling interval, s."""
+        return self.kalman.dt
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        """Those of the filter."""
+        return self.kalman.channels
+
+    @property
+    def outputs(self) -> tuple[Quantity, ...]:
+        """Those of the filter."""
+        return self.kalman.outputs
+
+    @property
+    def size(self) -> int:
+        """Number of features."""
+        widths = (2 * q.size if q.kind == "angle" else q.size for q in self.kalman.outputs)
+        model = self.kalman.model
+        return sum(widths) + model.error_size + model.residual_size + sum(c.size for c in self._shown)
+
+    @property
+    def _shown(self) -> list[Channel]:
+        return [c for c in self.kalman.channels if self.channels_seen is None or c.name in self.channels_seen]
+
+    def with_dt(self, dt: float) -> Self:
+        """See :class:`.front_end.FrontEnd`."""
+        return replace(self, kalman=self.kalman.with_dt(dt))
+
+    def configured(self, metadata: Mapping[str, Any]) -> Self:
+        """The filter told who rides what, where the metadata say so."""
+        model = self.kalman.model.configured(metadata)
+        return replace(self, kalman=replace(self.kalman, model=model))
+
+    def describe(self) -> dict[str, Any]:
+        """See :class:`.front_end.FrontEnd`: what differs from the registered filter, persons and vehicles aside."""
+        name = name_of(self.kalman.model)
+        if name is None:
+            raise ValueError(f"{type(self.kalman.model).__name__} is not registered: a card could not name it")
+        usual, own = parameters_of(make(name).model), parameters_of(self.kalman.model)
+        noises = {key: own[key] for key in own if key != "dt" and key in usual and own[key] != usual[key]}
+        seen = None if self.channels_seen is None else list(self.channels_seen)
+        filter = {"name": name, "parameters": {key: value for key, value in noises.items() if "[" not in key}}
+        return {"kind": self.kind, "filter": filter, "interval": self.interval, "channels_seen": seen}
+
+    @classmethod
+    def read(cls, described: Mapping[str, Any], dt: float) -> Self:
+        """The inverse of :meth:`describe`."""
+        inner, seen = described["filter"], described.get("channels_seen")
+        kalman = make(inner["name"], dt=dt, **inner.get("parameters", {}))
+        return cls(kalman, float(described["interval"]), None if seen is None else tuple(seen))
+
+    def init(self, measurement: Measurement) -> FeatureState:
+        """See :class:`.front_end.FrontEnd`."""
+        arrays = check_measurements(self.channels, measurement, time_axis=False)
+        state = self.kalman.init(arrays)
+        zero = np.zeros((*state.x.shape[:-1], self.size))
+        return FeatureState(state, np.array(0), zero, zero.copy())
+
+    def step(self, state: FeatureState, measurement: Measurement) -> tuple[FeatureState, Seen]:
+        """See :class:`.front_end.FrontEnd`."""
+        arrays = check_measurements(self.channels, measurement, time_axis=False)
+        inner, estimate = self.kalman.step(state.filter, arrays)
+        values = self._values(estimate, arrays)
+        there = np.isfinite(values)
+        sums, known = state.sums + np.where(there, values, 0.0), state.known + there
+        count = int(state.count)
+        due = bool(interval_ends(count, 1, self.dt, self.interval)[0])
+        seen = self._seen(estimate, sums, known, np.full(values.shape[:-1], float(due)))
+        if due:
+            sums, known = np.zeros_like(sums), np.zeros_like(known)
+        return FeatureState(inner, np.array(count + 1), sums, known), seen
+
+    def run(self, measurements: Mapping[str, Any]) -> Seen:
+        """See :class:`.front_end.FrontEnd`."""
+        arrays = check_measurements(self.channels, measurements, time_axis=True)
+        estimate = self.kalman.run(arrays)
+        values = self._values(estimate, arrays)
+        due = interval_ends(0, len(values), self.dt, self.interval)
+        sums, known = np.zeros_like(values), np.zeros_like(values)
+        there = np.isfinite(values)
+        values, begin = np.where(there, values, 0.0), 0
+        for end in np.flatnonzero(due) + 1:
+            # features are read where an interval ends; between, only stepping knows them
+            sums[end - 1], known[end - 1] = values[begin:end].sum(axis=0), there[begin:end].sum(axis=0)
+            begin = end
+        column = due.astype(float).reshape(-1, *(1,) * (values.ndim - 2))
+        return self._seen(estimate, sums, known, np.broadcast_to(column, values.shape[:-1]))
+
+    def _values(self, estimate: Estimate, arrays: Mapping[str, Any]) -> np.ndarray:
+        """What is averaged ``(..., M)``."""
+        assert estimate.covariance is not None
+        parts = []
+        for quantity in self.kalman.outputs:
+            value = np.asarray(estimate.pose[quantity.name])
+            parts += [np.sin(value), np.cos(value)] if quantity.kind == "angle" else [value]
+        variances = np.diagonal(np.asarray(estimate.covariance), axis1=-2, axis2=-1)
+        parts.append(0.5 * np.log(np.maximum(variances, 1e-16)))
+        parts.append(np.clip(np.asarray(estimate.innovation), -10.0, 10.0))
+        parts += [np.asarray(arrays[channel.name], dtype=float) for channel in self._shown]
+        return np.concatenate(parts, axis=-1)
+
+    def _seen(self, estimate: Estimate, sums: np.ndarray, known: np.ndarray, due: np.ndarray) -> Seen:
+        features = np.where(due[..., None] > 0.0, sums / np.maximum(known, 1.0), 0.0)
+        base = {quantity.name: np.asarray(estimate.pose[quantity.name]) for quantity in self.kalman.outputs}
+        return Seen(features, due, base, features[..., :0])
+
+
+def standardisation(features: np.ndarray, mask: np.ndarray, least: float = 1e-3) -> tuple[np.ndarray, np.ndarray]:
+    """Mean and standard deviation ``(F,)`` of features ``(E, N, F)`` where the mask ``(E, N)`` says so.
+
+    A feature that hardly varies is left as it is: its deviation is 1.
+    """
+    chosen = features[mask].astype(float)
+    if not len(chosen):
+        return np.zeros(features.shape[-1]), np.ones(features.shape[-1])
+    mean, deviation = chosen.mean(axis=0), chosen.std(axis=0)
+    return mean, np.where(deviation > least * (1.0 + np.abs(mean)), deviation, math.inf)

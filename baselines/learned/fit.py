@@ -1,0 +1,334 @@
+"""Training of a network: reproducible bit by bit on one machine, also after an interruption."""
+
+from __future__ import annotations
+
+import copy
+import math
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ...filters.support.optional import extra
+from ..checkpoint import load_checkpoint, save_checkpoint
+from .data import SequenceData
+from .estimator import LearnedEstimator
+from .filter_features import standardisation
+from .front_end import FrontEnd
+from .head import Head
+from .modules import TorchNetwork
+
+with extra("learn"):
+    import torch
+    from torch import nn
+
+CHECKPOINT = "checkpoint.pt"
+MOST_BAD_STEPS = 10
+"""Updates without a finite loss and gradient, one after the other, that end a training."""
+
+
+@dataclass(frozen=True)
+class FitConfig:
+    """How a network is trained.
+
+    Raises:
+        ValueError: a number is out of its range.
+    """
+
+    epochs: int = 4
+    """passes over the sequences"""
+    batch: int = 32
+    """sequences in a batch"""
+    window: int = 250
+    """updates through which gradients flow; memory is carried on from window to window"""
+    learning_rate: float = 2e-3
+    """highest rate, after the warm-up; it falls to zero along a cosine"""
+    warmup: float = 0.1
+    """share of the updates in which the rate rises"""
+    weight_decay: float = 1e-2
+    """of AdamW"""
+    clip: float = 1.0
+    """largest norm of a gradient"""
+    seed: int = 0
+    """of order, headings and noise"""
+
+    def __post_init__(self) -> None:
+        for name in ("epochs", "batch", "window"):
+            if getattr(self, name) < 1:
+                raise ValueError(f"{name} must be at least 1, got {getattr(self, name)}")
+        for name in ("learning_rate", "clip"):
+            if not 0.0 < getattr(self, name) < math.inf:
+                raise ValueError(f"{name} must be positive, got {getattr(self, name)}")
+        if not 0.0 <= self.warmup < 1.0:
+            raise ValueError(f"warmup must lie in [0, 1), got {self.warmup}")
+        if self.seed < 0:
+            raise ValueError(f"seed must be 0 or more, got {self.seed}")
+
+
+class FitResult(NamedTuple):
+    """What a training gives.
+
+    Attributes:
+        estimator: with the weights of the best epoch.
+        history: one dictionary an epoch: ``epoch``, ``training`` and ``validation`` loss, ``validation_deg`` (mean over
+            parts of the root mean square error), ``skipped`` updates.
+        best_epoch: the one with the lowest validation loss; 0: the weights before the first.
+    """
+
+    estimator: LearnedEstimator
+    history: list[dict[str, float]]
+    best_epoch: int
+
+
+@contextmanager
+def one_thread() -> Iterator[None]:
+    """Let torch use one thread: sums then have one order, and small matrices gain nothing from more."""
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(threads)
+
+
+def fit(
+    module: nn.Module,
+    front_end: FrontEnd,
+    head: Head,
+    data: SequenceData,
+    validation: SequenceData,
+    config: FitConfig | None = None,
+    *,
+    folder: str | Path | None = None,
+    resume: bool = False,
+    context: int = 1,
+    say: Callable[[str], object] | None = None,
+) -> FitResult:
+    """Train a network to an estimator.
+
+    Args:
+        module: maps features ``(B, N, F)`` to outputs ``(B, N, O)``; one that remembers takes and gives its memory too
+            (:class:`.modules.TorchNetwork`). It is changed in place and ends with the weights of the best epoch.
+        front_end: what it sees.
+        head: what its outputs mean, and the loss.
+        data: what to train on, made with the same front end and head.
+        validation: what to choose the best epoch on; motions and riders that ``data`` does not hold.
+        config: how.
+        folder: where checkpoints and the TensorBoard log go; None keeps nothing.
+        resume: continue from the checkpoint in ``folder``, bit by bit as if there had been no interruption.
+        context: updates that a module without memory sees at once.
+        say: called with a line an epoch; None for a silent training.
+
+    Raises:
+        ValueError: the module gives other shapes than the head takes; there is nothing to resume, or it was started
+            with another configuration, other data or another version of the package; a data set scores nothing.
+        RuntimeError: loss or gradients were not finite several times in a row.
+    """
+    config = FitConfig() if config is None else config
+    for name, part in (("data", data), ("validation", validation)):
+        if not part.mask.any():
+            raise ValueError(f"{name} scores nothing: the truth of its {len(part)} sequences is unknown everywhere")
+    if resume and folder is None:
+        raise ValueError("resume needs the folder of the interrupted training")
+    home = None if folder is None else Path(folder)
+    if home is not None:
+        home.mkdir(parents=True, exist_ok=True)
+    with one_thread(), torch.random.fork_rng(devices=[]):
+        trainer = Trainer(module, head, config, data, context)
+        if resume and home is not None:
+            trainer.restore(home / CHECKPOINT)
+        else:
+            trainer.begin(data, validation)
+        log = (lambda entry: None) if home is None else open_log(home)
+        try:
+            while trainer.epoch < config.epochs:
+                trainer.train_epoch(data, validation)
+                if home is not None:
+                    trainer.save(home / CHECKPOINT)
+                entry = trainer.history[-1]
+                log(entry)
+                if say is not None:
+                    say(
+                        f"epoch {trainer.epoch}/{config.epochs}: training {entry['training']:.4g}, "
+                        f"held out {entry['validation']:.4g} ({entry['validation_deg']:.3f}°)"
+                    )
+        finally:
+            log(None)
+    module.load_state_dict(trainer.best)
+    module.eval()
+    network = module.export() if hasattr(module, "export") else trainer.network  # type: ignore[operator]
+    return FitResult(LearnedEstimator(network, front_end, head), trainer.history, trainer.best_epoch)
+
+
+class Trainer:
+    """Everything that changes during a training.
+
+    Args:
+        module: the network.
+        head: its loss.
+        config: how it is trained.
+        data: tells how many updates there will be, and the shapes.
+        context: see :func:`fit`.
+    """
+
+    def __init__(self, module: nn.Module, head: Head, config: FitConfig, data: SequenceData, context: int) -> None:
+        self.module, self.head, self.config = module, head, config
+        settings = {"config": asdict(config), "head": head.describe(), "data": data.digest()}
+        self.key = {**settings, "module": repr(module)}
+        own = getattr(module, "standardised", None)
+        self.network = TorchNetwork(module, data.features.shape[-1], head.size, context, own)
+        self.optimizer = torch.optim.AdamW(
+            module.parameters(), lr=config.learning_rate, weight_decay=config.weight_decay
+        )
+        batches = len(data) // min(config.batch, len(data))
+        self.updates = config.epochs * batches * math.ceil(data.features.shape[1] / config.window)
+        self.update = self.bad_steps = self.epoch = self.best_epoch = 0
+        self.history: list[dict[str, float]] = []
+        self.best_loss = math.inf
+        self.best: dict[str, Any] = copy.deepcopy(module.state_dict())
+
+    def begin(self, data: SequenceData, validation: SequenceData) -> None:
+        """Take the scales of the features, check the shapes, and score the network as it is."""
+        self.network.standardised.fit(*standardisation(data.features, data.mask))
+        told, _ = self.forward(torch.from_numpy(data.features[:1, :2]), None)
+        if tuple(told.shape) != (1, 2, self.head.size):
+            raise ValueError(
+                f"module must give (B, N, {self.head.size}) for features (B, N, {data.features.shape[-1]}), "
+                f"got {tuple(told.shape)} for (1, 2, …)"
+            )
+        self.best = copy.deepcopy(self.module.state_dict())
+        self.best_loss, _ = validation_loss(self, validation)
+
+    def forward(self, features: torch.Tensor, memory: Any) -> tuple[torch.Tensor, Any]:
+        """The module on features as they are."""
+        if not hasattr(self.module, "standardised"):
+            features = self.network.standardised(features)
+        if self.network.remembers:
+            told, memory = self.module(features, memory)
+            return told, memory
+        return self.module(features), None
+
+    def learning_rate(self) -> float:
+        """Rate of the next update: linear rise, then a cosine."""
+        rise = self.config.warmup * self.updates
+        if self.update < rise:
+            return self.config.learning_rate * (self.update + 1.0) / (rise + 1.0)
+        rest = max(1.0, self.updates - rise)
+        return 0.5 * self.config.learning_rate * (1.0 + math.cos(math.pi * (self.update - rise) / rest))
+
+    def train_epoch(self, data: SequenceData, validation: SequenceData) -> None:
+        """One pass over the data, and a look at what is held out."""
+        generator = np.random.default_rng((self.config.seed, self.epoch))
+        torch.manual_seed(int(generator.integers(2**31)))
+        self.module.train()
+        total, count, skipped = 0.0, 0, 0
+        memory: Any = None
+        for window in data.windows(self.config.batch, self.config.window, generator, self.head):
+            features, target, spread, mask = (torch.from_numpy(np.ascontiguousarray(part)) for part in window[:4])
+            told, last = self.forward(features, None if window.first else memory)
+            memory = None if last is None else last.detach()
+            if not mask.any():
+                continue
+            loss = self.head.loss(told, target, spread, mask)
+            if self.descend(loss):
+                total, count = total + loss.item(), count + 1
+            else:
+                skipped += 1
+                memory = None if memory is None else torch.nan_to_num(memory)
+        held_out, degrees = validation_loss(self, validation)
+        self.epoch += 1
+        if held_out < self.best_loss:
+            self.best, self.best_epoch = copy.deepcopy(self.module.state_dict()), self.epoch
+            self.best_loss = held_out
+        entry = {"training": total / max(count, 1), "validation": held_out, "validation_deg": degrees}
+        self.history.append({"epoch": float(self.epoch), **entry, "skipped": float(skipped)})
+
+    def descend(self, loss: torch.Tensor) -> bool:
+        """One update; False if loss or gradient is not finite, and nothing was changed."""
+        for group in self.optimizer.param_groups:
+            group["lr"] = self.learning_rate()
+        self.update += 1
+        self.optimizer.zero_grad(set_to_none=True)
+        loss.backward()  # type: ignore[no-untyped-call]
+        norm = nn.utils.clip_grad_norm_(self.module.parameters(), self.config.clip)
+        if not (torch.isfinite(loss) and torch.isfinite(norm)):
+            self.bad_steps += 1
+            if self.bad_steps >= MOST_BAD_STEPS:
+                raise RuntimeError(f"loss or gradients were not finite in {self.bad_steps} updates in a row")
+            return False
+        self.bad_steps = 0
+        self.optimizer.step()
+        return True
+
+    def save(self, path: Path) -> None:
+        """Write a checkpoint."""
+        state = {
+            "module": self.module.state_dict(),
+            "standardised": self.network.standardised.state_dict(),
+            "optimizer": self.optimizer.state_dict(),
+            "counters": [self.update, self.bad_steps, self.epoch, self.best_epoch],
+            "best_loss": self.best_loss,
+            "history": self.history,
+            "best": self.best,
+        }
+        save_checkpoint(path, self.key, state)
+
+    def restore(self, path: Path) -> None:
+        """Continue from a checkpoint.
+
+        Raises:
+            ValueError: see :func:`~poise.baselines.checkpoint.load_checkpoint`.
+        """
+        state = load_checkpoint(path, self.key)
+        self.module.load_state_dict(state["module"])
+        self.network.standardised.load_state_dict(state["standardised"])
+        self.optimizer.load_state_dict(state["optimizer"])
+        self.update, self.bad_steps, self.epoch, self.best_epoch = state["counters"]
+        self.best_loss, self.history, self.best = state["best_loss"], state["history"], state["best"]
+
+
+def validation_loss(
+    trainer: Trainer, data: SequenceData, size: int = 64, length: int = 1000
+) -> tuple[float, float]:
+    """Loss of whole sequences, without gradients, and mean over parts of the root mean square error, deg."""
+    trainer.module.eval()
+    total, count, squares, scored = 0.0, 0, 0.0, 0
+    with torch.no_grad():
+        for start in range(0, len(data), size):
+            part = slice(start, start + size)
+            memory, told = None, []
+            features = torch.from_numpy(data.features[part])
+            for begin in range(0, features.shape[1], length):
+                output, memory = trainer.forward(features[:, begin : begin + length], memory)
+                told.append(output)
+            outputs, mask = torch.cat(told, dim=1), torch.from_numpy(data.mask[part])
+            target, spread = torch.from_numpy(data.target[part]), torch.from_numpy(data.spread[part])
+            counted = int(mask.any(dim=1).sum())
+            if not counted:
+                continue
+            total += float(trainer.head.loss(outputs, target, spread, mask)) * counted
+            error = trainer.head.errors(outputs, target, spread)
+            squares = squares + (error * error)[mask].sum(dim=0).double()
+            count, scored = count + counted, scored + int(mask.sum())
+    degrees = math.degrees(float(torch.as_tensor(squares / max(scored, 1)).sqrt().mean()))
+    return total / max(count, 1), degrees
+
+
+def open_log(folder: Path) -> Callable[[dict[str, float] | None], None]:
+    """A function that writes an epoch to TensorBoard, and closes the log when it gets None."""
+    from torch.utils.tensorboard import SummaryWriter
+
+    writer = SummaryWriter(str(folder))
+
+    def log(entry: dict[str, float] | None) -> None:
+        if entry is None:
+            writer.close()
+            return
+        for name in ("training", "validation", "validation_deg", "skipped"):
+            writer.add_scalar(name, entry[name], int(entry["epoch"]))
+        writer.flush()
+
+    return log

@@ -1,0 +1,244 @@
+"""What a network sees: samples of sensors, or what a filter makes of them, as features at fixed intervals.
+
+A front end runs at the rate of the sensors. A network behind it is updated at the end of each interval, whose length
+does not depend on that rate, so that one set of weights serves every rate that the front end takes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple, Protocol, Self
+
+import numpy as np
+
+from ...filters.core.backend import Array, namespace
+from ...filters.core.estimator import check_measurements, run_by_steps
+from ...filters.core.quantity import Channel, Estimate, Measurement
+
+
+class Seen(NamedTuple):
+    """What a front end gives for one sample, or (time axis first) for a sequence.
+
+    Attributes:
+        features: ``(..., F)`` of the interval so far.
+        due: ``(...)``, 1 at the samples that end an interval, else 0.
+        base: quantity → ``(..., size)``: what the head corrects, such as the estimate of a filter.
+        spread: ``(..., S)`` standard deviations of the base, or S = 0 where nothing is known of them.
+    """
+
+    features: Array
+    due: Array
+    base: dict[str, Array]
+    spread: Array
+
+
+class FrontEnd(Protocol):
+    """Interface of front ends. They are immutable; what they remember is in the state."""
+
+    @property
+    def kind(self) -> str:
+        """Name under which cards know it."""
+        ...
+
+    @property
+    def dt(self) -> float:
+        """Sampling interval, s."""
+        ...
+
+    @property
+    def interval(self) -> float:
+        """Time between updates of the network, s."""
+        ...
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        """Required channels."""
+        ...
+
+    @property
+    def size(self) -> int:
+        """Number F of features."""
+        ...
+
+    def with_dt(self, dt: float) -> Self:
+        """The same for another sampling interval.
+
+        Raises:
+            ValueError: it is longer than the interval of the network.
+        """
+        ...
+
+    def configured(self, metadata: Mapping[str, Any]) -> Self:
+        """The same for the person, vehicle or device of a recording."""
+        ...
+
+    def init(self, measurement: Measurement) -> Any:
+        """State before the samples of the shape of ``measurement``."""
+        ...
+
+    def step(self, state: Any, measurement: Measurement) -> tuple[Any, Seen]:
+        """Process one sample."""
+        ...
+
+    def run(self, measurements: Mapping[str, Any]) -> Seen:
+        """Process a sequence ``(T, *batch, size)``; equal to stepping."""
+        ...
+
+    def describe(self) -> dict[str, Any]:
+        """Kind and settings for a card; JSON-able."""
+        ...
+
+
+def check_interval(dt: float, interval: float) -> None:
+    """Refuse sampling that is slower than the network.
+
+    Raises:
+        ValueError: names both.
+    """
+    if dt > interval * (1.0 + 1e-9):
+        raise ValueError(f"dt must be at most {interval:g} s ({1.0 / interval:g} Hz or more), got {dt:g} s")
+
+
+def interval_ends(first: int, count: int, dt: float, interval: float) -> np.ndarray:
+    """Whether each of ``count`` samples from number ``first`` on is the nearest to the end of an interval."""
+    numbers = np.floor((np.arange(first, first + count + 1) * dt) / interval + 0.5)
+    return np.diff(numbers) > 0.0
+
+
+class RawState(NamedTuple):
+    """Memory of :class:`RawChannels`.
+
+    Attributes:
+        count: ``()`` samples so far.
+        sums: ``(*batch, F / 2)`` over the interval of the known elements, scaled.
+        known: ``(*batch, F / 2)`` how many those are.
+    """
+
+    count: np.ndarray
+    sums: np.ndarray
+    known: np.ndarray
+
+
+@dataclass(frozen=True)
+class RawChannels:
+    """The channels of the sensors and nothing else: the mean over each interval, and the share of samples that came.
+
+    Attributes:
+        channels: what is read.
+        scales: unit of each channel in which its numbers are of the order of one; None: 1.
+        interval: s between updates of the network.
+        dt: sampling interval, s.
+
+    Raises:
+        ValueError: no channels, another number of scales, or sampling slower than the network.
+    """
+
+    channels: tuple[Channel, ...]
+    scales: tuple[float, ...] | None = None
+    interval: float = 0.04
+    dt: float = 0.01
+
+    kind = "raw-channels"
+
+    def __post_init__(self) -> None:
+        if not self.channels:
+            raise ValueError("channels must name at least one, got none")
+        if self.scales is not None and len(self.scales) != len(self.channels):
+            raise ValueError(f"scales must be {len(self.channels)}, one a channel, got {len(self.scales)}")
+        check_interval(self.dt, self.interval)
+
+    @property
+    def size(self) -> int:
+        """Two for each element of the channels."""
+        return 2 * sum(channel.size for channel in self.channels)
+
+    def with_dt(self, dt: float) -> Self:
+        """See :class:`FrontEnd`."""
+        return replace(self, dt=float(dt))
+
+    def configured(self, metadata: Mapping[str, Any]) -> Self:
+        """Nothing to configure."""
+        return self
+
+    def describe(self) -> dict[str, Any]:
+        """See :class:`FrontEnd`."""
+        channels = [[channel.name, channel.size, channel.unit] for channel in self.channels]
+        scales = None if self.scales is None else list(self.scales)
+        return {"kind": self.kind, "channels": channels, "scales": scales, "interval": self.interval}
+
+    @classmethod
+    def read(cls, described: Mapping[str, Any], dt: float) -> Self:
+        """The inverse of :meth:`describe`."""
+        channels = tuple(Channel(str(name), int(size), str(unit)) for name, size, unit in described["channels"])
+        scales = described.get("scales")
+        return cls(channels, None if scales is None else tuple(scales), float(described["interval"]), dt)
+
+    def init(self, measurement: Measurement) -> RawState:
+        """See :class:`FrontEnd`."""
+        batch = np.shape(measurement[self.channels[0].name])[:-1]
+        zero = np.zeros((*batch, self.size // 2))
+        return RawState(np.array(0), zero, zero.copy())
+
+    def step(self, state: RawState, measurement: Measurement) -> tuple[RawState, Seen]:
+        """See :class:`FrontEnd`."""
+        values = self._scaled(check_measurements(self.channels, measurement, time_axis=False))
+        there = np.isfinite(values)
+        sums, known = state.sums + np.where(there, values, 0.0), state.known + there
+        count = int(state.count)
+        due = bool(interval_ends(count, 1, self.dt, self.interval)[0])
+        seen = self._seen(sums, known, np.full(values.shape[:-1], float(due)))
+        if due:
+            sums, known = np.zeros_like(sums), np.zeros_like(known)
+        return RawState(np.array(count + 1), sums, known), seen
+
+    def run(self, measurements: Mapping[str, Any]) -> Seen:
+        """See :class:`FrontEnd`."""
+        arrays = check_measurements(self.channels, measurements, time_axis=True)
+        values = self._scaled(arrays)
+        there = np.isfinite(values)
+        due = interval_ends(0, len(values), self.dt, self.interval)
+        totals = []
+        for part in (np.where(there, values, 0.0), there.astype(float)):
+            total = np.zeros_like(part)
+            begin = 0
+            for end in [*(np.flatnonzero(due) + 1), len(due)]:
+                total[begin:end] = np.cumsum(part[begin:end], axis=0)
+                begin = end
+            totals.append(total)
+        column = due.astype(float).reshape(-1, *(1,) * (values.ndim - 2))
+        return self._seen(*totals, np.broadcast_to(column, values.shape[:-1]))
+
+    def _scaled(self, arrays: Mapping[str, Array]) -> np.ndarray:
+        scales = self.scales or (1.0,) * len(self.channels)
+        parts = [np.asarray(arrays[c.name], dtype=float) / s for c, s in zip(self.channels, scales, strict=True)]
+        return np.concatenate(parts, axis=-1)
+
+    def _seen(self, sums: np.ndarray, known: np.ndarray, due: np.ndarray) -> Seen:
+        length = max(1.0, round(self.interval / self.dt))
+        features = np.concatenate([sums / np.maximum(known, 1.0), known / length], axis=-1)
+        return Seen(features, due, {}, features[..., :0])
+
+
+def seen_by_steps(front_end: FrontEnd, measurements: Mapping[str, Any]) -> Seen:
+    """A front end run sample by sample, the reference of every faster ``run``."""
+
+    class Stepped:
+        channels, outputs, dt = front_end.channels, (), front_end.dt
+
+        def init(self, measurement: Measurement) -> Any:
+            return front_end.init(measurement)
+
+        def step(self, state: Any, measurement: Measurement) -> tuple[Any, Estimate]:
+            state, seen = front_end.step(state, measurement)
+            base = {f"base {name}": values for name, values in seen.base.items()}
+            return state, Estimate({"features": seen.features, "due": seen.due, "spread": seen.spread, **base})
+
+    pose = run_by_steps(Stepped(), measurements).pose  # type: ignore[arg-type]
+    base = {name.removeprefix("base "): values for name, values in pose.items() if name.startswith("base ")}
+    return Seen(pose["features"], pose["due"], base, pose["spread"])
+
+
+def join_features(parts: list[Array]) -> Array:
+    """Features side by side."""
+    return namespace(*parts).concat(parts, axis=-1)

@@ -1,0 +1,209 @@
+"""Front ends for one inertial sensor: features in a level frame, kept by an observer or by a Kalman filter."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, replace
+from typing import Any, ClassVar, NamedTuple, Self
+
+from ...filters.core.backend import Array, is_torch, namespace
+from ...filters.core.estimator import check_measurements
+from ...filters.core.kalman import KalmanFilter
+from ...filters.core.model import parameters_of
+from ...filters.core.observer import Observer
+from ...filters.core.quantity import ACCELEROMETER, GYROSCOPE, Channel, Estimate, Measurement, Quantity
+from ...filters.core.rotation import exp, multiply, rotate
+from ...filters.core.sampling import FilterState
+from ...filters.registry import make, name_of
+from .front_end import Seen, check_interval
+from .gravity_aligned_frame import DUE, FEATURES, GravityAlignedFrame
+
+ATTITUDE = Channel("filter/orientation", 4, "1")
+BIAS = Channel("filter/gyroscope_bias", 3, "rad/s")
+TILT_STD = Channel("filter/tilt_std", 1, "rad")
+"""Outputs of a filter, as channels of :class:`FilterFrame`."""
+FILTERED = Quantity("features", "vector", FEATURES.size + 1, "1")
+"""The features of :class:`GravityAlignedFrame` and the logarithm of the filter's deviation."""
+
+
+@dataclass(frozen=True)
+class FilterFrame(GravityAlignedFrame):
+    """The features of its base class in the level frame of a filter, whose outputs it reads as channels."""
+
+    tilt_gain: float = 0.0
+    """the filter corrects the tilt"""
+    bias_gain: float = 0.0
+    """and the bias"""
+
+    channels: ClassVar[tuple[Channel, ...]] = (GYROSCOPE, ACCELEROMETER, ATTITUDE, BIAS, TILT_STD)
+    outputs: ClassVar[tuple[Quantity, ...]] = (*GravityAlignedFrame.outputs[:1], FILTERED, DUE)
+    state_size: ClassVar[int] = 33
+
+    def prior(self, z: Measurement) -> Array:
+        """The filter's attitude at its first sample."""
+        xp, x = namespace(z["imu/acc"]), super().prior(z)
+        return xp.concat([z[ATTITUDE.name], z[BIAS.name], x[..., 7:], xp.log(z[TILT_STD.name])], axis=-1)
+
+    def predict(self, x: Array, z: Measurement, previous: Measurement) -> Array:
+        """The attitude of the filter; the force in the middle of the interval that ends there."""
+        xp = namespace(x)
+        q, b = z[ATTITUDE.name], z[BIAS.name]
+        moved = super().predict(xp.concat([q, b, x[..., 7:32]], axis=-1), z, previous)
+        middle = multiply(q, exp(-0.5 * self.dt * (z["imu/gyr"] - b)))
+        force = rotate(middle, z["imu/acc"])
+        spread = xp.log(z[TILT_STD.name] + 1e-6)
+        return xp.concat([q, b, moved[..., 7:10], force, moved[..., 13:], spread], axis=-1)
+
+    def finish(self, x: Array, z: Measurement) -> Array:
+        """Integrals and sums."""
+        return namespace(x).concat([super().finish(x[..., :32], z), x[..., 32:]], axis=-1)
+
+    def pose(self, x: Array) -> dict[str, Array]:
+        """Attitude of the frame, features, whether the interval ends."""
+        xp, pose = namespace(x), super().pose(x[..., :32])
+        return {**pose, "features": xp.concat([pose["features"], 0.25 * x[..., 32:] + 1.0], axis=-1)}
+
+
+class LevelState(NamedTuple):
+    """Memory of :class:`LevelFrame`: of the filter (None without one) and of the frame."""
+
+    filter: FilterState | None
+    frame: FilterState
+
+
+@dataclass(frozen=True)
+class LevelFrame:
+    """Six axes in a level frame.
+
+    Without a filter the frame is kept by an observer with fixed gains (:class:`GravityAlignedFrame`); with one, it is
+    the filter's, the network corrects the filter's inclination, and ``spread`` is the filter's deviation of tilt.
+
+    Attributes:
+        kalman: a filter of six axes with the output ``relative_orientation`` and a covariance, or None.
+        frame: settings of the features; its sampling interval is that of the front end.
+        compiled: use compiled loops for NumPy data.
+
+    Raises:
+        ValueError: sampling slower than the network, or a filter that estimates no relative orientation.
+    """
+
+    kalman: KalmanFilter | None = None
+    frame: GravityAlignedFrame = field(default_factory=GravityAlignedFrame)
+    compiled: bool = True
+
+    kind: ClassVar[str] = "level-frame"
+    channels: ClassVar[tuple[Channel, ...]] = (GYROSCOPE, ACCELEROMETER)
+
+    def __post_init__(self) -> None:
+        check_interval(self.frame.dt, self.frame.interval)
+        if self.kalman is None:
+            return
+        if "relative_orientation" not in self.kalman.model.error_parts:
+            raise ValueError(f"kalman must estimate a relative orientation; {type(self.kalman.model).__name__} does not")
+        kalman = replace(self.kalman, keep_covariance=True, compiled=self.compiled).with_dt(self.frame.dt)
+        object.__setattr__(self, "kalman", kalman)
+        if not isinstance(self.frame, FilterFrame):
+            settings = {name: value for name, value in asdict(self.frame).items() if not name.endswith("_gain")}
+            object.__setattr__(self, "frame", FilterFrame(**settings, velocity_gain=self.frame.velocity_gain))
+
+    @property
+    def dt(self) -> float:
+        """Sampling interval, s."""
+        return self.frame.dt
+
+    @property
+    def interval(self) -> float:
+        """Time between updates of the network, s."""
+        return self.frame.interval
+
+    @property
+    def size(self) -> int:
+        """Number of features."""
+        return type(self.frame).outputs[1].size
+
+    def with_dt(self, dt: float) -> Self:
+        """See :class:`.front_end.FrontEnd`."""
+        check_interval(dt, self.interval)
+        return replace(self, frame=self.frame.with_dt(dt))
+
+    def configured(self, metadata: Mapping[str, Any]) -> Self:
+        """Nothing to configure."""
+        return self
+
+    def describe(self) -> dict[str, Any]:
+        """See :class:`.front_end.FrontEnd`."""
+        frame = {name: value for name, value in asdict(self.frame).items() if name != "dt"}
+        described: dict[str, Any] = {"kind": self.kind, "frame": frame, "filter": None}
+        if self.kalman is not None:
+            name = name_of(self.kalman.model)
+            if name is None:
+                raise ValueError(f"{type(self.kalman.model).__name__} is not registered: a card could not name it")
+            usual = parameters_of(make(name).model)
+            own = parameters_of(self.kalman.model)
+            changed = {key: value for key, value in own.items() if key != "dt" and value != usual[key]}
+            described["filter"] = {"name": name, "parameters": changed}
+        return described
+
+    @classmethod
+    def read(cls, described: Mapping[str, Any], dt: float) -> Self:
+        """The inverse of :meth:`describe`."""
+        settings, inner = dict(described["frame"]), described.get("filter")
+        if inner is None:
+            return cls(None, GravityAlignedFrame(**settings, dt=dt))
+        return cls(make(inner["name"], dt=dt, **inner.get("parameters", {})), FilterFrame(**settings, dt=dt))
+
+    def init(self, measurement: Measurement) -> LevelState:
+        """See :class:`.front_end.FrontEnd`."""
+        if self.kalman is None:
+            return LevelState(None, self._observer.init(measurement))
+        arrays = check_measurements(self.channels, measurement, time_axis=False)
+        inner = self.kalman.init(arrays)
+        xp, like = namespace(arrays["imu/acc"]), 0.0 * arrays["imu/acc"][..., :1] + namespace(arrays["imu/acc"]).nan
+        unknown = {c.name: xp.concat([like] * c.size, axis=-1) for c in (ATTITUDE, BIAS, TILT_STD)}
+        return LevelState(inner, self._observer.init({**arrays, **unknown}))
+
+    def step(self, state: LevelState, measurement: Measurement) -> tuple[LevelState, Seen]:
+        """See :class:`.front_end.FrontEnd`."""
+        if self.kalman is None:
+            frame, seen = self._observer.step(state.frame, measurement)
+            return LevelState(None, frame), self._seen(seen, None)
+        arrays = check_measurements(self.channels, measurement, time_axis=False)
+        assert state.filter is not None
+        inner, estimate = self.kalman.step(state.filter, arrays)
+        frame, seen = self._observer.step(state.frame, {**arrays, **self._told(estimate)})
+        return LevelState(inner, frame), self._seen(seen, estimate)
+
+    def run(self, measurements: Mapping[str, Any]) -> Seen:
+        """See :class:`.front_end.FrontEnd`."""
+        arrays = check_measurements(self.channels, measurements, time_axis=True)
+        if self.kalman is None:
+            return self._seen(self._observer.run(arrays), None)
+        estimate = self.kalman.run(arrays)
+        return self._seen(self._observer.run({**arrays, **self._told(estimate)}), estimate)
+
+    @property
+    def _observer(self) -> Observer:
+        return Observer(self.frame, compiled=self.compiled)
+
+    def _told(self, estimate: Estimate) -> dict[str, Array]:
+        """The filter's outputs as channels."""
+        orientation, bias = estimate.pose["relative_orientation"], estimate.pose["gyroscope_bias"]
+        return {ATTITUDE.name: orientation, BIAS.name: bias, TILT_STD.name: self._deviation(estimate)}
+
+    def _deviation(self, estimate: Estimate) -> Array:
+        """Deviation of the tilt, rad: the root of the variances about both horizontal axes ``(..., 1)``."""
+        assert self.kalman is not None
+        assert estimate.covariance is not None
+        start = self.kalman.model.error_parts["relative_orientation"][0]
+        P = estimate.covariance
+        return namespace(P).sqrt(P[..., start, start] + P[..., start + 1, start + 1])[..., None]
+
+    def _seen(self, found: Estimate, estimate: Estimate | None) -> Seen:
+        pose = found.pose
+        q = pose["relative_orientation"]
+        spread = q[..., :0] if estimate is None else self._deviation(estimate)
+        base = q if estimate is None else estimate.pose["relative_orientation"]
+        features, due = pose["features"], pose["due"][..., 0]
+        if not is_torch(due):
+            features = namespace(features).where((due == 1.0)[..., None], features, 0.0 * features)
+        return Seen(features, due, {"relative_orientation": base}, spread)
