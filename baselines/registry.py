@@ -32,7 +32,7 @@ TRAINED: dict[str, Entry] = {
         "recurrent network, trained on simulated hand motion",
         HERE,
         "learned",
-        describes="..baselines.learned.estimator:LearnedEstimator",
+        {"weights": "gru"},
     ),
 }
 """Name → estimator with shipped weights."""

@@ -70,8 +70,8 @@ class Entry:
 
     def _names(self, attribute: str) -> tuple[str, ...]:
         described = _load(self.describes) if self.describes else self.made_by
-        found = getattr(described, attribute)
-        if isinstance(found, property):  # depends on parameters
+        found = getattr(described, attribute, None)
+        if found is None or isinstance(found, property):  # of a function, or depends on parameters
             found = getattr(described(**self.fixed), attribute)
         return tuple(each.name for each in found)
 
@@ -94,6 +94,8 @@ class Entry:
         made = self.made_by(**given, **self.fixed)
         if self.kind == "external":
             made.load()
+        if metadata and callable(getattr(made, "configured", None)) and not isinstance(made, Equations):
+            made = made.configured(metadata)
         if self.runner:
             return self.runner(made, **{key: value for key, value in parameters.items() if key in outer})
         return made

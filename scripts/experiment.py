@@ -160,7 +160,9 @@ def command_line(command: str, args: Any, options: Sequence[str]) -> str:
     words = ["poise", command, getattr(args, dataclasses.fields(args)[0].name)]
     for name in options:
         value = getattr(args, name)
-        if value not in (None, ()):
+        if value is True:
+            words.append(f"--{name.replace('_', '-')}")
+        elif value is not False and value not in (None, ()):
             words += [f"--{name.replace('_', '-')}", *map(str, value if isinstance(value, tuple) else (value,))]
     return shlex.join(words)
 

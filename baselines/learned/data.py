@@ -87,14 +87,25 @@ class SequenceData:
     def joined(cls, parts: Sequence[tuple[np.ndarray, ...]], names: Sequence[str]) -> Self:
         """Sequences of :func:`sequence_of`, padded to one length."""
         longest = max(len(part[0]) for part in parts)
-        wholes = []
+        wholes: list[np.ndarray] = []
         for index in range(4):
             shape = (len(parts), longest, *parts[0][index].shape[1:])
             wholes.append(np.zeros(shape, bool if index == 3 else np.float32))
             for row, part in enumerate(parts):
                 wholes[index][row, : len(part[index])] = part[index]
-        wholes[2][wholes[2] == 0.0] = 1.0
-        return cls(*wholes, tuple(names))
+        features, target, spread, mask = wholes
+        spread[spread == 0.0] = 1.0
+        return cls(features, target, spread, mask, tuple(names))
+
+    @classmethod
+    def together(cls, sets: Sequence[SequenceData]) -> Self:
+        """Several data sets as one, in their order."""
+        parts = [
+            (one.features[row], one.target[row], one.spread[row], one.mask[row])
+            for one in sets
+            for row in range(len(one))
+        ]
+        return cls.joined(parts, [name for one in sets for name in one.names])
 
     @classmethod
     def from_recipe(
@@ -133,7 +144,9 @@ class SequenceData:
                 return cls.load(path)
         jobs = [(recipe, seed, index, front_end, head) for index in range(episodes)]
         done = dict(in_parallel(simulated_sequence, jobs, processes, label=progress, unit="episode"))
-        data = cls.joined([done[index] for index in range(episodes)], [f"{recipe.name}-{seed}-{index}" for index in range(episodes)])
+        data = cls.joined(
+            [done[index] for index in range(episodes)], [f"{recipe.name}-{seed}-{index}" for index in range(episodes)]
+        )
         if path is not None:
             data.save(path)
         return data

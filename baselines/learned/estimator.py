@@ -29,7 +29,7 @@ NETWORKS: dict[str, Any] = {kind.kind: kind for kind in (GruNetwork, TcnNetwork)
 
 
 class Network(Protocol):
-    """Interface of networks: what :class:`.gru.GruNetwork` and :class:`.torch_network.TorchNetwork` have."""
+    """Interface of networks: what :class:`.gru.GruNetwork` and :class:`.modules.TorchNetwork` have."""
 
     @property
     def kind(self) -> str:
@@ -127,7 +127,9 @@ class LearnedEstimator:
             front_end = look_up("kind of front end", front["kind"], FRONT_ENDS).read(front, dt)
             return cls(made, front_end, look_up("kind of head", head["kind"], HEADS).read(head))
         except (KeyError, TypeError) as reason:
-            raise ValueError(f"{path_or_name}: the card does not describe a network of this package ({reason})") from None
+            raise ValueError(
+                f"{path_or_name}: the card does not describe a network of this package ({reason})"
+            ) from None
 
     def save(self, path: str | Path, card: Mapping[str, Any] | None = None) -> Path:
         """Write weights and card, for :meth:`load`.
@@ -218,7 +220,6 @@ class LearnedEstimator:
         return memory, output, outputs.reshape(length, *batch, -1)
 
 
-def shipped(weights: str = "gru", dt: float = 0.01, metadata: Mapping[str, Any] | None = None) -> LearnedEstimator:
+def shipped(weights: str = "gru", dt: float = 0.01) -> LearnedEstimator:
     """The estimator with weights of the package, for samples ``dt`` seconds apart."""
-    made = LearnedEstimator.load(weights, dt)
-    return made.configured(metadata) if metadata else made
+    return LearnedEstimator.load(weights, dt)

@@ -11,7 +11,7 @@ import numpy as np
 
 from ...filters.core.estimator import check_measurements
 from ...filters.core.kalman import KalmanFilter
-from ...filters.core.model import parameters_of
+from ...filters.core.model import equations_of, parameters_of
 from ...filters.core.quantity import Channel, Estimate, Measurement, Quantity
 from ...filters.core.sampling import FilterState
 from ...filters.registry import make, name_of
@@ -23,13 +23,13 @@ class FeatureState(NamedTuple):
 
     Attributes:
         filter: of the filter.
-        count: ``()`` samples so far.
+        samples: ``()`` so far.
         sums: ``(*batch, M)`` of what is averaged, over the interval.
         known: ``(*batch, M)`` of how many samples.
     """
 
     filter: FilterState
-    count: np.ndarray
+    samples: np.ndarray
     sums: np.ndarray
     known: np.ndarray
 
@@ -96,7 +96,7 @@ class FilterFeatures:
         return replace(self, kalman=self.kalman.with_dt(dt))
 
     def configured(self, metadata: Mapping[str, Any]) -> Self:
-        """The filter told who rides what, where the metadata say so."""
+        """The filter configured for rider and bicycle, where the metadata describe them."""
         model = self.kalman.model.configured(metadata)
         return replace(self, kalman=replace(self.kalman, model=model))
 
@@ -105,7 +105,7 @@ class FilterFeatures:
         name = name_of(self.kalman.model)
         if name is None:
             raise ValueError(f"{type(self.kalman.model).__name__} is not registered: a card could not name it")
-        usual, own = parameters_of(make(name).model), parameters_of(self.kalman.model)
+        usual, own = parameters_of(equations_of(make(name))), parameters_of(self.kalman.model)
         noises = {key: own[key] for key in own if key != "dt" and key in usual and own[key] != usual[key]}
         seen = None if self.channels_seen is None else list(self.channels_seen)
         filter = {"name": name, "parameters": {key: value for key, value in noises.items() if "[" not in key}}
@@ -116,6 +116,7 @@ class FilterFeatures:
         """The inverse of :meth:`describe`."""
         inner, seen = described["filter"], described.get("channels_seen")
         kalman = make(inner["name"], dt=dt, **inner.get("parameters", {}))
+        assert isinstance(kalman, KalmanFilter)
         return cls(kalman, float(described["interval"]), None if seen is None else tuple(seen))
 
     def init(self, measurement: Measurement) -> FeatureState:
@@ -132,7 +133,7 @@ class FilterFeatures:
         values = self._values(estimate, arrays)
         there = np.isfinite(values)
         sums, known = state.sums + np.where(there, values, 0.0), state.known + there
-        count = int(state.count)
+        count = int(state.samples)
         due = bool(interval_ends(count, 1, self.dt, self.interval)[0])
         seen = self._seen(estimate, sums, known, np.full(values.shape[:-1], float(due)))
         if due:
@@ -148,7 +149,7 @@ class FilterFeatures:
         sums, known = np.zeros_like(values), np.zeros_like(values)
         there = np.isfinite(values)
         values, begin = np.where(there, values, 0.0), 0
-        for end in np.flatnonzero(due) + 1:
+        for end in (np.flatnonzero(due) + 1).tolist():
             # features are read where an interval ends; between, only stepping knows them
             sums[end - 1], known[end - 1] = values[begin:end].sum(axis=0), there[begin:end].sum(axis=0)
             begin = end

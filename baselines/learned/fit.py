@@ -252,7 +252,7 @@ class Trainer:
             group["lr"] = self.learning_rate()
         self.update += 1
         self.optimizer.zero_grad(set_to_none=True)
-        loss.backward()  # type: ignore[no-untyped-call]
+        loss.backward()
         norm = nn.utils.clip_grad_norm_(self.module.parameters(), self.config.clip)
         if not (torch.isfinite(loss) and torch.isfinite(norm)):
             self.bad_steps += 1
@@ -290,9 +290,7 @@ class Trainer:
         self.best_loss, self.history, self.best = state["best_loss"], state["history"], state["best"]
 
 
-def validation_loss(
-    trainer: Trainer, data: SequenceData, size: int = 64, length: int = 1000
-) -> tuple[float, float]:
+def validation_loss(trainer: Trainer, data: SequenceData, size: int = 64, length: int = 1000) -> tuple[float, float]:
     """Loss of whole sequences, without gradients, and mean over parts of the root mean square error, deg."""
     trainer.module.eval()
     total, count, squares, scored = 0.0, 0, 0.0, 0

@@ -102,7 +102,7 @@ def check_interval(dt: float, interval: float) -> None:
 
 def interval_ends(first: int, count: int, dt: float, interval: float) -> np.ndarray:
     """Whether each of ``count`` samples from number ``first`` on is the nearest to the end of an interval."""
-    numbers = np.floor((np.arange(first, first + count + 1) * dt) / interval + 0.5)
+    numbers = np.floor((np.arange(first, first + count + 1) + 0.5) * (dt / interval) + 1e-9)
     return np.diff(numbers) > 0.0
 
 
@@ -110,12 +110,12 @@ class RawState(NamedTuple):
     """Memory of :class:`RawChannels`.
 
     Attributes:
-        count: ``()`` samples so far.
+        samples: ``()`` so far.
         sums: ``(*batch, F / 2)`` over the interval of the known elements, scaled.
         known: ``(*batch, F / 2)`` how many those are.
     """
 
-    count: np.ndarray
+    samples: np.ndarray
     sums: np.ndarray
     known: np.ndarray
 
@@ -185,7 +185,7 @@ class RawChannels:
         values = self._scaled(check_measurements(self.channels, measurement, time_axis=False))
         there = np.isfinite(values)
         sums, known = state.sums + np.where(there, values, 0.0), state.known + there
-        count = int(state.count)
+        count = int(state.samples)
         due = bool(interval_ends(count, 1, self.dt, self.interval)[0])
         seen = self._seen(sums, known, np.full(values.shape[:-1], float(due)))
         if due:
@@ -202,12 +202,13 @@ class RawChannels:
         for part in (np.where(there, values, 0.0), there.astype(float)):
             total = np.zeros_like(part)
             begin = 0
-            for end in [*(np.flatnonzero(due) + 1), len(due)]:
+            for end in [*(np.flatnonzero(due) + 1).tolist(), len(due)]:
                 total[begin:end] = np.cumsum(part[begin:end], axis=0)
                 begin = end
             totals.append(total)
         column = due.astype(float).reshape(-1, *(1,) * (values.ndim - 2))
-        return self._seen(*totals, np.broadcast_to(column, values.shape[:-1]))
+        sums, known = totals
+        return self._seen(sums, known, np.broadcast_to(column, values.shape[:-1]))
 
     def _scaled(self, arrays: Mapping[str, Array]) -> np.ndarray:
         scales = self.scales or (1.0,) * len(self.channels)

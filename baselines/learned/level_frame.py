@@ -6,10 +6,10 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any, ClassVar, NamedTuple, Self
 
-from ...filters.core.backend import Array, is_torch, namespace
+from ...filters.core.backend import Array, namespace
 from ...filters.core.estimator import check_measurements
 from ...filters.core.kalman import KalmanFilter
-from ...filters.core.model import parameters_of
+from ...filters.core.model import equations_of, parameters_of
 from ...filters.core.observer import Observer
 from ...filters.core.quantity import ACCELEROMETER, GYROSCOPE, Channel, Estimate, Measurement, Quantity
 from ...filters.core.rotation import exp, multiply, rotate
@@ -80,7 +80,7 @@ class LevelFrame:
 
     Attributes:
         kalman: a filter of six axes with the output ``relative_orientation`` and a covariance, or None.
-        frame: settings of the features; its sampling interval is that of the front end.
+        frame: settings of the features; the sampling interval is the filter's if there is one.
         compiled: use compiled loops for NumPy data.
 
     Raises:
@@ -95,16 +95,19 @@ class LevelFrame:
     channels: ClassVar[tuple[Channel, ...]] = (GYROSCOPE, ACCELEROMETER)
 
     def __post_init__(self) -> None:
-        check_interval(self.frame.dt, self.frame.interval)
         if self.kalman is None:
+            check_interval(self.frame.dt, self.frame.interval)
             return
         if "relative_orientation" not in self.kalman.model.error_parts:
-            raise ValueError(f"kalman must estimate a relative orientation; {type(self.kalman.model).__name__} does not")
+            raise ValueError(
+                f"kalman must estimate a relative orientation; {type(self.kalman.model).__name__} does not"
+            )
+        if not isinstance(self.frame, FilterFrame):
+            kept = {name: value for name, value in asdict(self.frame).items() if name not in ("tilt_gain", "bias_gain")}
+            object.__setattr__(self, "frame", FilterFrame(**{**kept, "dt": self.kalman.dt}))
+        check_interval(self.frame.dt, self.frame.interval)
         kalman = replace(self.kalman, keep_covariance=True, compiled=self.compiled).with_dt(self.frame.dt)
         object.__setattr__(self, "kalman", kalman)
-        if not isinstance(self.frame, FilterFrame):
-            settings = {name: value for name, value in asdict(self.frame).items() if not name.endswith("_gain")}
-            object.__setattr__(self, "frame", FilterFrame(**settings, velocity_gain=self.frame.velocity_gain))
 
     @property
     def dt(self) -> float:
@@ -138,7 +141,7 @@ class LevelFrame:
             name = name_of(self.kalman.model)
             if name is None:
                 raise ValueError(f"{type(self.kalman.model).__name__} is not registered: a card could not name it")
-            usual = parameters_of(make(name).model)
+            usual = parameters_of(equations_of(make(name)))
             own = parameters_of(self.kalman.model)
             changed = {key: value for key, value in own.items() if key != "dt" and value != usual[key]}
             described["filter"] = {"name": name, "parameters": changed}
@@ -150,7 +153,9 @@ class LevelFrame:
         settings, inner = dict(described["frame"]), described.get("filter")
         if inner is None:
             return cls(None, GravityAlignedFrame(**settings, dt=dt))
-        return cls(make(inner["name"], dt=dt, **inner.get("parameters", {})), FilterFrame(**settings, dt=dt))
+        kalman = make(inner["name"], dt=dt, **inner.get("parameters", {}))
+        assert isinstance(kalman, KalmanFilter)
+        return cls(kalman, FilterFrame(**settings, dt=dt))
 
     def init(self, measurement: Measurement) -> LevelState:
         """See :class:`.front_end.FrontEnd`."""
@@ -203,7 +208,8 @@ class LevelFrame:
         q = pose["relative_orientation"]
         spread = q[..., :0] if estimate is None else self._deviation(estimate)
         base = q if estimate is None else estimate.pose["relative_orientation"]
-        features, due = pose["features"], pose["due"][..., 0]
-        if not is_torch(due):
-            features = namespace(features).where((due == 1.0)[..., None], features, 0.0 * features)
-        return Seen(features, due, {"relative_orientation": base}, spread)
+        xp, due = namespace(q), pose["due"][..., 0]
+        now = due == 1.0
+        # before the start nothing is known, and no interval ends
+        features = xp.where(now[..., None], pose["features"], xp.zeros_like(pose["features"]))
+        return Seen(features, xp.where(now, due, xp.zeros_like(due)), {"relative_orientation": base}, spread)

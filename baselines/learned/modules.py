@@ -83,7 +83,7 @@ class GruModule(nn.Module):
         gru = [to_numpy(getattr(self.gru, name).detach()) for name in ("weight_ih_l0", "bias_ih_l0")]
         gru += [to_numpy(getattr(self.gru, name).detach()) for name in ("weight_hh_l0", "bias_hh_l0")]
         last = [self.scale * to_numpy(part.detach()) for part in (self.output.weight, self.output.bias)]
-        return GruNetwork(*(np.float32(array) for array in (weight, bias, *gru, *last)))
+        return GruNetwork(*(array.astype(np.float32) for array in (weight, bias, *gru, *last)))
 
 
 class TcnModule(nn.Module):
@@ -145,7 +145,7 @@ class TcnModule(nn.Module):
         taps = np.stack([to_numpy(block.weight.detach()).transpose(2, 0, 1) for block in blocks])
         biases = np.stack([to_numpy(block.bias.detach()) for block in blocks])
         last = [self.scale * to_numpy(part.detach()) for part in (self.output.weight, self.output.bias)]
-        return TcnNetwork(*(np.float32(array) for array in (weight, bias, taps, biases, *last)))
+        return TcnNetwork(*(array.astype(np.float32) for array in (weight, bias, taps, biases, *last)))
 
 
 class TorchNetwork:
@@ -182,7 +182,8 @@ class TorchNetwork:
         self.standardised = Standardised(features) if standardised is None else standardised
         self.remembers = hasattr(module, "memory_size")
         # the last numbers tell how much of the memory is filled
-        self.memory_size = 1 + (int(module.memory_size) if self.remembers else (context - 1) * features)  # type: ignore[call-overload]
+        remembered: Any = getattr(module, "memory_size", (context - 1) * features)
+        self.memory_size = 1 + int(remembered)
 
     def arrays(self) -> dict[str, np.ndarray]:
         """The weights: the module's state, and the scales of the features."""

@@ -8,8 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from poise.baselines.learned.dataset import LearnedDataset, rotated, sequence_of, simulation_digest
+from poise.baselines.learned.data import SequenceData, sequence_of, simulation_digest, split
 from poise.baselines.learned.gravity_aligned_frame import FEATURES, GravityAlignedFrame
+from poise.baselines.learned.head import TiltHead, turned
+from poise.baselines.learned.level_frame import LevelFrame
 from poise.envs.data.trajectory import Trajectory
 from poise.envs.hand.hand_held import HandHeld
 from poise.envs.recipes.hand import HandRecipe
@@ -17,6 +19,7 @@ from poise.filters.core import rotation
 from poise.filters.core.estimator import run
 from poise.filters.core.observer import Observer
 
+END, HEAD = LevelFrame(), TiltHead()
 SHORT = HandRecipe(duration=12.0, carried_share=0.0, held=HandHeld(first_rest=(0.3, 2.0), longest=(4.0, 6.0)))
 
 
@@ -26,8 +29,8 @@ def episodes() -> list[Trajectory]:
 
 
 @pytest.fixture(scope="module")
-def dataset(episodes: list[Trajectory]) -> LearnedDataset:
-    return LearnedDataset.from_trajectories(episodes)
+def dataset(episodes: list[Trajectory]) -> SequenceData:
+    return SequenceData.from_trajectories(episodes, END, HEAD)
 
 
 def test_an_episode_is_a_function_of_its_seed(episodes: list[Trajectory]) -> None:
@@ -48,15 +51,15 @@ def test_rates_differ_and_the_hand_goes_nowhere(episodes: list[Trajectory]) -> N
         np.testing.assert_allclose(np.nanmean(force, axis=0), [0.0, 0.0, 9.80665], atol=0.6)
 
 
-def test_the_vertical_in_the_level_frame_is_nearly_vertical(dataset: LearnedDataset) -> None:
-    assert dataset.features.shape == (5, dataset.up.shape[1], FEATURES.size)
+def test_the_vertical_in_the_level_frame_is_nearly_vertical(dataset: SequenceData) -> None:
+    assert dataset.features.shape == (5, dataset.target.shape[1], FEATURES.size)
     assert dataset.features.dtype == np.float32
     assert np.isfinite(dataset.features).all()
-    np.testing.assert_allclose(np.linalg.norm(dataset.up, axis=-1), 1.0, rtol=1e-5)
-    assert np.median(dataset.up[..., 2]) > np.cos(np.deg2rad(10.0))
+    np.testing.assert_allclose(np.linalg.norm(dataset.target, axis=-1), 1.0, rtol=1e-5)
+    assert np.median(dataset.target[..., 2]) > np.cos(np.deg2rad(10.0))
 
 
-def test_intervals_are_counted_exactly_at_odd_rates(episodes: list[Trajectory], dataset: LearnedDataset) -> None:
+def test_intervals_are_counted_exactly_at_odd_rates(episodes: list[Trajectory], dataset: SequenceData) -> None:
     for index, episode in enumerate(episodes):
         # a late device has no samples of what was before the episode
         first = int(np.argmax(np.isfinite(episode.measurements["imu/gyr"][:, 0])))
@@ -66,11 +69,11 @@ def test_intervals_are_counted_exactly_at_odd_rates(episodes: list[Trajectory], 
 
 def test_what_the_mask_leaves_out_is_not_scored(episodes: list[Trajectory]) -> None:
     mask = episodes[0].time > 6.0
-    scored = sequence_of(episodes[0].replace(mask=mask), GravityAlignedFrame())[2]
+    scored = sequence_of(episodes[0].replace(mask=mask), END, HEAD)[3]
     assert 0.45 < scored.mean() < 0.55
     unknown = episodes[0].truth["orientation"].copy()
     unknown[: len(unknown) // 2] = np.nan
-    _, vertical, scored = sequence_of(episodes[0].replace(truth={"orientation": unknown}), GravityAlignedFrame())
+    _, vertical, _, scored = sequence_of(episodes[0].replace(truth={"orientation": unknown}), END, HEAD)
     assert 0.45 < scored.mean() < 0.55
     assert np.isfinite(vertical).all()
 
@@ -96,11 +99,11 @@ def test_heading_turns_the_vectors_and_nothing_else(episodes: list[Trajectory]) 
         return np.array(rows)[None], np.array(ups)[None]
 
     plain, other = features(np.array([1.0, 0.0, 0.0, 0.0])), features(turn)
-    for expected, found in zip(rotated(*plain, np.array([angle])), other, strict=True):
+    for expected, found in zip(turned(*plain, np.array([angle])), other, strict=True):
         np.testing.assert_allclose(found, expected, atol=2e-6)
 
 
-def test_windows_hold_everything_once(dataset: LearnedDataset) -> None:
+def test_windows_hold_everything_once(dataset: SequenceData) -> None:
     windows = list(dataset.windows(2, 100))
     assert sum(window.mask.sum() for window in windows) == dataset.mask.sum()
     assert [window.first for window in windows[:3]] == [True, False, False]
@@ -109,36 +112,36 @@ def test_windows_hold_everything_once(dataset: LearnedDataset) -> None:
     np.testing.assert_array_equal(joined, dataset.features[:2])
 
 
-def test_shuffled_windows_keep_errors(dataset: LearnedDataset) -> None:
-    windows = list(dataset.windows(5, 10_000, np.random.default_rng(0)))
+def test_shuffled_windows_keep_errors(dataset: SequenceData) -> None:
+    windows = list(dataset.windows(5, 10_000, np.random.default_rng(0), HEAD))
     assert len(windows) == 1
-    assert not np.array_equal(windows[0].up, dataset.up)
-    tilts = np.sort(windows[0].up[:, -1, 2])
-    np.testing.assert_allclose(tilts, np.sort(dataset.up[:, -1, 2]), rtol=1e-6)
-    again = list(dataset.windows(5, 10_000, np.random.default_rng(0)))
+    assert not np.array_equal(windows[0].target, dataset.target)
+    tilts = np.sort(windows[0].target[:, -1, 2])
+    np.testing.assert_allclose(tilts, np.sort(dataset.target[:, -1, 2]), rtol=1e-6)
+    again = list(dataset.windows(5, 10_000, np.random.default_rng(0), HEAD))
     np.testing.assert_array_equal(windows[0].features, again[0].features)
 
 
 def test_a_data_set_is_kept_and_found(tmp_path: Path) -> None:
-    first = LearnedDataset.from_simulation(SHORT, 3, 2, cache=tmp_path)
+    first = SequenceData.from_recipe(SHORT, 3, 2, END, HEAD, cache=tmp_path)
     (path,) = tmp_path.iterdir()
     stamp = path.stat().st_mtime_ns
-    second = LearnedDataset.from_simulation(SHORT, 3, 2, cache=tmp_path)
+    second = SequenceData.from_recipe(SHORT, 3, 2, END, HEAD, cache=tmp_path)
     np.testing.assert_array_equal(first.features, second.features)
-    assert second.names == ("randomised-3-0", "randomised-3-1")
+    assert second.names == ("custom-3-0", "custom-3-1")
     assert path.stat().st_mtime_ns == stamp
-    frame = GravityAlignedFrame()
     names = {
-        simulation_digest(SHORT, 3, 2, frame),
-        simulation_digest(SHORT, 4, 2, frame),
-        simulation_digest(replace(SHORT, duration=13.0), 3, 2, frame),
-        simulation_digest(SHORT, 3, 2, GravityAlignedFrame(tilt_gain=0.03)),
+        simulation_digest(SHORT, 3, 2, END, HEAD),
+        simulation_digest(SHORT, 4, 2, END, HEAD),
+        simulation_digest(replace(SHORT, duration=13.0), 3, 2, END, HEAD),
+        simulation_digest(SHORT, 3, 2, LevelFrame(frame=GravityAlignedFrame(tilt_gain=0.03)), HEAD),
+        simulation_digest(SHORT, 3, 2, END, TiltHead(floor=0.1)),
     }
-    assert len(names) == 4
+    assert len(names) == 5
 
 
 def test_more_episodes_keep_the_first_ones(tmp_path: Path) -> None:
-    few, more = (LearnedDataset.from_simulation(SHORT, 3, count) for count in (1, 2))
+    few, more = (SequenceData.from_recipe(SHORT, 3, count, END, HEAD) for count in (1, 2))
     length = few.features.shape[1]
     np.testing.assert_array_equal(few.features[0], more.features[0, :length])
 
@@ -146,17 +149,38 @@ def test_more_episodes_keep_the_first_ones(tmp_path: Path) -> None:
 def test_wrong_input_is_refused(episodes: list[Trajectory]) -> None:
     episode = episodes[0]
     with pytest.raises(ValueError, match="at least one"):
-        LearnedDataset.from_trajectories([])
+        SequenceData.from_trajectories([], END, HEAD)
     with pytest.raises(ValueError, match="at least 1"):
-        LearnedDataset.from_simulation(SHORT, 0, 0)
+        SequenceData.from_recipe(SHORT, 0, 0, END, HEAD)
     with pytest.raises(ValueError, match="knows no 'up'"):
-        LearnedDataset.from_trajectories([episode.replace(truth={})])
+        SequenceData.from_trajectories([episode.replace(truth={})], END, HEAD)
     with pytest.raises(ValueError, match="too short"):
-        LearnedDataset.from_trajectories([episode[:2]])
-    with pytest.raises(ValueError, match="not sampled evenly"):
-        LearnedDataset.from_trajectories([episode.replace(time=episode.time**1.1 + episode.time)])
+        SequenceData.from_trajectories([episode[:2]], END, HEAD)
     with pytest.raises(ValueError, match="more than"):
-        LearnedDataset.from_trajectories([episode.replace(time=episode.time * 30.0)])
+        SequenceData.from_trajectories([episode.replace(time=episode.time * 30.0)], END, HEAD)
+
+
+def test_gaps_of_a_recording_are_missing_samples(episodes: list[Trajectory]) -> None:
+    """Rows that were lost leave gaps on the grid: updates stay where time says."""
+    episode = episodes[0]
+    kept = np.ones(len(episode), bool)
+    kept[200:230] = False
+    parts = {name: values[kept] for name, values in episode.measurements.items()}
+    truth = {name: values[kept] for name, values in episode.truth.items()}
+    lost = episode.replace(time=episode.time[kept], measurements=parts, truth=truth, mask=episode.mask[kept])
+    whole, gap = (sequence_of(each, END, HEAD) for each in (episode, lost))
+    assert len(whole[0]) == len(gap[0])
+    assert gap[3].sum() < whole[3].sum()
+
+
+def test_parts_of_a_set_do_not_depend_on_the_rest() -> None:
+    names = [f"rider-{index}" for index in range(300)]
+    parts = {part: split(names, part) for part in ("train", "validation", "test")}
+    assert sorted(name for part in parts.values() for name in part) == sorted(names)
+    assert 0.6 < len(parts["train"]) / 300 < 0.8
+    assert set(split(names[:50], "test")) == set(parts["test"]) & set(names[:50])
+    with pytest.raises(ValueError, match="part must be one of"):
+        split(names, "tests")
 
 
 def test_the_front_end_alone_is_a_sound_observer() -> None:

@@ -1,4 +1,4 @@
-"""The network and the estimator around it: one meaning in torch, NumPy and compiled; the contracts of estimators."""
+"""The estimator around a network: the contracts of estimators, files, limits, shipped weights."""
 
 from __future__ import annotations
 
@@ -7,16 +7,19 @@ import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import torch
 
-from poise.baselines.learned.dataset import LearnedDataset
+from poise.baselines.learned.data import SequenceData
 from poise.baselines.learned.estimator import LearnedEstimator, shipped
 from poise.baselines.learned.gravity_aligned_frame import FEATURES
-from poise.baselines.learned.gru import NAMES, GruNetwork
-from poise.baselines.learned.gru_module import GruModule
+from poise.baselines.learned.gru import GruNetwork
+from poise.baselines.learned.head import AngleHead, TiltHead
+from poise.baselines.learned.level_frame import LevelFrame
+from poise.baselines.learned.modules import GruModule
 from poise.baselines.weights_io import save_weights
 from poise.envs.data.trajectory import Trajectory
 from poise.envs.hand.gestures import make_gesture
@@ -25,25 +28,25 @@ from poise.envs.recipes.hand import HandRecipe
 from poise.envs.sensors.suite import imu_suite
 from poise.filters.core import rotation
 from poise.filters.core.estimator import Estimator, run, run_by_steps
-from poise.filters.core.metrics import score
+from poise.filters.core.metrics import direction_error, score
 from poise.filters.core.observer import Observer
-from poise.filters.core.quantity import UP
+from poise.filters.core.quantity import UP, Quantity
 from poise.filters.imu.classical import GyroscopeIntegration, Tilt
+from poise.filters.registry import make
 
 
 @pytest.fixture(scope="module")
-def module() -> GruModule:
-    module = GruModule(12, seed=1)
+def network() -> GruNetwork:
+    module = GruModule(FEATURES.size, 2, 12, seed=1, scale=0.1)
     with torch.no_grad():
         generator = torch.Generator().manual_seed(2)
         module.output.weight.copy_(torch.randn(2, 12, generator=generator))
         module.output.bias.copy_(torch.randn(2, generator=generator))
-    return module
+    return module.export()
 
 
-@pytest.fixture(scope="module")
-def network(module: GruModule) -> GruNetwork:
-    return GruNetwork.from_arrays(module.arrays())
+def learned(network: GruNetwork, dt: float = 0.01, **parts: Any) -> LearnedEstimator:
+    return LearnedEstimator(network, **{"front_end": LevelFrame().with_dt(dt), "head": TiltHead(), **parts})
 
 
 @pytest.fixture(scope="module")
@@ -76,47 +79,64 @@ def inclination(estimator: Estimator, trajectory: Trajectory, skip: float = 0.0)
     return score(UP, estimate.pose["up"], trajectory.truth_of("up"), mask)["inclination"][0]
 
 
-def test_torch_numpy_and_compiled_agree(module: GruModule, network: GruNetwork) -> None:
-    features = np.random.default_rng(0).standard_normal((3, 50, FEATURES.size))
-    with torch.no_grad():
-        expected, last = module(torch.from_numpy(features).float())
-    memory = np.zeros((3, 12))
-    tilts = []
-    for t in range(50):
-        memory, tilt = network.step(features[:, t], memory)
-        tilts.append(tilt)
-    np.testing.assert_allclose(np.stack(tilts, axis=1), expected.numpy(), atol=2e-6)
-    np.testing.assert_allclose(memory, last.numpy(), atol=2e-6)
-    compiled_memory, compiled_tilt = np.zeros((3, 12)), np.zeros((3, 2))
-    compiled = network.advance(
-        np.ascontiguousarray(features.swapaxes(0, 1)), np.ones((50, 3)), compiled_memory, compiled_tilt
+@pytest.mark.parametrize("limit", [None, 3.0])
+@pytest.mark.parametrize("inner", [None, "bounded-motion"])
+def test_a_file_gives_the_same_estimator(
+    network: GruNetwork, episode: Trajectory, tmp_path: Path, inner: str | None, limit: float | None
+) -> None:
+    front_end = LevelFrame(None if inner is None else make(inner))
+    if inner is not None:
+        network = replace(network, input_weight=np.pad(network.input_weight, ((0, 0), (0, 1))))
+    estimator = LearnedEstimator(network, front_end, TiltHead(None if inner is None else limit)).with_dt(episode.dt)
+    path = estimator.save(tmp_path / "mine", {"name": "mine"})
+    again = LearnedEstimator.load(path, dt=episode.dt)
+    np.testing.assert_array_equal(
+        run(again, episode.measurements).pose["up"], run(estimator, episode.measurements).pose["up"]
     )
-    np.testing.assert_allclose(compiled.swapaxes(0, 1), np.stack(tilts, axis=1), atol=1e-13)
-    np.testing.assert_allclose(compiled_memory, memory, atol=1e-13)
 
 
-def test_weights_of_another_network_are_refused(module: GruModule) -> None:
-    arrays = module.arrays()
-    assert set(arrays) == set(NAMES)
-    with pytest.raises(ValueError, match="hold the arrays"):
-        GruNetwork.from_arrays({name: array for name, array in arrays.items() if name != "output.bias"})
-    with pytest.raises(ValueError, match="input_weight must have shape"):
-        GruNetwork.from_arrays(arrays | {"input.weight": arrays["input.weight"][:, 1:]})
-
-
-def test_what_is_no_such_network_is_not_loaded(module: GruModule, tmp_path: Path) -> None:
+def test_what_is_no_such_network_is_not_loaded(network: GruNetwork, tmp_path: Path) -> None:
     other = save_weights(tmp_path / "policy", {"0.weight": np.zeros(3)}, {})
-    with pytest.raises(ValueError, match="hold the arrays"):
+    with pytest.raises(ValueError, match="does not describe a network"):
         LearnedEstimator.load(other)
-    old = save_weights(tmp_path / "old", module.arrays(), {"front_end": {"gain": 1.0}})
-    with pytest.raises(ValueError, match="another front end"):
+    parts = {"front_end": {"kind": "level-frame", "frame": {"gain": 1.0}}, "head": {"kind": "tilt"}}
+    old = save_weights(tmp_path / "old", network.arrays(), {"network": "gru", **parts})
+    with pytest.raises(ValueError, match="does not describe a network"):
         LearnedEstimator.load(old)
-    slower = save_weights(tmp_path / "slower", module.arrays(), {"front_end": {"interval": 0.1}})
-    assert LearnedEstimator.load(slower, dt=0.08).frame.interval == 0.1
+    with pytest.raises(ValueError, match="kind of network"):
+        LearnedEstimator.load(save_weights(tmp_path / "new", network.arrays(), {"network": "lstm", **parts}))
+    with pytest.raises(ValueError, match="must take 22 features and give 3 outputs"):
+        LearnedEstimator(network, LevelFrame(), AngleHead((Quantity("a", "angle", 3, "rad"),), (1.0, 1.0, 1.0)))
+
+
+def test_a_filter_that_is_certain_is_not_overruled(network: GruNetwork, episode: Trajectory) -> None:
+    """Whatever the network says, the correction stays below its limit in deviations of the filter."""
+    wide = replace(
+        network, input_weight=np.pad(network.input_weight, ((0, 0), (0, 1))), output_bias=np.array([9.0, 4.0])
+    )
+    front_end = LevelFrame(make("bounded-motion")).with_dt(episode.dt)
+    seen = front_end.run(episode.measurements)
+    for limit in (0.5, 3.0):
+        bounded = LearnedEstimator(wide, front_end, TiltHead(limit, floor=0.001))
+        up = run(bounded, episode.measurements).pose["up"]
+        known = np.isfinite(up).all(axis=-1)
+        corrected = direction_error(up, rotation.up_in_body(seen.base["relative_orientation"]))[known]
+        allowed = np.arctan(limit * seen.spread[known, 0] + 0.001)
+        assert (corrected <= allowed + 1e-9).all()
+        assert (corrected[100:] > 0.9 * allowed[100:]).all()
+
+
+def test_a_network_that_says_nothing_leaves_the_filter_alone(network: GruNetwork, episode: Trajectory) -> None:
+    silent = replace(network, output_weight=0.0 * network.output_weight, output_bias=np.zeros(2))
+    silent = replace(silent, input_weight=np.pad(network.input_weight, ((0, 0), (0, 1))))
+    kalman = make("bounded-motion").with_dt(episode.dt)
+    estimator = LearnedEstimator(silent, LevelFrame(kalman), TiltHead(3.0))
+    expected = run(kalman, episode.measurements).pose["up"]
+    np.testing.assert_allclose(run(estimator, episode.measurements).pose["up"], expected, atol=1e-12)
 
 
 def test_stepping_is_running(network: GruNetwork, episode: Trajectory) -> None:
-    estimator = LearnedEstimator(network).with_dt(episode.dt)
+    estimator = learned(network, episode.dt)
     assert isinstance(estimator, Estimator)
     whole = run(estimator, episode.measurements).pose["up"]
     np.testing.assert_array_equal(run_by_steps(estimator, episode.measurements).pose["up"], whole)
@@ -128,7 +148,7 @@ def test_stepping_is_running(network: GruNetwork, episode: Trajectory) -> None:
 
 
 def test_a_batch_is_its_members(network: GruNetwork, episode: Trajectory) -> None:
-    estimator = LearnedEstimator(network).with_dt(episode.dt)
+    estimator = learned(network, episode.dt)
     other = {name: np.roll(values, 3, axis=-1)[::-1] for name, values in episode.measurements.items()}
     batch = {name: np.stack([values, other[name]], axis=1) for name, values in episode.measurements.items()}
     together = run(estimator, batch).pose["up"]
@@ -139,7 +159,7 @@ def test_a_batch_is_its_members(network: GruNetwork, episode: Trajectory) -> Non
 
 
 def test_torch_gives_the_same(network: GruNetwork, episode: Trajectory) -> None:
-    estimator = LearnedEstimator(network).with_dt(episode.dt)
+    estimator = learned(network, episode.dt)
     part = {name: values[:150] for name, values in episode.measurements.items()}
     expected = run(estimator, part).pose["up"]
     found = run(estimator, {name: torch.from_numpy(values.copy()) for name, values in part.items()}).pose["up"]
@@ -147,7 +167,7 @@ def test_torch_gives_the_same(network: GruNetwork, episode: Trajectory) -> None:
 
 
 def test_gradients_reach_the_samples(network: GruNetwork, episode: Trajectory) -> None:
-    estimator = LearnedEstimator(network).with_dt(episode.dt)
+    estimator = learned(network, episode.dt)
     part = {name: torch.from_numpy(values[20:40].copy()) for name, values in episode.measurements.items()}
     part["imu/acc"].requires_grad_()
     run(estimator, part).pose["up"][-1].sum().backward()
@@ -158,7 +178,7 @@ def test_gradients_reach_the_samples(network: GruNetwork, episode: Trajectory) -
 
 
 def test_a_saved_state_goes_on(network: GruNetwork, episode: Trajectory) -> None:
-    estimator = LearnedEstimator(network).with_dt(episode.dt)
+    estimator = learned(network, episode.dt)
     samples = [{name: values[t] for name, values in episode.measurements.items()} for t in range(120)]
     state = estimator.init(samples[0])
     for sample in samples[:60]:
@@ -171,27 +191,27 @@ def test_a_saved_state_goes_on(network: GruNetwork, episode: Trajectory) -> None
             current, estimate = estimator.step(current, sample)
         ends.append(estimate.pose["up"])
     np.testing.assert_array_equal(ends[0], ends[1])
-    for array, kept in zip((*state.frame, *state[1:]), (*saved.frame, *saved[1:]), strict=True):
+    for array, kept in zip((*state.front.frame, *state[1:]), (*saved.front.frame, *saved[1:]), strict=True):
         np.testing.assert_array_equal(array, kept)
 
 
 def test_the_tilt_means_what_training_takes_it_for(network: GruNetwork, episode: Trajectory) -> None:
-    """An estimator whose network says the truth makes no error at the ticks of the network."""
-    dataset = LearnedDataset.from_trajectories([episode])
-    vertical = dataset.up[0, -1].astype(float)
+    """An estimator whose network says the truth makes no error at the samples where an interval ends."""
+    front_end, head = LevelFrame(), TiltHead()
+    data = SequenceData.from_trajectories([episode], front_end, head)
+    vertical = data.target[0, -1].astype(float)
     bias = vertical[:2] / vertical[2]
     knowing = replace(network, output_weight=0.0 * network.output_weight, output_bias=bias)
-    estimator = LearnedEstimator(knowing).with_dt(episode.dt)
-    pose = run(Observer(estimator.frame), episode.measurements).pose
-    last = np.flatnonzero(pose["due"][:, 0] == 1.0)[-1]
-    up = run(estimator, episode.measurements).pose["up"][last]
+    seen = front_end.with_dt(episode.dt).run(episode.measurements)
+    last = np.flatnonzero(seen.due == 1.0)[-1]
+    up = run(learned(knowing, episode.dt), episode.measurements).pose["up"][last]
     np.testing.assert_allclose(up, episode.truth_of("up")[last], atol=1e-6)
 
 
 def test_too_slow_a_sensor_is_refused(network: GruNetwork) -> None:
-    LearnedEstimator(network).with_dt(0.04)
+    learned(network).with_dt(0.04)
     with pytest.raises(ValueError, match="dt must be at most"):
-        LearnedEstimator(network).with_dt(0.05)
+        learned(network).with_dt(0.05)
 
 
 def test_running_needs_no_torch() -> None:
@@ -205,10 +225,10 @@ def test_running_needs_no_torch() -> None:
 
 def test_shipped_weights_beat_what_either_sensor_gives_alone() -> None:
     trajectory = fast(100.0)
-    learned = inclination(shipped(), trajectory)
-    assert learned < 1.0
-    assert learned < 0.2 * inclination(Observer(Tilt()), trajectory)
-    assert learned < 0.7 * inclination(Observer(GyroscopeIntegration()), trajectory)
+    found = inclination(shipped(), trajectory)
+    assert found < 1.0
+    assert found < 0.2 * inclination(Observer(Tilt()), trajectory)
+    assert found < 0.7 * inclination(Observer(GyroscopeIntegration()), trajectory)
 
 
 def test_shipped_weights_mean_the_same_at_every_rate() -> None:

@@ -1,0 +1,154 @@
+"""How each shipped network is trained: data, front end, network, head and settings, by name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from ...envs.data.trajectory import Trajectory
+from ...envs.recipes.registry import recipe
+from ...filters.registry import make
+from ...filters.support.names import look_up
+from ...filters.support.seeds import child_seeds
+from .data import SequenceData
+from .fit import FitConfig, FitResult, fit
+from .front_end import FrontEnd
+from .head import Head, TiltHead
+from .level_frame import LevelFrame
+from .modules import GruModule, TcnModule
+
+
+@dataclass(frozen=True)
+class Preset:
+    """The training of one network.
+
+    Raises:
+        ValueError: no episodes, or fewer than one unit.
+    """
+
+    summary: str
+    """what it is, in one line"""
+    sources: Mapping[str, int]
+    """recipe → training episodes"""
+    validation: float = 0.15
+    """held-out episodes of each recipe, as a share of the training episodes"""
+    network: str = "gru"
+    """``gru`` or ``tcn``"""
+    units: int = 64
+    """units of a GRU, channels of a convolution network"""
+    filter: str | None = None
+    """that the network corrects; None: it stands alone"""
+    limit: float | None = None
+    """of corrections, in standard deviations of the filter"""
+    scale: float = 0.1
+    """rad: unit of the output"""
+    noise: float = 0.0
+    """on standardised features while training"""
+    fit: FitConfig = field(default_factory=FitConfig)
+
+    def __post_init__(self) -> None:
+        if not self.sources or any(count < 1 for count in self.sources.values()):
+            raise ValueError(f"sources must map recipes to episodes, 1 or more, got {dict(self.sources)}")
+        if self.units < 1:
+            raise ValueError(f"units must be at least 1, got {self.units}")
+
+    def front_end(self) -> FrontEnd:
+        """What the network sees."""
+        return LevelFrame(None if self.filter is None else make(self.filter))  # type: ignore[arg-type]
+
+    def head(self) -> Head:
+        """What it says."""
+        return TiltHead(self.limit)
+
+    def module(self, features: int, outputs: int, seed: int) -> Any:
+        """The network before its training."""
+        kinds: dict[str, Any] = {"gru": GruModule, "tcn": TcnModule}
+        kind = look_up("network", self.network, kinds)
+        return kind(features, outputs, self.units, seed=seed, scale=self.scale, noise=self.noise)
+
+    def quick(self) -> Preset:
+        """A small version that learns visibly within minutes."""
+        sources = {name: min(count, 48) for name, count in self.sources.items()}
+        return replace(self, sources=sources, units=min(self.units, 32), fit=replace(self.fit, epochs=4, batch=16))
+
+    def describe(self) -> dict[str, Any]:
+        """All settings, for a card."""
+        return {**asdict(self), "sources": dict(self.sources)}
+
+
+HANDS = {"hand-held": 300, "carried": 60}
+PRESETS: dict[str, Preset] = {
+    "gru": Preset("inclination from six axes by a recurrent network alone", HANDS, fit=FitConfig(epochs=8)),
+    "tcn": Preset(
+        "inclination from six axes by a causal convolution network alone", HANDS, network="tcn", units=32,
+        fit=FitConfig(epochs=8),
+    ),
+    "bounded-motion+network": Preset(
+        "bounded-motion, its inclination corrected by a recurrent network within what its covariance allows",
+        HANDS,
+        filter="bounded-motion",
+        limit=3.0,
+        scale=0.02,
+    ),
+}  # fmt: skip
+"""Name of the weights → training."""
+
+
+def seeds_of(seed: int) -> tuple[int, int, int, int]:
+    """Children of a root seed: training data, validation data, initial weights and order, test data."""
+    train, validation, weights, test = child_seeds(seed, 4)
+    return train, validation, weights, test
+
+
+def train_preset(
+    preset: Preset,
+    seed: int,
+    folder: str | Path,
+    *,
+    recordings: list[Trajectory] | None = None,
+    resume: bool = False,
+    processes: int = 1,
+    say: Callable[[str], object] | None = None,
+) -> FitResult:
+    """Train a network; the same arguments on the same machine give the same weights, interrupted or not.
+
+    Args:
+        preset: what and how.
+        seed: root seed of data, weights and order.
+        folder: where data sets, checkpoints and the TensorBoard log go.
+        recordings: to train on instead of simulated episodes; of five or more the last fifth chooses the best epoch.
+        resume: continue from the checkpoint in ``folder``.
+        processes: how many episodes are simulated at a time; the weights do not depend on it.
+        say: called with a line an epoch; None for a silent training.
+
+    Raises:
+        ValueError: see :func:`.fit.fit`; a recording lacks a channel or the truth.
+    """
+    front_end, head = preset.front_end(), preset.head()
+    train_seed, validation_seed, weights_seed, _ = seeds_of(seed)
+
+    def simulated(root: int, share: float, words: str) -> SequenceData:
+        parts = [
+            SequenceData.from_recipe(
+                *(recipe(name), root, max(1, round(share * count)), front_end, head),
+                cache=folder,
+                progress="" if say is None else f"{words} {name}",
+                processes=processes,
+            )
+            for name, count in preset.sources.items()
+        ]
+        return SequenceData.together(parts)
+
+    data = validation = None
+    if recordings:
+        kept = max(1, len(recordings) * 4 // 5) if len(recordings) >= 5 else len(recordings)
+        data = SequenceData.from_trajectories(recordings[:kept], front_end, head)
+        if recordings[kept:]:
+            validation = SequenceData.from_trajectories(recordings[kept:], front_end, head)
+    data = simulated(train_seed, 1.0, "simulate") if data is None else data
+    validation = simulated(validation_seed, preset.validation, "held out") if validation is None else validation
+    module = preset.module(front_end.size, head.size, weights_seed % 2**31)
+    config = replace(preset.fit, seed=weights_seed % 2**31)
+    return fit(module, front_end, head, data, validation, config, folder=folder, resume=resume, say=say)

@@ -1,0 +1,111 @@
+"""Front ends: stepping is running, cards describe them, and drop-outs do not spoil them."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from poise.baselines.learned.filter_features import FilterFeatures, standardisation
+from poise.baselines.learned.front_end import FrontEnd, RawChannels, interval_ends, seen_by_steps
+from poise.baselines.learned.level_frame import LevelFrame
+from poise.envs.hand.sensing import simulate_hand
+from poise.filters.core.quantity import ACCELEROMETER, GYROSCOPE
+from poise.filters.registry import make
+
+RATE = 137.0
+ENDS: dict[str, FrontEnd] = {
+    "raw": RawChannels((GYROSCOPE, ACCELEROMETER), (3.0, 10.0)),
+    "level": LevelFrame(),
+    "level of a filter": LevelFrame(make("bounded-motion")),
+    "filter": FilterFeatures(make("mekf")),
+}
+
+
+@pytest.fixture(scope="module")
+def samples() -> dict[str, np.ndarray]:
+    motion = simulate_hand("fast", seed=1, duration=4.0, rate=RATE)
+    found = {name: motion.measurements[name][:300].copy() for name in ("imu/gyr", "imu/acc")}
+    found["imu/acc"][:3] = np.nan
+    found["imu/acc"][100:140] = np.nan
+    found["imu/gyr"][200:205] = np.nan
+    return found
+
+
+@pytest.mark.parametrize("name", ENDS)
+def test_stepping_is_running(name: str, samples: dict[str, np.ndarray]) -> None:
+    end = ENDS[name].with_dt(1.0 / RATE)
+    whole, stepped = end.run(samples), seen_by_steps(end, samples)
+    assert whole.features.shape == (300, end.size)
+    assert whole.due.sum() == pytest.approx(300 / RATE / end.interval, abs=1.1)
+    at = whole.due == 1.0
+    np.testing.assert_array_equal(whole.due, stepped.due)
+    np.testing.assert_allclose(whole.features[at], stepped.features[at], atol=1e-12)
+    np.testing.assert_allclose(whole.spread, stepped.spread, atol=1e-12)
+    for key, values in whole.base.items():
+        np.testing.assert_allclose(values, stepped.base[key], atol=1e-12)
+    assert np.isfinite(whole.features[at][1:]).all()
+
+
+@pytest.mark.parametrize("name", ENDS)
+def test_a_batch_is_its_members(name: str, samples: dict[str, np.ndarray]) -> None:
+    end = ENDS[name].with_dt(1.0 / RATE)
+    other = {key: np.roll(values, 1, axis=-1) for key, values in samples.items()}
+    both = end.run({key: np.stack([samples[key], other[key]], axis=1) for key in samples})
+    for index, alone in enumerate((samples, other)):
+        one = end.run(alone)
+        at = one.due == 1.0
+        np.testing.assert_allclose(both.features[:, index][at], one.features[at], atol=1e-9)
+
+
+@pytest.mark.parametrize("name", ENDS)
+def test_a_card_describes_it(name: str, samples: dict[str, np.ndarray]) -> None:
+    end = ENDS[name]
+    again = type(end).read(json.loads(json.dumps(end.describe())), 1.0 / RATE)  # type: ignore[attr-defined]
+    np.testing.assert_array_equal(again.run(samples).features, end.with_dt(1.0 / RATE).run(samples).features)
+
+
+def test_filters_are_described_by_what_differs() -> None:
+    end = LevelFrame(make("bounded-motion", velocity_bound=0.4))
+    assert end.describe()["filter"] == {"name": "bounded-motion", "parameters": {"velocity_bound": 0.4}}
+
+
+@pytest.mark.parametrize("name", ENDS)
+def test_too_slow_a_sensor_is_refused(name: str) -> None:
+    ENDS[name].with_dt(0.04)
+    with pytest.raises(ValueError, match=r"dt must be at most 0\.04 s"):
+        ENDS[name].with_dt(0.05)
+
+
+def test_what_cannot_be_is_refused() -> None:
+    with pytest.raises(ValueError, match="at least one"):
+        RawChannels(())
+    with pytest.raises(ValueError, match="scales must be 1"):
+        RawChannels((GYROSCOPE,), (1.0, 2.0))
+    with pytest.raises(ValueError, match="must estimate a relative orientation"):
+        LevelFrame(make("external-acceleration"))
+    with pytest.raises(ValueError, match=r"channels_seen must be channels of the filter"):
+        FilterFeatures(make("mekf"), channels_seen=("imu/mag",))
+
+
+@pytest.mark.parametrize("rate", [25.0, 60.0, 286.0, 1000.0 / 7.0])
+def test_intervals_end_where_time_says(rate: float) -> None:
+    ends = interval_ends(0, 2000, 1.0 / rate, 0.04)
+    times = (np.flatnonzero(ends) + 1) / rate
+    np.testing.assert_allclose(times, 0.04 * np.round(times / 0.04), atol=0.5 / rate + 1e-9)
+    parts = np.concatenate([interval_ends(0, 700, 1.0 / rate, 0.04), interval_ends(700, 1300, 1.0 / rate, 0.04)])
+    np.testing.assert_array_equal(parts, ends)
+
+
+def test_scales_come_from_what_is_scored() -> None:
+    rng = np.random.default_rng(0)
+    features = rng.standard_normal((4, 500, 3)) * [2.0, 0.0, 5.0] + [1.0, 7.0, 0.0]
+    features[0] = 1e6
+    mask = np.ones((4, 500), bool)
+    mask[0] = False
+    mean, deviation = standardisation(features, mask)
+    np.testing.assert_allclose(mean, [1.0, 7.0, 0.0], atol=0.3)
+    np.testing.assert_allclose(deviation[[0, 2]], [2.0, 5.0], rtol=0.05)
+    # what hardly varies is removed
+    assert np.isinf(deviation[1])
