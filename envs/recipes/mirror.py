@@ -73,7 +73,8 @@ MIRRORS: dict[str, Mirror] = {
     **dict.fromkeys(("crank/angle", "bicycle/crank"), crank),
     **dict.fromkeys(("trunk/angles", "hip_left/angles", "hip_right/angles"), ISB),
     **dict.fromkeys(("shoulder_left/angles", "shoulder_right/angles"), shoulder),
-    "flexion": SAME,
+    "pelvis/angles": times(1.0, -1.0),
+    **dict.fromkeys(("flexion", "pelvis/height"), SAME),
     "joints/angles": joints,
     "joints/torques": joints,
 }

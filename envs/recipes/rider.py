@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import zlib
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
@@ -40,11 +39,7 @@ class RideSensors(Checked):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        known = ("paper", *list_sensor_presets())
-        for name in self.devices:
-            if name not in known:
-                raise ValueError(f"devices must be among {list(known)}, got {name!r}")
-        check_some("devices", self.devices)
+        check_some("devices", self.devices, ("paper", *list_sensor_presets()))
 
 
 @dataclass(frozen=True)
@@ -79,22 +74,21 @@ class RiderRecipe(Recipe):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        for name in ("suite", "fidelity", "scenarios", "subjects", "styles", "bicycles", "surfaces"):
-            check_some(name, getattr(self, name))
-        suite_channels(self.channels)
-        for name in self.scenarios:
-            scenario(name)
-        for name in self.styles:
-            rider_style(name)
-        for what, values, known in (
-            ("fidelity", self.fidelity, ("full", "lumped")),
-            ("bicycles", self.bicycles, tuple(BICYCLES)),
-            ("subjects", self.subjects, ("random", *range(len(SUBJECTS)))),
-            ("surfaces", self.surfaces, ("scenario", "random", *list_surfaces())),
+        for name, known in (
+            ("suite", None),
+            ("scenarios", None),
+            ("styles", None),
+            ("fidelity", ("full", "lumped")),
+            ("bicycles", tuple(BICYCLES)),
+            ("subjects", ("random", *range(len(SUBJECTS)))),
+            ("surfaces", ("scenario", "random", *list_surfaces())),
         ):
-            for value in values:
-                if value not in known:
-                    raise ValueError(f"{what} must be among {list(known)}, got {value!r}")
+            check_some(name, getattr(self, name), known)
+        suite_channels(self.channels)
+        for each in self.scenarios:
+            scenario(each)
+        for each in self.styles:
+            rider_style(each)
         if not self.duration >= 0.1:
             raise ValueError(f"duration must be at least 0.1 s, got {self.duration}")
 
@@ -104,11 +98,11 @@ class RiderRecipe(Recipe):
         return self.suite if len(self.suite) > 1 or "/" in self.suite[0] else self.suite[0]
 
     def options(self, seed: np.random.SeedSequence) -> dict[str, Any]:
-        """Draw the arguments of the environment, each from a child of the seed of its own name."""
+        """Draw the arguments of the environment, each from a descendant of the seed by its own name."""
+        generator = np.random.default_rng(seed)
 
         def one(name: str, values: tuple[Any, ...]) -> Any:
-            child = np.random.SeedSequence(seed.entropy, spawn_key=(*seed.spawn_key, zlib.crc32(name.encode())))
-            return values[int(np.random.default_rng(child).integers(len(values)))]
+            return chosen(named_generator(generator, name), values)
 
         surface = one("surface", self.surfaces)
         return {
@@ -160,7 +154,7 @@ class RiderRecipe(Recipe):
         return redrawn(
             ride,
             errors,
-            sensors=sensors.devices[int(generator.integers(len(sensors.devices)))],
+            sensors=chosen(generator, sensors.devices),
             noise_scale=log_uniform(generator, sensors.noise_scale),
             mirror=bool(generator.random() < sensors.mirrored_share),
             geometry=sensors.tape,
@@ -171,11 +165,19 @@ class RiderRecipe(Recipe):
         )
 
 
-def check_some(name: str, values: tuple[Any, ...]) -> None:
-    """Refuse an empty choice.
+def chosen(generator: np.random.Generator, values: tuple[Any, ...]) -> Any:
+    """One of the values, all of them equally likely."""
+    return values[int(generator.integers(len(values)))]
+
+
+def check_some(name: str, values: tuple[Any, ...], known: tuple[Any, ...] | None = None) -> None:
+    """Refuse an empty choice, and one of what is not known.
 
     Raises:
-        ValueError: with the name.
+        ValueError: with the name, and what is accepted.
     """
     if not values:
         raise ValueError(f"{name} must hold one name at least, got none")
+    for value in values:
+        if known is not None and value not in known:
+            raise ValueError(f"{name} must be among {list(known)}, got {value!r}")

@@ -11,6 +11,7 @@ from poise.envs.bicycle.environment import RiderBicycleEnv
 from poise.envs.bicycle.ride.contact_forces import LoadCells
 from poise.envs.bicycle.ride.truth import isb_yxy, isb_zxy
 from poise.envs.bicycle.rider.limbs import three_turns
+from poise.envs.bicycle.rider.posture import two_turns
 from poise.envs.data.trajectory import Trajectory
 from poise.envs.recipes.devices import VariedTiming
 from poise.envs.recipes.mirror import mirrored
@@ -51,6 +52,21 @@ def test_errors_drawn_again_are_those_of_the_environment(ride: Trajectory) -> No
         np.testing.assert_allclose(found[name], values, rtol=0.0, atol=1e-9, err_msg=name)
     for name, values in biases.items():
         np.testing.assert_allclose(values, expected.truth[name], atol=1e-12, err_msg=name)
+
+
+def test_late_samples_lie_between_the_readings(ride: Trajectory) -> None:
+    timing = {"bicycle_imu": Timing(delay=0.013), "steer": Timing(delay=0.013)}
+    late, prompt = redrawn(ride, 0, timing=timing), redrawn(ride, 0)
+    for name in ("bicycle_imu/gyr", "steer/angle"):
+        known = ride.measurements[name]
+        error = prompt.measurements[name] - known
+        values = late.measurements[name] - (0.7 * np.roll(known, 1, axis=0) + 0.3 * np.roll(known, 2, axis=0))
+        # the same errors, but for quantisation and for samples that come later
+        np.testing.assert_allclose(values[20:].std(axis=0), error[20:].std(axis=0), rtol=0.2, atol=1e-3)
+        np.testing.assert_allclose(values[20:].mean(axis=0), error[20:].mean(axis=0), rtol=0.2, atol=2e-3)
+    np.testing.assert_array_equal(late.measurements["trunk_imu/gyr"], prompt.measurements["trunk_imu/gyr"])
+    lost = redrawn(ride, 0, timing=Timing(burst_rate=2.0, burst_duration=0.3)).measurements["trunk_imu/gyr"]
+    assert 0.05 < np.isnan(lost[:, 0]).mean() < 0.9
 
 
 def test_draws_differ_in_errors_and_measured_geometry_only(ride: Trajectory) -> None:
@@ -96,8 +112,10 @@ def test_a_mirrored_ride_is_consistent(fidelity: str) -> None:
         np.testing.assert_allclose(isb_yxy(arm), truth[f"shoulder_{side}/angles"], atol=1e-9)
         leg = rotation.multiply(rotation.conjugate(truth["bicycle/orientation"]), truth[f"thigh_{side}/orientation"])
         np.testing.assert_allclose(isb_zxy(leg), truth[f"hip_{side}/angles"], atol=1e-9)
+    seat = two_turns(np.concatenate([truth["pelvis/angles"], truth["pelvis/height"]], axis=1))
+    pelvis = rotation.multiply(truth["bicycle/orientation"], seat)
     for index, limb in enumerate(("upper_arm_left", "upper_arm_right", "thigh_left", "thigh_right")):
-        root = truth["trunk/orientation" if "arm" in limb else "bicycle/orientation"]
+        root = truth["trunk/orientation"] if "arm" in limb else pelvis
         turn = rotation.multiply(rotation.conjugate(root), truth[f"{limb}/orientation"])
         angles = truth["joints/angles"][:, 3 + 4 * index : 6 + 4 * index]
         difference = rotation.multiply(rotation.conjugate(turn), three_turns(*angles.T))
@@ -160,6 +178,7 @@ def test_settings_are_drawn_from_what_the_recipe_names() -> None:
     ("described", "message"),
     [
         ({"scenarios": ["ice"]}, "scenario must be one of"),
+        ({"sensors": {"timings": ["late"]}}, "timings must be among .*got 'late'"),
         ({"scenarios": []}, "scenarios must hold one name at least"),
         ({"bicycles": ["tricycle"]}, "bicycles must be among .*got 'tricycle'"),
         ({"surfaces": ["ice"]}, "surfaces must be among .*got 'ice'"),
