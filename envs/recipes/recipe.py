@@ -113,7 +113,7 @@ def built(cls: type[T], described: Any, where: str) -> T:
     names = [field.name for field in fields(cls)]  # type: ignore[arg-type]
     for name in described:
         if name not in names:
-            raise ValueError(unknown(f"field of {where}", name, names))
+            raise ValueError(f"{where}: {unknown('field', name, names)}")
     hints = annotations_of(cls)
     values = {}
     for name, value in described.items():

@@ -74,7 +74,7 @@ def test_a_recipe_is_read_from_its_file(tmp_path: Path) -> None:
     [
         ({"kind": "foot"}, "unknown kind 'foot'"),
         ({"duration": 5.0}, "a recipe must be a mapping with its kind"),
-        ({"kind": "hand", "durations": 5.0}, "unknown field of recipe 'durations', did you mean 'duration'"),
+        ({"kind": "hand", "durations": 5.0}, "recipe: unknown field 'durations', did you mean 'duration'"),
         ({"kind": "hand", "held": {"rate": [2.0, 1.0]}}, r"recipe.held: rate must be a range .*got \(2.0, 1.0\)"),
         ({"kind": "hand", "held": [1.0]}, "recipe.held must be a mapping"),
         ({"kind": "hand", "instant_share": 1.5}, r"instant_share must lie in \[0, 1\], got 1.5"),

@@ -54,21 +54,6 @@ def test_errors_drawn_again_are_those_of_the_environment(ride: Trajectory) -> No
         np.testing.assert_allclose(values, expected.truth[name], atol=1e-12, err_msg=name)
 
 
-def test_late_samples_lie_between_the_readings(ride: Trajectory) -> None:
-    timing = {"bicycle_imu": Timing(delay=0.013), "steer": Timing(delay=0.013)}
-    late, prompt = redrawn(ride, 0, timing=timing), redrawn(ride, 0)
-    for name in ("bicycle_imu/gyr", "steer/angle"):
-        known = ride.measurements[name]
-        error = prompt.measurements[name] - known
-        values = late.measurements[name] - (0.7 * np.roll(known, 1, axis=0) + 0.3 * np.roll(known, 2, axis=0))
-        # the same errors, but for quantisation and for samples that come later
-        np.testing.assert_allclose(values[20:].std(axis=0), error[20:].std(axis=0), rtol=0.2, atol=1e-3)
-        np.testing.assert_allclose(values[20:].mean(axis=0), error[20:].mean(axis=0), rtol=0.2, atol=2e-3)
-    np.testing.assert_array_equal(late.measurements["trunk_imu/gyr"], prompt.measurements["trunk_imu/gyr"])
-    lost = redrawn(ride, 0, timing=Timing(burst_rate=2.0, burst_duration=0.3)).measurements["trunk_imu/gyr"]
-    assert 0.05 < np.isnan(lost[:, 0]).mean() < 0.9
-
-
 def test_draws_differ_in_errors_and_measured_geometry_only(ride: Trajectory) -> None:
     one, again, other = (redrawn(ride, seed, geometry=TapeMeasure()) for seed in (1, 1, 2))
     np.testing.assert_array_equal(one.measurements["trunk_imu/gyr"], again.measurements["trunk_imu/gyr"])
@@ -178,7 +163,7 @@ def test_settings_are_drawn_from_what_the_recipe_names() -> None:
     ("described", "message"),
     [
         ({"scenarios": ["ice"]}, "scenario must be one of"),
-        ({"sensors": {"timings": ["late"]}}, "timings must be among .*got 'late'"),
+        ({"sensors": {"timing": {"late_share": 2.0}}}, r"late_share must lie in \[0, 1\], got 2.0"),
         ({"scenarios": []}, "scenarios must hold one name at least"),
         ({"bicycles": ["tricycle"]}, "bicycles must be among .*got 'tricycle'"),
         ({"surfaces": ["ice"]}, "surfaces must be among .*got 'ice'"),
