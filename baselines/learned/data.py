@@ -48,7 +48,7 @@ class SequenceData:
 
     Attributes:
         features: ``(E, N, F)`` float32.
-        target: ``(E, N, K)`` float32 at the end of each interval; zeros where it is unknown.
+        target: ``(E, N, K)`` float32 at the end of each interval; any value where it is unknown.
         spread: ``(E, N, S)`` float32.
         mask: ``(E, N)`` bool: the truth is known, and the sample is in the evaluation mask of its trajectory.
         names: of the trajectories.
@@ -93,6 +93,8 @@ class SequenceData:
             wholes.append(np.zeros(shape, bool if index == 3 else np.float32))
             for row, part in enumerate(parts):
                 wholes[index][row, : len(part[index])] = part[index]
+                if index == 1:
+                    wholes[index][row, len(part[index]) :] = part[index][-1]
         features, target, spread, mask = wholes
         spread[spread == 0.0] = 1.0
         return cls(features, target, spread, mask, tuple(names))
@@ -215,7 +217,9 @@ def sequence_of(trajectory: Trajectory, front_end: FrontEnd, head: Head) -> tupl
     target = head.target(seen, trajectory)[due]
     known = np.isfinite(target).all(axis=-1) & np.isfinite(seen.features[due]).all(axis=-1)
     features, spread = np.nan_to_num(seen.features[due]), seen.spread[due]
-    return features, np.where(known[:, None], target, 0.0), np.nan_to_num(spread), trajectory.mask[due] & known
+    # what is not scored takes a value that has an error and derivatives
+    usual = target[known][0] if known.any() else np.ones_like(target[0])
+    return features, np.where(known[:, None], target, usual), np.nan_to_num(spread), trajectory.mask[due] & known
 
 
 def simulated_sequence(
