@@ -236,6 +236,7 @@ def connect_points(
     return int(constraint)
 
 
-def constraint_force(physics: Physics, constraint: int) -> np.ndarray:
-    """Force ``(3,)`` on the child of a point-to-point constraint during the last step, N, world axes."""
-    return np.array(pybullet.getConstraintState(constraint, physicsClientId=physics.client)[:3])
+def constraint_force(physics: Physics, constraint: int) -> tuple[float, float, float]:
+    """Force on the child of a point-to-point constraint during the last step, N, world axes."""
+    x, y, z = pybullet.getConstraintState(constraint, physicsClientId=physics.client)[:3]
+    return x, y, z

@@ -246,13 +246,16 @@ class Bicycle:
             brake: wanted force (N, not negative) of both brakes at the ground.
         """
         body = self.body
-        forces, own, first = body.forces, self._turned, 6
+        forces, first = body.forces, 6
         bicycle_forces(
             body.tree, body.state, body.frames, self._numbers, self._body, self._tyres, self.ground.table,
             self.physics.time_step, self._chain, self._bristles, brake, self._contacts, forces,
         )  # fmt: skip
-        for link, torque in zip((*own[:2], *own[3:]), (steer_torque, wheel_torque, crank_torque), strict=False):
-            forces[first + link] += torque
+        if steer_torque or wheel_torque or crank_torque:
+            rear, _, front, crank = self._numbers.tolist()
+            for link, torque in ((front, steer_torque), (rear, wheel_torque), (crank, crank_torque)):
+                if torque:
+                    forces[first + link] += torque
         if len(joints):
             forces[first + np.asarray(joints)] += torques
         body.apply()

@@ -61,7 +61,8 @@ def turns_ahead(points, distance, speed, turn, lateral, braking, changes):  # ty
         turn: steer per curvature (rad·m, right positive), and roll per steer at rest and what a squared speed adds.
         lateral: comfortable lateral acceleration, m/s².
         braking: comfortable deceleration, m/s².
-        changes: ``(2 · PREVIEW_BINS,)`` of roll and of steer in each bin of time ahead, rad, right positive; overwritten.
+        changes: ``(2 · PREVIEW_BINS,)`` of roll and of steer in each bin of time ahead, rad, right positive;
+            overwritten.
 
     Returns:
         The highest speed (m/s) that will suit the path a reaction later.

@@ -126,9 +126,9 @@ class Ride:
         if self._count % self._each == 0:
             self._control()
         self._count += 1
-        torques = rider.act()
+        rider.act()
         brake = max(0.0, -self.pilot.command[1] - COASTING)
-        bicycle.act(joints=rider.driven, torques=torques, brake=brake)
+        bicycle.act(brake=brake)
         self.physics.step()
 
     def _control(self) -> None:

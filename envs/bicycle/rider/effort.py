@@ -8,11 +8,11 @@ steer; both together pull against being tipped backwards. All forces are in bicy
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
+from ....filters.compile.cache import jit
 from .posture import Posture
 from .saddle import SeatContact, upper_body
 
@@ -78,6 +78,7 @@ def reach_of(posture: Posture, gravity: float) -> Reach:
     )
 
 
+@jit
 def pedal_push(push: float, around: float, phase: float, draw: float) -> Force:
     """Force of a foot on its pedal by the leg's muscles, N.
 
@@ -90,6 +91,7 @@ def pedal_push(push: float, around: float, phase: float, draw: float) -> Force:
     return -around * math.sin(phase), 0.0, draw - around * math.cos(phase) - push * max(0.0, math.cos(phase))
 
 
+@jit
 def held_down(seat: SeatContact, rise: float, rising: float) -> float:
     """Force (N) with which each leg draws a pelvis that has left the saddle down to it.
 
@@ -102,14 +104,22 @@ def held_down(seat: SeatContact, rise: float, rising: float) -> float:
     return max(0.0, min(LARGEST_DRAW, DRAW * off + DRAW_RATE * rising)) if off > 0.0 else 0.0
 
 
-def add_weights(pushes: Sequence[Force], weights: Sequence[Force], share: float) -> tuple[Force, Force]:
-    """Forces of both feet: what the muscles push, and a share of the legs' weight."""
-    left, right = (
-        (f[0] + share * w[0], f[1] + share * w[1], f[2] + share * w[2]) for f, w in zip(pushes, weights, strict=True)
-    )
-    return left, right
+@jit
+def swung(reach: Reach, left: Force, right: Force, lift: float, tip: float) -> tuple[Force, Force]:
+    """Forces of both feet with which rigid legs have the effect of swinging ones.
+
+    Args:
+        reach: of the rider.
+        left: force of the left leg's muscles, N.
+        right: of the right one's.
+        lift: force of the swinging legs on the rider upwards, N.
+        tip: their moment to the right, N·m.
+    """
+    both, apart = 0.5 * lift, 0.5 * tip / reach.pedal
+    return (left[0], left[1], left[2] - both - apart), (right[0], right[1], right[2] - both + apart)
 
 
+@jit
 def moments_of_feet(reach: Reach, crank: float, left: Force, right: Force) -> tuple[float, float]:
     """Moments (N·m) on the rider about the saddle point, to the right and forwards, of pushing on the pedals."""
     along, down = reach.crank * math.cos(crank), reach.crank * math.sin(crank)
@@ -119,11 +129,13 @@ def moments_of_feet(reach: Reach, crank: float, left: Force, right: Force) -> tu
     return mx, my
 
 
+@jit
 def carried(moment: float, most: float) -> float:
     """Part of a moment that the hands carry when the saddle carries no more than ``most``, N·m."""
     return moment - most * math.tanh(moment / most)
 
 
+@jit
 def hands_against(
     reach: Reach, seat: SeatContact, rightwards: float, forwards: float, pelvis: tuple[float, float, float, float]
 ) -> tuple[float, float]:
@@ -142,7 +154,7 @@ def hands_against(
     pitch, pitching, roll, rolling = pelvis
     rightwards = carried(rightwards, SHIFT_ACROSS * seat.load) + HOLD_ROLL * roll + HOLD_ROLL_RATE * rolling
     forwards = carried(forwards, SHIFT_ALONG * seat.load) + HOLD_PITCH * pitch + HOLD_PITCH_RATE * pitching
-    x, y, _ = reach.grip
+    x, y = reach.grip[0], reach.grip[1]
     difference = rightwards / (2.0 * y * reach.steer_axis[1])
     common = -forwards / (2.0 * x)
     return (
@@ -151,6 +163,7 @@ def hands_against(
     )
 
 
+@jit
 def trunk_support(reach: Reach, left: Force, right: Force, flexion: float, lean: float) -> tuple[float, float, float]:
     """Torques (N·m) of the trunk's joint about y, x and z that bear the trunk's weight and the hands' reactions.
 

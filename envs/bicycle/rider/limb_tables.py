@@ -7,21 +7,22 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ....filters.compile.cache import jit
 from ....filters.core import rotation
-from .limbs import forward, reach_to, three_turns
-from .posture import KNEE_OUT, LIMBS, Posture
+from .leg_loads import leg_swing, weight_on_pedal
+from .limbs import reach_to, three_turns
+from .posture import CRANKS, KNEE_OUT, LIMBS, POINTS, Posture
 
-POINTS = 49
-STEERS = np.linspace(-0.6, 0.6, POINTS)
-"""rad at which the arms' posture is tabulated"""
-CRANKS = np.linspace(0.0, 2.0 * math.pi, POINTS)
-"""rad at which that of the legs is"""
+WIDEST = 0.6
+STEERS = np.linspace(-WIDEST, WIDEST, POINTS)
+"""rad at which the arms' posture is tabulated; that of the legs is at :data:`.CRANKS`"""
 SHOULDERS_FOLLOW = 0.45
 """part of the steering angle by which the trunk twists, so that the outer hand stays within reach"""
 STRAIGHTEST = 0.985
 """largest extension of an arm, as a share of its straight length"""
 BIT = 0.01
 """rad for slopes"""
+Vector = tuple[float, float, float]
 
 
 class LimbTables:
@@ -36,6 +37,7 @@ class LimbTables:
 
     def __init__(self, posture: Posture, trunk: Sequence[float], swivel: np.ndarray, gravity: float) -> None:
         self.posture, self.trunk, self.swivel = posture, tuple(trunk), swivel
+        self.middle = np.array([*trunk, *swivel.tolist()])
         now = self.angles(CRANKS, STEERS)
         changed = [self.angles(CRANKS, STEERS, **{what: BIT}) for what in ("extra", "lean", "twist")]
         rows = []
@@ -43,8 +45,9 @@ class LimbTables:
             slopes = [(there[limb][:, 1] - now[limb][:, 1]) / BIT for there in changed]
             rows.append(np.stack([now[limb][:, 1], *slopes], axis=1))
         # (point, limb, value and slopes)
-        self._table = np.stack(rows, axis=1)
-        self._weight = weight_on_pedal(posture, gravity)
+        self.table = np.stack(rows, axis=1)
+        # (point, weight on the pedal and swing)
+        self.legs = np.column_stack([weight_on_pedal(posture, gravity), leg_swing(posture)])
 
     def angles(
         self,
@@ -78,60 +81,53 @@ class LimbTables:
             angles.append(reach_to(posture.limb(name), target, out, turn).angles)
         return angles
 
-    def abductions(self, steer: float, crank: float, trunk: Sequence[float], swivel: Sequence[float]) -> list[float]:
-        """Abduction of each limb for given positions of elbows and knees, rad.
 
-        Args:
-            steer: rad, left positive.
-            crank: rad.
-            trunk: wanted angles about y, x, z.
-            swivel: change of each limb's swivel, rad.
-        """
-        lean, twist = trunk[1] - self.trunk[1], trunk[2] - self.trunk[2] - SHOULDERS_FOLLOW * steer
-        last = POINTS - 1
-        arms = (steer - STEERS[0]) / (STEERS[-1] - STEERS[0]) * last
-        legs = (crank % (2.0 * math.pi)) / (2.0 * math.pi) * last
-        found = []
-        for limb, turn in enumerate(swivel):
-            place = max(0.0, min(last - 1e-9, arms if limb < 2 else legs))
-            index = int(place)
-            first, second = self._table[index, limb], self._table[index + 1, limb]
-            angle, by_swivel, by_lean, by_twist = (first + (place - index) * (second - first)).tolist()
-            found.append(angle + by_swivel * turn + by_lean * lean + by_twist * twist)
-        return found
+@jit
+def abductions(table, middle, steer, crank, trunk, swivel, found):  # type: ignore[no-untyped-def]
+    """Abduction of each limb for given positions of elbows and knees, rad.
 
-    def leg_weights(self, crank: float) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
-        """Forces (N, bicycle axes) of the left and the right leg's own weight on the pedals."""
-        found = []
-        for angle, side in ((crank, 1.0), (crank + math.pi, -1.0)):
-            place = (angle % (2.0 * math.pi)) / (2.0 * math.pi) * (POINTS - 1)
-            index = min(int(place), POINTS - 2)
-            first, second = self._weight[index], self._weight[index + 1]
-            x, y, z = (first + (place - index) * (second - first)).tolist()
-            found.append((x, side * y, z))
-        return found[0], found[1]
-
-
-def weight_on_pedal(posture: Posture, gravity: float) -> np.ndarray:
-    """Force ``(POINTS, 3)`` of the left leg's own weight on its pedal at the angles :data:`CRANKS`, N, bicycle axes.
-
-    Hip and pedal carry the leg. Its hip is free to bend and to turn and its knee to bend, so that the virtual work of
-    weight and pedal along these three joints vanishes: Jᵀ f = ∂V/∂q.
+    Args:
+        table: :attr:`LimbTables.table`.
+        middle: :attr:`LimbTables.middle`.
+        steer: rad, left positive.
+        crank: rad.
+        trunk: ``(3,)`` wanted angles about y, x, z, rad.
+        swivel: ``(4,)`` wanted swivel of each limb, rad.
+        found: ``(4,)``, overwritten.
     """
-    limb, segments = posture.leg, posture.segments()
-    angles = reach_to(limb, posture.leg_target("left", CRANKS), KNEE_OUT).angles
+    lean, twist = trunk[1] - middle[1], trunk[2] - middle[2] - SHOULDERS_FOLLOW * steer
+    last = table.shape[0] - 1
+    for limb in range(4):
+        place = (steer + WIDEST) / (2.0 * WIDEST) * last
+        if limb > 1:
+            place = (crank % (2.0 * math.pi)) / (2.0 * math.pi) * last
+        place = max(0.0, min(last - 1e-9, place))
+        index = int(place)
+        first, second, part = table[index, limb], table[index + 1, limb], place - index
+        turn = swivel[limb] - middle[3 + limb]
+        found[limb] = first[0] + part * (second[0] - first[0])
+        for slope, change in ((1, turn), (2, lean), (3, twist)):
+            found[limb] += (first[slope] + part * (second[slope] - first[slope])) * change
 
-    def tip_and_energy(q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        leg, tip = forward(limb, q)
-        height = 0.0
-        for part, start, turn in (("thigh", np.zeros(3), leg.upper), ("shank", leg.hinge, leg.lower)):
-            centre = start + rotation.rotate(turn, segments[part].centre)
-            height = height + segments[part].mass * centre[..., 2]
-        return tip, gravity * np.asarray(height)
 
-    free, step = (0, 2, 3), 1e-5
-    moved = [[tip_and_energy(angles + sign * step * np.eye(4)[joint]) for sign in (1.0, -1.0)] for joint in free]
-    jacobian = np.stack([(more[0] - less[0]) / (2.0 * step) for more, less in moved], axis=1)
-    slope = np.stack([(more[1] - less[1]) / (2.0 * step) for more, less in moved], axis=1)
-    # the pedal's force on the leg is the opposite of the leg's on the pedal
-    return -np.linalg.solve(jacobian, slope[..., None])[..., 0]
+@jit
+def legs_on_pedals(table, crank):  # type: ignore[no-untyped-def]
+    """Forces (N, bicycle axes) of the left and the right leg's own weight on the pedals, and the legs' swing.
+
+    The swing is a force upwards and a moment to the right per (rad/s)² of the crank, see :func:`.leg_swing`.
+
+    Args:
+        table: :attr:`LimbTables.legs`.
+        crank: rad.
+    """
+    last = table.shape[0] - 1
+    found = np.empty((2, 5))
+    for side in range(2):
+        place = ((crank + side * math.pi) % (2.0 * math.pi)) / (2.0 * math.pi) * last
+        index = min(int(place), last - 1)
+        for column in range(5):
+            first, second = table[index, column], table[index + 1, column]
+            found[side, column] = first + (place - index) * (second - first)
+    left, right = found[0], found[1]
+    weights = (left[0], left[1], left[2]), (right[0], -right[1], right[2])
+    return weights[0], weights[1], left[3] + right[3], left[4] - right[4]

@@ -7,14 +7,13 @@ the hinge (elbow or knee) about y. The tip lies anywhere in the x-z plane of the
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import lru_cache
+import math
 from typing import NamedTuple
 
 import numpy as np
 
+from ....filters.compile.cache import jit
 from ....filters.core import rotation
-from ...physics.straight_line import straight_line
 
 
 class Limb(NamedTuple):
@@ -120,35 +119,65 @@ def forward(limb: Limb, angles: np.ndarray) -> tuple[LimbPosture, np.ndarray]:
     return LimbPosture(upper, lower, angles, hinge), tip
 
 
-@lru_cache(maxsize=64)
-def tip_torques(limb: Limb) -> Callable[..., list[list[float]]]:
-    """Function of joint angles and two forces: lists ``(4,)``, ``(3,)``, ``(3,)`` (root axes) → ``[torques (4,)]``.
+@jit
+def tip_torques(limb, angles, force, lift):  # type: ignore[no-untyped-def]
+    """Torques of the four joints (N·m) that let the tip push on what it holds, and that lift the hinge: virtual work.
 
-    The joint torques let the tip push with the first force on what it holds, and lift the hinge with the second, N·m
-    (virtual work).
+    Args:
+        limb: length of the upper segment, x and z of the tip in axes of the lower one, m.
+        angles: of the joints y, x, z and hinge, rad.
+        force: of the tip, N, root axes.
+        lift: force on the hinge, N, root axes.
     """
+    (cy, cx, cz, ch), (sy, sx, sz, sh) = _cosines(angles), _sines(angles)
+    # columns of the matrix after y, x and z; the third is that of the upper segment too
+    first, second, third = (cy, 0.0, -sy), (sy * sx, cx, cy * sx), (sy * cx, -sx, cy * cx)
+    ahead = _sum(cz, first, sz, second)
+    across = _sum(-sz, first, cz, second)
+    hinge = (-limb[0] * third[0], -limb[0] * third[1], -limb[0] * third[2])
+    lower = _sum(ch * limb[1] + sh * limb[2], ahead, ch * limb[2] - sh * limb[1], third)
+    # a joint's torque is its axis times the moment of the forces about it
+    tip = (hinge[0] + lower[0], hinge[1] + lower[1], hinge[2] + lower[2])
+    root = _sum(1.0, _cross(tip, force), 1.0, _cross(hinge, lift))
+    return root[1], _dot(first, root), _dot(third, root), _dot(across, _cross(lower, force))
 
-    def compute(angles, force, lift):  # type: ignore[no-untyped-def]
-        xp = rotation.namespace(angles)
-        half = 0.5 * angles
-        c, s, zero = xp.cos(half), xp.sin(half), 0.0 * half[..., 0]
-        turn_y = xp.stack([c[..., 0], zero, s[..., 0], zero], axis=-1)
-        turn_x = xp.stack([c[..., 1], s[..., 1], zero, zero], axis=-1)
-        turn_z = xp.stack([c[..., 2], zero, zero, s[..., 2]], axis=-1)
-        bend = xp.stack([c[..., 3], zero, s[..., 3], zero], axis=-1)
-        # attitudes after each joint; hinge and tip in root axes
-        second = rotation.multiply(turn_y, turn_x)
-        upper = rotation.multiply(second, turn_z)
-        hinge = rotation.rotate(upper, np.array([0.0, 0.0, -limb.upper]))
-        lower = rotation.rotate(rotation.multiply(upper, bend), np.array([limb.tip[0], 0.0, limb.tip[1]]))
-        # virtual work: a joint's torque is its axis times the moment of the forces about it
-        root = rotation.cross(hinge + lower, force) + rotation.cross(hinge, lift)
-        axis_x = rotation.rotate(turn_y, np.array([1.0, 0.0, 0.0]))
-        axis_z = rotation.rotate(second, np.array([0.0, 0.0, 1.0]))
-        axis_hinge = rotation.rotate(upper, np.array([0.0, 1.0, 0.0]))
-        along_x = xp.sum(axis_x * root, axis=-1)
-        along_z = xp.sum(axis_z * root, axis=-1)
-        along_hinge = xp.sum(axis_hinge * rotation.cross(lower, force), axis=-1)
-        return (xp.stack([root[..., 1], along_x, along_z, along_hinge], axis=-1),)
 
-    return straight_line(compute, angles=4, force=3, lift=3)
+@jit
+def _cosines(angles):  # type: ignore[no-untyped-def]
+    return math.cos(angles[0]), math.cos(angles[1]), math.cos(angles[2]), math.cos(angles[3])
+
+
+@jit
+def _sines(angles):  # type: ignore[no-untyped-def]
+    return math.sin(angles[0]), math.sin(angles[1]), math.sin(angles[2]), math.sin(angles[3])
+
+
+@jit
+def _sum(a, u, b, v):  # type: ignore[no-untyped-def]
+    return a * u[0] + b * v[0], a * u[1] + b * v[1], a * u[2] + b * v[2]
+
+
+@jit
+def _dot(u, v):  # type: ignore[no-untyped-def]
+    return u[0] * v[0] + u[1] * v[1] + u[2] * v[2]
+
+
+@jit
+def _cross(u, v):  # type: ignore[no-untyped-def]
+    return u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]
+
+
+@jit
+def into_pelvis(angles, force):  # type: ignore[no-untyped-def]
+    """Force in bicycle axes to pelvis axes, or in pelvis axes to axes after two joints; angles about y, x (rad)."""
+    cy, sy, cx, sx = math.cos(angles[0]), math.sin(angles[0]), math.cos(angles[1]), math.sin(angles[1])
+    x, z = cy * force[0] - sy * force[2], sy * force[0] + cy * force[2]
+    return x, cx * force[1] + sx * z, cx * z - sx * force[1]
+
+
+@jit
+def into_trunk(angles, force):  # type: ignore[no-untyped-def]
+    """Force in pelvis axes to trunk axes; angles about y, x, z (rad)."""
+    x, y, z = into_pelvis((angles[0], angles[1]), force)
+    c, s = math.cos(angles[2]), math.sin(angles[2])
+    return c * x + s * y, c * y - s * x, z

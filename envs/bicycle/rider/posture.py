@@ -30,6 +30,9 @@ HIP_ABOVE_SADDLE = 0.08
 TRUNK_IMU = (-0.10, 0.0, 0.27)
 """m: sixth thoracic vertebra in the trunk frame, likewise"""
 KNEE_OUT = np.array([1.0, 0.0, 0.0])
+POINTS = 49
+CRANKS = np.linspace(0.0, 2.0 * math.pi, POINTS)
+"""rad at which whatever depends on the crank is tabulated"""
 AT_REST = np.zeros(3)
 """Displacement of the pelvis: rad of forward tip and of tip to the right, m off the saddle"""
 

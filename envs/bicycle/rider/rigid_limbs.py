@@ -8,40 +8,28 @@ from ....filters.compile.cache import jit
 from ....filters.core import rotation
 from ...physics.kinematics import add_force
 from ..frame.bicycle import Bicycle
-from .effort import Force
 from .posture import SIDES, SIGNS, Posture
 
 
-class RigidLimbs:
-    """Hands act on the handlebar and, oppositely, on the trunk; feet on the pedals and on the pelvis.
+def rigid_limbs(bicycle: Bicycle, posture: Posture, full: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Links, arms and axes of :func:`push_between` for a person on a bicycle: hands and feet.
 
-    Args:
-        bicycle: with the rider's links.
-        posture: the person on it.
+    Hands act on the handlebar and, oppositely, on the trunk; feet on the pedals and on the pelvis. Those of a ``full``
+    rider are held by constraints; nothing acts between links.
     """
-
-    def __init__(self, bicycle: Bicycle, posture: Posture) -> None:
-        self._body, links, physics = bicycle.body, bicycle.links, bicycle.physics
-        bike = posture.bicycle
-        assert bike.drive is not None
-        grips = [np.array(bike.grip) * (1.0, SIGNS[side], 1.0) - bike.steer_origin for side in SIDES]
-        pedals = [posture.pedal(side, 0.0) - np.array(bike.drive.axle) for side in SIDES]
-        held = [links["front_assembly"]] * 2 + [links["crank"]] * 2
-        holding = [links["trunk"]] * 2 + [links["pelvis"]] * 2
-        self._links = np.array([held, holding]).T
-        arms = []
-        for link, arm in zip(held, (*grips, *pedals), strict=True):
-            centre, axes = physics.inertial_frame(bicycle.body.body, link)
-            arms.append(rotation.rotate_back(axes, arm - centre))
-        self._arms = np.array(arms)
-        self._axes = rotation.to_matrix(rotation.conjugate(physics.inertial_frame(bicycle.body.body)[1]))
-
-    def push(self, hands: tuple[Force, Force], feet: tuple[Force, Force]) -> None:
-        """Act with these forces (N, bicycle axes; left and right) on bar and pedals during the next step."""
-        body = self._body
-        push_between(
-            body.tree, body.frames, self._links, self._arms, self._axes, np.array((*hands, *feet)), body.forces
-        )
+    links, physics, bike = bicycle.links, bicycle.physics, posture.bicycle
+    assert bike.drive is not None
+    grips = [np.array(bike.grip) * (1.0, SIGNS[side], 1.0) - bike.steer_origin for side in SIDES]
+    pedals = [posture.pedal(side, 0.0) - np.array(bike.drive.axle) for side in SIDES]
+    held = [links["front_assembly"]] * 2 + [links["crank"]] * 2
+    holding = [links["trunk"]] * 2 + [links["pelvis"]] * 2
+    arms = []
+    for link, arm in zip(held, (*grips, *pedals), strict=True):
+        centre, axes = physics.inertial_frame(bicycle.body.body, link)
+        arms.append(rotation.rotate_back(axes, arm - centre))
+    count = 0 if full else len(held)
+    axes = rotation.to_matrix(rotation.conjugate(physics.inertial_frame(bicycle.body.body)[1]))
+    return np.array([held[:count], holding[:count]], int).T.copy(), np.array(arms[:count]).reshape(-1, 3), axes
 
 
 @jit

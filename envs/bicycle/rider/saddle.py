@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from ....filters.compile.cache import jit
 from ...sensors.ideal import STANDARD_GRAVITY
 from .anthropometry import Mass
 from .posture import Posture, placed
@@ -104,6 +105,7 @@ def seat_contact(load: float, ahead: float, parameters: SaddleParameters | None 
     )
 
 
+@jit
 def press(
     seat: SeatContact, pitch: float, pitching: float, roll: float, rolling: float, rise: float, rising: float
 ) -> tuple[float, float, float]:

@@ -80,7 +80,7 @@ def test_tip_torques_do_the_work_of_the_tip_force():
     jacobian = (forward(limb, angles + step)[1] - forward(limb, angles - step)[1]) / 2e-6
     hinges = (forward(limb, angles + step)[0].hinge - forward(limb, angles - step)[0].hinge) / 2e-6
     lift = np.array([1.0, 2.0, 8.0])
-    found = tip_torques(limb)(angles.tolist(), force.tolist(), lift.tolist())[0]
+    found = tip_torques(np.array([limb.upper, *limb.tip]), tuple(angles), tuple(force), tuple(lift))
     np.testing.assert_allclose(found, jacobian @ force + hinges @ lift, atol=1e-7)
 
 

@@ -1,0 +1,208 @@
+"""What a rider's muscles do, compiled: :func:`plan` for a control step, :func:`act` in every physics step.
+
+Arrays of a rider with n joints (three of the trunk, four of each limb unless lumped):
+
+* memory ``(MUSCLES + 2 n,)``: what :func:`plan` decided and :func:`act` applied, by the slices below, then n planned
+  and n applied torques (N·m);
+* links ``(3 + n,)`` of joints: pitch, roll and rise of the pelvis, then those of trunk and limbs.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from ....filters.compile.cache import jit
+from .effort import (
+    AROUND,
+    LARGEST_PEDAL_FORCE,
+    MEAN_STROKE,
+    Reach,
+    hands_against,
+    held_down,
+    moments_of_feet,
+    pedal_push,
+    swung,
+    trunk_support,
+)
+from .limb_tables import SHOULDERS_FOLLOW, abductions, legs_on_pedals
+from .limbs import into_pelvis, into_trunk, tip_torques
+from .rigid_limbs import push_between
+from .saddle import SeatContact, press
+
+TRUNK_STIFFNESS, TRUNK_DAMPING = 900.0, 90.0
+"""N·m/rad and N·m·s/rad of the lumbar joint's muscles"""
+SWIVEL_STIFFNESS, SWIVEL_DAMPING = 60.0, 2.0
+"""N·m/rad, N·m·s/rad: hold elbows and knees in their plane"""
+HEAVIEST = 3.0
+"""1: weight of a lumped rider's legs on the pedals over a bump at most, in parts of that at rest"""
+KEEPING_UP = 4.0
+"""N·m/(rad/s) on the crank, towards the wheel's pace"""
+
+TARGET, SUPPORT, SWIVEL, WANTED = slice(0, 3), slice(3, 6), slice(6, 10), slice(10, 14)
+"""wanted angles of the trunk (rad), torques that support it (N·m), wanted abduction and swivel of the limbs (rad)"""
+HANDS, FEET, PUSHES, WEIGHTS = slice(14, 20), slice(20, 26), slice(26, 32), slice(32, 38)
+HANDS_AND_FEET = slice(14, 26)
+"""forces (N, bicycle axes) of left and right hand and foot, of the legs' muscles and of the legs' weight"""
+MUSCLES = 38
+"""where the planned torques begin"""
+
+
+class Build(NamedTuple):
+    """Numbers of one rider on one bicycle."""
+
+    reach: Reach
+    seat: SeatContact
+    flexion: float
+    """rad: of the trunk at rest"""
+    wheel_radius: float
+    """m: rear"""
+    grip_arm: float
+    """m: of the hands about the steering axis"""
+    pulls: np.ndarray
+    """(2, 2, 3) direction in which each hand moves when the bar turns to the left, and its change with the angle"""
+    axis: np.ndarray
+    """(3,) of steering, upwards"""
+    hand_load: float
+    """N downwards with each hand"""
+    elbow_weight: float
+    """N"""
+    limbs: np.ndarray
+    """(2, 3) of arms and legs: length of the upper segment, x and z of the tip in the lower one, m"""
+    table: np.ndarray
+    """of :func:`.abductions`"""
+    legs: np.ndarray
+    """of :func:`.legs_on_pedals`"""
+    middle: np.ndarray
+    """(7,) trunk (rad) and swivels (rad) around which the table is linear"""
+
+
+@jit
+def plan(build, intended, bicycle, steer_torque, drive, ratio, state, links, memory):  # type: ignore[no-untyped-def]
+    """Decide what the muscles do during the next control period.
+
+    Args:
+        build: of the rider.
+        intended: ``(8,)`` change of the trunk's flexion, lean and twist, four swivels (rad), unsteady torque (N·m).
+        bicycle: steer, crank (rad), rates of crank and rear wheel (rad/s).
+        steer_torque: N·m on the handlebar, left positive.
+        drive: desired propulsive force at the wheel, N, without braking.
+        ratio: of the gear.
+        state: see :mod:`poise.envs.physics.kinematics`.
+        links: see above.
+        memory: written.
+    """
+    reach, seat = build.reach, build.seat
+    steer, crank, crank_rate, wheel_rate = bicycle
+    first, rates, joints = 13, 13 + (state.shape[0] - 13) // 2, (memory.shape[0] - MUSCLES) // 2
+    target = memory[TARGET]
+    target[0] = build.flexion + intended[0]
+    target[1] = intended[1]
+    target[2] = intended[2] + SHOULDERS_FOLLOW * max(-0.8, min(0.8, steer))
+    memory[WANTED] = intended[3:7]
+    pitch, roll, rise = state[first + links[0]], state[first + links[1]], state[first + links[2]]
+    pitching, rolling, rising = state[rates + links[0]], state[rates + links[1]], state[rates + links[2]]
+    # muscles also carry the legs' weight around, half of it each
+    wanted = max(0.0, drive) * build.wheel_radius * ratio
+    push = min(LARGEST_PEDAL_FORCE, wanted / (reach.crank * MEAN_STROKE))
+    left_weight, right_weight, lift, tip = legs_on_pedals(build.legs, crank)
+    left_phase, right_phase = crank, crank + math.pi
+    turning = -math.sin(left_phase) * left_weight[0] - math.cos(left_phase) * left_weight[2]
+    turning -= math.sin(right_phase) * right_weight[0] + math.cos(right_phase) * right_weight[2]
+    # and keep the crank at the speed of the wheel, so that the chain stays nearly taut
+    pace = max(-15.0, min(15.0, KEEPING_UP * (wheel_rate / ratio - crank_rate)))
+    around = push * AROUND + 0.5 * (pace / reach.crank - turning)
+    draw = held_down(seat, rise, rising)
+    left, right = pedal_push(push, around, left_phase, draw), pedal_push(push, around, right_phase, draw)
+    pushes, weights, feet = memory[PUSHES], memory[WEIGHTS], memory[FEET]
+    for axis in range(3):
+        weights[axis], weights[3 + axis] = left_weight[axis], right_weight[axis]
+        feet[axis], feet[3 + axis] = left[axis] + left_weight[axis], right[axis] + right_weight[axis]
+    lift, tip = crank_rate * crank_rate * lift, crank_rate * crank_rate * tip
+    rightwards, _ = moments_of_feet(reach, crank, (feet[0], feet[1], feet[2]), (feet[3], feet[4], feet[5]))
+    # the legs' own weight is part of the balance at rest; drive, brakes and slopes act on the upper body
+    _, forwards = moments_of_feet(reach, crank, left, right)
+    forwards -= reach.pushed_back * drive
+    rightwards += tip + reach.trunk_moment * math.sin(target[1])
+    difference, common = hands_against(reach, seat, rightwards, forwards, (pitch, pitching, roll, rolling))
+    # forces of the hands, and how the trunk bears them
+    strength = 0.5 * (steer_torque + intended[7]) / build.grip_arm
+    c, s = math.cos(steer), math.sin(steer)
+    hands = memory[HANDS]
+    for side in range(2):
+        along = difference if side == 0 else -difference
+        for axis in range(3):
+            pull = c * build.pulls[side, 0, axis] + s * build.pulls[side, 1, axis]
+            hands[3 * side + axis] = strength * pull + along * build.axis[axis]
+        hands[3 * side + 2] += common - build.hand_load
+    left_hand, right_hand = (hands[0], hands[1], hands[2]), (hands[3], hands[4], hands[5])
+    support = memory[SUPPORT]
+    support[0], support[1], support[2] = trunk_support(reach, left_hand, right_hand, target[0], target[1])
+    if joints == 3:
+        left, right = swung(reach, left, right, lift, tip)
+        for axis in range(3):
+            pushes[axis], pushes[3 + axis] = left[axis], right[axis]
+        return
+    abductions(build.table, build.middle, steer, crank, target, intended[3:7], memory[SWIVEL])
+    trunk = (state[first + links[3]], state[first + links[4]], state[first + links[5]])
+    up, nothing = into_trunk(trunk, (0.0, 0.0, build.elbow_weight)), (0.0, 0.0, 0.0)
+    torques = memory[MUSCLES : MUSCLES + joints]
+    torques[:3] = 0.0
+    for limb, force in enumerate((left_hand, right_hand, left, right)):
+        force = into_pelvis((pitch, roll), force)
+        if limb < 2:
+            force = into_trunk(trunk, force)
+        place = 3 + 4 * limb
+        held = links[3 + place : 7 + place]
+        angles = (state[first + held[0]], state[first + held[1]], state[first + held[2]], state[first + held[3]])
+        found = tip_torques(build.limbs[limb // 2], angles, force, up if limb < 2 else nothing)
+        for joint in range(4):
+            torques[place + joint] = found[joint]
+
+
+@jit
+def act(seat, tree, state, frames, links, rigid, memory, forces):  # type: ignore[no-untyped-def]
+    """Add what rider and saddle do in the next physics step to the generalised forces.
+
+    Args:
+        seat: the saddle.
+        tree: see :mod:`poise.envs.physics.kinematics`, as of the next two.
+        state: now.
+        frames: now.
+        links: see above.
+        rigid: links, arms and axes of :func:`.push_between` for the rigid limbs of a lumped rider.
+        memory: the applied torques are written.
+        forces: ``(6 + …,)``, added to.
+    """
+    first, rates, joints = 13, 13 + (state.shape[0] - 13) // 2, (memory.shape[0] - MUSCLES) // 2
+    pitch, roll, rise = state[first + links[0]], state[first + links[1]], state[first + links[2]]
+    pitching, rolling, rising = state[rates + links[0]], state[rates + links[1]], state[rates + links[2]]
+    target, support = memory[TARGET], memory[SUPPORT]
+    applied = memory[MUSCLES + joints :]
+    applied[:] = memory[MUSCLES : MUSCLES + joints]
+    # the trunk keeps its posture in the bicycle, whatever the pelvis does below it
+    c, s = math.cos(target[0]), math.sin(target[0])
+    below, moving = (pitch, c * roll, s * roll), (pitching, c * rolling, s * rolling)
+    for axis in range(3):
+        angle = state[first + links[3 + axis]] + below[axis]
+        rate = state[rates + links[3 + axis]] + moving[axis]
+        applied[axis] += TRUNK_STIFFNESS * (target[axis] - angle) - TRUNK_DAMPING * rate + support[axis]
+    for limb in range((joints - 3) // 4):
+        # abduction holds the swivel
+        joint = 4 + 4 * limb
+        angle, rate = state[first + links[3 + joint]], state[rates + links[3 + joint]]
+        applied[joint] += SWIVEL_STIFFNESS * (memory[SWIVEL][limb] - angle) - SWIVEL_DAMPING * rate
+    forwards, rightwards, force = press(seat, pitch, pitching, roll, rolling, rise, rising)
+    if joints == 3:
+        # saddle and pedals share the weight of rigid legs, also over a bump
+        share = min(HEAVIEST, force / seat.load)
+        for number in range(6):
+            memory[FEET][number] = memory[PUSHES][number] + share * memory[WEIGHTS][number]
+        push_between(tree, frames, rigid[0], rigid[1], rigid[2], memory[HANDS_AND_FEET].reshape(4, 3), forces)
+    for joint in range(joints):
+        forces[6 + links[3 + joint]] += applied[joint]
+    forces[6 + links[0]] += forwards
+    forces[6 + links[1]] += rightwards
+    forces[6 + links[2]] += force
