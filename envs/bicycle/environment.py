@@ -24,6 +24,7 @@ from .course.terrain import Ground
 from .frame.parameters import BICYCLES, BicycleParameters
 from .frame.tyre import TyreParameters
 from .ride.control import ControlSettings
+from .ride.pilot import PilotParameters, check_pilot
 from .ride.ride import Ride
 from .ride.source import RideSource, SavedRide
 from .ride.truth import QUANTITIES, other_truth
@@ -130,6 +131,9 @@ class RiderBicycleEnv(PoseEnv):
         physics_rate: physics steps per second, Hz; a multiple of 250 Hz and of ``rate``.
         score: one quantity or several of ``info["pose"]``; by default the orientations of bicycle and trunk.
         noise_scale: factor on all errors, 0 for none.
+        pilot: who steers: ``expert``, ``skilled`` or ``novice``, human riders with delays, noise and muscles
+            (:mod:`poise.envs.bicycle.ride.pilot`); ``random``, one of them for each ride; ``ideal``, a regulator of the
+            exact state; or parameters.
         sampling: ``interval`` or ``instant``, of gyroscopes, accelerometers and contact forces: the mean over the
             interval that ends with the sample, or what acts at its end (forces: in the last physics step).
         surface: of the road: a name of :func:`poise.envs.bicycle.course.surfaces.list_surfaces` or a
@@ -172,6 +176,7 @@ class RiderBicycleEnv(PoseEnv):
         surface: str | Surface | None = None,
         timing: Timings | None = None,
         magnetics: str | Magnetics | None = None,
+        pilot: str | PilotParameters = "skilled",
         render_mode: str | None = None,
     ) -> None:
         self.scenario, self.subject, self.style = named_scenario(scenario), subject, style
@@ -211,7 +216,16 @@ class RiderBicycleEnv(PoseEnv):
                 raise ValueError(f"physics_rate must be a multiple of {name} of {value:g} Hz, got {physics_rate:g} Hz")
         quantities = _quantities(score)
         self._source = RideSource(
-            self.parameters, style, self.duration, made.rate, self.physics_rate, fidelity, self.tyre, sampling, surface
+            self.parameters,
+            style,
+            self.duration,
+            made.rate,
+            self.physics_rate,
+            fidelity,
+            self.tyre,
+            sampling,
+            surface,
+            check_pilot(pilot),
         )
         bounds = [{"rotation": 1.0, "angle": math.pi}.get(quantity.kind, 20.0) for quantity in quantities]
         super().__init__(made, quantities, made.rate, render_mode, bounds)

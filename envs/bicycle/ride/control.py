@@ -12,21 +12,18 @@ import math
 from bisect import bisect_right
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
-from scipy.linalg import expm, solve_discrete_are
 
-from ..course.path import Path
+from ..course.path import Path, PathPoint
 from ..frame.bicycle import AIR_DENSITY, BicycleState
 from ..frame.parameters import BicycleParameters
 from ..frame.whipple import WhippleModel, whipple_model
+from .regulator import PREVIEW_BIN, PREVIEW_BINS, lateral_model, preview_regulator, sampled
 
 LOWEST_SPEED = 0.3
 """m/s: gains are held below"""
-PREVIEW_BIN = 0.1
-"""s"""
-PREVIEW_BINS = 20
-"""preview distance of the rider along the path"""
 REACTION = 0.2
 """s, time constant of a rider's pedalling or braking"""
 ANTICIPATED = 3
@@ -94,54 +91,23 @@ class PilotMemory:
     target: float
     acceleration: float
     command: tuple[float, float]
-
-
-def lateral_model(model: WhippleModel, bicycle: BicycleParameters, speed: float) -> tuple[np.ndarray, np.ndarray]:
-    """Linear model of steering along a path: matrix ``(7, 7)`` and input column ``(7, 1)`` of the steer torque.
-
-    State: roll, steer, roll rate, steer rate, heading error, offset, integral of the offset; all to the right positive.
-    """
-    cos = math.cos(bicycle.steer_axis_tilt) / bicycle.wheelbase
-    A, B = np.zeros((7, 7)), np.zeros((7, 1))
-    A[:4, :4] = model.state_matrix(speed)
-    A[4, 1], A[4, 3] = speed * cos, bicycle.trail * cos
-    A[5, 4] = speed
-    A[6, 5] = 1.0
-    B[:4, 0] = model.input_matrix()[:, 1]
-    return A, B
+    human: Any = None
+    """state of a :class:`.human.HumanPilot`"""
 
 
 def regulator(
     model: WhippleModel, bicycle: BicycleParameters, speed: float, settings: ControlSettings
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Feedback and preview gains of the steer torque at one speed, with a zero-order hold between control steps.
-
-    The state is relative to that of the steady turn at the path's curvature, so that changes of the turn act as
-    disturbances. They are known in advance, and the optimal torque anticipates them (linear-quadratic preview control,
-    M. Tomizuka, Optimal continuous finite preview problem, IEEE Trans. Autom. Control 20 (1975)).
+    """Gains of the steer torque at one speed.
 
     Returns:
-        Gains ``(7,)`` on the state, and ``(2, PREVIEW_BINS)`` on the change of the steady turn's roll and steer, rad,
-        in each bin ahead.
+        Gains ``(7,)`` on the state of :func:`.lateral_model`, relative to the steady turn at the path's curvature, and
+        ``(2, PREVIEW_BINS)`` on the change of that turn's roll and steer, rad, in each bin ahead.
     """
-    A, B = lateral_model(model, bicycle, speed)
-    step = 1.0 / settings.rate
-    # exact discretisation with a zero-order hold of the torque
-    block = expm(step * np.block([[A, B], [np.zeros((1, 8))]]))
-    A, B = block[:7, :7], block[:7, 7:]
-    s = settings
-    cost = np.diag([s.roll, s.steer, s.roll_rate, s.steer_rate, s.heading, s.offset, s.offset_integral]) * step
-    solution = solve_discrete_are(A, B, cost, np.array([[s.effort * step]]))
-    left = np.linalg.solve(s.effort * step + B.T @ solution @ B, B.T)
-    gains = left @ solution @ A
-    # preview: the costate of a change of roll and steer, carried back from where it comes by the closed loop
-    closed, effect = (A - B @ gains).T, -solution[:, :2]
-    each = round(PREVIEW_BIN * settings.rate)
-    kernel = np.zeros((2, PREVIEW_BINS))
-    for index in range(PREVIEW_BINS * each):
-        kernel[:, index // each] += (left @ effect)[0] / each
-        effect = closed @ effect
-    return gains[0], kernel
+    s, step = settings, 1.0 / settings.rate
+    cost = np.diag([s.roll, s.steer, s.roll_rate, s.steer_rate, s.heading, s.offset, s.offset_integral])
+    A, B = sampled(*lateral_model(model, bicycle, speed), step)
+    return preview_regulator(A, B, cost, s.effort, step, np.eye(7)[:, :2])
 
 
 @lru_cache(maxsize=4096)
@@ -162,6 +128,7 @@ class Pilot:
         settings: weights.
         gravity: m/s².
         highest_speed: highest speed of the gain table, m/s.
+        lean_effect: part of a lean of the trunk by which the common mass centre leans.
     """
 
     def __init__(
@@ -170,8 +137,9 @@ class Pilot:
         settings: ControlSettings | None = None,
         gravity: float = 9.81,
         highest_speed: float = 7.0,
+        lean_effect: float = 0.0,
     ) -> None:
-        self.bicycle = bicycle
+        self.bicycle, self.lean_effect = bicycle, lean_effect
         self.settings = ControlSettings() if settings is None else settings
         self.model = whipple_model(bicycle, gravity)
         slow, fast = np.arange(LOWEST_SPEED, 0.95, 0.1), np.arange(1.0, highest_speed + 0.25, 0.25)
@@ -230,39 +198,37 @@ class Pilot:
         changes = [np.diff(np.interp(self._ahead, times, values)) for values in (rolls, steers)]
         return np.concatenate(changes), float(limits[ANTICIPATED])
 
-    def gains(self, speed: float) -> np.ndarray:
-        """Interpolated gains: 7 on the state, then those on the changes of roll and steer ahead."""
+    def _between(self, speed: float) -> tuple[float, float, float]:
+        """The two speeds of the table around one (m/s), and how far between them it lies."""
         speed = min(max(speed, LOWEST_SPEED), self._grid[-1])
         index = min(bisect_right(self._grid, speed), len(self._grid) - 1)
         low, high = self._grid[index - 1], self._grid[index]
-        part = (speed - low) / (high - low)
+        return low, high, (speed - low) / (high - low)
+
+    def gains(self, speed: float) -> np.ndarray:
+        """Interpolated gains: 7 on the state, then those on the changes of roll and steer ahead."""
+        low, high, part = self._between(speed)
         first, second = (gain_row(self.bicycle, self.settings, self._gravity, each) for each in (low, high))
         return (1.0 - part) * first + part * second
 
-    def update(self, state: BicycleState, speed: float, roll_bias: float = 0.0) -> tuple[float, float]:
+    def update(self, state: BicycleState, speed: float, lean: float = 0.0) -> tuple[float, float]:
         """Decide for the next control period.
 
         Args:
             state: of the bicycle.
             speed: wanted, m/s; less is ridden in and before sharp turns.
-            roll_bias: rad to add to the roll angle that a steady turn needs, for instance because the rider leans.
+            lean: of the trunk to the bicycle that the rider intends, rad, right positive. Who leans to the right keeps
+                the bicycle further to the left.
 
         Returns:
             Steer torque (N·m, left positive) and force at the wheels (N, forward positive, braking negative).
         """
-        self.distance, self.offset = self.path.progress(self.distance, state.x, state.y)
-        point = self.path.at(self.distance)
-        heading = math.remainder(state.yaw - point.heading, 2.0 * math.pi)
-        # beyond a metre or half a radian off the path, limit the correction
-        offset = max(-1.0, min(1.0, self.offset))
-        heading = max(-0.5, min(0.5, heading))
+        point, offset, heading = self._follow(state)
         self.offset_integral = max(-2.0, min(2.0, self.offset_integral + self.period * offset))
-        # beside the path a turn about the same middle has another radius
-        curvature = point.curvature / max(0.5, 1.0 - point.curvature * offset)
-        steer = math.atan(self.bicycle.wheelbase * curvature) / math.cos(self.bicycle.steer_axis_tilt)
+        steer = self._turn(point.curvature, offset)
         roll, torque = self.model.steady_turn(state.speed, -steer)
         errors = (
-            state.roll - roll - roll_bias,
+            state.roll - roll + self.lean_effect * lean,
             steer - state.steer,
             state.roll_rate,
             -state.steer_rate,
@@ -277,6 +243,20 @@ class Pilot:
         self._wish(min(speed, limit))
         self.command = (max(-largest, min(largest, -right)), self._driver(state))
         return self.command
+
+    def _follow(self, state: BicycleState) -> tuple[PathPoint, float, float]:
+        """The point of the path at the bicycle, and offset (m) and heading (rad) from it, left positive."""
+        self.distance, self.offset = self.path.progress(self.distance, state.x, state.y)
+        point = self.path.at(self.distance)
+        heading = math.remainder(state.yaw - point.heading, 2.0 * math.pi)
+        # beyond a metre or half a radian off the path, limit the correction
+        return point, max(-1.0, min(1.0, self.offset)), max(-0.5, min(0.5, heading))
+
+    def _turn(self, curvature: float, offset: float) -> float:
+        """Steering angle (rad, left positive) of the turn to ride, at an offset (m, left positive) from the path."""
+        # beside the path a turn about the same middle has another radius
+        curvature /= max(0.5, 1.0 - curvature * offset)
+        return math.atan(self.bicycle.wheelbase * curvature) / math.cos(self.bicycle.steer_axis_tilt)
 
     def _wish(self, speed: float) -> None:
         """Rate-limit the target speed."""

@@ -18,6 +18,8 @@ from ..rider.posture import Posture
 from ..rider.rider import Fidelity, Rider, RiderMemory
 from ..rider.style import RiderMotion
 from .control import ControlSettings, Pilot, PilotMemory
+from .human import HumanPilot, leaning_trunk
+from .pilot import IDEAL, PilotParameters, pilot_parameters
 
 PREVIEW = 0.3
 """s: lead of the rider's lean into turns"""
@@ -51,6 +53,8 @@ class Ride:
         physics_rate: physics steps per second, Hz; a multiple of the control rate.
         tyre: None for default tyres.
         control: None for default settings.
+        pilot: who steers: ``ideal``, or a human by name or parameters (:mod:`.pilot`).
+        noise: seed of a human's senses and muscles; None for 0.
         crank: angle at the start, rad.
         gravity: m/s².
         gui: open PyBullet's window.
@@ -71,6 +75,8 @@ class Ride:
         physics_rate: float = 500.0,
         tyre: TyreParameters | None = None,
         control: ControlSettings | None = None,
+        pilot: str | PilotParameters = IDEAL,
+        noise: np.random.SeedSequence | None = None,
         crank: float = 0.3,
         gravity: float = STANDARD_GRAVITY,
         gui: bool = False,
@@ -88,7 +94,7 @@ class Ride:
         trunk = posture.trunk()
         whole = sum(part.mass * part.centre[2] for part in self._loaded.parts)
         self._lean_effect = trunk.mass * float(trunk.centre[2]) * np.cos(posture.flexion) / whole
-        self.begin(motion, path, speed, ground=ground, crank=crank)
+        self.begin(motion, path, speed, ground=ground, pilot=pilot, noise=noise, crank=crank)
 
     def begin(
         self,
@@ -97,6 +103,8 @@ class Ride:
         speed: Callable[[float], float],
         *,
         ground: Ground | None = None,
+        pilot: str | PilotParameters = IDEAL,
+        noise: np.random.SeedSequence | None = None,
         crank: float = 0.3,
     ) -> None:
         """Start another ride of the same person in the same world; bit for bit what a new :class:`Ride` would do.
@@ -105,7 +113,7 @@ class Ride:
         """
         self.physics.steps = 0
         self.bicycle.lay(ground)
-        self.pilot = Pilot(self._loaded, self._settings, self.physics.gravity)
+        self.pilot = self._pilot(pilot, noise, motion)
         self.path, self.speed = path, speed
         point, first = path.at(0.0), self.pilot.comfortable_speed(path, speed(0.0))
         self.bicycle.start(first, (point.x, point.y), point.heading, crank=crank)
@@ -113,6 +121,14 @@ class Ride:
         self.pilot.start(path, first)
         self._count = 0
         self.state = self.bicycle.state()
+
+    def _pilot(self, name: str | PilotParameters, noise: np.random.SeedSequence | None, motion: RiderMotion) -> Pilot:
+        human, gravity = pilot_parameters(name), self.physics.gravity
+        if human is None:
+            return Pilot(self._loaded, self._settings, gravity, lean_effect=self._lean_effect)
+        seed = np.random.SeedSequence(0) if noise is None else noise
+        trunk = leaning_trunk(self.rider.posture, self.rider.full, motion.style.levelling)
+        return HumanPilot(self._loaded, human, seed, trunk, self._settings, gravity)
 
     @property
     def fallen(self) -> bool:
@@ -134,9 +150,7 @@ class Ride:
     def _control(self) -> None:
         self.state = state = self.bicycle.state()
         self.bicycle.shift()
-        lean = self.rider.intended_lean
-        # a rider who leans to the right keeps the bicycle further to the left
-        torque, drive = self.pilot.update(state, self.speed(state.time), -self._lean_effect * lean)
+        torque, drive = self.pilot.update(state, self.speed(state.time), self.rider.intended_lean)
         ahead = self.path.at(self.pilot.distance + PREVIEW * state.speed)
         self.rider.plan(state, ahead.curvature, torque, drive)
 

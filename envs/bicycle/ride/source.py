@@ -21,6 +21,7 @@ from ..rider.posture import Posture, sit
 from ..rider.rider import Fidelity
 from ..rider.style import RiderMotion, RiderStyle, rider_style
 from .log import RideLog, RideRecorder
+from .pilot import IDEAL, PILOTS, RANDOM, PilotParameters
 from .ride import Ride, RideMemory
 from .truth import Quaternions, continuous_pose, segment_states, true_pose
 
@@ -63,6 +64,7 @@ class RideSource:
         tyre: of both wheels.
         sampling: of the contact forces, see :class:`.RideRecorder`.
         surface: of the road; None for that of each scenario.
+        pilot: who steers, see :func:`.pilot_parameters`; ``random`` draws one of the skills for each ride.
 
     Raises:
         ValueError: a sample takes longer than the ride before time 0.
@@ -79,7 +81,9 @@ class RideSource:
         tyre: TyreParameters,
         sampling: Sampling = "interval",
         surface: str | Surface | None = None,
+        pilot: str | PilotParameters = IDEAL,
     ) -> None:
+        self.pilot = pilot
         self.bicycle, self.style, self.duration, self.rate = bicycle, style, duration, rate
         self.physics_rate, self.fidelity = physics_rate, fidelity
         self.tyre, self.sampling, self.surface = tyre, sampling, surface
@@ -102,7 +106,17 @@ class RideSource:
         person, or a previous fall, requires a new world. All three give the same ride, bit for bit.
         """
         seed = str(motion.bit_generator.seed_seq.state)  # type: ignore[attr-defined]
-        key = (scenario, subject, self.style, self.duration, self.physics_rate, self.tyre, self.surface, seed)
+        key = (
+            scenario,
+            subject,
+            self.style,
+            self.duration,
+            self.physics_rate,
+            self.tyre,
+            self.surface,
+            self.pilot,
+            seed,
+        )
         if self.ride is not None and self.ride.fallen:
             self.close()
         if self.ride is None or key != self._motion_key:
@@ -119,7 +133,7 @@ class RideSource:
 
     def _ride_first_second(self, scenario: Scenario, subject: Any, motion: np.random.Generator) -> None:
         """Draw rider, course and movements, and settle on the saddle."""
-        for_body, for_course, for_movement, for_crank = motion.spawn(4)
+        for_body, for_course, for_movement, for_crank, for_pilot = motion.spawn(5)
         body = rider_body(subject, for_body)
         world = (body, self.physics_rate, self.tyre)
         same = self.ride is not None and world == self._world_key
@@ -127,11 +141,16 @@ class RideSource:
         course = scenario.draw(for_course, self.duration + SETTLING + 1.0, self.surface)
         movement = RiderMotion(rider_style(scenario.style if self.style is None else self.style), for_movement)
         crank = float(for_crank.uniform(0.0, 2.0 * math.pi))
+        skills = list(PILOTS)
+        pilot = skills[int(for_pilot.integers(len(skills)))] if self.pilot == RANDOM else self.pilot
+        noise = np.random.SeedSequence(for_pilot.integers(2**63, size=2).tolist())
         if self.ride is not None and same:
             for memory in (*self._kept.values(), self._first):
                 self.ride.forget(memory)
             self._kept = {}
-            self.ride.begin(movement, course.path, course.speed, ground=course.ground, crank=crank)
+            self.ride.begin(
+                movement, course.path, course.speed, ground=course.ground, pilot=pilot, noise=noise, crank=crank
+            )
         else:
             self.close()
             self.ride = Ride(
@@ -143,6 +162,8 @@ class RideSource:
                 fidelity=self.fidelity,
                 physics_rate=self.physics_rate,
                 tyre=self.tyre,
+                pilot=pilot,
+                noise=noise,
                 crank=crank,
             )
             self._world_key, self.posture = world, posture

@@ -1,0 +1,71 @@
+"""Linear-quadratic preview control of a bicycle along a path: the equations behind every pilot."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from scipy.linalg import expm, solve_discrete_are
+
+from ..frame.parameters import BicycleParameters
+from ..frame.whipple import WhippleModel
+
+PREVIEW_BIN = 0.1
+"""s"""
+PREVIEW_BINS = 20
+"""preview distance of the rider along the path"""
+
+
+def lateral_model(model: WhippleModel, bicycle: BicycleParameters, speed: float) -> tuple[np.ndarray, np.ndarray]:
+    """Linear model of steering along a path: matrix ``(7, 7)`` and input column ``(7, 1)`` of the steer torque.
+
+    State: roll, steer, roll rate, steer rate, heading error, offset, integral of the offset; all to the right positive.
+    """
+    cos = math.cos(bicycle.steer_axis_tilt) / bicycle.wheelbase
+    A, B = np.zeros((7, 7)), np.zeros((7, 1))
+    A[:4, :4] = model.state_matrix(speed)
+    A[4, 1], A[4, 3] = speed * cos, bicycle.trail * cos
+    A[5, 4] = speed
+    A[6, 5] = 1.0
+    B[:4, 0] = model.input_matrix()[:, 1]
+    return A, B
+
+
+def sampled(A: np.ndarray, B: np.ndarray, step: float) -> tuple[np.ndarray, np.ndarray]:
+    """Exact discretisation of x' = A x + B u with inputs held over a step (s)."""
+    size, inputs = B.shape
+    block = expm(step * np.block([[A, B], [np.zeros((inputs, size + inputs))]]))
+    return block[:size, :size], block[:size, size:]
+
+
+def preview_regulator(
+    A: np.ndarray, B: np.ndarray, cost: np.ndarray, effort: float, step: float, changes: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Feedback and preview gains of one input that is held between control steps.
+
+    The state is relative to that of a steady turn, so that changes of the turn act as disturbances. They are known in
+    advance, and the optimal input anticipates them (linear-quadratic preview control, M. Tomizuka, Optimal continuous
+    finite preview problem, IEEE Trans. Autom. Control 20 (1975)).
+
+    Args:
+        A: ``(n, n)`` of the sampled system.
+        B: ``(n, 1)``.
+        cost: ``(n, n)`` of the squared state, per second.
+        effort: of the squared input, per second.
+        step: s between control steps.
+        changes: ``(n, k)`` what each kind of change of the turn adds to the state of the steady turn.
+
+    Returns:
+        Gains ``(n,)`` on the state, and ``(k, PREVIEW_BINS)`` on the changes in each bin ahead.
+    """
+    solution = solve_discrete_are(A, B, cost * step, np.array([[effort * step]]))
+    left = np.linalg.solve(effort * step + B.T @ solution @ B, B.T)
+    gains = left @ solution @ A
+    # preview: the costate of a change of the turn, carried back from where it comes by the closed loop
+    closed, effect = (A - B @ gains).T, -(solution @ changes)
+    each = round(PREVIEW_BIN / step)
+    kernel = np.zeros((changes.shape[1], PREVIEW_BINS))
+    for index in range(PREVIEW_BINS * each):
+        kernel[:, index // each] += (left @ effect)[0] / each
+        effect = closed @ effect
+    return gains[0], kernel
