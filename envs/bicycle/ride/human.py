@@ -14,8 +14,8 @@ from ..course.path import Path
 from ..frame.bicycle import BicycleState
 from ..frame.parameters import BicycleParameters
 from ..rider.anthropometry import join
+from ..rider.muscles import TRUNK_DAMPING, TRUNK_STIFFNESS
 from ..rider.posture import Posture
-from ..rider.rider import TRUNK_DAMPING, TRUNK_STIFFNESS
 from .control import ControlSettings, Pilot, PilotMemory
 from .internal_model import (
     RIGID,
@@ -49,7 +49,7 @@ class HumanMemory(NamedTuple):
     inputs: tuple[float, ...]
     readings: tuple[float, ...]
     arms: tuple[float, float]
-    count: int
+    step: int
 
 
 class HumanNoise:
@@ -196,7 +196,8 @@ class HumanPilot(Pilot):
     def _move(self, command: float, noise: float) -> float:
         """Torque of the arms, N·m, right positive, one control step after a command."""
         unsteady = self._muscle_sigma * math.hypot(self.human.tremor, self.human.motor_noise * command) * noise
-        (a, b), (c, d), (e, f) = *self._arms, self._drive
+        (a, b), (c, d) = self._arms
+        e, f = self._drive
         torque, rate = self._torque
         drive = command + unsteady
         self._torque = (a * torque + b * rate + e * drive, c * torque + d * rate + f * drive)
@@ -221,4 +222,4 @@ class HumanPilot(Pilot):
         self._state = np.array(human.state)
         self._inputs = np.array(human.inputs).reshape(-1, 3)
         self._readings = np.array(human.readings).reshape(-1, 6)
-        self._torque, self._count = human.arms, human.count
+        self._torque, self._count = human.arms, human.step
