@@ -114,19 +114,21 @@ def built(cls: type[T], described: Any, where: str) -> T:
     for name in described:
         if name not in names:
             raise ValueError(f"{where}: {unknown('field', name, names)}")
-    hints = annotations_of(cls)
-    values = {}
+    hints = annotations_of(cls)  # type: ignore[arg-type]
+    values: dict[str, Any] = {}
     for name, value in described.items():
         part = dataclass_in(hints[name])
-        nested = part is not None and not (value is None and type(None) in typing.get_args(hints[name]))
-        values[name] = built(part, value, f"{where}.{name}") if nested else tuples(value)  # type: ignore[type-var]
+        if part is None or (value is None and type(None) in typing.get_args(hints[name])):
+            values[name] = tuples(value)
+        else:
+            values[name] = built(part, value, f"{where}.{name}")
     try:
         return cls(**values)
     except (TypeError, ValueError) as reason:
         raise ValueError(f"{where}: {reason}") from None
 
 
-def dataclass_in(hint: Any) -> type | None:
+def dataclass_in(hint: Any) -> type[Any] | None:
     """The dataclass that an annotation names, alone or as ``X | None``; None where it names none."""
     choices = typing.get_args(hint) if typing.get_origin(hint) in (typing.Union, types.UnionType) else (hint,)
     return next((each for each in choices if isinstance(each, type) and is_dataclass(each)), None)

@@ -50,7 +50,8 @@ def kind_of(name: str) -> type[Recipe]:
         ValueError: an unknown kind.
     """
     module, cls = look_up("kind", name, KINDS)
-    return getattr(importlib.import_module(module, __package__), cls)  # type: ignore[no-any-return]
+    found: type[Recipe] = getattr(importlib.import_module(module, __package__), cls)
+    return found
 
 
 def list_recipes() -> list[str]:

@@ -85,11 +85,12 @@ def spectrum(values: np.ndarray, rate: float, segment: float = SEGMENT) -> Spect
             raise ValueError(f"a spectrum needs a second without longer gaps than {LONGEST_GAP:g} s, values has none")
         segment = longest / rate
         stretches = list(whole_stretches(values, rate, segment))
-    length, total, weight, frequency = round(segment * rate), 0.0, 0, np.zeros(1)
+    length = round(segment * rate)
+    total, weight = np.zeros(length // 2 + 1), 0
     for part in stretches:
-        frequency, density = welch(part - part.mean(axis=0), rate, nperseg=length, axis=0)
+        density = welch(part - part.mean(axis=0), rate, nperseg=length, axis=0)[1]
         total, weight = total + len(part) * density.sum(axis=1), weight + len(part)
-    return Spectrum(frequency, total / weight)
+    return Spectrum(np.fft.rfftfreq(length, 1.0 / rate), total / weight)
 
 
 def sinusoid_share(
