@@ -12,6 +12,7 @@ from ...filters.support.seeds import named_generator
 from ..bicycle.course.scenarios import list_scenarios, scenario
 from ..bicycle.course.surfaces import list_surfaces
 from ..bicycle.frame.parameters import BICYCLES
+from ..bicycle.ride.pilot import PILOTS
 from ..bicycle.rider.anthropometry import SUBJECTS
 from ..bicycle.rider.style import rider_style
 from ..bicycle.sensors.suites import suite_channels
@@ -68,6 +69,8 @@ class RiderRecipe(Recipe):
     """names of riding styles"""
     bicycles: tuple[str, ...] = ("mountain-bike",)
     """names of bicycles"""
+    pilots: tuple[str, ...] = ("expert", "skilled", "novice")
+    """names of pilots"""
     surfaces: tuple[str, ...] = ("scenario", "random")
     """names of road surfaces; ``scenario``: that of the scenario, ``random``: any"""
     sensors: RideSensors = field(default_factory=RideSensors)
@@ -81,6 +84,7 @@ class RiderRecipe(Recipe):
             ("fidelity", ("full", "lumped")),
             ("bicycles", tuple(BICYCLES)),
             ("subjects", ("random", *range(len(SUBJECTS)))),
+            ("pilots", ("ideal", "random", *PILOTS)),
             ("surfaces", ("scenario", "random", *list_surfaces())),
         ):
             check_some(name, getattr(self, name), known)
@@ -110,6 +114,7 @@ class RiderRecipe(Recipe):
             "subject": one("subject", self.subjects),
             "style": one("style", self.styles),
             "bicycle": one("bicycle", self.bicycles),
+            "pilot": one("pilot", self.pilots),
             "fidelity": one("fidelity", self.fidelity),
             "surface": None if surface == "scenario" else surface,
         }
