@@ -12,22 +12,18 @@ import math
 from bisect import bisect_right
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..course.path import Path, PathPoint
+from ..course.path import Path
 from ..frame.bicycle import AIR_DENSITY, BicycleState
 from ..frame.parameters import BicycleParameters
 from ..frame.whipple import WhippleModel, whipple_model
-from .regulator import PREVIEW_BIN, PREVIEW_BINS, lateral_model, preview_regulator, sampled
+from .preview import PREVIEW_BIN, PREVIEW_BINS, speed_limits
+from .regulator import lateral_model, preview_regulator, sampled
+from .steering import DISTANCE, DRIVE, LOWEST_SPEED, MEMORY, OFFSET, TARGET, TORQUE, Moving, Piloted, steer_exactly
 
-LOWEST_SPEED = 0.3
-"""m/s: gains are held below"""
-REACTION = 0.2
-"""s, time constant of a rider's pedalling or braking"""
-ANTICIPATED = 3
-"""bins of lead of the target"""
 POSITIVE = ("effort", "largest_torque", "largest_drive", "largest_power", "lateral_acceleration", "braking", "rate")
 """settings that must not be zero"""
 
@@ -80,17 +76,11 @@ class ControlSettings:
                 raise ValueError(f"{name} must be {'positive' if positive else 'not negative'} and finite, got {value}")
 
 
-@dataclass(frozen=True)
-class PilotMemory:
-    """State of the rider control model."""
+class PilotMemory(NamedTuple):
+    """State of a pilot."""
 
-    distance: float
-    offset: float
-    offset_integral: float
-    speed_integral: float
-    target: float
-    acceleration: float
-    command: tuple[float, float]
+    memory: tuple[float, ...]
+    """see :mod:`.steering`"""
     human: Any = None
     """state of a :class:`.human.HumanPilot`"""
 
@@ -145,18 +135,49 @@ class Pilot:
         slow, fast = np.arange(LOWEST_SPEED, 0.95, 0.1), np.arange(1.0, highest_speed + 0.25, 0.25)
         self._grid = [*slow.tolist(), *fast.tolist()]
         self._ahead = PREVIEW_BIN * np.arange(PREVIEW_BINS + 1)
-        self._mass, self._gravity = sum(part.mass for part in bicycle.parts), gravity
-        # a steady turn's roll, a part of its steer that grows with the square of the speed
-        still, moving = (self.model.steady_turn(speed, 1.0)[0] for speed in (0.0, 1.0))
-        self._roll_share = (still, moving - still)
+        self._gravity, self._rows = gravity, dict[float, np.ndarray]()
         self.period = 1.0 / self.settings.rate
+        self._numbers = self._piloted()
         self.start(Path(np.zeros(2)))
+
+    def _piloted(self) -> Piloted:
+        s, bicycle = self.settings, self.bicycle
+        mass = sum(part.mass for part in bicycle.parts)
+        return Piloted(
+            period=self.period,
+            wheelbase=bicycle.wheelbase,
+            tilt=math.cos(bicycle.steer_axis_tilt),
+            still=self._gravity * self.model.K0,
+            moving=self.model.K2,
+            mass=mass,
+            weight=mass * self._gravity,
+            rolling=bicycle.rolling_resistance,
+            drag=0.5 * AIR_DENSITY * bicycle.drag_area,
+            largest_torque=s.largest_torque,
+            speed_gain=s.speed_gain,
+            speed_integral=s.speed_integral,
+            largest_drive=s.largest_drive,
+            largest_power=s.largest_power,
+            largest_brake=mass * s.largest_brake,
+            lateral_acceleration=s.lateral_acceleration,
+            forward_acceleration=s.forward_acceleration,
+            braking=s.braking,
+        )
 
     def start(self, path: Path, speed: float = 0.0) -> None:
         """Begin a ride at the beginning of a path, at a speed (m/s)."""
-        self.path, self.distance, self.target = path, 0.0, speed
-        self.offset = self.offset_integral = self.speed_integral = self.acceleration = 0.0
-        self.command = (0.0, 0.0)
+        self.path, self._memory, self.command = path, np.zeros(MEMORY), (0.0, 0.0)
+        self._memory[TARGET] = speed
+
+    @property
+    def distance(self) -> float:
+        """Arc length on the path, m."""
+        return float(self._memory[DISTANCE])
+
+    @property
+    def offset(self) -> float:
+        """Distance to the left of the path, m."""
+        return float(self._memory[OFFSET])
 
     def comfortable_speed(self, path: Path, speed: float) -> float:
         """The most of ``speed`` (m/s) with which to begin a path that may turn soon."""
@@ -164,39 +185,10 @@ class Pilot:
         return min(speed, float(self.speed_limits(path.curvatures(distances), distances)[0]))
 
     def speed_limits(self, curvatures: np.ndarray, distances: np.ndarray) -> np.ndarray:
-        """The fastest ``(n,)`` m/s at each point ahead from which comfortable braking reaches all turns beyond in time.
-
-        v² = lateral acceleration / curvature + 2 · braking · distance, the least over all points beyond.
-
-        Args:
-            curvatures: ``(n,)`` of the path ahead, 1/m.
-            distances: ``(n,)`` to there, m, rising.
-        """
+        """See :func:`.preview.speed_limits`."""
         s = self.settings
-        reach = 2.0 * s.braking * distances
-        turns = s.lateral_acceleration / np.maximum(1e-6, np.abs(curvatures)) + reach
-        return np.sqrt(np.minimum.accumulate(turns[::-1])[::-1] - reach)
-
-    def turns_ahead(self, speed: float) -> tuple[np.ndarray, float]:
-        """Changes ``(2 · PREVIEW_BINS,)`` of the steady turn's roll and steer, rad, right positive, as they will come.
-
-        Args:
-            speed: now, m/s.
-
-        Returns:
-            The changes in each bin of time ahead, and the highest speed (m/s) that will suit the path a reaction later.
-        """
-        speed = max(speed, LOWEST_SPEED)
-        distances = speed * self._ahead
-        curvatures = self.path.curvatures(self.distance + distances)
-        limits = self.speed_limits(curvatures, distances)
-        speeds = np.minimum(speed, limits)
-        # braking delays the arrival
-        times = np.concatenate([[0.0], np.cumsum(2.0 * np.diff(distances) / (speeds[1:] + speeds[:-1]))])
-        steers = -self.bicycle.wheelbase / math.cos(self.bicycle.steer_axis_tilt) * curvatures
-        rolls = (self._roll_share[0] + self._roll_share[1] * speeds**2) * steers
-        changes = [np.diff(np.interp(self._ahead, times, values)) for values in (rolls, steers)]
-        return np.concatenate(changes), float(limits[ANTICIPATED])
+        found: np.ndarray = speed_limits(curvatures, distances, s.lateral_acceleration, s.braking)
+        return found
 
     def _between(self, speed: float) -> tuple[float, float, float]:
         """The two speeds of the table around one (m/s), and how far between them it lies."""
@@ -205,11 +197,11 @@ class Pilot:
         low, high = self._grid[index - 1], self._grid[index]
         return low, high, (speed - low) / (high - low)
 
-    def gains(self, speed: float) -> np.ndarray:
-        """Interpolated gains: 7 on the state, then those on the changes of roll and steer ahead."""
-        low, high, part = self._between(speed)
-        first, second = (gain_row(self.bicycle, self.settings, self._gravity, each) for each in (low, high))
-        return (1.0 - part) * first + part * second
+    def _row(self, speed: float) -> np.ndarray:
+        """Gains at a speed (m/s) of the table."""
+        if speed not in self._rows:
+            self._rows[speed] = gain_row(self.bicycle, self.settings, self._gravity, speed)
+        return self._rows[speed]
 
     def update(self, state: BicycleState, speed: float, lean: float = 0.0) -> tuple[float, float]:
         """Decide for the next control period.
@@ -223,78 +215,26 @@ class Pilot:
         Returns:
             Steer torque (N·m, left positive) and force at the wheels (N, forward positive, braking negative).
         """
-        point, offset, heading = self._follow(state)
-        self.offset_integral = max(-2.0, min(2.0, self.offset_integral + self.period * offset))
-        steer = self._turn(point.curvature, offset)
-        roll, torque = self.model.steady_turn(state.speed, -steer)
-        errors = (
-            state.roll - roll + self.lean_effect * lean,
-            steer - state.steer,
-            state.roll_rate,
-            -state.steer_rate,
-            -heading,
-            -offset,
-            -self.offset_integral,
-        )
-        ahead, limit = self.turns_ahead(state.speed)
-        # the model counts turns to the right
-        right = torque - float(self.gains(state.speed) @ np.concatenate([errors, ahead]))
-        largest = self.settings.largest_torque
-        self._wish(min(speed, limit))
-        self.command = (max(-largest, min(largest, -right)), self._driver(state))
+        low, high, part = self._between(state.speed)
+        rows, lean = (self._row(low), self._row(high)), self.lean_effect * lean
+        steer_exactly(self._numbers, self.path.points, *rows, part, moving(state), speed, lean, self._memory)
+        return self._decided()
+
+    def _decided(self) -> tuple[float, float]:
+        self.command = float(self._memory[TORQUE]), float(self._memory[DRIVE])
         return self.command
-
-    def _follow(self, state: BicycleState) -> tuple[PathPoint, float, float]:
-        """The point of the path at the bicycle, and offset (m) and heading (rad) from it, left positive."""
-        self.distance, self.offset = self.path.progress(self.distance, state.x, state.y)
-        point = self.path.at(self.distance)
-        heading = math.remainder(state.yaw - point.heading, 2.0 * math.pi)
-        # beyond a metre or half a radian off the path, limit the correction
-        return point, max(-1.0, min(1.0, self.offset)), max(-0.5, min(0.5, heading))
-
-    def _turn(self, curvature: float, offset: float) -> float:
-        """Steering angle (rad, left positive) of the turn to ride, at an offset (m, left positive) from the path."""
-        # beside the path a turn about the same middle has another radius
-        curvature /= max(0.5, 1.0 - curvature * offset)
-        return math.atan(self.bicycle.wheelbase * curvature) / math.cos(self.bicycle.steer_axis_tilt)
-
-    def _wish(self, speed: float) -> None:
-        """Rate-limit the target speed."""
-        s = self.settings
-        change = max(-s.braking * self.period, min(s.forward_acceleration * self.period, speed - self.target))
-        self.target += change
-        self.acceleration += (change / self.period - self.acceleration) * self.period / REACTION
-
-    def _driver(self, state: BicycleState) -> float:
-        """Force at the wheels: for slope, drag and the wanted acceleration, and against the error of the speed.
-
-        The error's integral is held while the force is at a limit.
-        """
-        s, bicycle, error = self.settings, self.bicycle, self.target - state.speed
-        weight = self._mass * self._gravity
-        drag = bicycle.rolling_resistance * weight + 0.5 * AIR_DENSITY * bicycle.drag_area * state.speed**2
-        known = self._mass * self.acceleration - weight * math.sin(state.pitch) + drag
-        integral = self.speed_integral + self.period * s.speed_integral * error
-        force, largest_brake = known + s.speed_gain * error + integral, self._mass * s.largest_brake
-        largest_drive = min(s.largest_drive, s.largest_power / max(LOWEST_SPEED, state.speed))
-        if -largest_brake < force < largest_drive:
-            self.speed_integral = integral
-        return max(-largest_brake, min(largest_drive, force))
 
     def save(self) -> PilotMemory:
         """State without the path."""
-        return PilotMemory(
-            self.distance,
-            self.offset,
-            self.offset_integral,
-            self.speed_integral,
-            self.target,
-            self.acceleration,
-            self.command,
-        )
+        return PilotMemory(tuple(self._memory.tolist()))
 
     def restore(self, memory: PilotMemory) -> None:
         """Undo :meth:`save`."""
-        self.distance, self.offset, self.offset_integral = memory.distance, memory.offset, memory.offset_integral
-        self.speed_integral, self.target = memory.speed_integral, memory.target
-        self.acceleration, self.command = memory.acceleration, memory.command
+        self._memory[:] = memory.memory
+        self._decided()
+
+
+def moving(state: BicycleState) -> Moving:
+    """What a pilot reads of a bicycle."""
+    s = state
+    return Moving(s.x, s.y, s.roll, s.pitch, s.yaw, s.roll_rate, s.speed, s.steer, s.steer_rate)

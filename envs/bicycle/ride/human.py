@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -16,22 +14,21 @@ from ..frame.parameters import BicycleParameters
 from ..rider.anthropometry import join
 from ..rider.muscles import TRUNK_DAMPING, TRUNK_STIFFNESS
 from ..rider.posture import Posture
-from .control import ControlSettings, Pilot, PilotMemory
+from .control import ControlSettings, Pilot, PilotMemory, moving
+from .human_steering import STATES, Human, InternalModel, steer_humanly
 from .internal_model import (
     RIGID,
-    STATES,
-    InternalModel,
     TrunkModel,
     command_noise,
     delays,
-    estimate,
     internal_model,
+    lean_matrices,
     rider_model,
     sensing_noise,
-    steady_turn,
+    steering_reaction,
 )
 from .pilot import PilotParameters
-from .regulator import PREVIEW_BINS, sampled
+from .regulator import sampled
 
 NOISES = 7
 """random numbers a control step: six senses and the muscles"""
@@ -48,7 +45,6 @@ class HumanMemory(NamedTuple):
     state: tuple[float, ...]
     inputs: tuple[float, ...]
     readings: tuple[float, ...]
-    arms: tuple[float, float]
     step: int
 
 
@@ -122,86 +118,51 @@ class HumanPilot(Pilot):
         s, step = self.settings, self.period
         self._costs = (s.roll, s.steer, s.roll_rate, s.steer_rate, *(human.care * c for c in (s.heading, s.offset)))
         self._costs += (human.care * s.offset_integral,)
-        self._sigma = sensing_noise(human, step)
-        self._muscle_sigma = command_noise(human, step)
+        self._models: dict[float, InternalModel] = {}
         # the arms themselves: torque and its rate
         A, B = rider_model(bicycle, human, trunk, gravity, 1.0)
-        arms, drive = sampled(A[6:8, 6:8], B[6:8, :1], step)
-        self._arms, self._drive = arms.tolist(), drive[:, 0].tolist()
+        still, faster = (lean_matrices(bicycle, trunk, gravity, speed)[2] for speed in (0.0, 1.0))
+        self._human = Human(
+            sigma=sensing_noise(human, step),
+            still=still,
+            moving=faster - still,
+            reaction=steering_reaction(bicycle, trunk),
+            muscles=trunk.stiffness - trunk.support,
+            levelling=float(trunk.levelling),
+            largest_torque=human.largest_torque,
+            arm_damping=human.arm_damping,
+            muscle_sigma=command_noise(human, step),
+            tremor=human.tremor,
+            motor_noise=human.motor_noise,
+            arms=np.hstack(sampled(A[6:8, 6:8], B[6:8, :1], step)),
+        )
 
     def start(self, path: Path, speed: float = 0.0) -> None:
         """Begin a ride at the beginning of a path, at a speed (m/s), upright and with idle hands."""
         super().start(path, speed)
-        self._slow, self._fast = delays(self.human, self.period)
-        self._state, self._inputs = np.zeros(STATES), np.zeros((self._slow + 1, 3))
-        self._readings = np.zeros((self._slow + 1, 6))
-        self._torque, self._count = (0.0, 0.0), 0
+        slow, _ = delays(self.human, self.period)
+        self._inputs, self._readings = np.zeros((slow + 1, 3)), np.zeros((slow + 1, 6))
+        # of the internal model and of the arms
+        self._state, self._count = np.zeros(STATES + 2), 0
 
     def update(self, state: BicycleState, speed: float, lean: float = 0.0) -> tuple[float, float]:
         """As :meth:`.Pilot.update`, steering as a human."""
-        point, offset, heading = self._follow(state)
+        low, high, part = self._between(state.speed)
         noise = self._noise.at(self._count)
         self._count += 1
-        readings, inputs = self._readings, self._inputs
-        readings[:-1] = readings[1:]
-        readings[-1] = (state.roll_rate, -state.steer, -state.steer_rate, state.roll, -heading, -offset)
-        readings[-1] += self._sigma * noise[:6]
-        expected = self._expected(state.speed)
-        left, lean = self._turn(point.curvature, offset), lean + self._trunk.levelling * state.roll
-        roll, trunk, torque = steady_turn(self.bicycle, self._trunk, self._gravity, state.speed, -left, lean)
-        # beyond a metre or half a radian off the path, limit the correction
-        offset, heading = max(-1.0, min(1.0, expected[5])), max(-0.5, min(0.5, expected[4]))
-        self.offset_integral = max(-2.0, min(2.0, self.offset_integral + self.period * offset))
-        errors = np.append(expected, self.offset_integral)
-        errors[[0, 1, 6, 10]] -= (roll, -left, torque, trunk)
-        errors[4], errors[5] = heading, offset
-        ahead, limit = self.turns_ahead(state.speed)
-        wanted = torque - float(self._gains(state.speed) @ np.concatenate([errors, ahead]))
-        largest = self.human.largest_torque
-        command = largest * math.tanh(wanted / largest)
-        # the path turns the heading; so does what steering does beyond the linear model
-        cos, wheelbase = math.cos(self.bicycle.steer_axis_tilt), self.bicycle.wheelbase
-        angle = -cos * max(-1.2, min(1.2, expected[1]))
-        curvature = point.curvature / max(0.5, 1.0 + point.curvature * offset)
-        inputs[:-1] = inputs[1:]
-        inputs[-1] = (command, state.speed * (curvature - (math.tan(angle) - angle) / wheelbase), lean)
-        self._wish(min(speed, limit))
-        arms = -self._move(command, float(noise[6])) - self.human.arm_damping * state.steer_rate
-        self.command = (arms, self._driver(state))
-        return self.command
-
-    def _expected(self, speed: float) -> np.ndarray:
-        """Filter and predict: the state ``(12,)`` that the rider expects at present."""
-        low, high, part = self._between(speed)
-        before, inputs, readings = self._state, self._inputs, self._readings
-        first, present = estimate(self._model(low), before, inputs, readings)
-        second, later = estimate(self._model(high), before, inputs, readings)
-        self._state = (1.0 - part) * first + part * second
-        return (1.0 - part) * present + part * later
+        steer_humanly(
+            self._numbers, self._human, self.path.points, self._model(low), self._model(high), part, noise,
+            moving(state), speed, lean, self._memory, self._state, self._inputs, self._readings,
+        )  # fmt: skip
+        return self._decided()
 
     def _model(self, speed: float) -> InternalModel:
-        return internal_model(self.bicycle, self.human, self._trunk, self._costs, self._gravity, speed, self.period)
-
-    def _gains(self, speed: float) -> np.ndarray:
-        low, high, part = self._between(speed)
-        return (1.0 - part) * self._model(low).gains + part * self._model(high).gains
-
-    def turns_ahead(self, speed: float) -> tuple[np.ndarray, float]:
-        """As :meth:`.Pilot.turns_ahead`, with the changes of the arm torque after those of roll and steer."""
-        changes, limit = super().turns_ahead(speed)
-        stiffness = self.model.stiffness(max(speed, self._grid[0]))[1]
-        roll, steer = changes[:PREVIEW_BINS], changes[PREVIEW_BINS:]
-        return np.concatenate([changes, stiffness[0] * roll + stiffness[1] * steer]), limit
-
-    def _move(self, command: float, noise: float) -> float:
-        """Torque of the arms, N·m, right positive, one control step after a command."""
-        unsteady = self._muscle_sigma * math.hypot(self.human.tremor, self.human.motor_noise * command) * noise
-        (a, b), (c, d) = self._arms
-        e, f = self._drive
-        torque, rate = self._torque
-        drive = command + unsteady
-        self._torque = (a * torque + b * rate + e * drive, c * torque + d * rate + f * drive)
-        return torque
+        """What the rider knows at a speed (m/s) of the table."""
+        if speed not in self._models:
+            self._models[speed] = internal_model(
+                self.bicycle, self.human, self._trunk, self._costs, self._gravity, speed, self.period
+            )
+        return self._models[speed]
 
     def save(self) -> PilotMemory:
         """State without the path."""
@@ -209,17 +170,15 @@ class HumanPilot(Pilot):
             tuple(self._state.tolist()),
             tuple(self._inputs.ravel().tolist()),
             tuple(self._readings.ravel().tolist()),
-            self._torque,
             self._count,
         )
-        return replace(super().save(), human=human)
+        return super().save()._replace(human=human)
 
     def restore(self, memory: PilotMemory) -> None:
         """Undo :meth:`save`."""
         super().restore(memory)
         human = memory.human
         assert human is not None
-        self._state = np.array(human.state)
-        self._inputs = np.array(human.inputs).reshape(-1, 3)
-        self._readings = np.array(human.readings).reshape(-1, 6)
-        self._torque, self._count = human.arms, human.step
+        self._state[:] = human.state
+        self._inputs.ravel()[:], self._readings.ravel()[:] = human.inputs, human.readings
+        self._count = human.step

@@ -20,13 +20,10 @@ from scipy.linalg import solve_discrete_are
 
 from ..frame.parameters import BicycleParameters
 from ..frame.whipple import whipple_model
+from .human_steering import CHANNELS, STATES, InternalModel
 from .pilot import PilotParameters
 from .regulator import preview_regulator, sampled
 
-STATES = 12
-"""size of the state"""
-CHANNELS = (2, 1, 3, 0, 4, 5)
-"""state that each sense reads: roll rate, steer, steer rate (fast); roll, heading, offset (visual)"""
 FAST = 3
 """number of fast senses"""
 STEER_DISTURBANCE, STEER_DISTURBANCE_TIME = 1.0, 0.5
@@ -72,26 +69,6 @@ class TrunkModel(NamedTuple):
 
 RIGID = TrunkModel(0.0, 0.3, 1.0, 0.3, 0.0, 1.0, 900.0, 90.0, 0.0, 0.0, 0.0, 0.0)
 """No trunk besides what is rigid on the bicycle: a joint without mass."""
-
-
-class InternalModel(NamedTuple):
-    """The rider's knowledge at one speed; arrays for :func:`.estimate`."""
-
-    A: np.ndarray
-    """(12, 12) one control step"""
-    B: np.ndarray
-    """(12, 3) of command, turning rate of the path and intended lean"""
-    K: np.ndarray
-    """(12, 6) filter gain of all senses"""
-    carry: np.ndarray
-    """(12, 12) filter's state to the present"""
-    inputs: np.ndarray
-    """(12, 3 Ns) remembered inputs, the oldest first, to the present"""
-    readings: np.ndarray
-    """(12, 3 (Ns − Nf)) fast readings since the filter's time, the oldest first, to the present"""
-    gains: np.ndarray
-    """(13 + 3 · PREVIEW_BINS,): command per state (the integral of the offset is the last) and per change of roll,
-    steer and arm torque of the steady turn ahead"""
 
 
 def delays(pilot: PilotParameters, step: float) -> tuple[int, int]:
@@ -140,26 +117,6 @@ def lean_matrices(bicycle: BicycleParameters, trunk: TrunkModel, gravity: float,
     K[2, 1] = m * arm * speed**2 * yaw
     K[2, 2] = trunk.stiffness - m * gravity * arm * math.cos(trunk.flexion)
     return [M, C, K]
-
-
-def steady_turn(
-    bicycle: BicycleParameters, trunk: TrunkModel, gravity: float, speed: float, steer: float, lean: float
-) -> tuple[float, float, float]:
-    """Roll (rad), lean (rad) and steer torque (N·m) that hold a small steering angle with an intended lean.
-
-    The lean is what is intended besides levelling.
-    """
-    K = lean_matrices(bicycle, trunk, gravity, speed)[2]
-    reaction = steering_reaction(bicycle, trunk)
-    # the torque, eliminated from the equation of the lean, adds the reaction times the equation of the steering
-    muscles = trunk.stiffness - trunk.support
-    a, b, c, d = K[0, 0], K[0, 2], K[2, 0] + reaction * K[1, 0], K[2, 2] + reaction * K[1, 2]
-    c += muscles * trunk.levelling
-    first = -K[0, 1] * steer
-    second = muscles * lean - (K[2, 1] + reaction * K[1, 1]) * steer
-    inverse = 1.0 / (a * d - b * c)
-    roll, lean = inverse * (d * first - b * second), inverse * (a * second - c * first)
-    return roll, lean, K[1, 0] * roll + K[1, 1] * steer + K[1, 2] * lean
 
 
 def steering_reaction(bicycle: BicycleParameters, trunk: TrunkModel) -> float:
@@ -277,28 +234,3 @@ def _command_gains(
     sampled_A, sampled_B = sampled(larger, column, step)
     gains, kernel = preview_regulator(sampled_A, sampled_B, np.diag(cost), pilot.effort, step, changes)
     return np.concatenate([gains, kernel.ravel()])
-
-
-def estimate(
-    model: InternalModel, state: np.ndarray, inputs: np.ndarray, readings: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """One control step of filter and prediction.
-
-    Args:
-        model: at the present speed.
-        state: ``(12,)`` of the filter, Ns + 1 steps ago.
-        inputs: ``(Ns + 1, 3)`` inputs since then, the oldest first.
-        readings: ``(Ns + 1, 6)`` of all senses, of Ns steps ago up to the present; the visual ones count at their first
-            row only, the fast ones up to Nf steps ago.
-
-    Returns:
-        State of the filter Ns steps ago, and the expected state at present.
-    """
-    before = model.A @ state + model.B @ inputs[0]
-    expected = np.array([before[2], before[1], before[3], before[0], before[4], before[5]])
-    now = before + model.K @ (readings[0] - expected)
-    steps = model.readings.shape[1] // 3
-    fast = readings[1 : steps + 1, :3].copy().reshape(3 * steps)
-    return now, model.carry @ now + model.inputs @ inputs[1:].copy().reshape(
-        model.inputs.shape[1]
-    ) + model.readings @ fast

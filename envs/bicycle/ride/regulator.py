@@ -9,11 +9,7 @@ from scipy.linalg import expm, solve_discrete_are
 
 from ..frame.parameters import BicycleParameters
 from ..frame.whipple import WhippleModel
-
-PREVIEW_BIN = 0.1
-"""s"""
-PREVIEW_BINS = 20
-"""preview distance of the rider along the path"""
+from .preview import PREVIEW_BIN, PREVIEW_BINS
 
 
 def lateral_model(model: WhippleModel, bicycle: BicycleParameters, speed: float) -> tuple[np.ndarray, np.ndarray]:

@@ -1,0 +1,199 @@
+"""One control step of a human pilot, compiled: senses, filter and prediction, command, arms."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from ....filters.compile.cache import jit
+from .preview import PREVIEW_BINS
+from .steering import DRIVE, LOWEST_SPEED, OFFSET_INTEGRAL, TORQUE, ahead, drive, follow, turning
+
+STATES = 12
+"""size of the state of the internal model"""
+CHANNELS = (2, 1, 3, 0, 4, 5)
+"""state that each sense reads: roll rate, steer, steer rate (fast); roll, heading, offset (visual)"""
+
+
+class Human(NamedTuple):
+    """Numbers of a human pilot."""
+
+    sigma: np.ndarray
+    """(6,) standard deviations of the readings"""
+    still: np.ndarray
+    """(3, 3) stiffness over roll, steer and lean at rest, N·m/rad"""
+    moving: np.ndarray
+    """(3, 3) what a squared speed adds, N·m/rad/(m/s)²"""
+    reaction: float
+    """1: moment that leans the trunk to the left, per steer torque to the right"""
+    muscles: float
+    """N·m/rad: of the trunk's muscles, less what the hands prop"""
+    levelling: float
+    """1: share of the roll that the intended lean compensates"""
+    largest_torque: float
+    """N·m"""
+    arm_damping: float
+    """N·m·s/rad"""
+    muscle_sigma: float
+    """1: standard deviation of a command for one of the torque"""
+    tremor: float
+    """N·m"""
+    motor_noise: float
+    """1"""
+    arms: np.ndarray
+    """(2, 3) torque and its rate after a step: of both before it, and of the command"""
+
+
+class InternalModel(NamedTuple):
+    """The rider's knowledge at one speed. The eyes lag Ns control steps behind, balance and arms Nf."""
+
+    A: np.ndarray
+    """(12, 12) one control step"""
+    B: np.ndarray
+    """(12, 3) of command, turning rate of the path and intended lean"""
+    K: np.ndarray
+    """(12, 6) filter gain of all senses"""
+    carry: np.ndarray
+    """(12, 12) filter's state to the present"""
+    inputs: np.ndarray
+    """(12, 3 Ns) remembered inputs, the oldest first, to the present"""
+    readings: np.ndarray
+    """(12, 3 (Ns − Nf)) fast readings since the filter's time, the oldest first, to the present"""
+    gains: np.ndarray
+    """(13 + 3 · PREVIEW_BINS,): command per state (the integral of the offset is the last) and per change of roll,
+    steer and arm torque of the steady turn ahead"""
+
+
+@jit
+def estimate(model, state, inputs, readings, now, present):  # type: ignore[no-untyped-def]
+    """One control step of filter and prediction.
+
+    Args:
+        model: at the present speed.
+        state: ``(12,)`` of the filter, Ns + 1 steps ago.
+        inputs: ``(Ns + 1, 3)`` inputs since then, the oldest first.
+        readings: ``(Ns + 1, 6)`` of all senses, of Ns steps ago up to the present; the visual ones count at their first
+            row only, the fast ones up to Nf steps ago.
+        now: ``(12,)`` state of the filter Ns steps ago, overwritten.
+        present: ``(12,)`` expected state at present, overwritten.
+    """
+    before = np.empty(STATES)
+    for row in range(STATES):
+        value = 0.0
+        for column in range(STATES):
+            value += model.A[row, column] * state[column]
+        for column in range(3):
+            value += model.B[row, column] * inputs[0, column]
+        before[row] = value
+    for row in range(STATES):
+        value = before[row]
+        for sense in range(6):
+            value += model.K[row, sense] * (readings[0, sense] - before[CHANNELS[sense]])
+        now[row] = value
+    delay, fast = model.inputs.shape[1] // 3, model.readings.shape[1] // 3
+    for row in range(STATES):
+        value = 0.0
+        for column in range(STATES):
+            value += model.carry[row, column] * now[column]
+        for step in range(delay):
+            for column in range(3):
+                value += model.inputs[row, 3 * step + column] * inputs[1 + step, column]
+        for step in range(fast):
+            for column in range(3):
+                value += model.readings[row, 3 * step + column] * readings[1 + step, column]
+        present[row] = value
+
+
+@jit
+def steady_turn(human, speed, steer, lean):  # type: ignore[no-untyped-def]
+    """Roll (rad), lean (rad) and steer torque (N·m) that hold a small steering angle with an intended lean.
+
+    The lean is what is intended besides levelling.
+    """
+    K = human.still + speed * speed * human.moving
+    # the torque, eliminated from the equation of the lean, adds the reaction times the equation of the steering
+    reaction, muscles = human.reaction, human.muscles
+    a, b, c, d = K[0, 0], K[0, 2], K[2, 0] + reaction * K[1, 0], K[2, 2] + reaction * K[1, 2]
+    c += muscles * human.levelling
+    first = -K[0, 1] * steer
+    second = muscles * lean - (K[2, 1] + reaction * K[1, 1]) * steer
+    inverse = 1.0 / (a * d - b * c)
+    roll, lean = inverse * (d * first - b * second), inverse * (a * second - c * first)
+    return roll, lean, K[1, 0] * roll + K[1, 1] * steer + K[1, 2] * lean
+
+
+@jit
+def steer_humanly(  # type: ignore[no-untyped-def]
+    piloted, human, points, low, high, part, noise, now, wanted, lean, memory, state, inputs, readings
+):
+    """Decide as a human.
+
+    Args:
+        piloted: numbers of the bicycle, :class:`.Piloted`.
+        human: numbers of the pilot.
+        points: ``(n, 4)`` of the path.
+        low: :class:`InternalModel` at a speed below.
+        high: at a speed above.
+        part: how far the speed lies between both, 0 to 1.
+        noise: ``(7,)`` standard normal numbers: six senses and the muscles.
+        now: :class:`.Moving`.
+        wanted: speed, m/s.
+        lean: of the trunk to the bicycle that the rider intends besides levelling, rad, right positive.
+        memory: of the pilot; the decision is written there.
+        state: ``(14,)`` of the internal model and of the arms (torque and its rate), advanced.
+        inputs: ``(Ns + 1, 3)`` remembered, advanced.
+        readings: ``(Ns + 1, 6)`` remembered, advanced.
+    """
+    curvature, offset, heading = follow(points, now, memory)
+    readings[:-1] = readings[1:]
+    felt = (now.roll_rate, -now.steer, -now.steer_rate, now.roll, -heading, -offset)
+    for sense in range(6):
+        readings[-1, sense] = felt[sense] + human.sigma[sense] * noise[sense]
+    # filter and predict, between two speeds of the table
+    first, second, expected, later = np.empty(STATES), np.empty(STATES), np.empty(STATES), np.empty(STATES)
+    estimate(low, state, inputs, readings, first, expected)
+    estimate(high, state, inputs, readings, second, later)
+    for row in range(STATES):
+        state[row] = (1.0 - part) * first[row] + part * second[row]
+        expected[row] = (1.0 - part) * expected[row] + part * later[row]
+    left, lean = turning(piloted, curvature, offset), lean + human.levelling * now.roll
+    roll, trunk, torque = steady_turn(human, now.speed, -left, lean)
+    # beyond a metre or half a radian off the path, limit the correction
+    steer, offset, heading = expected[1], max(-1.0, min(1.0, expected[5])), max(-0.5, min(0.5, expected[4]))
+    memory[OFFSET_INTEGRAL] = max(-2.0, min(2.0, memory[OFFSET_INTEGRAL] + piloted.period * offset))
+    expected[0] -= roll
+    expected[1] += left
+    expected[6] -= torque
+    expected[10] -= trunk
+    expected[4], expected[5] = heading, offset
+    command = torque
+    for row in range(STATES):
+        command -= ((1.0 - part) * low.gains[row] + part * high.gains[row]) * expected[row]
+    command -= ((1.0 - part) * low.gains[STATES] + part * high.gains[STATES]) * memory[OFFSET_INTEGRAL]
+    changes = np.empty(2 * PREVIEW_BINS)
+    limit = ahead(piloted, points, now.speed, memory, changes)
+    squared = max(now.speed, LOWEST_SPEED) ** 2
+    by_roll = piloted.still[1, 0] + squared * piloted.moving[1, 0]
+    by_steer = piloted.still[1, 1] + squared * piloted.moving[1, 1]
+    for index in range(PREVIEW_BINS):
+        to_roll, to_steer = changes[index], changes[PREVIEW_BINS + index]
+        for kind, change in enumerate((to_roll, to_steer, by_roll * to_roll + by_steer * to_steer)):
+            place = STATES + 1 + PREVIEW_BINS * kind + index
+            command -= ((1.0 - part) * low.gains[place] + part * high.gains[place]) * change
+    command = human.largest_torque * math.tanh(command / human.largest_torque)
+    # the path turns the heading; so does what steering does beyond the linear model
+    angle = -piloted.tilt * max(-1.2, min(1.2, steer))
+    curvature /= max(0.5, 1.0 + curvature * offset)
+    inputs[:-1] = inputs[1:]
+    inputs[-1, 0] = command
+    inputs[-1, 1] = now.speed * (curvature - (math.tan(angle) - angle) / piloted.wheelbase)
+    inputs[-1, 2] = lean
+    # the arms' torque, right positive, follows the command of muscles that are not steady
+    memory[TORQUE] = -state[12] - human.arm_damping * now.steer_rate
+    driven = command + human.muscle_sigma * math.hypot(human.tremor, human.motor_noise * command) * noise[6]
+    arm, rate = state[12], state[13]
+    for row in range(2):
+        state[12 + row] = human.arms[row, 0] * arm + human.arms[row, 1] * rate + human.arms[row, 2] * driven
+    memory[DRIVE] = drive(piloted, now, min(wanted, limit), memory)

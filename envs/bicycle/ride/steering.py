@@ -1,0 +1,177 @@
+"""Steering along a path and the driving force, compiled: :func:`steer_exactly` and :func:`steer_humanly`.
+
+A pilot's memory ``(8,)``: arc length on the path (m), offset to the left of it (m), integral of the offset (m·s),
+integral of the speed's error (N), target speed (m/s), its rate (m/s²), steer torque (N·m, left positive) and force at
+the wheels (N) that were decided last.
+
+The model counts roll, steer and offset to the right; a bicycle's state and a path count to the left.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from ....filters.compile.cache import jit
+from ..course.path import nearest, point_at
+from .preview import PREVIEW_BINS, turns_ahead
+
+DISTANCE, OFFSET, OFFSET_INTEGRAL, SPEED_INTEGRAL, TARGET, ACCELERATION, TORQUE, DRIVE = range(8)
+"""places in a pilot's memory"""
+MEMORY = 8
+LOWEST_SPEED = 0.3
+"""m/s: gains are held below"""
+REACTION = 0.2
+"""s, time constant of a rider's pedalling or braking"""
+
+
+class Piloted(NamedTuple):
+    """Numbers of a bicycle with its rider, and of the settings of its pilot."""
+
+    period: float
+    """s of control"""
+    wheelbase: float
+    """m"""
+    tilt: float
+    """1: cosine of the steering axis' tilt"""
+    still: np.ndarray
+    """(2, 2) stiffness of Whipple's model at rest, N·m/rad"""
+    moving: np.ndarray
+    """(2, 2) what a squared speed adds, N·m/rad/(m/s)²"""
+    mass: float
+    """kg, of all"""
+    weight: float
+    """N"""
+    rolling: float
+    """1: rolling resistance"""
+    drag: float
+    """kg/m: half the density of air times the drag area"""
+    largest_torque: float
+    """N·m"""
+    speed_gain: float
+    """N/(m/s)"""
+    speed_integral: float
+    """N/m"""
+    largest_drive: float
+    """N"""
+    largest_power: float
+    """W"""
+    largest_brake: float
+    """N"""
+    lateral_acceleration: float
+    """m/s²"""
+    forward_acceleration: float
+    """m/s²"""
+    braking: float
+    """m/s²"""
+
+
+class Moving(NamedTuple):
+    """What a pilot reads of a bicycle; units and signs of :class:`.BicycleState`."""
+
+    x: float
+    y: float
+    roll: float
+    pitch: float
+    yaw: float
+    roll_rate: float
+    speed: float
+    steer: float
+    steer_rate: float
+
+
+@jit
+def follow(points, now, memory):  # type: ignore[no-untyped-def]
+    """Curvature of the path at the bicycle (1/m), and offset (m) and heading (rad) from it, limited, left positive."""
+    memory[DISTANCE], memory[OFFSET] = nearest(points, memory[DISTANCE], now.x, now.y)
+    _, _, heading, curvature = point_at(points, memory[DISTANCE])
+    heading = now.yaw - heading
+    heading -= 2.0 * math.pi * np.round(heading / (2.0 * math.pi))
+    # beyond a metre or half a radian off the path, limit the correction
+    return curvature, max(-1.0, min(1.0, memory[OFFSET])), max(-0.5, min(0.5, heading))
+
+
+@jit
+def turning(piloted, curvature, offset):  # type: ignore[no-untyped-def]
+    """Steering angle (rad, left positive) of the turn to ride, at an offset (m, left positive) from the path."""
+    # beside the path a turn about the same middle has another radius
+    curvature /= max(0.5, 1.0 - curvature * offset)
+    return math.atan(piloted.wheelbase * curvature) / piloted.tilt
+
+
+@jit
+def ahead(piloted, points, speed, memory, changes):  # type: ignore[no-untyped-def]
+    """:func:`.turns_ahead` at a speed (m/s): the speed that will suit the path a reaction later."""
+    still, moving = piloted.still, piloted.moving
+    rest = -still[0, 1] / still[0, 0]
+    # the roll of a steady turn per steer; its part that grows with the square of the speed
+    grown = -(still[0, 1] + moving[0, 1]) / (still[0, 0] + moving[0, 0]) - rest
+    turn = (-piloted.wheelbase / piloted.tilt, rest, grown)
+    lateral, braking = piloted.lateral_acceleration, piloted.braking
+    return turns_ahead(points, memory[DISTANCE], max(speed, LOWEST_SPEED), turn, lateral, braking, changes)
+
+
+@jit
+def drive(piloted, now, wanted, memory):  # type: ignore[no-untyped-def]
+    """Force at the wheels (N): for slope, drag and the wanted acceleration, and against the error of the speed.
+
+    The error's integral is held while the force is at a limit.
+    """
+    p = piloted
+    change = max(-p.braking * p.period, min(p.forward_acceleration * p.period, wanted - memory[TARGET]))
+    memory[TARGET] += change
+    memory[ACCELERATION] += (change / p.period - memory[ACCELERATION]) * p.period / REACTION
+    error = memory[TARGET] - now.speed
+    drag = p.rolling * p.weight + p.drag * now.speed**2
+    known = p.mass * memory[ACCELERATION] - p.weight * math.sin(now.pitch) + drag
+    integral = memory[SPEED_INTEGRAL] + p.period * p.speed_integral * error
+    force = known + p.speed_gain * error + integral
+    largest = min(p.largest_drive, p.largest_power / max(LOWEST_SPEED, now.speed))
+    if -p.largest_brake < force < largest:
+        memory[SPEED_INTEGRAL] = integral
+    return max(-p.largest_brake, min(largest, force))
+
+
+@jit
+def steer_exactly(piloted, points, low, high, part, now, wanted, lean, memory):  # type: ignore[no-untyped-def]
+    """Decide as a pilot who knows the exact state, without delay.
+
+    Args:
+        piloted: numbers of the bicycle.
+        points: ``(n, 4)`` of the path.
+        low: gains ``(7 + 2 · PREVIEW_BINS,)`` at a speed below.
+        high: gains at a speed above.
+        part: how far the speed lies between both, 0 to 1.
+        now: :class:`Moving`.
+        wanted: speed, m/s.
+        lean: what the rider's lean adds to the roll, rad.
+        memory: of the pilot; the decision is written there.
+    """
+    p = piloted
+    curvature, offset, heading = follow(points, now, memory)
+    memory[OFFSET_INTEGRAL] = max(-2.0, min(2.0, memory[OFFSET_INTEGRAL] + p.period * offset))
+    steer = turning(p, curvature, offset)
+    squared = now.speed * now.speed
+    s00, s01 = p.still[0, 0] + squared * p.moving[0, 0], p.still[0, 1] + squared * p.moving[0, 1]
+    s10, s11 = p.still[1, 0] + squared * p.moving[1, 0], p.still[1, 1] + squared * p.moving[1, 1]
+    roll = s01 * steer / s00
+    right = s10 * roll - s11 * steer
+    errors = (
+        now.roll - roll + lean,
+        steer - now.steer,
+        now.roll_rate,
+        -now.steer_rate,
+        -heading,
+        -offset,
+        -memory[OFFSET_INTEGRAL],
+    )
+    for index in range(7):
+        right -= ((1.0 - part) * low[index] + part * high[index]) * errors[index]
+    changes = np.empty(2 * PREVIEW_BINS)
+    limit = ahead(p, points, now.speed, memory, changes)
+    for index in range(len(changes)):
+        right -= ((1.0 - part) * low[7 + index] + part * high[7 + index]) * changes[index]
+    memory[TORQUE] = max(-p.largest_torque, min(p.largest_torque, -right))
+    memory[DRIVE] = drive(p, now, min(wanted, limit), memory)
