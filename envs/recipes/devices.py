@@ -76,6 +76,12 @@ class VariedSensors(Checked):
     """1/s, how often"""
     pause: Range = (0.05, 2.0)
     """s, mean length"""
+    magnetometer_noise: Range = (0.01, 0.3)
+    """µT/√Hz"""
+    magnetometer_bias: Range = (0.1, 3.0)
+    """µT: what a calibration of hard iron leaves"""
+    magnetometer_scale: Range = (1e-3, 2e-2)
+    """of scale factors and cross-axis sensitivities alike"""
     timing: VariedTiming = field(default_factory=VariedTiming)
 
     def draw(self, generator: np.random.Generator) -> SensorPreset:
@@ -105,5 +111,14 @@ class VariedSensors(Checked):
             burst_rate=burst_rate * float(silent),
             burst_duration=log_uniform(generator, self.pause),
         )
+        # descendants by name, which leave the draws above as they are
+        own = named_generator(generator, "magnetometer")
+        magnetometer = NoiseModel(
+            white_noise=log_uniform(own, self.magnetometer_noise),
+            turn_on_bias=log_uniform(own, self.magnetometer_bias),
+            scale_factor=log_uniform(own, self.magnetometer_scale),
+            misalignment=log_uniform(own, self.magnetometer_scale),
+            full_scale=4900.0,
+        )
         timing = self.timing.draw(generator)
-        return SensorPreset("varied", "domain randomisation", gyroscope, accelerometer, timing=timing)
+        return SensorPreset("varied", "domain randomisation", gyroscope, accelerometer, magnetometer, timing=timing)

@@ -14,20 +14,23 @@ import numpy as np
 
 from ...filters.core import rotation
 from ...filters.support.ranges import Range, log_uniform
+from ...filters.support.seeds import named_generator
 from ..data.trajectory import Trajectory
 from ..hand.carried import Carried
 from ..hand.hand_held import HandHeld
 from ..sensors.ideal import Mounting, mounted
+from ..sensors.magnetics import MAGNETICS
 from ..sensors.suite import imu_suite
 from .devices import VariedSensors
-from .recipe import Recipe, unspawned
+from .recipe import Recipe, check_some, chosen, unspawned
 
 
 @dataclass(frozen=True)
 class HandRecipe(Recipe):
     """A distribution of hand motions, devices and mountings; no physics engine is used.
 
-    An episode has the channels ``imu/gyr`` (rad/s) and ``imu/acc`` (m/s²), NaN where a sample is lost, and the truth
+    An episode has the channels ``imu/gyr`` (rad/s) and ``imu/acc`` (m/s²), with a magnetometer ``imu/mag`` (µT), NaN
+    where a sample is lost, and the truth
     ``orientation`` (sensor to world) and ``position`` (of the sensor, m).
     """
 
@@ -47,10 +50,15 @@ class HandRecipe(Recipe):
     carried: Carried = field(default_factory=lambda: Carried(first_rest=(0.3, 20.0), running_share=0.15))
     carried_share: float = 0.25
     """of the episodes in which the device is carried, not moved by the hand alone"""
+    magnetics: tuple[str, ...] = ()
+    """names of magnetic surroundings (:data:`poise.envs.sensors.magnetics.MAGNETICS`), of which an episode has one;
+    without any, devices have no magnetometer"""
     sensors: VariedSensors = field(default_factory=VariedSensors)
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        if self.magnetics:
+            check_some("magnetics", self.magnetics, tuple(MAGNETICS))
         if not self.duration * self.rates[0] >= 2.0:
             raise ValueError(f"duration must be two samples at least, got {self.duration} s")
 
@@ -68,7 +76,11 @@ class HandRecipe(Recipe):
         sampling: Literal["interval", "instant"] = "interval" if means else "instant"
         lever = tuple(setting.standard_normal(3) * log_uniform(setting, self.lever_arm))
         mounting = Mounting(lever, tuple(rotation.random(setting)))
-        suite = imu_suite(self.sensors.draw(setting), rate, lever, mounting.rotation, sampling=sampling)
+        device = self.sensors.draw(setting)
+        magnetics = chosen(named_generator(setting, "magnetics"), self.magnetics) if self.magnetics else None
+        suite = imu_suite(
+            device, rate, lever, mounting.rotation, self.magnetics != (), sampling=sampling, magnetics=magnetics
+        )
         suite.reset(noise)
         carried = setting.random() < self.carried_share
         gesture = (self.carried if carried else self.held).draw(motion, self.duration)

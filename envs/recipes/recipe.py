@@ -132,3 +132,21 @@ def dataclass_in(hint: Any) -> type[Any] | None:
     """The dataclass that an annotation names, alone or as ``X | None``; None where it names none."""
     choices = typing.get_args(hint) if typing.get_origin(hint) in (typing.Union, types.UnionType) else (hint,)
     return next((each for each in choices if isinstance(each, type) and is_dataclass(each)), None)
+
+
+def chosen(generator: np.random.Generator, values: tuple[Any, ...]) -> Any:
+    """One of the values, all of them equally likely."""
+    return values[int(generator.integers(len(values)))]
+
+
+def check_some(name: str, values: tuple[Any, ...], known: tuple[Any, ...] | None = None) -> None:
+    """Refuse an empty choice, and one of what is not known.
+
+    Raises:
+        ValueError: with the name, and what is accepted.
+    """
+    if not values:
+        raise ValueError(f"{name} must hold one name at least, got none")
+    for value in values:
+        if known is not None and value not in known:
+            raise ValueError(f"{name} must be among {list(known)}, got {value!r}")

@@ -19,7 +19,7 @@ from ..bicycle.sensors.suites import suite_channels
 from ..data.trajectory import Trajectory
 from ..sensors.presets import list_sensor_presets
 from .devices import VariedTiming
-from .recipe import Recipe, unspawned
+from .recipe import Recipe, check_some, chosen, unspawned
 from .redraw import TapeMeasure, redrawn
 
 
@@ -168,21 +168,3 @@ class RiderRecipe(Recipe):
                 for site in dict.fromkeys(name.partition("/")[0] for name in ride.measurements)
             },
         )
-
-
-def chosen(generator: np.random.Generator, values: tuple[Any, ...]) -> Any:
-    """One of the values, all of them equally likely."""
-    return values[int(generator.integers(len(values)))]
-
-
-def check_some(name: str, values: tuple[Any, ...], known: tuple[Any, ...] | None = None) -> None:
-    """Refuse an empty choice, and one of what is not known.
-
-    Raises:
-        ValueError: with the name, and what is accepted.
-    """
-    if not values:
-        raise ValueError(f"{name} must hold one name at least, got none")
-    for value in values:
-        if known is not None and value not in known:
-            raise ValueError(f"{name} must be among {list(known)}, got {value!r}")

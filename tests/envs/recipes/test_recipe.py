@@ -94,3 +94,15 @@ def test_unknown_names_are_refused() -> None:
         SHORT.episode(0, -1)
     with pytest.raises(ValueError, match="rhythmic_share"):
         replace(SHORT.held, rhythmic_share=2.0)
+
+
+def test_magnetic_surroundings_bring_a_magnetometer_and_change_nothing_else() -> None:
+    plain, magnetic = SHORT.episode(4, 0), replace(SHORT, magnetics=("indoor", "passing-magnets")).episode(4, 0)
+    assert "imu/mag" not in plain.measurements
+    for name in ("imu/gyr", "imu/acc"):
+        np.testing.assert_array_equal(magnetic.measurements[name], plain.measurements[name])
+    strength = np.linalg.norm(magnetic.measurements["imu/mag"], axis=1)
+    assert 20.0 < np.nanmedian(strength) < 90.0
+    assert np.nanstd(strength) > 0.05
+    with pytest.raises(ValueError, match=r"magnetics must be among .*got 'moon'"):
+        replace(SHORT, magnetics=("moon",))
