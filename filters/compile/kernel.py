@@ -1,7 +1,8 @@
 """The Kalman recursion as plain loops: the part of the compiled filter that is the same for every model.
 
-Printed models (:mod:`.printer`) import it. F, H and R of most models are mostly zeros, so products run over lists of
-the elements that are not (:func:`nonzero`), found anew at every tick.
+Printed models (:mod:`.printer`) import it. F and H of most models are mostly zeros, so products run over lists of the
+elements that can be other: line i has ``column[first[i]:first[i + 1]]``. Sums over several columns or rows at a time
+stay in registers; each is formed in the order in which it is written.
 """
 
 from __future__ import annotations
@@ -52,19 +53,15 @@ def zeros(rows, columns):  # type: ignore[no-untyped-def]
 
 @jit
 def scratch(n, e, m, d, p):  # type: ignore[no-untyped-def]
-    """Memory of a run, reused at every tick: vectors, matrices of states and of rows, lists of integers.
+    """Memory of a run, reused at every tick: vectors, matrices of states and of rows, the rows that were used.
 
     For n states, e error states, m rows, d numbers a sample and p parameters: current, present, before, x1, x0, r, dx,
-    grown; P0, F, Q, work; H, R, S, HP, K; every, first, column, rows.
+    grown; P0, F, Q, work; H, R, S, HP, K; rows.
     """
     vectors = np.empty(d), np.empty(d), np.empty(d), np.empty(n), np.empty(n), np.empty(m), np.empty(e), np.empty(p)
     square = zeros(e, e), zeros(e, e), zeros(e, e), zeros(e, e)
     measured = zeros(m, e), zeros(m, m), zeros(m, m), zeros(m, e), zeros(m, e)
-    every, most = np.empty(e, np.int64), max(e, m)
-    for i in range(e):
-        every[i] = i
-    lists = every, np.empty(most + 1, np.int64), np.empty(most * e, np.int64), np.empty(m, np.int64)
-    return vectors, square, measured, lists
+    return vectors, square, measured, np.empty(m, np.int64)
 
 
 @jit
@@ -148,41 +145,49 @@ def keep(started, P, pose, covariances, t, b):  # type: ignore[no-untyped-def]
 
 
 @jit
-def nonzero(matrix, rows, count, first, column):  # type: ignore[no-untyped-def]
-    """List where the given rows of a matrix are not zero: line i has ``column[first[i]:first[i + 1]]``."""
-    total = 0
-    for i in range(count):
-        first[i] = total
-        for k in range(matrix.shape[1]):
-            if matrix[rows[i], k] != 0.0:
-                column[total] = k
-                total += 1
-    first[count] = total
-
-
-@jit
-def propagate(F, P, Q, work, every, first, column):  # type: ignore[no-untyped-def]
-    """P ← F P Fᵀ + Q in place; all ``(e, e)``.
-
-    ``every`` is 0, 1, … e − 1. Scratch: work ``(e, e)``; first, column, integers as for :func:`nonzero`.
-    """
+def propagate(F, P, Q, work, first, column):  # type: ignore[no-untyped-def]
+    """P ← F P Fᵀ + Q in place; all ``(e, e)``, with the lists of F. Scratch: work ``(e, e)``."""
     n = P.shape[0]
-    nonzero(F, every, n, first, column)
     for i in range(n):
-        for j in range(n):
-            work[i, j] = 0.0
-        for t in range(first[i], first[i + 1]):
-            k = column[t]
-            f = F[i, k]
-            for j in range(n):
-                work[i, j] += f * P[k, j]
+        begin, end, j = first[i], first[i + 1], 0
+        while j + 4 <= n:
+            s0 = s1 = s2 = s3 = 0.0
+            for t in range(begin, end):
+                k = column[t]
+                f = F[i, k]
+                s0 += f * P[k, j]
+                s1 += f * P[k, j + 1]
+                s2 += f * P[k, j + 2]
+                s3 += f * P[k, j + 3]
+            work[i, j], work[i, j + 1], work[i, j + 2], work[i, j + 3] = s0, s1, s2, s3
+            j += 4
+        while j < n:
+            s0 = 0.0
+            for t in range(begin, end):
+                s0 += F[i, column[t]] * P[column[t], j]
+            work[i, j] = s0
+            j += 1
+    for j in range(n):
+        begin, end, i = first[j], first[j + 1], j
+        while i + 3 <= n:
+            s0 = s1 = s2 = 0.0
+            for t in range(begin, end):
+                k = column[t]
+                f = F[j, k]
+                s0 += work[i, k] * f
+                s1 += work[i + 1, k] * f
+                s2 += work[i + 2, k] * f
+            P[i, j], P[i + 1, j], P[i + 2, j] = s0, s1, s2
+            i += 3
+        while i < n:
+            s0 = 0.0
+            for t in range(begin, end):
+                s0 += work[i, column[t]] * F[j, column[t]]
+            P[i, j] = s0
+            i += 1
     for i in range(n):
         for j in range(i + 1):
-            total = 0.0
-            for t in range(first[j], first[j + 1]):
-                total += work[i, column[t]] * F[j, column[t]]
-            P[i, j] = total + 0.5 * (Q[i, j] + Q[j, i])
-            P[j, i] = P[i, j]
+            P[i, j] = P[j, i] = P[i, j] + 0.5 * (Q[i, j] + Q[j, i])
 
 
 @jit
@@ -191,9 +196,10 @@ def correct(r, H, R, P, dx, white, rows, S, HP, K, first, column):  # type: igno
 
     S = H P Hᵀ + R = L Lᵀ,  K = P Hᵀ S⁻¹,  P ← (I − K H) P (I − K H)ᵀ + K R Kᵀ,  dx = K r,  white = L⁻¹ r
 
-    In: residual r ``(m,)``, Jacobian H ``(m, e)``, covariance R ``(m, m)``. Changed in place: P ``(e, e)``. Out: dx
-    ``(e,)``, white ``(m,)``. Scratch: rows ``(m,)`` integers, S ``(m, m)``, HP and K ``(m, e)``; first, column as for
-    :func:`nonzero`. Returns the normalised innovation squared, 0 if every row was left out.
+    In: residual r ``(m,)``, Jacobian H ``(m, e)`` with its lists, covariance R ``(m, m)``. Changed in place: P
+    ``(e, e)``. Out: dx ``(e,)``, white ``(m,)``, rows ``(m,)`` (the count that were used, then −1); of these, the
+    Cholesky factor of S ``(m, m)`` and K ``(m, e)``. Scratch: HP ``(m, e)``. Returns the normalised innovation squared,
+    0 if every row was left out.
     """
     n = P.shape[0]
     count = 0
@@ -202,14 +208,15 @@ def correct(r, H, R, P, dx, white, rows, S, HP, K, first, column):  # type: igno
         if np.isfinite(r[a]) and np.isfinite(R[a, a]) and finite(H[a]):
             rows[count] = a
             count += 1
+    for a in range(count, r.shape[0]):
+        rows[a] = -1
     fill(dx, 0.0)
     if count == 0:
         return 0.0
-    nonzero(H, rows, count, first, column)
     for a in range(count):
         for j in range(n):
             HP[a, j] = 0.0
-        for t in range(first[a], first[a + 1]):
+        for t in range(first[rows[a]], first[rows[a] + 1]):
             k = column[t]
             h = H[rows[a], k]
             for j in range(n):
@@ -217,7 +224,7 @@ def correct(r, H, R, P, dx, white, rows, S, HP, K, first, column):  # type: igno
     for a in range(count):
         for b in range(a + 1):
             total = 0.5 * (R[rows[a], rows[b]] + R[rows[b], rows[a]])
-            for t in range(first[b], first[b + 1]):
+            for t in range(first[rows[b]], first[rows[b] + 1]):
                 total += HP[a, column[t]] * H[rows[b], column[t]]
             S[a, b] = total
     # Cholesky factor in the lower triangle of S, then L⁻¹ r and the gain by substitution.
@@ -262,7 +269,7 @@ def correct(r, H, R, P, dx, white, rows, S, HP, K, first, column):  # type: igno
     for a in range(count):
         for i in range(n):
             total = 0.0
-            for t in range(first[a], first[a + 1]):
+            for t in range(first[rows[a]], first[rows[a] + 1]):
                 total += P[i, column[t]] * H[rows[a], column[t]]
             HP[a, i] = total
         for b in range(count):

@@ -19,7 +19,7 @@ from ..core.model import Equations, Model, Recurrence, parameters_of, with_param
 from ..core.monitor import INFLATION, INPUTS, LOST, MEMORY, places_of, starts_of, watch
 from ..core.quantity import GYROSCOPE
 from ..core.sampling import split
-from .trace import Tape, print_code
+from .trace import Expression, Tape, print_code
 
 _HEAD = """
 from math import *
@@ -31,11 +31,13 @@ from poise.filters.compile.cache import jit
 from poise.filters.compile.kernel import (
     begin, copy, copy_matrix, correct, fill, gather, keep, propagate, realign, scratch, squared, take, zeros
 )
-from poise.filters.compile.smoothing import smooth_step
+from poise.filters.compile.smoothing import remember, update_back
 
 inf, nan = np.inf, np.nan
 """
 
+WIDTH = 10
+"""Columns of a product that are summed at a time."""
 _INNER = '@njit(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)'
 
 _RUN = """
@@ -46,11 +48,10 @@ starts = np.array({starts})
 def run(x, P, held, age, monitor, started, Z, parameters, restart, poses, covariances, whites, nis):
     # All ticks of all sequences of a batch; the state, x to started, is changed in place.
     sizes = x.shape[1], P.shape[1], whites.shape[2], Z.shape[2], parameters.shape[2]
-    vectors, square, measured, lists = scratch(*sizes)
+    vectors, square, measured, rows = scratch(*sizes)
     current, present, before, x1, x0, r, dx, grown = vectors
     P0, F, Q, work = square
-    H, R, S, HP, K = measured
-    every, first, column, rows = lists{memory}
+    H, R, S, HP, K = measured{memory}
     for t in range(Z.shape[0]):
         for b in range(Z.shape[1]):
             p = parameters[t if parameters.shape[0] > 1 else 0, b if parameters.shape[1] > 1 else 0]
@@ -61,10 +62,10 @@ def run(x, P, held, age, monitor, started, Z, parameters, restart, poses, covari
                 noise = p{grown}
                 predict(state, present, before, noise, x1, F, Q)
                 if P1.shape[0] > 0:
-                    propagate(F, P1, Q, work, every, first, column)
-                    # predicted
+                    propagate(F, P1, Q, work, F_first, F_column)
                     residual(x1, z, p, r, H, R)
-                    nis[t, b] = correct(r, H, R, P1, dx, white, rows, S, HP, K, first, column)
+                    nis[t, b] = correct(r, H, R, P1, dx, white, rows, S, HP, K, H_first, H_column)
+                    # corrected
                 retract(x1, dx, p, x0)
                 # updated
                 finish(x0, z, p, state)
@@ -104,50 +105,133 @@ _WATCHED = """
 # ``record`` is ``run`` with further lines in place of the comments: it keeps what the way back needs.
 _RECORDED = {
     "def run(": "def record(",
-    "whites, nis):": "whites, nis, stage, updated, corrections, transitions, predictions):",
-    "# predicted": "copy_matrix(F, transitions[t, b])\n                    copy_matrix(P1, predictions[t, b])",
-    "# updated": "stage[t, b] = 2\n"
-    + " " * 16
-    + "copy(x0, updated[t, b])\n"
-    + " " * 16
-    + "copy(dx, corrections[t, b])",
+    "whites, nis):": "whites, nis, stage, updated, entries, gains, factors, used):",
+    "# corrected": "store(F, H, entries[t, b])\n"
+    + " " * 20
+    + "remember(K, S, rows, gains[t, b], factors[t, b], used[t, b])",
+    "# updated": "stage[t, b] = 2\n                copy(x0, updated[t, b])",
     "# begun": "stage[t, b] = 1 if started[b] else 0\n                copy(x0, updated[t, b])",
 }
 
 _SMOOTH = '''
 @jit
-def smooth(Z, parameters, stage, updated, corrections, transitions, predictions, later, covariances, poses):
+def smooth_sample(P, vector, information, error, work):
+    # The smoothed error δ = P λ and covariance P − P Λ P, in place of P, after the measurement update.
+    e = P.shape[0]
+    for i in range(e):
+        total = 0.0
+        for k in range(e):
+            total += P[i, k] * vector[k]
+        error[i] = total
+    product(information, P, work)
+    reduce(P, work)
+    for i in range(e):
+        for j in range(i):
+            P[i, j] = P[j, i] = 0.5 * (P[i, j] + P[j, i])
+
+
+@jit
+def predict_back(F, vector, information, moved, work):
+    # Fᵀ λ and Fᵀ Λ F: from before the measurement update of a sample to after that of the one before, in place.
+    e = F.shape[0]
+    fill(moved, 0.0)
+    for k in range(e):
+        for c in range(e):
+            moved[c] += F[k, c] * vector[k]
+    copy(moved, vector)
+    product(information, F, work)
+    transposed_product(F, work, information)
+    for i in range(e):
+        for j in range(i):
+            information[i, j] = information[j, i] = 0.5 * (information[i, j] + information[j, i])
+
+
+@jit
+def smooth(Z, parameters, whites, records, later, covariances, poses):
     """Backward over a recorded stretch; covariances (in: those of the filter) and ``later`` are changed in place."""
-    linked, error, smoothed, F, predicted = later
-    n, e = updated.shape[2], error.shape[1]
-    x0, x1, gain, work, scale = np.empty(n), np.empty(n), zeros(e, e), zeros(e, e), np.empty(e)
+    stage, updated, entries, gains, factors, used = records
+    vector, information = later
+    n, m, e = updated.shape[2], used.shape[2], vector.shape[1]
+    x0, x1, error, V, B, y = np.empty(n), np.empty(n), np.empty(e), zeros(m, e), np.empty((2, m, m)), np.empty(m)
+    F, H, work, moved = zeros(e, e), zeros(m, e), zeros(e, e), np.empty(e)
+    constants(F, H)
     for back in range(Z.shape[0]):
         t = Z.shape[0] - 1 - back
         for b in range(Z.shape[1]):
             if stage[t, b] == 0:
                 fill(poses[t, b], np.nan)
-                linked[b] = False
                 continue
             p = parameters[t if parameters.shape[0] > 1 else 0, b if parameters.shape[1] > 1 else 0]
-            if linked[b]:
-                smooth_step(covariances[t, b], F[b], predicted[b], error[b], smoothed[b], gain, work, scale)
-            else:
-                fill(error[b], 0.0)
-                copy_matrix(covariances[t, b], smoothed[b])
-            retract(updated[t, b], error[b], p, x1)
+            smooth_sample(covariances[t, b], vector[b], information[b], error, work)
+            retract(updated[t, b], error, p, x1)
             if stage[t, b] == 2:
                 finish(x1, Z[t, b], p, x0)
+                fetch(entries[t, b], F, H)
+                measured = gains[t, b], factors[t, b], used[t, b], whites[t, b]
+                update_back(H, H_first, H_column, *measured, vector[b], information[b], V, B, y)
+                predict_back(F, vector[b], information[b], moved, work)
             else:
                 copy(x1, x0)
-            pose(x0, p, poses[t, b])
-            copy_matrix(smoothed[b], covariances[t, b])
-            linked[b] = stage[t, b] == 2
-            if linked[b]:
+                fill(vector[b], 0.0)
                 for i in range(e):
-                    error[b, i] += corrections[t, b, i]
-                copy_matrix(transitions[t, b], F[b])
-                copy_matrix(predictions[t, b], predicted[b])
+                    fill(information[b, i], 0.0)
+            pose(x0, p, poses[t, b])
 '''
+
+
+def _lists(name: str, array: np.ndarray) -> list[str]:
+    """The places in a matrix that can be other than zero, line by line, as two constants of a printed module."""
+    lines = [[j for j, item in enumerate(line) if _number_of(item) != 0.0] for line in array]
+    first = np.concatenate([[0], np.cumsum([len(line) for line in lines], dtype=int)])
+    flat = [j for line in lines for j in line]
+    return [f"{name}_first = np.array({first.tolist()}, np.int64)", f"{name}_column = np.array({flat}, np.int64)"]
+
+
+def _number_of(item: Any) -> float | None:
+    """The number that an element is, or None."""
+    return item.value if isinstance(item, Expression) else float(item)
+
+
+def _print_entries(F: np.ndarray, H: np.ndarray) -> tuple[list[str], int]:
+    """Functions that keep and restore the elements of F and H which are no constants; and how many these are."""
+    stored, fetched, constants = [], [], []
+    for name, array in (("F", F), ("H", H)):
+        for i, j in np.ndindex(array.shape):
+            item, number = f"{name}[{i}, {j}]", _number_of(array[i, j])
+            if number is None:
+                fetched.append(f"    {item} = kept[{len(stored)}]")
+                stored.append(f"    kept[{len(stored)}] = {item}")
+            elif number != 0.0:
+                constants.append(f"    {item} = {number!r}")
+    text = []
+    for signature, lines in (
+        ("store(F, H, kept)", stored),
+        ("fetch(kept, F, H)", fetched),
+        ("constants(F, H)", constants),
+    ):
+        text += ["", "", _INNER, f"def {signature}:", *lines, "    return"]
+    return text, len(stored)
+
+
+def _print_products(e: int) -> list[str]:
+    """Products of ``(e, e)`` matrices: C ← A B, C ← Aᵀ B, and A ← A − A B. The sums of a row stay in registers."""
+    text = []
+    for head, factor, target, sign in (
+        ("product(A, B, C)", "A[i, k]", "C", "+"),
+        ("transposed_product(A, B, C)", "A[k, i]", "C", "+"),
+        ("reduce(A, B)", "A[i, k]", "A", "-"),
+    ):
+        text += ["", "", "@jit", f"def {head}:", f"    for i in range({e}):"]
+        for start in range(0, e, WIDTH):
+            columns = range(start, min(start + WIDTH, e))
+            text += [f"        s{j} = {f'A[i, {j}]' if sign == '-' else '0.0'}" for j in columns]
+            text += [f"        for k in range({e}):", f"            f = {factor}"]
+            text += [f"            s{j} {sign}= f * B[k, {j}]" for j in columns]
+            if sign == "+":
+                text += [f"        {target}[i, {j}] = s{j}" for j in columns]
+        if sign == "-":
+            text += [f"        {target}[i, {j}] = s{j}" for j in range(e)]
+    return text
 
 
 class UntraceableError(TypeError):
@@ -244,7 +328,7 @@ def print_model(model: Equations, shared: str = "shared") -> str:
         raise TypeError(f"{kind} is neither a Model nor a Recurrence")
     equations["finish(x, z, p, xn)"] = (("xn",), lambda: traced.finish(x, z))
     equations["pose(x, p, out)"] = (("out",), posed)
-    text = [_HEAD, ""]
+    text, jacobians = [_HEAD, ""], {"F": np.zeros((e, e)), "H": np.zeros((m, e))}
     for signature, (outputs, compute) in equations.items():
         where = f"{kind}.{signature.split('(')[0]}"
         try:
@@ -256,14 +340,16 @@ def print_model(model: Equations, shared: str = "shared") -> str:
         for name, array in arrays.items():
             if array.shape != shapes[name]:
                 raise ValueError(f"{where}: {name} must have shape {shapes[name]}, got {array.shape}")
+        jacobians |= {name: arrays[name] for name in ("F", "H") if name in arrays}
         # Zeros are not printed; matrices keep theirs between calls, vectors share their memory and are cleared.
         clear = [f"    fill({name}, 0.0)" for name in outputs if name in ("xn", "out", "r")]
         text += [_INNER, f"def {signature}:", *clear, *print_code(arrays), "    return", "", ""]
     run = _print_run(model, names, shared)
-    text.append(run)
+    text += [*_lists("F", jacobians["F"]), *_lists("H", jacobians["H"]), run]
     if isinstance(traced, Model):
         recorded = run
         for mark, line in _RECORDED.items():
             recorded = recorded.replace(mark, line)
-        text += [recorded, _SMOOTH]
+        entries, count = _print_entries(jacobians["F"], jacobians["H"])
+        text += [*entries, f"ENTRIES = {count}", *_print_products(e), recorded, _SMOOTH]
     return "\n".join(text)

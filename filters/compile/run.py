@@ -130,11 +130,13 @@ class CompiledEquations:
         Records of the forward pass are kept for one section at a time; the filter runs twice over each.
         """
         Z = np.asarray(join(arrays, model.channels), dtype=float)
-        length, batch, n, e = Z.shape[0], Z.shape[1:-1], model.state_size, model.error_size
+        length, batch = Z.shape[0], Z.shape[1:-1]
+        n, e, m = model.state_size, model.error_size, model.residual_size
         count = math.prod(batch)
         Z = np.require(Z.reshape(length, count, Z.shape[-1]), requirements=["C", "W"])
         parameters = self._parameters(model, gains, length, batch)
-        each = max(64, RECORDED // (count * (n + e + 4 * e * e)))
+        shapes = (n,), (self.module.ENTRIES,), (m, e), (m, m)
+        each = max(64, RECORDED // (count * (e * e + sum(map(math.prod, shapes)))))
         stretches = [slice(start, min(start + each, length)) for start in range(0, length, each)]
         states = [np.array(part) for part in empty_state(model, Z[0])]
         poses, covariances, whites, nis = self._outputs(model, length, count, length if keep_covariance else 0)
@@ -145,25 +147,18 @@ class CompiledEquations:
                 own = parameters if len(parameters) == 1 else parameters[stretch]
                 size = stretch.stop - stretch.start
                 self.kernel(*states, Z[stretch], own, restart, *self._outputs(model, size, count, 0))
-        later = np.zeros(count, bool), *(np.zeros((count, *shape)) for shape in ((e,), (e, e), (e, e), (e, e)))
+        later = np.zeros((count, e)), np.zeros((count, e, e))
+        label = f"{type(model).__name__} (smoother)"
         for stretch, start in zip(reversed(stretches), reversed(starts), strict=True):
             size, own = stretch.stop - stretch.start, parameters if len(parameters) == 1 else parameters[stretch]
-            pose, covariance, white, single = self._outputs(model, size, count, size)
-            records = [np.zeros((size, count), np.int64)]
-            records += [np.empty((size, count, *shape)) for shape in ((n,), (e,), (e, e), (e, e))]
+            covariance = covariances[stretch] if keep_covariance else np.empty((size, count, e, e))
+            outputs = poses[stretch], covariance, whites[stretch], nis[stretch]
+            kept = (np.empty((size, count, *shape)) for shape in shapes)
+            records = np.zeros((size, count), np.int64), *kept, np.empty((size, count, m), np.int64)
+            compile_now(self.module.record, (*start, Z[stretch], own, restart, *outputs, *records), label)
             compile_now(
-                self.module.record,
-                (*start, Z[stretch], own, restart, pose, covariance, white, single, *records),
-                f"{type(model).__name__} (smoother)",
+                self.module.smooth, (Z[stretch], own, outputs[2], records, later, covariance, outputs[0]), label
             )
-            compile_now(
-                self.module.smooth,
-                (Z[stretch], own, *records, later, covariance, pose),
-                f"{type(model).__name__} (smoother)",
-            )
-            poses[stretch], whites[stretch], nis[stretch] = pose, white, single
-            if keep_covariance:
-                covariances[stretch] = covariance
         shaped = [array.reshape((len(array), *batch, *array.shape[2:])) for array in (poses, covariances, whites, nis)]
         return self._estimate(model, shaped[0], shaped[1] if keep_covariance else None, *shaped[2:])
 

@@ -67,13 +67,15 @@ def test_the_kernel_is_the_array_form_also_with_rows_left_out():
         dx, expected, white = correct(P, r, H, R)
         outputs = np.empty(e), np.empty(m)
         covariance = P.copy()
-        scratch = np.empty(m, np.int64), np.empty((m, m)), np.empty((m, e)), np.empty((m, e))
-        lists = np.empty(e + 1, np.int64), np.empty(m * e, np.int64)
+        scratch = np.zeros(m, np.int64), np.empty((m, m)), np.empty((m, e)), np.empty((m, e))
+        lists = np.arange(0, m * e + 1, e), np.tile(np.arange(e), m)
         nis = kernel.correct(r, H, R, covariance, *outputs, *scratch, *lists)
         np.testing.assert_allclose(covariance, expected, rtol=0, atol=1e-12)
         np.testing.assert_allclose(outputs[0], dx, rtol=0, atol=1e-12)
         np.testing.assert_allclose(outputs[1], white, rtol=0, atol=1e-12)
         assert nis == pytest.approx(np.sum(white**2), abs=1e-12)
+        used = np.flatnonzero(usable)
+        np.testing.assert_array_equal(scratch[0], np.append(used, np.full(m - len(used), -1)))
 
 
 def test_zeros_that_are_skipped_change_nothing():
@@ -83,8 +85,8 @@ def test_zeros_that_are_skipped_change_nothing():
     P, Q = root @ root.T, np.diag(generator.random(e))
     F = np.where(generator.random((e, e)) < 0.4, generator.standard_normal((e, e)), 0.0)
     moved = P.copy()
-    lists = np.arange(e), np.empty(e + 1, np.int64), np.empty(e * e, np.int64)
-    kernel.propagate(F, moved, Q, np.empty((e, e)), *lists)
+    first = np.append(0, np.cumsum(np.count_nonzero(F, axis=1)))
+    kernel.propagate(F, moved, Q, np.empty((e, e)), first, np.nonzero(F)[1])
     np.testing.assert_allclose(moved, F @ P @ F.T + Q, rtol=0, atol=1e-12)
 
 
