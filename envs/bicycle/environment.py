@@ -275,7 +275,7 @@ class RiderBicycleEnv(PoseEnv):
         ride = RideQuantities(
             bodies,
             self._sites,
-            wheel_rate=log.rates[:, 2],
+            wheel_rate=log.wheel_rate,
             steer=log.steer,
             crank=log.crank,
             seat_force=contact.seat_force,

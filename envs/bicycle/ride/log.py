@@ -40,6 +40,8 @@ class RideLog:
     """(n,) rad, rear wheel, not wrapped"""
     rates: np.ndarray
     """(n, 3) rad/s of steer, crank and rear wheel"""
+    wheel_rate: np.ndarray
+    """(n,) rad/s of the rear wheel, as the contact forces over the interval or at the sample"""
     torques: np.ndarray
     """(n, joints) N·m of the rider's muscles"""
     fallen: np.ndarray
@@ -91,11 +93,13 @@ class RideRecorder:
                 break
         states = states[: len(forces) + 1]
         first, rates = BASE_SIZE + np.array(self._joints), (states.shape[1] - BASE_SIZE) // 2
-        ends = states[self.steps :: self.steps]
+        starts, ends = states[: -1 : self.steps], states[self.steps :: self.steps]
+        turned = ends[:, first[2]] - starts[:, first[2]]
         return self._compute(
             self._motion(states),
             np.array(forces),
             np.stack([ends[:, first], ends[:, first + rates]], axis=-1),
+            turned,
             np.array(torques),
             np.array(times),
             np.array(fallen),
@@ -129,6 +133,7 @@ class RideRecorder:
         motion: CentreMotion,
         forces: np.ndarray,
         joints: np.ndarray,
+        turned: np.ndarray,
         torques: np.ndarray,
         time: np.ndarray,
         fallen: np.ndarray,
@@ -158,7 +163,11 @@ class RideRecorder:
             else:
                 limbs[name] = self._solve(name, steer, crank, trunk_turn, swivels[:, index], pelvis)
         wheel, rates = angles[:, 2], rates[:, :3]
-        return RideLog(time, frames, contact, limbs, trunk, pelvis, steer, crank, wheel, rates, torques, fallen)
+        mean = turned / (self.steps * self.ride.physics.time_step)
+        wheel_rate = rates[:, 2] if self.sampling == "instant" else mean
+        return RideLog(
+            time, frames, contact, limbs, trunk, pelvis, steer, crank, wheel, rates, wheel_rate, torques, fallen
+        )
 
     def _solve(
         self,

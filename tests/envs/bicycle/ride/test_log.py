@@ -8,7 +8,7 @@ import pytest
 from poise.envs.bicycle.environment import RiderBicycleEnv
 from poise.envs.record import record
 
-FORCES = ["seat/wrench", "seat/load_cells", "handlebar/force"]
+FORCES = ["seat/wrench", "seat/load_cells", "handlebar/force", "wheel/speed"]
 
 
 def ride(rate, sampling):
