@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from ....envs.bicycle.ride.contact_forces import LoadCells
 from ....envs.data.trajectory import Trajectory
 from ....envs.hand.gestures import GESTURES
 from ....envs.hand.sensing import simulate_hand
 from ....filters.core import rotation
 from ..kit import Study
+from ..rides.saddle import saddle_statistics
 from .motion import motion_statistics
 
 LEFT_OUT = ("rest", "planar-walk", "infinity")
@@ -25,8 +25,6 @@ BANDWIDTH = 27.0
 """Hz: of rides, 0.45 of the recorded 60 Hz"""
 RIDE_RATE = 100.0
 """Hz"""
-SITTING = 50.0
-"""N on the saddle, from which there is a centre of pressure"""
 CHANNELS = ("bicycle_imu/gyr", "bicycle_imu/acc", "trunk_imu/gyr", "trunk_imu/acc", "seat/load_cells")
 SHOWN = ("gyr_rms", "gyr_f95", "gyr_f99", "gyr_sinusoids", "force_above_2", "force_above_10", "force_f95", "force_jerk")
 """Statistics of rides in a table"""
@@ -81,30 +79,6 @@ def ride_statistics(scenario: str, subject: int, seed: int, duration: float, fid
         for name, value in motion_statistics(ride, site, bandwidth=BANDWIDTH).items()
     }
     return found | saddle_statistics(ride.measurements["seat/load_cells"]) | control_statistics(ride)
-
-
-def saddle_statistics(cells: np.ndarray, geometry: LoadCells | None = None) -> dict[str, float]:
-    """What the load cells say of the contact on the saddle.
-
-    Args:
-        cells: ``(T, 3)`` compression front, rear left, rear right, N.
-        geometry: where they are; None for the published saddle.
-
-    Returns:
-        ``pulls``: % of the samples in which a cell is below −5 N; ``least``: N; ``along_5``, ``along_95``,
-        ``across_5``, ``across_95``: percentiles of the centre of pressure ahead and to the left of the post, mm, while
-        the saddle carries more than 50 N.
-    """
-    geometry = LoadCells() if geometry is None else geometry
-    cells = cells[np.isfinite(cells).all(axis=1)]
-    total = cells.sum(axis=1)
-    loaded = total > SITTING
-    place = 1e3 * cells[loaded] @ np.array([geometry.x, geometry.y]).T / total[loaded, None]
-    found = {"pulls": 100.0 * float((cells < -5.0).any(axis=1).mean()), "least": float(cells.min())}
-    for index, axis in enumerate(("along", "across")):
-        low, high = np.percentile(place[:, index], [5.0, 95.0]) if loaded.any() else (np.nan, np.nan)
-        found |= {f"{axis}_5": float(low), f"{axis}_95": float(high)}
-    return found
 
 
 def control_statistics(ride: Trajectory) -> dict[str, float]:

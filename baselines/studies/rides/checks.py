@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ....envs.bicycle.course.path import Path, smooth_curvature
+from ....envs.bicycle.course.scenarios import list_scenarios
 from ....envs.bicycle.environment import RiderBicycleEnv
 from ....envs.bicycle.frame.bicycle import AIR_DENSITY, Bicycle
 from ....envs.bicycle.frame.parameters import BENCHMARK, MOUNTAIN_BIKE
@@ -26,6 +27,7 @@ from ....envs.physics.world import Physics
 from ....envs.record import record
 from ....envs.sensors.ideal import STANDARD_GRAVITY
 from ....filters.core import rotation
+from .saddle import ACROSS, ALONG, APART, PULL, saddle_statistics
 
 GRAVITY = 9.81
 """m/s²: that of the published benchmark"""
@@ -228,6 +230,41 @@ def lean_checks(duration: float = 20.0) -> Iterator[Check]:
         yield Check(f"load cells there, {style}: mean (5th percentile), N", "pressed", found, bool(min(low) > 0.0))
 
 
+def saddle_checks(duration: float = 40.0, subject: int = 0, seed: int = 3) -> Iterator[Check]:
+    """Cells and centre of pressure of a full and a lumped rider in every scenario.
+
+    Args:
+        duration: of each ride, s.
+        subject: number of the rider.
+        seed: of the rides.
+    """
+    for name in list_scenarios():
+        pair = []
+        for fidelity in ("full", "lumped"):
+            options = {"subject": subject, "suite": ["seat/load_cells"], "duration": duration, "fidelity": fidelity}
+            pair.append(saddle_statistics(ridden(seed, scenario=name, **options).measurements["seat/load_cells"]))
+        full, lumped = pair
+        # over bumps the rider leaves the saddle
+        most = 1.0 if name == "bumps" else 0.0
+        ends = [abs(each[f"{axis}_{end}"]) for each in pair for axis in ("along", "across") for end in (5, 95)]
+        widest = [max(ends[0::4] + ends[1::4]), max(ends[2::4] + ends[3::4])]
+        apart = abs(full["along_mean"] - lumped["along_mean"])
+        text = "; ".join(
+            f"{each['pulls']:.2g} %, {each['least']:.0f} N, {each['along_5']:.0f} … {each['along_95']:.0f} mm, "
+            f"{each['across_5']:.0f} … {each['across_95']:.0f} mm"
+            for each in pair
+        )
+        holds = max(each["pulls"] for each in pair) <= most
+        holds = holds and widest[0] <= ALONG and widest[1] <= ACROSS and apart <= APART
+        yield Check(
+            f"saddle, {name}: samples with a cell below -{PULL:g} N, least cell, centre of pressure (5 to 95 %) along "
+            "and across, full; lumped",
+            f"{most:g} %, –, ±{ALONG:g} mm, ±{ACROSS:g} mm; means {APART:g} mm apart",
+            f"{text}; {apart:.0f} mm apart",
+            holds,
+        )
+
+
 def reset_checks(repeats: int = 3) -> Iterator[Check]:
     """CPU time of the three kinds of reset."""
     for fidelity in ("full", "lumped"):
@@ -264,4 +301,5 @@ def all_checks() -> Iterator[Check]:
     yield from momentum_checks()
     yield from sensor_checks()
     yield from lean_checks()
+    yield from saddle_checks()
     yield from reset_checks()

@@ -10,9 +10,10 @@ import numpy as np
 
 from ....envs.data.trajectory import Trajectory
 from ....filters.core import rotation
+from .saddle import saddle_statistics
 
-SUITE = ("bicycle_imu/acc", "trunk_imu/acc")
-"""Channels that are recorded, without errors: what the papers' accelerometers would have to measure."""
+SUITE = ("bicycle_imu/acc", "trunk_imu/acc", "seat/load_cells")
+"""Channels that are recorded, without errors: what the papers' accelerometers and load cells would have to measure."""
 
 
 UNITS = {
@@ -56,14 +57,15 @@ def ride_statistics(
     """Numbers of one recorded ride, of JSON's types.
 
     Args:
-        trajectory: of ``poise/RiderBicycle-v0`` with the channel ``bicycle_imu/acc``.
+        trajectory: of ``poise/RiderBicycle-v0`` with the channels ``bicycle_imu/acc`` and ``seat/load_cells``.
         scenario: its name.
         subject: number of the rider.
         gaps: ``(T, 4)`` m, see :func:`.loop_closure_error`; None if they are not known.
 
     Returns:
         ``scenario``, ``subject``, ``seed``, ``duration`` (s that were ridden), ``upright`` (whether the rider got to
-        the end), and ``<quantity>_<statistic>`` of :data:`UNITS` and :data:`KINDS`; no gaps if they are not known.
+        the end), and ``<quantity>_<statistic>`` of :data:`UNITS` and :data:`KINDS`; no gaps if they are not known;
+        ``saddle`` with :func:`.saddle_statistics`.
     """
     truth = trajectory.truth
     speed, roll, pitch = (truth[f"bicycle/{name}"][:, 0] for name in ("speed", "roll", "pitch"))
@@ -89,6 +91,7 @@ def ride_statistics(
         "seed": int(trajectory.metadata["seed"]),
         "duration": float(trajectory.time[-1] - trajectory.time[0]),
         "upright": trajectory.metadata.get("ended") != "terminated",
+        "saddle": saddle_statistics(trajectory.measurements["seat/load_cells"]),
     } | {f"{name}_{kind}": float(KINDS[kind](values)) for name, (values, kinds) in series.items() for kind in kinds}
 
 

@@ -88,7 +88,7 @@ class Ride:
         load = posture.load()
         self.physics = Physics(time_step=1.0 / physics_rate, gravity=gravity, gui=gui)
         self.rider = Rider(posture, fidelity)
-        self.bicycle = Bicycle(self.physics, posture.bicycle, ground, tyre, load=load, extend=self.rider.extend)
+        self.bicycle = Bicycle(self.physics, self.rider.ridden, ground, tyre, load=load, extend=self.rider.extend)
         self.rider.mount(self.bicycle)
         self._loaded, self._settings = posture.bicycle.with_load(load), settings
         trunk = posture.trunk()

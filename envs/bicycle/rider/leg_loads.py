@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ....filters.core import rotation
+from .anthropometry import Mass
 from .limbs import forward, reach_to
 from .posture import CRANKS, KNEE_OUT, Posture
 
@@ -30,10 +31,9 @@ class _Leg(NamedTuple):
 
 
 def _pose(posture: Posture, angles: np.ndarray) -> _Leg:
-    segments = posture.segments()
+    thigh, shank = (segment.centre for segment in _segments(posture))
     leg, tip = forward(posture.leg, angles)
-    thigh = rotation.rotate(leg.upper, segments["thigh"].centre)
-    shank = leg.hinge + rotation.rotate(leg.lower, segments["shank"].centre)
+    thigh, shank = rotation.rotate(leg.upper, thigh), leg.hinge + rotation.rotate(leg.lower, shank)
     return _Leg(tip, np.stack([thigh, shank], axis=-2), np.stack([leg.upper, leg.lower], axis=-2))
 
 
@@ -71,9 +71,8 @@ def _angles(posture: Posture) -> np.ndarray:
 
 def weight_on_pedal(posture: Posture, gravity: float) -> np.ndarray:
     """Force ``(n, 3)`` of the left leg's own weight on its pedal at the angles :data:`.CRANKS`, N, bicycle axes."""
-    masses = np.array([posture.segments()[part].mass for part in ("thigh", "shank")])
     weights = np.zeros((len(CRANKS), 2, 3))
-    weights[..., 2] = gravity * masses
+    weights[..., 2] = [gravity * segment.mass for segment in _segments(posture)]
     # what the leg does to the pedal is the opposite
     return -_on_pedal(posture, _angles(posture), weights, np.zeros_like(weights))
 
@@ -87,21 +86,45 @@ def leg_swing(posture: Posture) -> np.ndarray:
         ``(n, 2)`` per (rad/s)² of a steadily turning crank: force upwards, N; moment about the saddle point, N·m, that
         tips to the right.
     """
-    segments = [posture.segments()[part] for part in ("thigh", "shank")]
-    angles = _angles(posture)[:-1]
-    pose = _pose(posture, angles)
-    accelerations = np.stack([_derivative(pose.centres[:, part], 2) for part in (0, 1)], axis=1)
-    forces = accelerations * np.array([segment.mass for segment in segments])[:, None]
-    moments = np.zeros_like(forces)
-    for part, segment in enumerate(segments):
-        # ω from q' = ½ ω q; L = R I Rᵀ ω
-        q = pose.turns[:, part]
-        q = q * np.cumprod(np.concatenate([[1.0], np.where((q[1:] * q[:-1]).sum(axis=1) < 0.0, -1.0, 1.0)]))[:, None]
-        rate = 2.0 * rotation.multiply(_derivative(q), rotation.conjugate(q))[:, 1:]
-        spin = rotation.rotate(q, rotation.rotate_back(q, rate) @ segment.tensor)
-        moments[:, part] = _derivative(spin)
+    angles, pose, rates = _turn(posture)
+    segments = _segments(posture)
+    forces = np.stack([m.mass * _derivative(pose.centres[:, part], 2) for part, m in enumerate(segments)], axis=1)
+    spins = [_spin(pose.turns[:, part], rates[:, part], m.tensor) for part, m in enumerate(segments)]
+    moments = np.stack([_derivative(spin) for spin in spins], axis=1)
     pedal = _on_pedal(posture, angles, forces, moments)
     hip = posture.hip - posture.bicycle.saddle
     tip = rotation.cross(hip + pose.tip, pedal) - (rotation.cross(hip + pose.centres, forces) + moments).sum(axis=1)
     felt = np.stack([pedal[:, 2] - forces[..., 2].sum(axis=1), tip[:, 0]], axis=1)
     return np.concatenate([felt, felt[:1]])
+
+
+def legs_at_crank(posture: Posture) -> float:
+    """Moment of inertia (kg·m²) of both legs that the crank turns, mean over a turn."""
+    _, pose, rates = _turn(posture)
+    energy = np.zeros(len(rates))
+    for part, segment in enumerate(_segments(posture)):
+        speed, rate = _derivative(pose.centres[:, part]), rates[:, part]
+        energy += segment.mass * (speed**2).sum(axis=1)
+        energy += (_spin(pose.turns[:, part], rate, segment.tensor) * rate).sum(axis=1)
+    return 2.0 * float(energy.mean())
+
+
+def _segments(posture: Posture) -> list[Mass]:
+    return [posture.segments()[part] for part in ("thigh", "shank")]
+
+
+def _turn(posture: Posture) -> tuple[np.ndarray, _Leg, np.ndarray]:
+    """Angles ``(n, 4)`` and pose of the left leg over a turn, and rates ``(n, 2, 3)`` of its parts per crank rate."""
+    angles = _angles(posture)[:-1]
+    pose, rates = _pose(posture, angles), []
+    for part in (0, 1):
+        # ω from q' = ½ ω q, with a quaternion that never changes sign
+        q = pose.turns[:, part]
+        q = q * np.cumprod(np.concatenate([[1.0], np.where((q[1:] * q[:-1]).sum(axis=1) < 0.0, -1.0, 1.0)]))[:, None]
+        rates.append(2.0 * rotation.multiply(_derivative(q), rotation.conjugate(q))[:, 1:])
+    return angles, pose, np.stack(rates, axis=1)
+
+
+def _spin(turn: np.ndarray, rate: np.ndarray, tensor: np.ndarray) -> np.ndarray:
+    """Angular momentum R I Rᵀ ω ``(n, 3)`` per crank rate."""
+    return rotation.rotate(turn, rotation.rotate_back(turn, rate) @ tensor)

@@ -9,6 +9,7 @@ on the handlebar and, oppositely, on the trunk, and those of the feet on the ped
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -19,7 +20,9 @@ from ...physics.urdf import Tree
 from ...physics.world import BASE
 from ...sensors.ideal import STANDARD_GRAVITY
 from ..frame.bicycle import Bicycle, BicycleState
+from ..frame.parameters import BicycleParameters
 from .effort import reach_of
+from .leg_loads import legs_at_crank
 from .limb_tables import LimbTables, abductions
 from .links import (
     LUMPED_MASSES,
@@ -76,6 +79,16 @@ class Rider:
         self._axis = axis
         self._load_scale = balanced_hand_load(posture) / USUAL_HAND_LOAD
         self.constraints: list[int] = []
+
+    @property
+    def ridden(self) -> BicycleParameters:
+        """The bicycle; a lumped rider's crank has the inertia of the legs that turn with it."""
+        bicycle = self.posture.bicycle
+        if self.full or bicycle.drive is None:
+            return bicycle
+        x, y, z = bicycle.drive.inertia
+        legs = legs_at_crank(self.posture)
+        return replace(bicycle, drive=replace(bicycle.drive, inertia=(x + 0.5 * legs, y + legs, z + 0.5 * legs)))
 
     def extend(self, tree: Tree) -> None:
         """Add the rider's links to a bicycle's tree."""

@@ -5,32 +5,13 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from poise.baselines.studies.kit import Study
-from poise.baselines.studies.realism.environments import gestures, medians, ride_statistics, saddle_statistics
+from poise.baselines.studies.realism.environments import gestures, medians, ride_statistics
 from poise.baselines.studies.realism.ranges import BELIEVABLE, judged
 from poise.baselines.studies.realism.simulators import ride_motion, sensors
 from poise.baselines.studies.report import Report
-from poise.envs.bicycle.ride.contact_forces import LoadCells
-
-
-def test_saddle_statistics_of_a_known_load() -> None:
-    cells = LoadCells()
-    place = np.array([[0.05, 0.02]] * 50 + [[-0.03, -0.04]] * 50)
-    force, zero = np.full(100, 600.0), np.zeros(100)
-    moment = np.stack([force * place[:, 1], -force * place[:, 0], zero], axis=1)
-    found = saddle_statistics(cells.share(np.stack([zero, zero, force], axis=1), moment))
-    assert found["along_5"] == pytest.approx(-30.0)
-    assert found["along_95"] == pytest.approx(50.0)
-    assert found["across_5"] == pytest.approx(-40.0)
-    assert found["across_95"] == pytest.approx(20.0)
-    assert found["pulls"] in (0.0, 50.0)
-    lifted = saddle_statistics(np.array([[100.0, 100.0, 100.0], [100.0, -20.0, 100.0], [np.nan] * 3]))
-    assert lifted["pulls"] == 50.0
-    assert lifted["least"] == -20.0
-    assert math.isnan(saddle_statistics(np.zeros((5, 3)))["along_5"])
 
 
 def test_a_ride_in_numbers_that_agree_with_its_scenario() -> None:

@@ -1,0 +1,65 @@
+"""What load cells say of the contact on the saddle: whether a cell pulls, and where the centre of pressure is."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+
+from ....envs.bicycle.ride.contact_forces import LoadCells
+
+SITTING = 50.0
+"""N on the saddle, from which there is a centre of pressure"""
+PULL = 5.0
+"""N of tension of a cell that counts as a pull"""
+ALONG, ACROSS = 130.0, 140.0
+"""mm from the saddle point: a centre of pressure beyond is not on a saddle"""
+APART = 15.0
+"""mm between the mean centres of pressure of full and lumped riders"""
+
+
+def saddle_statistics(cells: np.ndarray, geometry: LoadCells | None = None) -> dict[str, float]:
+    """Pulls and centre of pressure of one ride.
+
+    Args:
+        cells: ``(T, 3)`` compression front, rear left, rear right, N.
+        geometry: where they are; None for the published saddle.
+
+    Returns:
+        ``pulls``: % of the samples in which a cell is below −5 N; ``least``: N; of the centre of pressure ahead and to
+        the left of the post, in mm and while the saddle carries more than 50 N, the 5th and 95th percentiles
+        ``along_5``, ``along_95``, ``across_5``, ``across_95``, and ``along_mean``, ``along_sd``, ``across_mean``,
+        ``across_sd``.
+    """
+    geometry = LoadCells() if geometry is None else geometry
+    cells = cells[np.isfinite(cells).all(axis=1)]
+    total = cells.sum(axis=1)
+    loaded = total > SITTING
+    place = 1e3 * cells[loaded] @ np.array([geometry.x, geometry.y]).T / total[loaded, None]
+    found = {"pulls": 100.0 * float((cells < -PULL).any(axis=1).mean()), "least": float(cells.min())}
+    for index, axis in enumerate(("along", "across")):
+        values = place[:, index] if loaded.any() else np.array([np.nan])
+        low, high = np.percentile(values, [5.0, 95.0])
+        found |= {f"{axis}_5": float(low), f"{axis}_95": float(high)}
+        found |= {f"{axis}_mean": float(values.mean()), f"{axis}_sd": float(values.std())}
+    return found
+
+
+def saddle_rows(found: Sequence[dict[str, Any]]) -> Iterator[dict[str, Any]]:
+    """Rows of a table by scenario, worst of the rides with their statistics under ``saddle``."""
+    for name in dict.fromkeys(each["scenario"] for each in found):
+        rides = [each["saddle"] for each in found if each["scenario"] == name]
+        worst = {key: pick(each[key] for each in rides) for key in rides[0] for pick in (_pick(key),)}
+        yield {
+            "scenario": name,
+            "a cell below -5 N, %": worst["pulls"],
+            "least N": worst["least"],
+            "CoP along mm": f"{worst['along_5']:.0f} … {worst['along_95']:.0f}",
+            "CoP across mm": f"{worst['across_5']:.0f} … {worst['across_95']:.0f}",
+            "mean along mm": f"{float(np.mean([each['along_mean'] for each in rides])):.0f}",
+        }
+
+
+def _pick(key: str) -> Any:
+    return min if key == "least" or key.endswith("_5") else max
