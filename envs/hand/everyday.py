@@ -10,7 +10,13 @@ from .carried import Carried
 from .hand_held import HandHeld, Over
 
 ALONE = Over(
-    tremor_share=0.0, drift_share=0.0, taps_share=0.0, vibration_share=0.0, set_down_share=0.0, tissue_share=0.0
+    clean_share=0.0,
+    tremor_share=0.0,
+    drift_share=0.0,
+    taps_share=0.0,
+    vibration_share=0.0,
+    set_down_share=0.0,
+    tissue_share=0.0,
 )
 """No part over the motion."""
 CALM = HandHeld(acceleration=(0.2, 2.0), rate=(0.2, 2.0), over=ALONE)
@@ -42,8 +48,8 @@ SUMMARIES: Mapping[str, str] = MappingProxyType(
         "rotation": "Rotation by hand about all axes, 1 to 8 rad/s rms, as in BROAD",
         "tremor": "A still hand with physiological tremor, 8 to 12 Hz",
         "drifting": "A still hand that wanders slowly, up to 0.3 m/s rms below 0.2 Hz",
-        "taps": "Calm motion with taps on the device, contacts of 1 to 10 ms",
-        "vibration": "Calm motion while the device buzzes, 20 to 250 Hz",
+        "taps": "Calm motion with taps on the device, contacts of 0.5 to 8 ms",
+        "vibration": "Calm motion while the device buzzes, 30 to 250 Hz",
         "set-downs": "Calm motion between rests on a table, with an impact each time",
         "carried-walking": "A phone in the hand, in a swinging hand or in a pocket of somebody who walks",
         "carried-running": "The same of somebody who runs",

@@ -99,15 +99,15 @@ class Taps(Checked):
     Attributes:
         rate: mean number a second, 1/s.
         peak: of the acceleration, m/s²; a tap is drawn within a factor of two of the episode's.
-        contact: time of contact, s (our choice; a finger on a housing takes 1 to 10 ms).
+        contact: time of contact, s (our choice; a finger on a housing takes 1 to 10 ms, a nail less).
         frequency: of the ringing that follows, Hz.
         radius: of gyration of the device, m.
     """
 
-    rate: Range = (0.1, 3.0)
-    peak: Range = (5.0, 250.0)
-    contact: Range = (0.001, 0.01)
-    frequency: Range = (20.0, 200.0)
+    rate: Range = (0.1, 5.0)
+    peak: Range = (5.0, 400.0)
+    contact: Range = (0.0005, 0.008)
+    frequency: Range = (30.0, 300.0)
     radius: float = 0.3
 
     def draw(self, generator: np.random.Generator, intervals: Intervals) -> Ringing:

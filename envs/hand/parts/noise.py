@@ -95,9 +95,16 @@ class Noise:
             shape = butter(1, low, "highpass", fs=rate, output="sos")
         edge = butter(steepness, high, fs=rate, output="sos")
         drawn = cls(start, 1.0 / rate, sosfilt(np.concatenate([shape, edge]), white, axis=0)[warm:])
-        at_knots = convolve1d(drawn.coefficients, AT_KNOTS[derivative], axis=0)[2:-2] * rate**derivative
-        spread = np.sqrt(np.mean(at_knots**2))
-        return drawn.scaled(np.asarray(level) / spread)
+        return drawn.scaled(np.asarray(level) / np.sqrt(np.mean(drawn._at_knots(derivative) ** 2)))
+
+    def _at_knots(self, derivative: int) -> np.ndarray:
+        """A derivative at all knots of the interval, ``(K - 4, n)``."""
+        return convolve1d(self.coefficients, AT_KNOTS[derivative], axis=0)[2:-2] / self.interval**derivative
+
+    @property
+    def spread(self) -> float:
+        """Root mean square of the length of the vector of functions."""
+        return float(np.sqrt(np.mean(np.sum(self._at_knots(0) ** 2, axis=1))))
 
     def sample(self, times: np.ndarray) -> Jet:
         """The jet ``(T, n)`` at ``times`` ``(T,)``."""

@@ -36,7 +36,7 @@ class Tremor(Checked):
         band: Hz.
     """
 
-    acceleration: Range = (0.02, 0.5)
+    acceleration: Range = (0.01, 0.5)
     rate: Range = (0.005, 0.6)
     band: Range = (8.0, 12.0)
 
@@ -104,10 +104,10 @@ class Vibration(Checked):
         radius: of gyration of the device, m: the motor is off centre.
     """
 
-    frequency: Range = (20.0, 250.0)
-    acceleration: Range = (0.5, 15.0)
+    frequency: Range = (30.0, 250.0)
+    acceleration: Range = (1.0, 20.0)
     on: Range = (0.5, 60.0)
-    off: Range = (0.3, 10.0)
+    off: Range = (0.3, 5.0)
     radius: float = 0.3
 
     def draw(self, generator: np.random.Generator, intervals: Intervals) -> Buzz:
@@ -138,7 +138,7 @@ class Drift(Checked):
         ramp: of the start and the end in each interval, s.
     """
 
-    speed: Range = (0.02, 0.3)
+    speed: Range = (0.01, 0.3)
     band: Range = (0.03, 0.15)
     ramp: float = 2.0
 

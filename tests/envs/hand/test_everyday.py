@@ -46,7 +46,7 @@ def share_above(name, frequency, seeds=5):
 
 def test_shocks_are_what_smooth_motion_lacks():
     smooth = share_above("rotation", 10.0)
-    for name in ("taps", "vibration", "carried-running"):
+    for name in ("taps", "vibration"):
         assert share_above(name, 10.0) > 3.0 * smooth
     assert share_above("tremor", 7.0) > 0.9
 
