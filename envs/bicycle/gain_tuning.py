@@ -85,7 +85,7 @@ class RiderBicycleGainEnv(GainTuningEnv):
         sensors: ``paper``, ``ideal``, or a device (:func:`poise.envs.sensors.presets.list_sensor_presets`).
         rate: samples per second, Hz.
         duration: of an episode, s.
-        fidelity: ``lumped`` (cheap; hands, feet and limbs exert no reactions on frame and trunk) or
+        fidelity: ``lumped`` (cheap; arms and legs are rigid parts of trunk and pelvis) or
             ``full``.
         physics_rate: physics steps per second, Hz; a multiple of 250 Hz and of ``rate``.
         noise_scale: factor on all sensor errors.

@@ -30,7 +30,7 @@ class Contact(NamedTuple):
     hands: np.ndarray
     """(2, 3) N, left and right, on the handlebar"""
     feet: np.ndarray
-    """(2, 3) N, left and right, on the pedals; zeros for a lumped rider, whose seat carries the legs too"""
+    """(2, 3) N, left and right, on the pedals"""
 
 
 @dataclass(frozen=True)

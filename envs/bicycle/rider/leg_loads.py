@@ -86,16 +86,23 @@ def leg_swing(posture: Posture) -> np.ndarray:
         ``(n, 2)`` per (rad/s)² of a steadily turning crank: force upwards, N; moment about the saddle point, N·m, that
         tips to the right.
     """
-    angles, pose, rates = _turn(posture)
-    segments = _segments(posture)
-    forces = np.stack([m.mass * _derivative(pose.centres[:, part], 2) for part, m in enumerate(segments)], axis=1)
-    spins = [_spin(pose.turns[:, part], rates[:, part], m.tensor) for part, m in enumerate(segments)]
-    moments = np.stack([_derivative(spin) for spin in spins], axis=1)
-    pedal = _on_pedal(posture, angles, forces, moments)
+    _, pose, rates = _turn(posture)
+    forces, moments = _momentum_rates(posture, pose, rates)
+    pedal = pedal_of_swing(posture)
     hip = posture.hip - posture.bicycle.saddle
     tip = rotation.cross(hip + pose.tip, pedal) - (rotation.cross(hip + pose.centres, forces) + moments).sum(axis=1)
     felt = np.stack([pedal[:, 2] - forces[..., 2].sum(axis=1), tip[:, 0]], axis=1)
     return np.concatenate([felt, felt[:1]])
+
+
+def pedal_of_swing(posture: Posture) -> np.ndarray:
+    """Force of the pedal on the left leg that swings it, at all but the last angle of :data:`.CRANKS`.
+
+    Returns:
+        ``(n − 1, 3)`` N per (rad/s)² of a steadily turning crank.
+    """
+    angles, pose, rates = _turn(posture)
+    return _on_pedal(posture, angles, *_momentum_rates(posture, pose, rates))
 
 
 def legs_at_crank(posture: Posture) -> float:
@@ -123,6 +130,14 @@ def _turn(posture: Posture) -> tuple[np.ndarray, _Leg, np.ndarray]:
         q = q * np.cumprod(np.concatenate([[1.0], np.where((q[1:] * q[:-1]).sum(axis=1) < 0.0, -1.0, 1.0)]))[:, None]
         rates.append(2.0 * rotation.multiply(_derivative(q), rotation.conjugate(q))[:, 1:])
     return angles, pose, np.stack(rates, axis=1)
+
+
+def _momentum_rates(posture: Posture, pose: _Leg, rates: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Rates of change of momentum and angular momentum ``(n, 2, 3)`` of both segments per squared crank rate."""
+    segments = _segments(posture)
+    forces = np.stack([m.mass * _derivative(pose.centres[:, part], 2) for part, m in enumerate(segments)], axis=1)
+    spins = [_spin(pose.turns[:, part], rates[:, part], m.tensor) for part, m in enumerate(segments)]
+    return forces, np.stack([_derivative(spin) for spin in spins], axis=1)
 
 
 def _spin(turn: np.ndarray, rate: np.ndarray, tensor: np.ndarray) -> np.ndarray:
