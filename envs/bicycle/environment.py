@@ -12,7 +12,7 @@ from ...filters.bicycle.geometry import RiderGeometry
 from ...filters.core.quantity import Quantity
 from ..base import Block, PoseEnv, renamed
 from ..drawn import Scene
-from ..sensors.ideal import STANDARD_GRAVITY, Sampling
+from ..sensors.ideal import Sampling
 from ..sensors.magnetics import Magnetics
 from ..sensors.sensor import Sensor
 from ..sensors.timing import Timings
@@ -33,9 +33,11 @@ from .rider.posture import Posture, sit
 from .rider.rider import Fidelity
 from .rider.style import RiderStyle, rider_style
 from .sensors.measured_geometry import rider_geometry
+from .sensors.placement import PlacementErrors
+from .sensors.placement import placement_errors as placing
 from .sensors.readings import RideQuantities
-from .sensors.sites import sensor_sites
-from .sensors.suites import CHANNELS, rider_bicycle_suite, suite_channels
+from .sensors.suites import CHANNELS, suite_channels
+from .sensors.worn import WornSensors, WornState
 
 BLOCK = 50
 """time steps computed at once"""
@@ -111,6 +113,7 @@ class RiderBicycleEnv(PoseEnv):
     | ``truth/joints/angles``, ``torques`` | 19 | rad, N·m (torques of a lumped rider: 3) |
     | ``truth/steer/rate``, ``crank/rate``, ``wheel/rate``, ``wheel/angle`` | 1 | rad/s, rad |
     | ``truth/<site>/gyroscope_bias`` … | | bias of the last sample of each sensor |
+    | ``truth/<site>/lever_arm``, ``rotation`` | 3, 4 | m, quaternion: where an inertial sensor really is on its body |
 
     ## Arguments
 
@@ -118,7 +121,8 @@ class RiderBicycleEnv(PoseEnv):
         scenario: name, see :func:`.list_scenarios`; ``"slalom+bumps"`` composes; or a
             :class:`poise.envs.bicycle.course.scenarios.Scenario`. ``reset(options={"scenario": …})`` replaces it once.
         subject: 0…4, ``"random"``, or a :class:`poise.envs.bicycle.rider.anthropometry.RiderBody`; also a reset option.
-        style: ``still``, ``mild``, ``normal``, ``aggressive``, or a style; None for that of the scenario.
+        style: ``still``, ``mild``, ``normal``, ``aggressive``, ``random`` (another one in each ride), or a style; None
+            for that of the scenario.
         suite: ``two-gyro``, ``force-inertial``, ``whole-body``, ``all``, or a list of channels
             (:mod:`poise.envs.bicycle.sensors.suites` has their sites and errors) and of your own :class:`.Sensor`
             objects on the bodies ``bicycle``, ``trunk``, ….
@@ -144,6 +148,10 @@ class RiderBicycleEnv(PoseEnv):
             :class:`poise.envs.sensors.timing.Timing`; None for none.
         magnetics: disturbances of the magnetic field: a name of :data:`poise.envs.sensors.magnetics.MAGNETICS` or a
             :class:`poise.envs.sensors.magnetics.Magnetics`; None for none.
+        placement_errors: factor on the default :class:`poise.envs.bicycle.sensors.placement.PlacementErrors`, or such
+            errors: each ride has its sensors a little beside their places. :attr:`geometry` does not know.
+        soft_tissue: factor on the motion of worn sensors on soft tissue
+            (:mod:`poise.envs.bicycle.sensors.soft_tissue`); None for ``noise_scale``, and for 0 with ideal sensors.
         render_mode: ``human`` (a window), ``rgb_array`` or None.
 
     Raises:
@@ -177,10 +185,12 @@ class RiderBicycleEnv(PoseEnv):
         timing: Timings | None = None,
         magnetics: str | Magnetics | None = None,
         pilot: str | PilotParameters = "skilled",
+        placement_errors: float | PlacementErrors = 0.0,
+        soft_tissue: float | None = None,
         render_mode: str | None = None,
     ) -> None:
         self.scenario, self.subject, self.style = named_scenario(scenario), subject, style
-        if style is not None:
+        if style not in (None, "random"):
             rider_style(style)
         if surface not in (None, "random"):
             named_surface(surface)  # type: ignore[arg-type]
@@ -202,9 +212,11 @@ class RiderBicycleEnv(PoseEnv):
             "timing": timing,
             "magnetics": magnetics,
         }
+        self.placement_errors = placing(placement_errors)
+        self.soft_tissue = (0.0 if sensors == "ideal" else noise_scale) if soft_tissue is None else soft_tissue
         self.tyre = TyreParameters()
         self._fit(sit(self.parameters, RiderBody() if subject == "random" else rider_body(subject)))
-        made = self._suite
+        made = self._worn.suite
         limbs = [name for name in names if CHANNELS[name].body not in ("bicycle", "trunk")]
         if fidelity == "lumped" and sampling == "instant" and limbs:
             raise ValueError(
@@ -238,12 +250,12 @@ class RiderBicycleEnv(PoseEnv):
     @property
     def geometry(self) -> RiderGeometry:
         """Anthropometry and mounting with which a filter may be configured; before a reset that of the arguments."""
-        return rider_geometry(self._posture, self._sites)
+        return rider_geometry(self._worn.posture, self._worn.sites)
 
     @property
     def scenery(self) -> tuple[Posture, Ground]:
         """The person on the bicycle and the ground of the present ride, for a picture."""
-        return self._posture, self._source.ground
+        return self._worn.posture, self._source.ground
 
     def begin(self, motion: np.random.Generator, sensors: np.random.Generator, options: Mapping[str, Any]) -> int:
         """Draw rider, course and movements, and start the ride."""
@@ -251,22 +263,21 @@ class RiderBicycleEnv(PoseEnv):
         subject = options.get("subject", self.subject)
         self._source.begin(chosen, subject, motion)
         self._started()
-        self.suite.reset(sensors)
+        self._worn.reset(sensors)
+        self.suite = self._worn.suite
         return max(1, round(self.duration * self.rate))
 
     def _started(self) -> None:
         """Sensors and picture of the new ride."""
-        if self._source.posture is not self._posture:
+        if self._source.posture is not self._worn.posture:
             self._fit(self._source.posture)
-        self.suite = self._suite
         if self._scene is not None and self._source.ground is not self._drawn_ground:
             self._scene.close()
             self._scene = None
 
     def _fit(self, posture: Posture) -> None:
         """Mount the sensors on a person on the bicycle."""
-        self._posture, self._sites = posture, sensor_sites(posture)
-        self._suite = rider_bicycle_suite(sites=self._sites, gravity=STANDARD_GRAVITY, **self._sensors)
+        self._worn = WornSensors(posture, self._sensors, self.placement_errors, self.soft_tissue)
 
     def next_block(self, most: int) -> Block:
         """Advance the ride and simulate the sensors."""
@@ -274,7 +285,7 @@ class RiderBicycleEnv(PoseEnv):
         contact = log.contact
         ride = RideQuantities(
             bodies,
-            self._sites,
+            self._worn.sites,
             wheel_rate=log.wheel_rate,
             steer=log.steer,
             crank=log.crank,
@@ -282,8 +293,8 @@ class RiderBicycleEnv(PoseEnv):
             seat_moment=contact.seat_moment,
             hands=contact.hands,
         )
-        measurements, biases, _ = self._suite.simulate(bodies, ride)
-        truth = {**other_truth(log), **biases}
+        measurements, of_sensors = self._worn.simulate(bodies, ride)
+        truth = {**other_truth(log), **of_sensors}
         return Block(log.time, measurements, pose, truth, np.ones(len(log.time), bool))
 
     def ending(self) -> tuple[int, bool]:
@@ -291,16 +302,17 @@ class RiderBicycleEnv(PoseEnv):
         fallen_at = self._source.fallen_at
         return (int(fallen_at), True) if fallen_at <= self._last_step else (self._last_step, False)
 
-    def save_source(self) -> tuple[SavedRide, Any]:
+    def save_source(self) -> tuple[SavedRide, WornState]:
         """The ride, and the sensors' state."""
-        return self._source.save(), self._suite.save()
+        return self._source.save(), self._worn.save()
 
-    def restore_source(self, saved: tuple[SavedRide, Any]) -> None:
+    def restore_source(self, saved: tuple[SavedRide, WornState]) -> None:
         """Undo :meth:`save_source`."""
-        ride, suite = saved
+        ride, sensors = saved
         self._source.restore(ride)
         self._started()
-        self._suite.restore(suite)
+        self._worn.restore(sensors)
+        self.suite = self._worn.suite
 
     def make_scene(self, gui: bool) -> Scene:
         """Rider, bicycle and ground."""

@@ -138,8 +138,10 @@ class RideSource:
         world = (body, self.physics_rate, self.tyre)
         same = self.ride is not None and world == self._world_key
         posture = self.posture if same else sit(self.bicycle, body)
-        course = scenario.draw(for_course, self.duration + SETTLING + 1.0, self.surface)
-        movement = RiderMotion(rider_style(scenario.style if self.style is None else self.style), for_movement)
+        length = self.duration + SETTLING + 1.0
+        course = scenario.draw(for_course, length, self.surface)
+        style = rider_style(scenario.style if self.style is None else self.style, for_movement.spawn(1)[0])
+        movement = RiderMotion(style, for_movement, length)
         crank = float(for_crank.uniform(0.0, 2.0 * math.pi))
         skills = list(PILOTS)
         pilot = skills[int(for_pilot.integers(len(skills)))] if self.pilot == RANDOM else self.pilot

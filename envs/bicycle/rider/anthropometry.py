@@ -55,6 +55,8 @@ MEAN_STATURE = {False: 1.741, True: 1.735}
 """m; True for women"""
 VERTEX_ABOVE_SUPRASTERNALE = {False: 0.3143, True: 0.3292}
 """m: table 4, vertex to cervicale plus cervicale above suprasternale"""
+STATURES, MASSES = (1.50, 1.95), (45.0, 110.0)
+"""m and kg: of random riders"""
 SHALLOWEST, HEAVIEST = (1.2, 2.3), (30.0, 200.0)
 """m and kg: outside these bounds the tables do not apply"""
 
@@ -140,11 +142,18 @@ SUBJECTS = (
 
 
 def random_body(rng: np.random.Generator) -> RiderBody:
-    """A random adult: stature 176 ± 5 cm, body mass index 22 ± 2.2 kg/m², one in five female and then 8 cm smaller."""
-    female = bool(rng.random() < 0.2)
-    stature = (1.69 if female else 1.775) + 0.045 * float(np.clip(rng.standard_normal(), -2.5, 2.5))
-    index = 22.0 + 2.2 * float(np.clip(rng.standard_normal(), -2.0, 2.5))
-    return RiderBody(round(stature, 3), round(index * stature**2, 1), female, "random rider")
+    """A random adult of 1.50 to 1.95 m and 45 to 110 kg, female or male with equal chance.
+
+    Stature 1.65 ± 0.07 m (women) and 1.78 ± 0.075 m (men), body mass index 24 ± 3.5 kg/m², both drawn again where they
+    leave these bounds: round figures of European adults.
+    """
+    female = bool(rng.random() < 0.5)
+    middle, spread = (1.65, 0.07) if female else (1.78, 0.075)
+    while True:
+        stature = round(middle + spread * float(rng.standard_normal()), 3)
+        mass = round((24.0 + 3.5 * float(rng.standard_normal())) * stature**2, 1)
+        if STATURES[0] <= stature <= STATURES[1] and MASSES[0] <= mass <= MASSES[1] and mass / stature**2 >= 17.5:
+            return RiderBody(stature, mass, female, "random rider")
 
 
 def rider_body(subject: int | str | RiderBody, rng: np.random.Generator | None = None) -> RiderBody:

@@ -1,22 +1,37 @@
-"""Riding styles from mild to aggressive: sway, lean into turns, elbows and knees, unsteady hands."""
+"""Riding styles from mild to aggressive: how much a rider moves on the bicycle, and the motion of one ride."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
+from ....filters.compile.cache import jit
+from .body_motion import (
+    CHANNELS,
+    HANDS,
+    SWIVEL,
+    TABLE_RATE,
+    TRUNK,
+    breathing,
+    coloured_noise,
+    glances,
+    posture_changes,
+    row_at,
+)
+
 START = 2.0
 """s over which the movements set in"""
-WAVES = 4
 LARGEST_LEAN = 0.4
 """rad into a turn, to the bicycle"""
 
 
 @dataclass(frozen=True)
 class RiderStyle:
-    """Parameters of a riding style; choices of this project within observed ranges.
+    """Parameters of a riding style: choices of this project, such that the trunk moves as the chest of a recorded ride.
+
+    The spectra were compared with the chest sensor alone; see ``docs/rider_bicycle.md``.
 
     Raises:
         ValueError: a negative amplitude, or an implausible sway.
@@ -24,11 +39,11 @@ class RiderStyle:
 
     name: str
     lean: float
-    """rad: standard deviation of sideways sway"""
+    """rad: standard deviation of the noise in the trunk's wanted sideways lean"""
     flexion: float
-    """rad: of bending and straightening"""
+    """rad: the same of bending and straightening"""
     twist: float
-    """rad: of turning the shoulders"""
+    """rad: the same of turning the shoulders"""
     turn_lean: float
     """rad·m: lean into a turn, relative to the bicycle, times the path's curvature"""
     levelling: float
@@ -43,78 +58,151 @@ class RiderStyle:
     """
     unsteadiness: float = 0.15
     """N·m: standard deviation of the hands' unsteady torque"""
+    pedalling: float = 0.0
+    """rad: amplitude of lean and twist with each turn of the cranks; of flexion half of it, twice a turn"""
+    posture: float = 0.0
+    """rad: standard deviation of the posture's change of flexion, lean and twist, each"""
+    posture_interval: float = math.inf
+    """s between changes of posture, on average"""
+    glance: float = 0.0
+    """rad: twist of the trunk in a look over the shoulder, on average"""
+    glance_interval: float = math.inf
+    """s between looks, on average"""
+    breath: float = 0.0
+    """rad: amplitude of the trunk's flexion with each breath"""
 
     def __post_init__(self) -> None:
-        for name in ("lean", "flexion", "twist", "swivel", "hand_load", "unsteadiness"):
+        for name in (*SIZES, "hand_load", "unsteadiness"):
             if not 0.0 <= getattr(self, name) < math.inf:
                 raise ValueError(f"{name} must not be negative, got {getattr(self, name)}")
-        if max(self.lean, self.flexion, self.twist) > 0.2:
-            raise ValueError("lean, flexion and twist must be at most 0.2 rad: a rider could not stay in the saddle")
+        for name in ("posture_interval", "glance_interval"):
+            if not getattr(self, name) >= 1.0:
+                raise ValueError(f"{name} must be at least 1 s, got {getattr(self, name)}")
+        largest = max(SIZES, key=lambda name: getattr(self, name))
+        if getattr(self, largest) > 0.2:
+            raise ValueError(
+                f"{largest} must be at most 0.2 rad: a rider could not stay in the saddle, got {getattr(self, largest)}"
+            )
 
 
+SIZES = ("lean", "flexion", "twist", "swivel", "pedalling", "posture", "glance", "breath")
+"""fields that are angles of movements"""
 STYLES = {
     style.name: style
     for style in (
         RiderStyle("still", 0.0, 0.0, 0.0, 0.0, 0.0, swivel=0.0, unsteadiness=0.0),
-        RiderStyle("mild", 0.02, 0.015, 0.02, 0.25, 0.3),
-        RiderStyle("normal", 0.035, 0.025, 0.035, 0.6, 0.5),
-        RiderStyle("aggressive", 0.06, 0.04, 0.06, 0.8, 0.6, unsteadiness=0.25),
+        RiderStyle(
+            "mild", 0.028, 0.025, 0.055, 0.25, 0.3,
+            pedalling=0.02, posture=0.01, posture_interval=30.0, glance=0.1, glance_interval=40.0, breath=0.004,
+        ),
+        RiderStyle(
+            "normal", 0.04, 0.035, 0.065, 0.6, 0.5,
+            pedalling=0.03, posture=0.015, posture_interval=20.0, glance=0.15, glance_interval=25.0, breath=0.006,
+        ),
+        RiderStyle(
+            "aggressive", 0.06, 0.05, 0.09, 0.8, 0.6, unsteadiness=0.25,
+            pedalling=0.045, posture=0.02, posture_interval=15.0, glance=0.2, glance_interval=15.0, breath=0.01,
+        ),
     )
-}
+}  # fmt: skip
 """The styles by name."""
 
 
-def rider_style(style: str | RiderStyle) -> RiderStyle:
-    """A style by name, or as given.
+def random_style(rng: np.random.Generator) -> RiderStyle:
+    """A style between mild and aggressive, each parameter by itself, uniform on a logarithmic scale."""
+    low, high = STYLES["mild"], STYLES["aggressive"]
+    drawn = {}
+    for field in fields(RiderStyle)[1:]:
+        a, b = getattr(low, field.name), getattr(high, field.name)
+        drawn[field.name] = float(a * (b / a) ** rng.random())
+    return RiderStyle("random", **drawn)
+
+
+def rider_style(style: str | RiderStyle, rng: np.random.Generator | None = None) -> RiderStyle:
+    """A style by name, as ``"random"`` (drawn from ``rng``), or as given.
 
     Raises:
-        ValueError: there is none of that name.
+        ValueError: there is none of that name, or a random one without ``rng``.
     """
     if isinstance(style, RiderStyle):
         return style
+    if style == "random":
+        if rng is None:
+            raise ValueError("a random style needs a generator")
+        return random_style(rng)
     if style not in STYLES:
-        raise ValueError(f"style must be one of {list(STYLES)} or a RiderStyle, got {style!r}")
+        raise ValueError(f"style must be one of {list(STYLES)}, 'random' or a RiderStyle, got {style!r}")
     return STYLES[style]
 
 
+@jit
+def intentions(table, habits, time, curvature, roll, crank):  # type: ignore[no-untyped-def]
+    """Intended movements ``(8,)`` at a time; see :meth:`RiderMotion.at`.
+
+    Args:
+        table: ``(n, 8)`` random movements, see :mod:`.body_motion`.
+        habits: ``(6,)`` lean into turns (rad·m), levelling, amplitude with the cranks (rad) and three phases (rad).
+        time: s.
+        curvature: 1/m.
+        roll: rad.
+        crank: rad.
+    """
+    onset = min(1.0, time / START)
+    onset = onset * onset * (3.0 - 2.0 * onset)
+    values = row_at(table, time)
+    values[0] += 0.5 * habits[2] * math.sin(2.0 * crank + habits[3])
+    values[1] += habits[2] * math.sin(crank + habits[4])
+    values[2] += habits[2] * math.sin(crank + habits[5])
+    turn = max(-LARGEST_LEAN, min(LARGEST_LEAN, habits[0] * curvature))
+    values[1] += -turn - habits[1] * roll
+    for index in (0, 1, 2, 7):
+        values[index] *= onset
+    return values
+
+
 class RiderMotion:
-    """Intended motion of one rider: smooth random functions of time.
+    """Intended motion of one rider: random functions of time, a part locked to the pedals, and a lean into turns.
 
     Args:
         style: habits.
-        rng: draws frequencies and phases.
+        rng: draws everything random.
+        duration: s; a longer motion of the same ``rng`` begins with a shorter one.
     """
 
-    def __init__(self, style: RiderStyle, rng: np.random.Generator) -> None:
-        self.style = style
-        # rows: flexion, lean, twist, four swivels, hands
-        low, high = np.array([0.08] * 3 + [0.03] * 4 + [0.4]), np.array([0.9] * 3 + [0.3] * 4 + [2.0])
-        size = (len(low), WAVES)
-        self._frequencies = 2.0 * math.pi * np.exp(rng.uniform(np.log(low)[:, None], np.log(high)[:, None], size))
-        self._phases = rng.uniform(0.0, 2.0 * math.pi, size)
-        deviations = np.array([style.flexion, style.lean, style.twist, *[style.swivel] * 4, style.unsteadiness])
-        shares = rng.dirichlet(np.full(WAVES, 3.0), len(low))
-        self._amplitudes = np.sqrt(2.0 * shares) * deviations[:, None]
-        self._offsets = np.zeros(len(low))
-        self._offsets[3:7] = style.swivel * rng.standard_normal(4)
+    def __init__(self, style: RiderStyle, rng: np.random.Generator, duration: float = 120.0) -> None:
+        self.style, self.duration = style, duration
+        for_noise, for_posture, for_glances, for_breath, for_rest = rng.spawn(5)
+        # one row before time 0 and two after the end, for the interpolation
+        rows = math.ceil(duration * TABLE_RATE) + 4
+        time = (np.arange(rows) - 1.0) / TABLE_RATE
+        deviations = [style.flexion, style.lean, style.twist, *[style.swivel] * 4, style.unsteadiness]
+        self.table = coloured_noise(for_noise, np.array(deviations), rows)
+        self.table[:, TRUNK] += posture_changes(for_posture, time, style.posture, style.posture_interval)
+        self.table[:, CHANNELS.index("twist")] += glances(for_glances, time, style.glance, style.glance_interval)
+        self.table[:, CHANNELS.index("flexion")] += breathing(for_breath, time, style.breath)
+        self.table[:, SWIVEL] += style.swivel * for_rest.standard_normal(4)
+        phases = for_rest.uniform(0.0, 2.0 * math.pi, 3)
+        self.habits = np.array([style.turn_lean, style.levelling, style.pedalling, *phases])
 
-    def at(self, time: float, curvature: float, roll: float) -> tuple[np.ndarray, np.ndarray, float]:
+    def at(
+        self, time: float, curvature: float, roll: float, crank: float = 0.0
+    ) -> tuple[np.ndarray, np.ndarray, float]:
         """Intentions at a time.
 
         Args:
             time: s since the start.
             curvature: of the path a little ahead, 1/m, left positive.
             roll: of the bicycle, rad, right positive.
+            crank: angle of the cranks, rad.
 
         Returns:
             Change ``(3,)`` of the trunk's flexion, lean (right positive) and twist to the bicycle, rad; swivel
             ``(4,)`` of left arm, right arm, left leg, right leg, rad; unsteady steer torque, N·m.
+
+        Raises:
+            ValueError: a time outside the duration.
         """
-        waves = (self._amplitudes * np.sin(self._frequencies * time + self._phases)).sum(axis=1)
-        onset = min(1.0, time / START)
-        onset = onset * onset * (3.0 - 2.0 * onset)
-        values = onset * waves + self._offsets
-        trunk = values[:3]
-        turn = max(-LARGEST_LEAN, min(LARGEST_LEAN, self.style.turn_lean * curvature))
-        trunk[1] += onset * (-turn - self.style.levelling * roll)
-        return trunk, values[3:7], float(values[7])
+        if not 0.0 <= time <= self.duration:
+            raise ValueError(f"time must lie in the {self.duration:g} s of this motion, got {time:g} s")
+        values = intentions(self.table, self.habits, time, curvature, roll, crank)
+        return values[TRUNK], values[SWIVEL], float(values[HANDS])

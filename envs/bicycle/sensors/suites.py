@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -132,6 +132,7 @@ def rider_bicycle_suite(
     noise_scale: float = 1.0,
     *,
     sites: SensorSites | None = None,
+    placed: Mapping[str, Mounting] | None = None,
     magnetometer: bool = False,
     relative_rate: float | None = None,
     sampling: Sampling = "interval",
@@ -150,6 +151,8 @@ def rider_bicycle_suite(
         rate: time steps per second and rate of all sensors but the camera, Hz; None for that of the paper.
         noise_scale: factor on all errors, between 0 (ideal, with the papers' ranges and camera rate) and 1 or beyond.
         sites: see :func:`.sensor_sites`; None for the papers' mean rider on their mountain bike.
+        placed: where inertial sensors really are, by site (``trunk_imu``, ``thigh_left``, …); the others are where
+            ``sites`` says.
         magnetometer: add magnetometers to the bicycle's IMU, and to the trunk's where the suite has one.
         relative_rate: of the camera, Hz; None for the papers' 16 Hz (or ``rate``, if that is less), and for ``rate``
             with ideal sensors.
@@ -185,6 +188,7 @@ def rider_bicycle_suite(
         its_rate = slow if each.startswith("relative/") else steps
         device = _device(each, channel, sensors, sites, its_rate)
         mounting = getattr(sites, channel.site) if channel.site else Mounting()
+        mounting = (placed or {}).get(each.split("/")[0], mounting)
         body = sites.seen if each.startswith("relative/") else channel.body
         noise = device.at_rate(its_rate).scaled(noise_scale)
         signal = Channel(each, channel.size, channel.kind.unit)

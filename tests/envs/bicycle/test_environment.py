@@ -73,7 +73,7 @@ def test_geometry_is_that_of_the_rider_in_the_saddle():
     assert env.ride is None
     assert env.geometry.rider_mass == SUBJECTS[0].mass
     env.reset(seed=0, options={"subject": 4})
-    assert env.geometry == rider_geometry(env.ride.rider.posture, env._sites)
+    assert env.geometry == rider_geometry(env.ride.rider.posture, env._worn.sites)
     assert env.geometry.rider_mass == SUBJECTS[4].mass
     env.close()
 

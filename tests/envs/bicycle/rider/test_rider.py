@@ -230,12 +230,6 @@ def test_two_minutes_with_every_subject(subject, fidelity):
                 assert ride.rider.gaps().max() < 1e-3
 
 
-def test_motion_has_the_deviations_of_its_style():
-    style, times = STYLES["aggressive"], np.linspace(5.0, 605.0, 2500)
-    rows = [RiderMotion(style, np.random.default_rng(seed)).at(t, 0.0, 0.0)[0] for seed in range(2) for t in times]
-    np.testing.assert_allclose(np.std(rows, axis=0), (style.flexion, style.lean, style.twist), rtol=0.05)
-
-
 @pytest.mark.parametrize(
     ("make", "message"),
     [
