@@ -193,7 +193,7 @@ class RiderBicycleEnv(PoseEnv):
         if style not in (None, "random"):
             rider_style(style)
         if surface not in (None, "random"):
-            named_surface(surface)  # type: ignore[arg-type]
+            named_surface(surface)
         self.parameters = _bicycle(bicycle)
         if fidelity not in ("full", "lumped"):
             raise ValueError(f"fidelity must be 'full' or 'lumped', got {fidelity!r}")
