@@ -62,6 +62,8 @@ MIRRORS: dict[str, Mirror] = {
     "orientation": times(*TURN),
     "orientation_bias": AXIAL_VECTOR,
     "angular_rate": AXIAL_VECTOR,
+    "lever_arm": POLAR_VECTOR,
+    "rotation": times(*TURN),
     **dict.fromkeys(("position", "velocity", "acceleration", "force", "force_left", "force_right"), POLAR_VECTOR),
     "moment": AXIAL_VECTOR,
     "seat/wrench": times(*POLAR, *AXIAL),

@@ -16,16 +16,17 @@ from ...filters.bicycle.geometry import RiderGeometry
 from ...filters.core import rotation
 from ...filters.support.ranges import Checked
 from ..bicycle.sensors.measured_geometry import measured
+from ..bicycle.sensors.placement import PLACED
 from ..bicycle.sensors.sites import sensor_sites
 from ..bicycle.sensors.suites import rider_bicycle_suite
 from ..data.trajectory import Trajectory
-from ..sensors.ideal import STANDARD_GRAVITY
+from ..sensors.ideal import STANDARD_GRAVITY, Mounting
 from ..sensors.late import readings_at
 from ..sensors.noise import TIMES
 from ..sensors.sensor import Sensor, due
 from ..sensors.suite import SensorSuite
 from ..sensors.timing import Timings, make_clocks
-from .mirror import mirrored
+from .mirror import POLAR, TURN, mirrored, other_side
 from .recipe import unspawned
 
 TRUE_GEOMETRY = "true_geometry"
@@ -116,19 +117,27 @@ def ideal_sensors(ride: Trajectory) -> Mapping[str, Any]:
 def suite_of(
     ride: Trajectory, described: Mapping[str, Any], sensors: str, noise_scale: float, timing: Timings | None = None
 ) -> SensorSuite:
-    """The suite with errors, at the rate of the ride, with its wheel."""
+    """The suite with errors, at the rate of the ride, with its wheel and the places of its sensors."""
     from ..bicycle.frame.parameters import MOUNTAIN_BIKE
     from ..bicycle.rider.anthropometry import RiderBody
     from ..bicycle.rider.posture import sit
 
     sites = sensor_sites(sit(MOUNTAIN_BIKE, RiderBody()))
     sites = replace(sites, wheel_radius=RiderGeometry.of(ride.metadata).wheel_radius)
+    placed = {}
+    for sensor in described["sensors"]:
+        site, lever, axes = sensor["channel"].partition("/")[0], sensor["lever_arm"], sensor["rotation"]
+        if ride.metadata.get("mirrored"):
+            site, lever, axes = other_side(site), POLAR * lever, TURN * axes
+        if site in PLACED:
+            placed[site] = Mounting(tuple(lever), tuple(axes))
     return rider_bicycle_suite(
         list(ride.measurements),
         sensors=sensors,
         rate=float(described["rate"]),
         noise_scale=noise_scale,
         sites=sites,
+        placed=placed,
         sampling=described["sensors"][0]["sampling"],
         timing=timing,
     )

@@ -15,6 +15,7 @@ from ..bicycle.frame.parameters import BICYCLES
 from ..bicycle.ride.pilot import PILOTS
 from ..bicycle.rider.anthropometry import SUBJECTS
 from ..bicycle.rider.style import rider_style
+from ..bicycle.sensors.placement import placement_errors
 from ..bicycle.sensors.suites import suite_channels
 from ..data.trajectory import Trajectory
 from ..sensors.presets import list_sensor_presets
@@ -65,14 +66,18 @@ class RiderRecipe(Recipe):
     """names of scenarios, also composed"""
     subjects: tuple[int | str, ...] = ("random",)
     """numbers of riders, ``random`` among them"""
-    styles: tuple[str, ...] = ("mild", "normal", "aggressive")
-    """names of riding styles"""
+    styles: tuple[str, ...] = ("random",)
+    """names of riding styles, ``random`` among them: one between mild and aggressive"""
     bicycles: tuple[str, ...] = ("mountain-bike",)
     """names of bicycles"""
     pilots: tuple[str, ...] = ("expert", "skilled", "novice")
     """names of pilots"""
     surfaces: tuple[str, ...] = ("scenario", "random")
     """names of road surfaces; ``scenario``: that of the scenario, ``random``: any"""
+    placement_errors: float = 1.0
+    """1: factor on :class:`poise.envs.bicycle.sensors.placement.PlacementErrors`"""
+    soft_tissue: Range = (0.5, 1.5)
+    """1: factor on the motion of soft tissue below worn sensors"""
     sensors: RideSensors = field(default_factory=RideSensors)
 
     def __post_init__(self) -> None:
@@ -92,7 +97,8 @@ class RiderRecipe(Recipe):
         for each in self.scenarios:
             scenario(each)
         for each in self.styles:
-            rider_style(each)
+            rider_style(each, np.random.default_rng(0))
+        placement_errors(self.placement_errors)
         if not self.duration >= 0.1:
             raise ValueError(f"duration must be at least 0.1 s, got {self.duration}")
 
@@ -117,6 +123,8 @@ class RiderRecipe(Recipe):
             "pilot": one("pilot", self.pilots),
             "fidelity": one("fidelity", self.fidelity),
             "surface": None if surface == "scenario" else surface,
+            "placement_errors": self.placement_errors,
+            "soft_tissue": log_uniform(named_generator(np.random.default_rng(seed), "soft_tissue"), self.soft_tissue),
         }
 
     def ride(self, seed: int | np.random.SeedSequence, name: str = "ride") -> Trajectory:

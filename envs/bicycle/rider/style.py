@@ -92,15 +92,15 @@ STYLES = {
     for style in (
         RiderStyle("still", 0.0, 0.0, 0.0, 0.0, 0.0, swivel=0.0, unsteadiness=0.0),
         RiderStyle(
-            "mild", 0.028, 0.025, 0.055, 0.25, 0.3,
+            "mild", 0.04, 0.038, 0.05, 0.25, 0.3,
             pedalling=0.02, posture=0.01, posture_interval=30.0, glance=0.1, glance_interval=40.0, breath=0.004,
         ),
         RiderStyle(
-            "normal", 0.04, 0.035, 0.065, 0.6, 0.5,
+            "normal", 0.055, 0.05, 0.055, 0.6, 0.5,
             pedalling=0.03, posture=0.015, posture_interval=20.0, glance=0.15, glance_interval=25.0, breath=0.006,
         ),
         RiderStyle(
-            "aggressive", 0.06, 0.05, 0.09, 0.8, 0.6, unsteadiness=0.25,
+            "aggressive", 0.075, 0.065, 0.075, 0.8, 0.6, unsteadiness=0.25,
             pedalling=0.045, posture=0.02, posture_interval=15.0, glance=0.2, glance_interval=15.0, breath=0.01,
         ),
     )

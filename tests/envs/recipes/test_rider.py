@@ -36,7 +36,7 @@ def ridden(**options: object) -> Trajectory:
 
 @pytest.fixture(scope="module")
 def ride() -> Trajectory:
-    return ridden(sensors="ideal")
+    return ridden(sensors="ideal", soft_tissue=1.0)
 
 
 def test_errors_drawn_again_are_those_of_the_environment(ride: Trajectory) -> None:

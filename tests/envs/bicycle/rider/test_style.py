@@ -44,10 +44,9 @@ def test_styles_lean_in_order_and_an_aggressive_rider_far():
 def test_a_steady_rider_presses_on_all_load_cells(style, scenario):
     _, cells, hands = steady_ride(style, scenario, fidelity="full")
     assert cells.mean(axis=0).min() > 50.0
+    assert np.percentile(cells, 5.0, axis=0).min() > 0.0
     # the hands carry some, the saddle most
     weight = 68.0 * STANDARD_GRAVITY
-    # the trunk sways as people do, so that single corners are relieved for moments
-    assert np.percentile(cells, 5.0, axis=0).min() > -0.12 * weight
     assert 0.1 * weight < hands.sum(axis=1).mean() < 0.3 * weight
     assert 0.5 * weight < cells.sum(axis=1).mean() < 0.8 * weight
 
