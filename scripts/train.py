@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from datetime import date
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import tyro
 
@@ -24,7 +24,7 @@ CONTENDERS = ("bounded-motion", "vqf", "mahony", "tilt", "gyroscope-integration"
 """What a network for one inertial sensor is compared with on the test episodes."""
 GESTURES = ("slow", "fast", "severe", "mixed")
 """Gestures of the hand-motion environment on which it is tested besides episodes of its recipes."""
-OPTIONS = ("quick", "seed", "episodes", "epochs", "units", "recipe", "recordings", "test_episodes")
+OPTIONS = ("quick", "seed", "episodes", "epochs", "units", "recipe", "recordings", "teacher", "start", "test_episodes")
 """Arguments that the weights and their card depend on."""
 
 
@@ -49,6 +49,10 @@ class Args:
     recordings: tuple[Path, ...] = ()
     """files or folders of recordings with known truth, to train on instead of simulated episodes; of five or more the
     last fifth chooses the best epoch"""
+    teacher: Literal["truth", "smoother"] = "truth"
+    """what is right in the recordings: their truth, or the smoother of the corrected filter, which needs none"""
+    start: Path | None = None
+    """weights to start from, such as those of a training on simulation"""
     test_episodes: int = 48
     """simulated episodes that the finished network is tested on"""
     processes: int = 2
@@ -74,6 +78,8 @@ def run(args: Args) -> int:
         result = train_preset(
             *(preset, args.seed, folder.folder),
             recordings=own,
+            teacher=args.teacher == "smoother",
+            start=args.start,
             resume=args.resume is not None,
             processes=args.processes,
             say=out.say,

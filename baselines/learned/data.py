@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,6 +18,7 @@ from ...filters.core.estimator import check_measurements
 from ...filters.support.files import replacing
 from ...filters.support.parallel import in_parallel, progress_bar
 from ...filters.support.version import code_version
+from ..run import smooth
 from .front_end import FrontEnd
 from .head import Head
 
@@ -227,6 +229,36 @@ def simulated_sequence(
 ) -> tuple[int, tuple[np.ndarray, ...]]:
     """The index, and :func:`sequence_of` the episode, for parallel processes."""
     return index, sequence_of(recipe.episode(seed, index), front_end, head)
+
+
+def taught(trajectory: Trajectory, filter: str) -> Trajectory:
+    """A recording whose truth is what the smoother of a filter says: a teacher that needs no reference.
+
+    The smoother knows what comes later, so it errs half as much as the filter (Rauch, Tung, Striebel 1965).
+
+    Args:
+        trajectory: a recording; its own truth is not looked at.
+        filter: name of a Kalman filter.
+    """
+    trajectory = trajectory.on_grid()
+    estimate = smooth(filter, trajectory)
+    truth = {name: np.asarray(values) for name, values in estimate.pose.items()}
+    return trajectory.replace(truth=truth, mask=np.ones(len(trajectory), bool))
+
+
+def with_errors(trajectory: Trajectory, generator: np.random.Generator) -> Trajectory:
+    """The same motion with another device: further errors on top of those of a recording of one inertial sensor.
+
+    A constant bias of up to 0.6 °/s of the gyroscope and 0.03 m/s² of the accelerometer, and white noise of up to
+    0.05 °/s a sample.
+    """
+    gyr, acc = trajectory.measurements["imu/gyr"], trajectory.measurements["imu/acc"]
+    bias = math.radians(generator.uniform(0.0, 0.6)) / math.sqrt(3.0) * generator.standard_normal(3)
+    noise = math.radians(generator.uniform(0.0, 0.05)) * generator.standard_normal(gyr.shape)
+    offset = generator.uniform(0.0, 0.03) * generator.standard_normal(3)
+    return trajectory.replace(
+        measurements={**trajectory.measurements, "imu/gyr": gyr + bias + noise, "imu/acc": acc + offset}
+    )
 
 
 def simulate(recipe: Recipe, seed: int, episodes: int, progress: str = "") -> Iterator[Trajectory]:

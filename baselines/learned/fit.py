@@ -191,8 +191,9 @@ class Trainer:
         self.best: dict[str, Any] = copy.deepcopy(module.state_dict())
 
     def begin(self, data: SequenceData, validation: SequenceData) -> None:
-        """Take the scales of the features, check the shapes, and score the network as it is."""
-        self.network.standardised.fit(*standardisation(data.features, data.mask))
+        """Take the scales of the features if they are not known, check the shapes, score the network as it is."""
+        if not self.network.standardised.known:
+            self.network.standardised.fit(*standardisation(data.features, data.mask))
         told, _ = self.forward(torch.from_numpy(data.features[:1, :2]), None)
         if tuple(told.shape) != (1, 2, self.head.size):
             raise ValueError(

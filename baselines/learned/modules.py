@@ -27,11 +27,13 @@ class Standardised(nn.Module):
         super().__init__()
         self.register_buffer("shift", torch.zeros(features))
         self.register_buffer("factor", torch.ones(features))
+        self.register_buffer("known", torch.tensor(False))
 
     def fit(self, mean: np.ndarray, deviation: np.ndarray) -> None:
         """Take mean and standard deviation ``(F,)`` of the training data."""
         self.shift.copy_(torch.from_numpy(np.asarray(mean)))  # type: ignore[operator]
         self.factor.copy_(torch.from_numpy(1.0 / np.asarray(deviation)))  # type: ignore[operator]
+        self.known.fill_(True)  # type: ignore[operator]
 
     def forward(self, features: Tensor) -> Tensor:
         """Standardised features."""
@@ -76,6 +78,17 @@ class GruModule(nn.Module):
         start = None if memory is None else memory[None].contiguous()
         hidden, last = self.gru(torch.tanh(self.input(noisy(self, self.standardised(features)))), start)
         return self.scale * self.output(hidden), last[0]
+
+    @classmethod
+    def of(cls, network: GruNetwork, scale: float = 1.0) -> GruModule:
+        """A module with the weights of a network, to be trained further; scales of the features are in them."""
+        made = cls(network.features, network.outputs, network.size, scale=scale)
+        arrays = {name: torch.from_numpy(array) for name, array in network.arrays().items()}
+        for name in ("output.weight", "output.bias"):
+            arrays[name] = arrays[name] / scale
+        made.load_state_dict(arrays, strict=False)
+        made.standardised.fit(np.zeros(network.features), np.ones(network.features))
+        return made
 
     def export(self) -> GruNetwork:
         """The weights without torch."""

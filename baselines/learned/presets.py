@@ -7,14 +7,18 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ...envs.data.trajectory import Trajectory
 from ...envs.recipes.registry import recipe
 from ...filters.registry import make
 from ...filters.support.names import look_up
 from ...filters.support.seeds import child_seeds
-from .data import SequenceData
+from .data import SequenceData, taught, with_errors
+from .estimator import LearnedEstimator
 from .fit import FitConfig, FitResult, fit
 from .front_end import FrontEnd
+from .gru import GruNetwork
 from .head import Head, TiltHead
 from .level_frame import LevelFrame
 from .modules import GruModule, TcnModule
@@ -47,6 +51,8 @@ class Preset:
     noise: float = 0.0
     """on standardised features while training"""
     fit: FitConfig = field(default_factory=FitConfig)
+    refined: FitConfig = field(default_factory=lambda: FitConfig(epochs=8, batch=16, learning_rate=4e-4))
+    """settings of a training that starts from weights"""
 
     def __post_init__(self) -> None:
         if not self.sources or any(count < 1 for count in self.sources.values()):
@@ -78,6 +84,8 @@ class Preset:
         return {**asdict(self), "sources": dict(self.sources)}
 
 
+COPIES = 4
+"""of each recording that a teacher explains"""
 HANDS = {"hand-held": 300, "carried": 60}
 PRESETS: dict[str, Preset] = {
     "gru": Preset("inclination from six axes by a recurrent network alone", HANDS, fit=FitConfig(epochs=8)),
@@ -108,6 +116,8 @@ def train_preset(
     folder: str | Path,
     *,
     recordings: list[Trajectory] | None = None,
+    teacher: bool = False,
+    start: str | Path | None = None,
     resume: bool = False,
     processes: int = 1,
     say: Callable[[str], object] | None = None,
@@ -119,6 +129,9 @@ def train_preset(
         seed: root seed of data, weights and order.
         folder: where data sets, checkpoints and the TensorBoard log go.
         recordings: to train on instead of simulated episodes; of five or more the last fifth chooses the best epoch.
+        teacher: learn from the smoother of the corrected filter instead of the recordings' truth, each recording
+            :data:`COPIES` times with further errors of its sensors.
+        start: weights to start from; None: from scratch.
         resume: continue from the checkpoint in ``folder``.
         processes: how many episodes are simulated at a time; the weights do not depend on it.
         say: called with a line an epoch; None for a silent training.
@@ -142,13 +155,28 @@ def train_preset(
         return SequenceData.together(parts)
 
     data = validation = None
-    if recordings:
+    if teacher and (preset.filter is None or not recordings):
+        raise ValueError("a teacher needs recordings, and a preset that corrects a filter")
+    if recordings and teacher:
+        generator = np.random.default_rng(train_seed)
+        lessons = [taught(each, str(preset.filter)) for each in recordings]
+        copies = [[with_errors(each, generator) for _ in range(COPIES)] for each in lessons]
+        data = SequenceData.from_trajectories([each for own in copies for each in own], front_end, head)
+        validation = SequenceData.from_trajectories(lessons, front_end, head)
+    elif recordings:
         kept = max(1, len(recordings) * 4 // 5) if len(recordings) >= 5 else len(recordings)
         data = SequenceData.from_trajectories(recordings[:kept], front_end, head)
         if recordings[kept:]:
             validation = SequenceData.from_trajectories(recordings[kept:], front_end, head)
     data = simulated(train_seed, 1.0, "simulate") if data is None else data
     validation = simulated(validation_seed, preset.validation, "held out") if validation is None else validation
-    module = preset.module(front_end.size, head.size, weights_seed % 2**31)
-    config = replace(preset.fit, seed=weights_seed % 2**31)
+    number = weights_seed % 2**31
+    if start is None:
+        module, config = preset.module(front_end.size, head.size, number), preset.fit
+    else:
+        network = LearnedEstimator.load(start).network
+        if not isinstance(network, GruNetwork):
+            raise ValueError(f"start must be weights of a recurrent network, got a {network.kind} in {start}")
+        module, config = GruModule.of(network, preset.scale), preset.refined
+    config = replace(config, seed=number)
     return fit(module, front_end, head, data, validation, config, folder=folder, resume=resume, say=say)
