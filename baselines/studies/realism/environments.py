@@ -48,7 +48,7 @@ def gestures(study: Study, episodes: int) -> dict[str, dict[str, float]]:
 
 
 def ride_statistics(scenario: str, subject: int, seed: int, duration: float, fidelity: str) -> dict[str, float]:
-    """Statistics of one ride of ``poise/RiderBicycle-v0`` with ideal sensors, for :meth:`.Study.map`.
+    """Statistics of one ride of ``poise/RiderBicycle-v0`` with ideal sensors on soft tissue, for :meth:`.Study.map`.
 
     Args:
         scenario: its name.
@@ -68,6 +68,7 @@ def ride_statistics(scenario: str, subject: int, seed: int, duration: float, fid
         rate=RIDE_RATE,
         duration=duration,
         fidelity=fidelity,  # type: ignore[arg-type]
+        soft_tissue=1.0,
     )
     try:
         ride = record(env, seed=seed)

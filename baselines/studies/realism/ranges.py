@@ -7,6 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from ..rides.saddle import ACROSS, ALONG, PULL
+
 
 @dataclass(frozen=True)
 class Believable:
@@ -36,9 +38,9 @@ SADDLE = "a saddle is about 280 mm long and 140 to 280 mm wide, and nothing hold
 BELIEVABLE = {
     "trunk gyroscope rms": Believable(20.0, 45.0, "deg/s", CHEST),
     "trunk gyroscope 95 % frequency": Believable(3.0, 10.0, "Hz", CHEST),
-    "least force of a load cell": Believable(-5.0, math.inf, "N", SADDLE),
-    "centre of pressure across": Believable(-140.0, 140.0, "mm", SADDLE),
-    "centre of pressure along": Believable(-130.0, 130.0, "mm", SADDLE),
+    "least force of a load cell": Believable(-PULL, math.inf, "N", SADDLE),
+    "centre of pressure across": Believable(-ACROSS, ACROSS, "mm", SADDLE),
+    "centre of pressure along": Believable(-ALONG, ALONG, "mm", SADDLE),
 }
 """Quantity → range."""
 

@@ -69,7 +69,7 @@ def ride_motion(study: Study, report: Report, count: int, groups: Sequence[Recor
         report.table(
             f"Motion at {site} by scenario",
             rows + recordings,
-            f"Medians over {each_scenario} rides, up to {BANDWIDTH:g} Hz, ideal sensors.",
+            f"Medians over {each_scenario} rides, up to {BANDWIDTH:g} Hz, ideal sensors, the trunk's on soft tissue.",
         )
     report.table(
         "Trunk, against what is believable",
