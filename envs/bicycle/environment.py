@@ -39,8 +39,8 @@ from .sensors.readings import RideQuantities
 from .sensors.suites import CHANNELS, suite_channels
 from .sensors.worn import WornSensors, WornState
 
-BLOCK = 50
-"""time steps computed at once"""
+FIRST_BLOCK, BLOCK = 20, 200
+"""time steps computed at once: by a reset, and later; the numbers do not depend on it"""
 
 
 class RiderBicycleEnv(PoseEnv):
@@ -281,7 +281,7 @@ class RiderBicycleEnv(PoseEnv):
 
     def next_block(self, most: int) -> Block:
         """Advance the ride and simulate the sensors."""
-        log, bodies, pose = self._source.record(min(most, BLOCK))
+        log, bodies, pose = self._source.record(min(most, BLOCK if self._source.samples else FIRST_BLOCK))
         contact = log.contact
         ride = RideQuantities(
             bodies,

@@ -174,6 +174,11 @@ class RideSource:
             self.ride.step()
         self._first = self.ride.save()
 
+    @property
+    def samples(self) -> int:
+        """Number of samples recorded in the present ride."""
+        return self._samples
+
     def record(self, most: int) -> Ridden:
         """Ride on for ``most`` samples, or to the one in which the rider fell."""
         log = self._recorder.record(most)
