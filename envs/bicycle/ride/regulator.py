@@ -60,8 +60,12 @@ def preview_regulator(
     # preview: the costate of a change of the turn, carried back from where it comes by the closed loop
     closed, effect = (A - B @ gains).T, -(solution @ changes)
     each = round(PREVIEW_BIN / step)
-    kernel = np.zeros((changes.shape[1], PREVIEW_BINS))
-    for index in range(PREVIEW_BINS * each):
-        kernel[:, index // each] += (left @ effect)[0] / each
-        effect = closed @ effect
+    power, total = np.eye(len(closed)), np.eye(len(closed))
+    for _ in range(each - 1):
+        power = closed @ power
+        total += power
+    kernel, bin_later = np.zeros((changes.shape[1], PREVIEW_BINS)), closed @ power
+    for index in range(PREVIEW_BINS):
+        kernel[:, index] = (left @ total @ effect)[0] / each
+        effect = bin_later @ effect
     return gains[0], kernel

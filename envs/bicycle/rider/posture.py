@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.optimize import brentq
 
 from ....filters.core import rotation
 from ..frame.parameters import BicycleParameters, RigidPart
@@ -41,10 +42,7 @@ def _root(function: Callable[[float], float], low: float, high: float, message: 
     """Where a rising function passes zero."""
     if not function(low) < 0.0 < function(high):
         raise ValueError(message)
-    for _ in range(60):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if function(middle) < 0.0 else (low, middle)
-    return 0.5 * (low + high)
+    return float(brentq(function, low, high, xtol=1e-15))
 
 
 @dataclass(frozen=True)
