@@ -14,7 +14,7 @@ ENTRY_POINTS: dict[str, str] = {
     "poise/Replay-v0": "poise.envs.replay:ReplayEnv",
     "poise/BicycleFixture-v0": "poise.envs.bicycle.fixture:BicycleFixtureEnv",
     "poise/RiderBicycle-v0": "poise.envs.bicycle.environment:RiderBicycleEnv",
-    "poise/RiderBicycleGain-v0": "poise.envs.bicycle.gain_tuning:RiderBicycleGainEnv",
+    "poise/RiderBicycleGain-v0": "poise.envs.ride_gain_tuning:RiderBicycleGainEnv",
     "poise/HandMotionGain-v0": "poise.envs.gain_tuning:HandMotionGainEnv",
     "poise/ReplayGain-v0": "poise.envs.gain_tuning:ReplayGainEnv",
 }

@@ -6,9 +6,9 @@ import pytest
 
 import poise
 from poise.envs.bicycle.environment import RiderBicycleEnv
-from poise.envs.bicycle.gain_tuning import RiderBicycleGainEnv
 from poise.envs.bicycle.sensors.single_imu import SITES, imu_of
 from poise.envs.gain_tuning import ReplayGainEnv
+from poise.envs.ride_gain_tuning import RiderBicycleGainEnv
 from poise.filters.bicycle.geometry import RiderGeometry
 from poise.filters.core.kalman import KalmanFilter
 from poise.filters.imu.bounded_motion import BoundedMotion

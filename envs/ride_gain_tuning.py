@@ -6,21 +6,21 @@ from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
-from ...filters.core.kalman import KalmanFilter
-from ...filters.support.seeds import child_seeds, root_seed
-from ..base import renamed
-from ..data.trajectory import Trajectory
-from ..drawn import Scene, Shown
-from ..episodes import EpisodeStore
-from ..gain_tuning import GainTuningEnv
-from ..record import record
-from ..sensors.ideal import Sampling
-from .course.scenarios import Scenario
-from .environment import RiderBicycleEnv
-from .rider.anthropometry import RiderBody
-from .rider.rider import Fidelity
-from .rider.style import RiderStyle
-from .sensors.single_imu import SITES, imu_of
+from ..filters.core.kalman import KalmanFilter
+from ..filters.support.seeds import child_seeds, root_seed
+from .base import renamed
+from .bicycle.course.scenarios import Scenario
+from .bicycle.environment import RiderBicycleEnv
+from .bicycle.rider.anthropometry import RiderBody
+from .bicycle.rider.rider import Fidelity
+from .bicycle.rider.style import RiderStyle
+from .bicycle.sensors.single_imu import SITES, imu_of
+from .data.trajectory import Trajectory
+from .drawn import Scene, Shown
+from .episodes import EpisodeStore
+from .gain_tuning import GainTuningEnv
+from .record import record
+from .sensors.ideal import Sampling
 
 Scenarios = str | Scenario | Sequence[str | Scenario]
 
@@ -179,7 +179,7 @@ class RiderBicycleGainEnv(GainTuningEnv):
 
     def make_scene(self, gui: bool) -> Scene:
         """Rider, bicycle and ground of the episode."""
-        from .course.scene import RideScene
+        from .bicycle.course.scene import RideScene
 
         ride = self.rides[self._rider]
         # a ride that was read has no world yet
