@@ -3,6 +3,9 @@
 A push on one pedal, a lean or a brake would tip the rider off the saddle. The saddle carries a small moment; the hands
 carry the rest: that of the pushing side pulls, the other one presses, along the steering axis, so that they do not
 steer; both together pull against being tipped backwards. All forces are in bicycle axes.
+
+The constants are round figures of this project, found in rides of all preset riders: with them the pelvis tips by no
+more than 3 degrees, but for moments on the ramp and over bumps, and no force is beyond what people reach.
 """
 
 from __future__ import annotations
@@ -32,7 +35,6 @@ HOLD_ROLL, HOLD_ROLL_RATE = 500.0, 40.0
 """N·m/rad and N·m·s/rad of the hands against the tip of the pelvis to the side"""
 HOLD_PITCH, HOLD_PITCH_RATE = 1000.0, 60.0
 """likewise forwards and backwards"""
-
 DRAW, DRAW_RATE, LARGEST_DRAW = 5e3, 300.0, 150.0
 """N/m, N·s/m and N of each leg that draws the pelvis back to the saddle"""
 
