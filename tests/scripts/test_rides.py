@@ -80,6 +80,7 @@ def test_rides_prints_tables_leaves_a_run_and_goes_on(tmp_path, capsys):
     output = capsys.readouterr().out
     assert "4 of 4 rides upright" in output
     assert "Beside the papers" in output
+    assert "Saddle by scenario" in output
     (folder,) = (tmp_path / "rides").iterdir()
     table = pandas.read_csv(folder / "results.csv")
     assert tuple(table.columns) == COLUMNS

@@ -16,6 +16,7 @@ from .checks import all_checks
 from .inclinations import inclination_rows
 from .plots import example_ride, ride_signals
 from .reports import comparison
+from .saddle import ACROSS, ALONG, PULL, saddle_rows
 from .statistics import KINDS, UNITS, ride
 from .vibration import vibration_checks
 
@@ -59,6 +60,8 @@ def rides(study: Study, report: Report, scenarios: Sequence[str], fidelity: str)
         f"{len(found)} rides of {study.duration:g} s, {fidelity} rider",
         [{title: each[field] for field, title in shown.items()} for each in found],
     )
+    accepted = f"Accepted: no cell below -{PULL:g} N but in flight; ±{ALONG:g} mm along and ±{ACROSS:g} mm across."
+    report.table(f"Saddle by scenario, worst of the riders, {fidelity} rider", list(saddle_rows(found)), accepted)
     report.claims("Beside the papers, range over riders", comparison(found))
     draw(study, report, scenarios, fidelity, seeds)
     return found
