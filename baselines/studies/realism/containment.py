@@ -30,12 +30,14 @@ class Summary(NamedTuple):
         rate: Hz.
         statistics: bandwidth (Hz) → statistic → value.
         spectra: ``gyr``, ``force``, ``acc`` → mean density in the bands of :data:`DRAWN`, NaN in bands without a line.
+        fell: whether it is a ride that ended in a fall.
     """
 
     name: str
     rate: float
     statistics: dict[float, dict[str, float]]
     spectra: dict[str, list[float]]
+    fell: bool = False
 
 
 def summary(trajectory: Trajectory, site: str, bandwidths: Sequence[float], orientation: str) -> Summary:
@@ -50,7 +52,8 @@ def summary(trajectory: Trajectory, site: str, bandwidths: Sequence[float], orie
     spectra = motion_spectra(trajectory, site, orientation=orientation)
     own = SHARE_OF_RATE * spectra.rate
     found = {each: statistics_of(spectra, min(each, own)) for each in bandwidths}
-    return Summary(trajectory.name, spectra.rate, found, banded_spectra(spectra))
+    fell = trajectory.metadata.get("ended") == "terminated"
+    return Summary(trajectory.name, spectra.rate, found, banded_spectra(spectra), fell)
 
 
 def banded_spectra(spectra: MotionSpectra) -> dict[str, list[float]]:

@@ -65,6 +65,9 @@ def containment(study: Study, report: Report, settings: Settings, groups: Sequen
         widths = sorted({width for each in each_one for width in each.statistics})
         rate = max(each.rate for each in each_one)
         simulated = simulated_summaries(study, made, settings.of(made.kind), site, widths, rate)
+        if made.kind == "rider":
+            falls = sum(each.fell for each in simulated)
+            report.text(f"{falls} of {len(simulated)} rides of the recipe {name} ended in a fall.")
         for label, summaries in found.items():
             title = f"{label} in {name} at {site}"
             report.table(title, containment_rows(summaries, simulated))
