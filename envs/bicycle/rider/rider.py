@@ -188,7 +188,8 @@ class Rider:
             steer_torque: N·m on the handlebar, left positive.
             drive: desired propulsive force at the wheel, N, without braking.
         """
-        trunk, swivel, unsteady = self.motion.at(state.time - self._began, curvature, state.roll, state.crank)
+        since = state.time - self._began
+        trunk, swivel, unsteady = self.motion.at(since, curvature, state.roll, state.crank, state.speed)
         intended = np.array([*trunk.tolist(), *swivel.tolist(), unsteady])
         bicycle = (state.steer, state.crank, state.crank_rate, state.wheel_rate)
         ratio, now = self.bicycle.ratio, self.bicycle.body.state

@@ -25,6 +25,10 @@ START = 2.0
 """s over which the movements set in"""
 LARGEST_LEAN = 0.4
 """rad into a turn, to the bicycle"""
+AT_EASE, LEAST_EASE = 3.0, 0.3
+"""m/s above which a rider sways and bends freely, and the part of it that is left at walking pace, to keep balance"""
+MOST_UPRIGHT = 0.04
+"""rad by which the trunk straightens at most: beyond, the arms would be straight, above all the outer one in a turn"""
 
 
 @dataclass(frozen=True)
@@ -100,8 +104,8 @@ STYLES = {
             pedalling=0.03, posture=0.015, posture_interval=20.0, glance=0.15, glance_interval=25.0, breath=0.006,
         ),
         RiderStyle(
-            "aggressive", 0.075, 0.065, 0.075, 0.8, 0.6, unsteadiness=0.25,
-            pedalling=0.045, posture=0.02, posture_interval=15.0, glance=0.2, glance_interval=15.0, breath=0.01,
+            "aggressive", 0.06, 0.05, 0.07, 0.8, 0.6, unsteadiness=0.25,
+            pedalling=0.04, posture=0.015, posture_interval=15.0, glance=0.2, glance_interval=15.0, breath=0.01,
         ),
     )
 }  # fmt: skip
@@ -136,7 +140,7 @@ def rider_style(style: str | RiderStyle, rng: np.random.Generator | None = None)
 
 
 @jit
-def intentions(table, habits, time, curvature, roll, crank):  # type: ignore[no-untyped-def]
+def intentions(table, habits, time, curvature, roll, crank, speed):  # type: ignore[no-untyped-def]
     """Intended movements ``(8,)`` at a time; see :meth:`RiderMotion.at`.
 
     Args:
@@ -146,11 +150,17 @@ def intentions(table, habits, time, curvature, roll, crank):  # type: ignore[no-
         curvature: 1/m.
         roll: rad.
         crank: rad.
+        speed: m/s.
     """
     onset = min(1.0, time / START)
     onset = onset * onset * (3.0 - 2.0 * onset)
     values = row_at(table, time)
+    ease = max(LEAST_EASE, min(1.0, speed / AT_EASE))
+    values[0] *= ease
+    values[1] *= ease
     values[0] += 0.5 * habits[2] * math.sin(2.0 * crank + habits[3])
+    if values[0] < 0.0:
+        values[0] = MOST_UPRIGHT * math.tanh(values[0] / MOST_UPRIGHT)
     values[1] += habits[2] * math.sin(crank + habits[4])
     values[2] += habits[2] * math.sin(crank + habits[5])
     turn = max(-LARGEST_LEAN, min(LARGEST_LEAN, habits[0] * curvature))
@@ -185,7 +195,7 @@ class RiderMotion:
         self.habits = np.array([style.turn_lean, style.levelling, style.pedalling, *phases])
 
     def at(
-        self, time: float, curvature: float, roll: float, crank: float = 0.0
+        self, time: float, curvature: float, roll: float, crank: float = 0.0, speed: float = AT_EASE
     ) -> tuple[np.ndarray, np.ndarray, float]:
         """Intentions at a time.
 
@@ -194,6 +204,7 @@ class RiderMotion:
             curvature: of the path a little ahead, 1/m, left positive.
             roll: of the bicycle, rad, right positive.
             crank: angle of the cranks, rad.
+            speed: of the bicycle, m/s.
 
         Returns:
             Change ``(3,)`` of the trunk's flexion, lean (right positive) and twist to the bicycle, rad; swivel
@@ -204,5 +215,5 @@ class RiderMotion:
         """
         if not 0.0 <= time <= self.duration:
             raise ValueError(f"time must lie in the {self.duration:g} s of this motion, got {time:g} s")
-        values = intentions(self.table, self.habits, time, curvature, roll, crank)
+        values = intentions(self.table, self.habits, time, curvature, roll, crank, speed)
         return values[TRUNK], values[SWIVEL], float(values[HANDS])
