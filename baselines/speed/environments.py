@@ -114,7 +114,7 @@ def recording_rate(options: dict[str, Any]) -> float:
 def standing_ride(fidelity: Literal["full", "lumped"]) -> Ride:
     """A rider on a mountain bike about to ride straight on, without the environment around them."""
     from ...envs.bicycle.course.path import Path
-    from ...envs.bicycle.frame.parameters import BICYCLES
+    from ...envs.bicycle.frame.bicycles import BICYCLES
     from ...envs.bicycle.ride.ride import Ride
     from ...envs.bicycle.rider.anthropometry import rider_body
     from ...envs.bicycle.rider.posture import sit

@@ -21,7 +21,8 @@ from .course.scenarios import scenario as named_scenario
 from .course.surfaces import Surface
 from .course.surfaces import surface as named_surface
 from .course.terrain import Ground
-from .frame.parameters import BICYCLES, BicycleParameters
+from .frame.bicycles import BICYCLES
+from .frame.parameters import BicycleParameters
 from .frame.tyre import TyreParameters
 from .ride.control import ControlSettings
 from .ride.pilot import PilotParameters, check_pilot
@@ -131,7 +132,8 @@ class RiderBicycleEnv(PoseEnv):
         rate: Hz; None for that of the suite.
         duration: s.
         fidelity: ``full`` or ``lumped``.
-        bicycle: ``mountain-bike`` or parameters with a crank.
+        bicycle: ``mountain-bike``, ``city-bike``, ``racing-bike``, ``trail-bike``, ``cargo-bike``
+            (:mod:`poise.envs.bicycle.frame.bicycles`) or parameters with a crank.
         physics_rate: physics steps per second, Hz; a multiple of 250 Hz and of ``rate``.
         score: one quantity or several of ``info["pose"]``; by default the orientations of bicycle and trunk.
         noise_scale: factor on all errors, 0 for none.

@@ -11,7 +11,7 @@ from ...filters.support.ranges import Checked, Range, log_uniform
 from ...filters.support.seeds import named_generator
 from ..bicycle.course.scenarios import list_scenarios, scenario
 from ..bicycle.course.surfaces import list_surfaces
-from ..bicycle.frame.parameters import BICYCLES
+from ..bicycle.frame.bicycles import BICYCLES
 from ..bicycle.ride.pilot import PILOTS
 from ..bicycle.rider.anthropometry import SUBJECTS
 from ..bicycle.rider.style import rider_style

@@ -221,6 +221,3 @@ MOUNTAIN_BIKE = BicycleParameters(
     drag_area=0.5,
     rolling_resistance=0.006,
 )
-
-BICYCLES = {bicycle.name: bicycle for bicycle in (BENCHMARK, MOUNTAIN_BIKE)}
-"""The bicycles by name."""
