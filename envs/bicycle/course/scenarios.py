@@ -9,11 +9,14 @@ from functools import partial
 
 import numpy as np
 
+from .events import Events, coasting_phases, gusts, usual_cadence
 from .path import Path, smooth_curvature, wandering_path
 from .surfaces import SURFACES, Surface
 from .surfaces import surface as named_surface
 from .terrain import Bump, FlatGround, Ground, GroundSum, Ramp
 
+STOP_HOLD = 9.0
+"""s from a stop to the next level, and from there to the next stop"""
 Factory = Callable[[np.random.Generator, float], "SpeedProfile"]
 
 
@@ -53,6 +56,7 @@ class Course:
     ground: Ground
     """bumps and slopes, with the surface on them"""
     surface: Surface
+    events: Events
 
 
 @dataclass(frozen=True)
@@ -71,6 +75,10 @@ class Scenario:
     """default riding style"""
     surface: str | Surface = "smooth"
     """default surface"""
+    windy: bool = False
+    """whether there are gusts and pushes from the side"""
+    coasts: bool = False
+    """whether the rider coasts now and then"""
 
     def draw(self, rng: np.random.Generator, duration: float, surface: str | Surface | None = None) -> Course:
         """Draw a course for a ride of ``duration`` seconds.
@@ -83,7 +91,7 @@ class Scenario:
         Raises:
             ValueError: an unknown surface.
         """
-        for_speed, for_path, for_ground, for_surface = rng.spawn(4)
+        for_speed, for_path, for_ground, for_surface, for_events = rng.spawn(5)
         speed = self.speed(for_speed, duration)
         longest = float(speed.levels.max()) * duration + 10.0
         path = self.path(for_path, longest)
@@ -92,7 +100,10 @@ class Scenario:
             laid = list(SURFACES)[int(for_surface.integers(1, len(SURFACES)))]
         laid = named_surface(laid)
         ground = GroundSum([self.ground(for_ground, path, speed), laid.draw(for_surface)])
-        return Course(path, speed, ground, laid)
+        cadence = usual_cadence(for_events)
+        side = gusts(for_events, speed.mean, duration) if self.windy else None
+        events = Events(side, coasting_phases(for_events, duration) if self.coasts else (), cadence)
+        return Course(path, speed, ground, laid, events)
 
 
 def _steady_speed(rng: np.random.Generator, duration: float, low: float, high: float) -> SpeedProfile:
@@ -104,6 +115,14 @@ def _varied_speed(rng: np.random.Generator, duration: float, low: float, high: f
     size = max(2, math.ceil(duration / hold) + 1)
     parts = (rng.permutation(size) + rng.uniform(size=size)) / size
     return SpeedProfile(low + (high - low) * parts, hold, dwell=0.5)
+
+
+def _stops(rng: np.random.Generator, duration: float, low: float, high: float) -> SpeedProfile:
+    """From rest to a level and back to rest, again and again."""
+    size = max(2, math.ceil(duration / STOP_HOLD) + 1)
+    levels = rng.uniform(low, high, size)
+    levels[::2] = 0.0
+    return SpeedProfile(levels, STOP_HOLD, dwell=0.35)
 
 
 def _flat(rng: np.random.Generator, path: Path, speed: SpeedProfile) -> Ground:
@@ -223,12 +242,40 @@ SCENARIOS = {
         ),
         Scenario(
             "slow",
-            "almost a track stand: 0.5 to 0.7 m/s",
-            partial(_steady_speed, low=0.5, high=0.7),
+            "walking pace and less: 0.7 to 0.9 m/s",
+            partial(_steady_speed, low=0.7, high=0.9),
             _straight,
             _flat,
             "mild",
             "tarmac",
+        ),
+        Scenario(
+            "stop-and-go",
+            "from rest to 2.5 to 5 m/s and back to rest every 18 s, a foot on the ground at stops",
+            partial(_stops, low=2.5, high=5.0),
+            _nudged,
+            _flat,
+            "mild",
+            surface="tarmac",
+        ),
+        Scenario(
+            "commute",
+            "an arbitrary path at 2.5 to 6.5 m/s on tarmac, coasting now and then",
+            partial(_varied_speed, low=2.5, high=6.5, hold=12.0),
+            _wander,
+            _flat,
+            surface="tarmac",
+            coasts=True,
+        ),
+        Scenario(
+            "gusts",
+            "nearly straight at 3 to 6 m/s in gusts of cross wind and pushes from the side",
+            partial(_steady_speed, low=3.0, high=6.0),
+            _nudged,
+            _flat,
+            "mild",
+            surface="tarmac",
+            windy=True,
         ),
     )
 }

@@ -1,9 +1,9 @@
 """Bicycles by name: measured ones with published numbers, and heavy ones with round figures.
 
 The measured ones are those of J. K. Moore, M. Hubbard, A. L. Schwab, J. D. G. Kooijman, Accurate measurement of bicycle
-parameters, Proc. Bicycle and Motorcycle Dynamics (2010), as distributed with the Python package BicycleParameters; there
-z points down, so products of inertia change sign here. What they do not give is a round figure of this project: bottom
-bracket, crank and gears, saddle, grips, tyres and resistances.
+parameters, Proc. Bicycle and Motorcycle Dynamics (2010), as distributed with the Python package BicycleParameters;
+there z points down, so products of inertia change sign here. What they do not give is a round figure of this project:
+bottom bracket, crank and gears, saddle, grips, tyres and resistances.
 """
 
 from __future__ import annotations
@@ -100,8 +100,8 @@ TRAIL_BIKE = BicycleParameters(
 CARGO_BIKE = replace(
     CITY_BIKE,
     name="cargo-bike",
-    source="round figures of this project for an electric long-tail bicycle: geometry of the city bicycle with a longer "
-    "wheelbase; motor in the rear hub, battery and 20 kg of luggage on the rear rack",
+    source="round figures of this project for an electric long-tail bicycle: geometry of the city bicycle with a "
+    "longer wheelbase; motor in the rear hub, battery and 20 kg of luggage on the rear rack",
     wheelbase=1.25,
     rear_wheel=WheelParameters(0.305, 5.5, inertia_axle=0.20, inertia_diameter=0.11, crown_radius=0.026),
     front_wheel=WheelParameters(0.305, 2.3, inertia_axle=0.15, inertia_diameter=0.08, crown_radius=0.026),

@@ -13,6 +13,8 @@ SLOW_CADENCE, FAST_CADENCE = 4.2, 8.5
 """rad/s (40 and 81 a minute): where a rider shifts down and up"""
 SHIFT_PAUSE = 1.0
 """s between two shifts"""
+AROUND_CADENCE = 1.25
+"""1: part by which the cadence of a rider with a preference exceeds or misses it before a shift"""
 
 
 @jit
@@ -47,6 +49,7 @@ class Drivetrain:
     def __init__(self, parameters: DriveParameters) -> None:
         self.parameters = parameters
         stiffness, damping = parameters.chain_stiffness, parameters.chain_damping
+        self.prefer(None)
         self.chain = np.array([parameters.gears[0], 0.0, -math.inf, stiffness, damping])
         """of :func:`chain_torque`"""
 
@@ -65,9 +68,15 @@ class Drivetrain:
         ratio = self.ratio if ratio is None else ratio
         self.chain[:3] = ratio, ratio * crank - wheel, -math.inf
 
+    def prefer(self, cadence: float | None) -> None:
+        """Choose gears around a cadence (rad/s); None for the middle of the comfortable range."""
+        self._slow, self._fast = SLOW_CADENCE, FAST_CADENCE
+        if cadence is not None:
+            self._slow, self._fast = cadence / AROUND_CADENCE, cadence * AROUND_CADENCE
+
     def gear_for(self, wheel_rate: float) -> float:
         """Ratio that brings the cadence nearest to the middle of the comfortable range."""
-        middle = math.sqrt(SLOW_CADENCE * FAST_CADENCE)
+        middle = math.sqrt(self._slow * self._fast)
         return min(self.parameters.gears, key=lambda ratio: abs(math.log(max(1e-3, wheel_rate) / ratio / middle)))
 
     def shift(self, time: float, crank: float, wheel: float, wheel_rate: float) -> None:
@@ -76,7 +85,7 @@ class Drivetrain:
             return
         gears, cadence = self.parameters.gears, wheel_rate / self.ratio
         index = gears.index(self.ratio)
-        index += 1 if cadence > FAST_CADENCE else -1 if cadence < SLOW_CADENCE else 0
+        index += 1 if cadence > self._fast else -1 if cadence < self._slow else 0
         index = max(0, min(len(gears) - 1, index))
         if gears[index] != self.ratio:
             self.engage(crank, wheel, gears[index])

@@ -22,7 +22,19 @@ from ..frame.parameters import BicycleParameters
 from ..frame.whipple import WhippleModel, whipple_model
 from .preview import PREVIEW_BIN, PREVIEW_BINS, speed_limits
 from .regulator import lateral_model, preview_regulator, sampled
-from .steering import DISTANCE, DRIVE, LOWEST_SPEED, MEMORY, OFFSET, TARGET, TORQUE, Moving, Piloted, steer_exactly
+from .steering import (
+    COASTING,
+    DISTANCE,
+    DRIVE,
+    LOWEST_SPEED,
+    MEMORY,
+    OFFSET,
+    TARGET,
+    TORQUE,
+    Moving,
+    Piloted,
+    steer_exactly,
+)
 
 POSITIVE = ("effort", "largest_torque", "largest_drive", "largest_power", "lateral_acceleration", "braking", "rate")
 """settings that must not be zero"""
@@ -168,6 +180,10 @@ class Pilot:
         """Begin a ride at the beginning of a path, at a speed (m/s)."""
         self.path, self._memory, self.command = path, np.zeros(MEMORY), (0.0, 0.0)
         self._memory[TARGET] = speed
+
+    def coast(self, resting: bool) -> None:
+        """Whether the legs rest, from the next control step on; brakes still act."""
+        self._memory[COASTING] = resting
 
     @property
     def distance(self) -> float:

@@ -32,9 +32,9 @@ from .regulator import sampled
 
 NOISES = 7
 """random numbers a control step: six senses and the muscles"""
-ARMS_ON_BAR, ARMS_DAMPING = 0.45, 3.1
-"""1, N·m·s/rad: part of the mass of a full rider's arms that moves with the grips, and what their joints damp; found in
-the response of riders 0, 2 and 4 to a torque on the bar (0.43 to 0.64, 3.1 to 3.2)"""
+ARMS_INERTIA, ARMS_DAMPING = 0.24, 3.1
+"""kg·m², N·m·s/rad: what a full rider's arms and their joints add to the steering; found in the response of riders 0, 2
+and 4 to a torque on the bar (0.23 to 0.27, 2.8 to 3.2)"""
 BLOCK = 512
 """control steps whose noise is drawn at once"""
 
@@ -71,8 +71,6 @@ def leaning_trunk(posture: Posture, full: bool, levelling: float) -> TrunkModel:
     """What of a rider leans: trunk, head and arms. The arms of a ``full`` rider turn with the bar."""
     trunk, arms = posture.trunk(), posture.limbs_at(0.0)
     whole = join([trunk, arms["arm_left"], arms["arm_right"]])
-    bicycle = posture.bicycle
-    grip = float(np.linalg.norm(np.cross(bicycle.steer_axis, np.array(bicycle.grip) - bicycle.steer_origin)))
     centre = posture.lumbar + rotation.rotate(posture.trunk_orientation(), whole.centre)
     return TrunkModel(
         whole.mass,
@@ -84,7 +82,7 @@ def leaning_trunk(posture: Posture, full: bool, levelling: float) -> TrunkModel:
         TRUNK_STIFFNESS,
         TRUNK_DAMPING,
         STANDARD_GRAVITY * trunk.mass * float(trunk.centre[2]),
-        full * ARMS_ON_BAR * 2.0 * arms["arm_left"].mass * grip**2,
+        full * ARMS_INERTIA,
         full * ARMS_DAMPING,
         levelling,
     )

@@ -106,7 +106,7 @@ PILOTS = {
     for pilot in (
         _skill("expert", (0.10, 0.15), 0.3, 0.03, 0.05, 1.0),
         _skill("skilled", (0.11, 0.18), 0.5, 0.04, 0.05, 0.7),
-        _skill("novice", (0.13, 0.22), 0.75, 0.06, 0.05, 0.5),
+        _skill("novice", (0.12, 0.20), 0.7, 0.06, 0.05, 0.5),
     )
 }
 """Human pilots by name, from the most to the least skilled."""

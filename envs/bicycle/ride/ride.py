@@ -2,22 +2,26 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from ...physics.world import Physics
+from ...physics.world import BASE, Physics
 from ...sensors.ideal import STANDARD_GRAVITY
+from ..course.events import Events
 from ..course.path import Path
 from ..course.terrain import Ground
 from ..frame.bicycle import Bicycle, BicycleMemory
 from ..frame.tyre import TyreParameters
+from ..rider.muscles import RESTING
 from ..rider.posture import Posture
 from ..rider.rider import Fidelity, Rider, RiderMemory
 from ..rider.style import RiderMotion
 from .control import ControlSettings, Pilot, PilotMemory
+from .foot import Foot
 from .human import HumanPilot, leaning_trunk
 from .pilot import IDEAL, PilotParameters, pilot_parameters
 
@@ -38,6 +42,7 @@ class RideMemory:
     rider: RiderMemory
     pilot: PilotMemory
     control: int
+    foot: float
 
 
 class Ride:
@@ -55,6 +60,7 @@ class Ride:
         control: None for default settings.
         pilot: who steers: ``ideal``, or a human by name or parameters (:mod:`.pilot`).
         noise: seed of a human's senses and muscles; None for 0.
+        events: gusts and pushes, coasting, cadence.
         crank: angle at the start, rad.
         gravity: m/s².
         gui: open PyBullet's window.
@@ -77,6 +83,7 @@ class Ride:
         control: ControlSettings | None = None,
         pilot: str | PilotParameters = IDEAL,
         noise: np.random.SeedSequence | None = None,
+        events: Events | None = None,
         crank: float = 0.3,
         gravity: float = STANDARD_GRAVITY,
         gui: bool = False,
@@ -94,7 +101,8 @@ class Ride:
         trunk = posture.trunk()
         whole = sum(part.mass * part.centre[2] for part in self._loaded.parts)
         self._lean_effect = trunk.mass * float(trunk.centre[2]) * np.cos(posture.flexion) / whole
-        self.begin(motion, path, speed, ground=ground, pilot=pilot, noise=noise, crank=crank)
+        self.foot = Foot()
+        self.begin(motion, path, speed, ground=ground, pilot=pilot, noise=noise, events=events, crank=crank)
 
     def begin(
         self,
@@ -105,6 +113,7 @@ class Ride:
         ground: Ground | None = None,
         pilot: str | PilotParameters = IDEAL,
         noise: np.random.SeedSequence | None = None,
+        events: Events | None = None,
         crank: float = 0.3,
     ) -> None:
         """Start another ride of the same person in the same world; bit for bit what a new :class:`Ride` would do.
@@ -114,11 +123,14 @@ class Ride:
         self.physics.steps = 0
         self.bicycle.lay(ground)
         self.pilot = self._pilot(pilot, noise, motion)
-        self.path, self.speed = path, speed
+        self.path, self.speed, self.events = path, speed, Events() if events is None else events
+        if self.bicycle.drivetrain is not None:
+            self.bicycle.drivetrain.prefer(self.events.cadence)
         point, first = path.at(0.0), self.pilot.comfortable_speed(path, speed(0.0))
         self.bicycle.start(first, (point.x, point.y), point.heading, crank=crank)
         self.rider.start(motion, crank, self.bicycle.state().crank_rate)
         self.pilot.start(path, first)
+        self.foot.start(first)
         self._count = 0
         self.state = self.bicycle.state()
 
@@ -144,19 +156,46 @@ class Ride:
         self._count += 1
         rider.act()
         brake = max(0.0, -self.pilot.command[1] - COASTING)
+        self.foot.push(bicycle, self.state)
+        if self.events.side is not None:
+            self._push_aside(self.events.side(self.physics.time))
         bicycle.act(brake=brake)
         self.physics.step()
 
     def _control(self) -> None:
         self.state = state = self.bicycle.state()
         self.bicycle.shift()
-        torque, drive = self.pilot.update(state, self.speed(state.time), self.rider.intended_lean)
+        wanted = self.speed(state.time)
+        coasting = self.events.coasts(state.time)
+        self.pilot.coast(coasting)
+        self.foot.update(state, wanted, self.pilot.period)
+        torque, drive = self.pilot.update(state, wanted, self.rider.intended_lean)
+        torque = self.foot.steer(torque, state)
+        if coasting and drive >= -COASTING:
+            drive = RESTING
         ahead = self.path.at(self.pilot.distance + PREVIEW * state.speed)
         self.rider.plan(state, ahead.curvature, torque, drive)
 
+    def _push_aside(self, force: float) -> None:
+        """A force (N, to the left) on the frame, at the height of the saddle."""
+        state, body = self.state, self.bicycle.body
+        c, s = math.cos(state.yaw), math.sin(state.yaw)
+        x, _, z = self.rider.posture.bicycle.saddle
+        # a rolled bicycle carries its saddle to the side
+        aside = -z * math.sin(state.roll)
+        point = (state.x + c * x - s * aside, state.y + s * x + c * aside, state.z + z * math.cos(state.roll))
+        body.push(BASE, (-s * force, c * force, 0.0), point)
+
     def save(self) -> RideMemory:
         """Keep the whole state; free it with :meth:`forget`."""
-        return RideMemory(self.physics.save(), self.bicycle.save(), self.rider.save(), self.pilot.save(), self._count)
+        return RideMemory(
+            self.physics.save(),
+            self.bicycle.save(),
+            self.rider.save(),
+            self.pilot.save(),
+            self._count,
+            self.foot.engaged,
+        )
 
     def restore(self, memory: RideMemory) -> None:
         """Return to a saved state, bitwise."""
@@ -164,7 +203,7 @@ class Ride:
         self.bicycle.restore(memory.bicycle)
         self.rider.restore(memory.rider)
         self.pilot.restore(memory.pilot)
-        self._count = memory.control
+        self._count, self.foot.engaged = memory.control, memory.foot
         self.state = self.bicycle.state()
 
     def forget(self, memory: RideMemory) -> None:

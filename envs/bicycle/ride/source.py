@@ -151,7 +151,14 @@ class RideSource:
                 self.ride.forget(memory)
             self._kept = {}
             self.ride.begin(
-                movement, course.path, course.speed, ground=course.ground, pilot=pilot, noise=noise, crank=crank
+                movement,
+                course.path,
+                course.speed,
+                ground=course.ground,
+                pilot=pilot,
+                noise=noise,
+                events=course.events,
+                crank=crank,
             )
         else:
             self.close()
@@ -166,6 +173,7 @@ class RideSource:
                 tyre=self.tyre,
                 pilot=pilot,
                 noise=noise,
+                events=course.events,
                 crank=crank,
             )
             self._world_key, self.posture = world, posture

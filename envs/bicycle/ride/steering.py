@@ -18,9 +18,9 @@ from ....filters.compile.cache import jit
 from ..course.path import nearest, point_at
 from .preview import PREVIEW_BINS, turns_ahead
 
-DISTANCE, OFFSET, OFFSET_INTEGRAL, SPEED_INTEGRAL, TARGET, ACCELERATION, TORQUE, DRIVE = range(8)
+DISTANCE, OFFSET, OFFSET_INTEGRAL, SPEED_INTEGRAL, TARGET, ACCELERATION, TORQUE, DRIVE, COASTING = range(9)
 """places in a pilot's memory"""
-MEMORY = 8
+MEMORY = 9
 LOWEST_SPEED = 0.3
 """m/s: gains are held below"""
 REACTION = 0.2
@@ -129,6 +129,9 @@ def drive(piloted, now, wanted, memory):  # type: ignore[no-untyped-def]
     integral = memory[SPEED_INTEGRAL] + p.period * p.speed_integral * error
     force = known + p.speed_gain * error + integral
     largest = min(p.largest_drive, p.largest_power / max(LOWEST_SPEED, now.speed))
+    if memory[COASTING] > 0.0:
+        # what is lost meanwhile is not made up for in a sprint
+        memory[TARGET], largest = min(memory[TARGET], now.speed), 0.0
     if -p.largest_brake < force < largest:
         memory[SPEED_INTEGRAL] = integral
     return max(-p.largest_brake, min(largest, force))

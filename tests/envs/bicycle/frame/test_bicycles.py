@@ -1,4 +1,4 @@
-"""Bicycles by name: they fit riders of all sizes, are stable at the speeds that theory gives them, and can be ridden."""
+"""Bicycles by name: they fit riders of all sizes, are stable at some speed, and can be ridden."""
 
 from __future__ import annotations
 
