@@ -59,8 +59,9 @@ class PilotParameters:
     """1: damping ratio of the same (Hess et al. 2012: 0.707)"""
     arm_damping: float = 1.0
     """N·m·s/rad: of arms that hold the bar, without delay"""
-    largest_torque: float = 10.0
-    """N·m, approached softly"""
+    largest_torque: float = 25.0
+    """N·m, approached softly: usual torques stay below 10, but a full rider's arms must also move against the damping of
+    their joints when a fall is near"""
     sway: float = 2.0
     """N·m: standard deviation of the roll moment that the internal model expects from body and wind"""
     sway_time: float = 0.5
