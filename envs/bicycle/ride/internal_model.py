@@ -26,11 +26,11 @@ from .regulator import preview_regulator, sampled
 
 FAST = 3
 """number of fast senses"""
-STEER_DISTURBANCE, STEER_DISTURBANCE_TIME = 1.0, 0.5
+STEER_DISTURBANCE, STEER_DISTURBANCE_TIME = 1.5, 0.5
 """N·m, s: standard deviation and time constant of the steer torque that the internal model does not explain"""
 HEADING_DRIFT, OFFSET_DRIFT = math.radians(0.3), 0.01
 """rad/√s, m/√s: growth of heading and offset that it does not explain (tyres slip, the road slopes)"""
-TRUNK_DRIFT = 0.1
+TRUNK_DRIFT = 0.3
 """rad/s/√s: growth of the trunk's rate that it does not explain"""
 USUAL_TORQUE = 1.0
 """N·m: for the noise of muscles that the internal model expects"""

@@ -57,11 +57,11 @@ class PilotParameters:
     """rad/s: natural frequency of arms and muscles (Hess et al. 2012)"""
     muscle_damping: float = 0.7
     """1: damping ratio of the same (Hess et al. 2012: 0.707)"""
-    arm_damping: float = 1.0
-    """N·m·s/rad: of arms that hold the bar, without delay"""
+    arm_damping: float = 2.0
+    """N·m·s/rad: of arms that hold the bar, without delay (round figure of this project)"""
     largest_torque: float = 25.0
-    """N·m, approached softly: usual torques stay below 10, but a full rider's arms must also move against the damping of
-    their joints when a fall is near"""
+    """N·m, approached softly: usual torques stay below 10, but a full rider's arms must also move against the damping
+    of their joints when a fall is near"""
     sway: float = 2.0
     """N·m: standard deviation of the roll moment that the internal model expects from body and wind"""
     sway_time: float = 0.5
@@ -107,7 +107,7 @@ PILOTS = {
     for pilot in (
         _skill("expert", (0.10, 0.15), 0.3, 0.03, 0.05, 1.0),
         _skill("skilled", (0.11, 0.18), 0.5, 0.04, 0.05, 0.7),
-        _skill("novice", (0.12, 0.20), 0.7, 0.06, 0.05, 0.5),
+        _skill("novice", (0.12, 0.20), 0.6, 0.06, 0.05, 0.5),
     )
 }
 """Human pilots by name, from the most to the least skilled."""
