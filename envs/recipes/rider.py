@@ -23,6 +23,9 @@ from .devices import VariedTiming
 from .recipe import Recipe, check_some, chosen, unspawned
 from .redraw import TapeMeasure, redrawn
 
+RIDDEN = tuple(name for name, bicycle in BICYCLES.items() if bicycle.drive is not None)
+"""Bicycles with pedals"""
+
 
 @dataclass(frozen=True)
 class RideSensors(Checked):
@@ -68,7 +71,7 @@ class RiderRecipe(Recipe):
     """numbers of riders, ``random`` among them"""
     styles: tuple[str, ...] = ("random",)
     """names of riding styles, ``random`` among them: one between mild and aggressive"""
-    bicycles: tuple[str, ...] = ("mountain-bike",)
+    bicycles: tuple[str, ...] = RIDDEN
     """names of bicycles"""
     pilots: tuple[str, ...] = ("expert", "skilled", "novice")
     """names of pilots"""
@@ -88,7 +91,7 @@ class RiderRecipe(Recipe):
             ("scenarios", None),
             ("styles", None),
             ("fidelity", ("full", "lumped")),
-            ("bicycles", tuple(BICYCLES)),
+            ("bicycles", RIDDEN),
             ("subjects", ("random", *range(len(SUBJECTS)))),
             ("pilots", ("ideal", "random", *PILOTS)),
             ("surfaces", ("scenario", "random", *list_surfaces())),
