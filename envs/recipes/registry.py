@@ -35,8 +35,13 @@ RECIPES: dict[str, ShippedRecipe] = {
     ),
     "carried": ShippedRecipe(
         "hand",
-        "a phone carried by somebody who walks or runs: in the hand, swinging, in a pocket",
-        {"carried_share": 1.0},
+        "a phone carried by somebody who walks or stands: in the hand, swinging, in a pocket",
+        {"carried_share": 1.0, "carried": {"first_rest": (0.3, 20.0), "running_share": 0.0}},
+    ),
+    "carried-running": ShippedRecipe(
+        "hand",
+        "the same of somebody who runs",
+        {"carried_share": 1.0, "carried": {"first_rest": (0.3, 20.0), "running_share": 1.0, "standing_share": 0.0}},
     ),
     "rider": ShippedRecipe("rider", "rides of anybody anywhere with sensors of several grades", {}),
 }
