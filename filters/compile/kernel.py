@@ -108,6 +108,14 @@ def gather(present, z, pose, age, dt, declination, always, places, inputs):  # t
 
 
 @jit
+def reject(z, places, memory, age, least, share, longest):  # type: ignore[no-untyped-def]
+    """Put NaN into a sample as :func:`poise.filters.core.monitor.without_impacts` does."""
+    square = squared(z, places[1], places[1] + 3)
+    if memory[4] > 0.0 and age < longest and square > least * least and square > share * share * memory[3]:
+        fill(z[places[1] : places[1] + 3], np.nan)
+
+
+@jit
 def realign(memory, places, present, dt, current):  # type: ignore[no-untyped-def]
     """Put the averages of force and field into a sample, as :func:`poise.filters.core.monitor.realigned` does."""
     for i in range(3):

@@ -16,8 +16,18 @@ import numpy as np
 
 from ..core.held_inputs import grown
 from ..core.model import Equations, Model, Recurrence, parameters_of, with_parameters
-from ..core.monitor import INFLATION, INPUTS, LOST, MEMORY, places_of, starts_of, watch
-from ..core.quantity import GYROSCOPE
+from ..core.monitor import (
+    IMPACT,
+    IMPACT_SHARE,
+    INPUTS,
+    LONGEST_IMPACT,
+    LOST,
+    MEMORY,
+    places_of,
+    starts_of,
+    watch,
+)
+from ..core.quantity import ACCELEROMETER, GYROSCOPE
 from ..core.sampling import split
 from .trace import Expression, Tape, print_code
 
@@ -29,7 +39,7 @@ from numba import njit
 
 from poise.filters.compile.cache import jit
 from poise.filters.compile.kernel import (
-    begin, copy, copy_matrix, correct, fill, gather, keep, propagate, realign, scratch, squared, take, zeros
+    begin, copy, copy_matrix, correct, fill, gather, keep, propagate, realign, reject, scratch, squared, take, zeros
 )
 from poise.filters.compile.smoothing import remember, update_back
 
@@ -55,7 +65,7 @@ def run(x, P, held, age, monitor, started, Z, parameters, restart, poses, covari
     for t in range(Z.shape[0]):
         for b in range(Z.shape[1]):
             p = parameters[t if parameters.shape[0] > 1 else 0, b if parameters.shape[1] > 1 else 0]
-            z, state, P1, white, pose_now = Z[t, b], x[b], P[b], whites[t, b], poses[t, b]
+            z, state, P1, white, pose_now = Z[t, b], x[b], P[b], whites[t, b], poses[t, b]{rejected}
             missing = take(z, held[b], age[b], starts, p[{dt}], current, present, before)
             lost = {lost}
             if started[b] and not lost:
@@ -91,10 +101,14 @@ _GROWN_ONE = """
                     ω = squared(present, {start}, {stop})
                     grown[{i}] = grow(p[{i}], age[b, {c}], ω, p[{dt}], p[{dt}]**{power}, {constants})"""
 
+_REJECTED = f"""
+            if restart and started[b]:
+                reject(z, places, monitor[b], age[b, {{a}}], {IMPACT}, {IMPACT_SHARE}, {LONGEST_IMPACT})"""
+
 _REALIGNED = """
                 if lost:
                     realign(monitor[b], places, present, p[{dt}], current)
-                    factor = {inflation}"""
+                    factor = monitor[b, {lost}]"""
 
 _WATCHED = """
             if restart and started[b]:
@@ -263,6 +277,7 @@ def _print_run(model: Equations, names: list[str], shared: str) -> str:
         "memory": "",
         "lost": "False",
         "realigned": "",
+        "rejected": "",
     }
     head = []
     if model.held_inputs:
@@ -278,8 +293,9 @@ def _print_run(model: Equations, names: list[str], shared: str) -> str:
         declination = f"p[{names.index('declination')}]" if "declination" in names and places.field >= 0 else "0.0"
         parts["memory"] = f"\n    inputs, watched = np.empty({INPUTS}), np.empty({MEMORY})"
         parts["lost"] = f"restart and monitor[b, {LOST}] > 0.5"
-        parts["realigned"] = _REALIGNED.format(dt=dt, inflation=INFLATION)
-        c = channels.index(GYROSCOPE.name)
+        parts["realigned"] = _REALIGNED.format(dt=dt, lost=LOST)
+        c, a = (channels.index(channel.name) for channel in (GYROSCOPE, ACCELEROMETER))
+        parts["rejected"] = _REJECTED.format(a=a)
         parts["watched"] = _WATCHED.format(c=c, dt=dt, declination=declination, always=float(model.error_size > 0))
     return "\n".join([*head, _RUN.format(**parts)])
 

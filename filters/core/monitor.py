@@ -12,6 +12,10 @@ free fall. An estimate that contradicts a trusted average by more than any accel
 good. The heading is watched until it has been confirmed once; after that the field may be disturbed, and only the
 estimator decides. The inclination of a method without covariance is watched until then, too: what it makes of its drift
 later is its own.
+
+Two rules need no patience. An average of a few samples that the next one contradicts, or one of less than a second that
+a sample contradicts which points the other way, starts anew with that sample, and so does the estimator, until a start
+has been confirmed. And a force that no motion explains (:func:`without_impacts`) counts as missing for a moment.
 """
 
 from __future__ import annotations
@@ -45,6 +49,16 @@ GYROSCOPE_GAP = 0.1
 """s without a gyroscope after which averaging begins anew."""
 SHORTEST_FORCE, SHORTEST_FIELD = 0.2, 0.9
 """Least length of an average, in root mean squares of its samples."""
+LARGEST_CHANGE, LARGEST_CHANGE_EARLY = math.radians(30.0), math.radians(120.0)
+"""Angle between an average and the next sample beyond which they contradict each other: while one sample or less than
+:data:`FEW` have been averaged, and until :data:`SETTLED`."""
+FEW = 0.05
+"""s"""
+IMPACT, IMPACT_SHARE = 300.0, 10.0
+"""m/s² and root mean squares of the samples before: a force that exceeds both is no sample. The first is more than all
+axes of a sensor with a range of ±16 g can show together."""
+LONGEST_IMPACT = 0.05
+"""s for which such samples count as missing; what lasts longer is a motion."""
 INFLATION = 4.0
 """Factor on the covariance of a prior that is formed of averages in motion."""
 
@@ -53,8 +67,9 @@ INPUTS = 20
 whether the inclination is watched for good (1) or until it was confirmed (0)."""
 MEMORY = 15
 """Of :func:`watch`: average force (3), mean square, time, time of contradiction; the same of the field (3, 1, 1, 1);
-times of agreement of the heading and of the inclination; whether the estimate is lost (1 or 0)."""
-FORCE, FIELD, FIELD_TIME, LOST = slice(0, 3), slice(6, 9), 10, 14
+times of agreement of the heading and of the inclination; zero, or if the estimate is lost the factor on the covariance
+of its prior."""
+FORCE, SQUARE, TIME, FIELD, FIELD_TIME, LOST = slice(0, 3), 3, 4, slice(6, 9), 10, 14
 """Where some of it is."""
 
 
@@ -73,24 +88,32 @@ def watch(memory: Array, inputs: Array) -> Array:
     turn = exp(rate * dt)
     broken = xp.greater(age, GYROSCOPE_GAP)
     zero = 0.0 * dt
+    unconfirmed = xp.less(memory[..., 13:14], CONFIRMED)
 
-    def averaged(part: Array, sample: Array) -> tuple[Array, Array, Array]:
+    def averaged(part: Array, sample: Array) -> tuple[Array, Array, Array, Array]:
         there = xp.all(xp.isfinite(sample), axis=-1)[..., None]
         sample = xp.where(there, sample, xp.zeros_like(sample))
         mean, square = rotate_back(turn, part[..., :3]), part[..., 3:4]
         time = xp.where(broken, zero, part[..., 4:5])
+        few = xp.logical_or(xp.less(time, 1.5 * dt), xp.less(time, FEW))
+        least = xp.where(few, zero + math.cos(LARGEST_CHANGE), zero + math.cos(LARGEST_CHANGE_EARLY))
+        lengths = xp.sqrt(xp.sum(mean * mean, axis=-1) * xp.sum(sample * sample, axis=-1) + 1e-30)[..., None]
+        contrary = xp.logical_and(there, xp.less(xp.sum(mean * sample, axis=-1)[..., None], least * lengths))
+        early = xp.logical_and(xp.greater(time, 0.0), xp.less(time, SETTLED))
+        contrary = xp.logical_and(contrary, xp.logical_and(early, unconfirmed))
+        time = xp.where(contrary, zero, time)
         longer = time + dt
         share = xp.where(there, dt / xp.where(xp.greater(longer, AVERAGED), zero + AVERAGED, longer), zero)
         time = xp.where(there, xp.where(xp.greater(longer, AVERAGED), zero + AVERAGED, longer), time)
         squared = xp.sum(sample * sample, axis=-1)[..., None]
-        return mean + share * (sample - mean), square + share * (squared - square), time
+        return mean + share * (sample - mean), square + share * (squared - square), time, contrary
 
     def trusted(mean: Array, square: Array, time: Array, shortest: float) -> Array:
         length = xp.sum(mean * mean, axis=-1)[..., None]
         return xp.logical_and(xp.greater_equal(time, SETTLED), xp.greater(length, shortest**2 * square))
 
-    force, force_square, force_time = averaged(memory[..., :6], inputs[..., 3:6])
-    field, field_square, field_time = averaged(memory[..., 6:12], inputs[..., 6:9])
+    force, force_square, force_time, force_contrary = averaged(memory[..., :6], inputs[..., 3:6])
+    field, field_square, field_time, field_contrary = averaged(memory[..., 6:12], inputs[..., 6:9])
     upright = trusted(force, force_square, force_time, SHORTEST_FORCE)
     aligned = xp.sum(up * force, axis=-1)[..., None]
     length = xp.sqrt(xp.sum(force * force, axis=-1)[..., None] + 1e-30)
@@ -121,9 +144,10 @@ def watch(memory: Array, inputs: Array) -> Array:
         xp.logical_and(xp.greater(leant, PATIENCE), watched),
         xp.logical_and(xp.greater(off, PATIENCE), xp.less(agreed, CONFIRMED_HEADING)),
     )
-    leant, off, agreed = (xp.where(lost, zero, value) for value in (leant, off, agreed))
+    early = xp.logical_or(force_contrary, field_contrary)
+    leant, off, agreed = (xp.where(xp.logical_or(lost, early), zero, value) for value in (leant, off, agreed))
     parts = [force, force_square, force_time, leant, field, field_square, field_time, off, agreed, stood]
-    return xp.concat([*parts, xp.where(lost, zero + 1.0, zero)], axis=-1)
+    return xp.concat([*parts, xp.where(early, zero + 1.0, xp.where(lost, zero + INFLATION, zero))], axis=-1)
 
 
 @dataclass(frozen=True)
@@ -180,6 +204,25 @@ def inputs_of(model: Equations, places: Places, held: Array, sample: Array, pose
     parts += [part(pose, places.up, 3), part(pose, places.orientation, 4), age]
     always = zero + float(model.error_size > 0)
     return xp.concat([*parts, zero + expand(model.dt, 1), zero + declination, always], axis=-1)
+
+
+def without_impacts(places: Places, sample: Array, memory: Array, age: Array) -> Array:
+    """A sample ``(..., d)`` with NaN for a force that no motion explains.
+
+    Args:
+        places: of :func:`places_of`.
+        sample: ``(..., d)``.
+        memory: ``(..., 15)`` of the sample before.
+        age: ``(..., 1)`` s since the last valid force, at the sample before.
+    """
+    xp = namespace(sample, memory)
+    force = sample[..., places.force : places.force + 3]
+    squared = xp.sum(force * force, axis=-1)[..., None]
+    seen = xp.logical_and(xp.greater(memory[..., TIME : TIME + 1], 0.0), xp.less(age, LONGEST_IMPACT))
+    beyond = xp.greater(squared, IMPACT_SHARE**2 * memory[..., SQUARE : SQUARE + 1])
+    impact = xp.logical_and(xp.logical_and(seen, beyond), xp.greater(squared, IMPACT**2))
+    force = xp.where(impact, xp.nan + 0.0 * force, force)
+    return xp.concat([sample[..., : places.force], force, sample[..., places.force + 3 :]], axis=-1)
 
 
 def realigned(places: Places, current: Array, memory: Array, dt: Array) -> Array:

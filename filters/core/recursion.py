@@ -7,7 +7,8 @@ Six rules hold for all equations:
 * an estimator initialises itself at the first sample with a finite prior; earlier estimates are NaN;
 * gains, log factors on named constants, may change at every sample; all zeros is exactly the published tuning;
 * the noise of an input grows with the age of its last sample (:mod:`.held_inputs`);
-* an estimate that contradicts the sensors for too long starts anew (:mod:`.monitor`).
+* an estimate that contradicts the sensors for too long starts anew, and a force that no motion explains is no sample
+  (:mod:`.monitor`).
 
 NumPy data are processed in the compiled form (:mod:`poise.filters.compile.run`). The array form below defines the
 result, is differentiable, and runs equations that cannot be traced.
@@ -26,8 +27,8 @@ from .backend import Array, constant, is_torch, namespace
 from .estimator import check_measurements, stack_estimates
 from .held_inputs import grown_parameters
 from .model import Gain, Model, Recurrence, with_parameters
-from .monitor import INFLATION, LOST, inputs_of, places_of, realigned, watch
-from .quantity import GYROSCOPE, Channel, Estimate, Measurement, Quantity
+from .monitor import LOST, inputs_of, places_of, realigned, watch, without_impacts
+from .quantity import ACCELEROMETER, GYROSCOPE, Channel, Estimate, Measurement, Quantity
 from .sampling import (
     FilterState,
     Gains,
@@ -178,12 +179,16 @@ class Recursion:
     ) -> tuple[FilterState, Estimate]:
         model = scaled(self.model, gains, state.x)
         sample = join(arrays, self.channels)
-        xp = namespace(sample, state.x)
+        xp, names = namespace(sample, state.x), [channel.name for channel in self.channels]
+        places = places_of(model) if self.restart else None
+        if places is not None:
+            force_age = state.age[..., names.index(ACCELEROMETER.name)][..., None]
+            clean = without_impacts(places, sample, state.monitor, force_age)
+            sample = xp.where(state.started[..., None], clean, sample)
         current, started, samples = hold(sample, state.held), state.started, split(sample, self.channels)
         age = aged(state.age, sample, self.channels, model.dt)
         whitened = xp.zeros_like(state.x[..., :1]) + constant([0.0] * model.residual_size, state.x)
         x, P = state.x, state.covariance
-        places = places_of(model) if self.restart else None
         lost = started & (state.monitor[..., LOST] > 0.5) if places is not None else started & ~started
         going = started & ~lost
         if bool(xp.any(going)):
@@ -211,7 +216,8 @@ class Recursion:
                 first = xp.where(lost[..., None], anew, current)
             begun = model.prior(split(first, self.channels))
             x0, P0 = begun if isinstance(model, Model) else (begun, P)
-            P0 = xp.where(lost[..., None, None], INFLATION * P0, P0 + xp.zeros_like(P))
+            factor = state.monitor[..., LOST][..., None, None] if places is not None else 1.0
+            P0 = xp.where(lost[..., None, None], factor * P0, P0 + xp.zeros_like(P))
             ready = xp.all(xp.isfinite(x0), axis=-1) & xp.all(xp.all(xp.isfinite(P0), axis=-1), axis=-1)
             new = ready & ~going
             x = xp.where(new[..., None], x0, x)
@@ -220,7 +226,7 @@ class Recursion:
         pose, covariance, memory = model.pose(x), P, state.monitor
         if places is not None and bool(xp.any(started)):
             outputs = xp.concat([pose[quantity.name] for quantity in self.outputs], axis=-1)
-            ages = age[..., [channel.name for channel in self.channels].index(GYROSCOPE.name)][..., None]
+            ages = age[..., names.index(GYROSCOPE.name)][..., None]
             seen = watch(memory, inputs_of(model, places, filled(current), sample, outputs, ages))
             memory = xp.where(started[..., None], seen, memory)
         if not bool(xp.all(started)):

@@ -17,6 +17,8 @@ from poise.filters.core.monitor import INFLATION
 from poise.filters.registry import make
 
 FILTERS = ["external-acceleration", "mekf", "mekf-9", "bounded-motion", "bounded-motion-9"]
+REFERENCES = ["mahony", "mahony-9", "marins", "array-orientation-imu"]
+"""Methods whose error in ordinary motion is of the size of what a bad start may leave."""
 CORRUPTIONS = ["zeros", "missing", "random", "scaled", "reversed", "huge", "force", "field"]
 
 
@@ -71,9 +73,43 @@ def test_bad_first_samples_decide_nothing(name: str, kind: str) -> None:
             data, q = dict(trajectory.measurements), trajectory.truth["orientation"]
         lean, turn = errors(name, corrupted(data, kind, count, index), q)
         usual, usual_turn = errors(name, data, q)
-        # vigorous motion from the start on: MEKF takes acceleration for tilt, and needs longer to forget
-        assert lean < max(5.0 if gesture == "slow" else 8.0, usual + 1.0), (gesture, count)
+        assert lean < max(5.0, usual + 1.0), (gesture, count)
         assert turn < max(15.0, usual_turn + 3.0), (gesture, count)
+
+
+@pytest.mark.parametrize("kind", ["random", "reversed", "force", "field"])
+@pytest.mark.parametrize("name", REFERENCES)
+def test_bad_first_samples_of_references_decide_nothing(name: str, kind: str) -> None:
+    trajectory = motion("slow")
+    data, q = dict(trajectory.measurements), trajectory.truth["orientation"]
+    usual, usual_turn = errors(name, data, q)
+    for count in (1, 3, 20):
+        lean, turn = errors(name, corrupted(data, kind, count, 3), q)
+        assert lean < max(5.0, usual + 1.0), count
+        assert turn < max(15.0, usual_turn + 3.0), count
+
+
+@pytest.mark.parametrize("glitch", [400.0, 1e3, 1.9e3])
+@pytest.mark.parametrize("name", [*FILTERS, *REFERENCES])
+def test_a_force_that_no_motion_explains_is_no_sample(name: str, glitch: float) -> None:
+    trajectory, estimator = motion("slow"), make(name, dt=0.01)
+    data = {channel: array.copy() for channel, array in trajectory.measurements.items()}
+    data["imu/acc"][[700, 1001]] = np.nan
+    absent: Any = estimator.run(data)  # type: ignore[attr-defined]
+    data["imu/acc"][700], data["imu/acc"][1001] = [0.0, glitch, 5.0], -glitch
+    given = data["imu/acc"].copy()
+    found: Any = estimator.run(data)  # type: ignore[attr-defined]
+    for quantity, values in absent.pose.items():
+        np.testing.assert_array_equal(found.pose[quantity], values)
+    np.testing.assert_array_equal(data["imu/acc"], given)
+
+
+def test_a_force_that_lasts_is_a_motion() -> None:
+    trajectory, estimator = motion("slow"), make("bounded-motion", dt=0.01)
+    data = {channel: array.copy() for channel, array in trajectory.measurements.items()}
+    data["imu/acc"][700:800] += [0.0, 0.0, 400.0]
+    force: Any = estimator.run(data)  # type: ignore[attr-defined]
+    assert np.linalg.norm(force.pose["external_acceleration"][720:800], axis=1).min() > 300.0
 
 
 @pytest.mark.parametrize("name", FILTERS)
@@ -89,9 +125,11 @@ def test_nothing_happens_on_ordinary_data(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", ["mekf-9", "bounded-motion", "mahony-9", "gyroscope-integration"])
-def test_a_restart_is_the_same_in_every_form(name: str) -> None:
+@pytest.mark.parametrize("kind", ["reversed", "random"])
+def test_a_restart_is_the_same_in_every_form(name: str, kind: str) -> None:
     data, _ = upside_down(motion("slow"))
-    data = {channel: array[:500] for channel, array in corrupted(data, "reversed", 5, 0).items()}
+    data = {channel: array[:500] for channel, array in corrupted(data, kind, 5, 0).items()}
+    data["imu/acc"][300] = 500.0
     estimator: Any = make(name, dt=0.01)
     whole, arrays = estimator.run(data), replace(estimator, compiled=False).run(data)
     without = replace(estimator, restart=False).run(data)
@@ -105,9 +143,9 @@ def test_a_restart_is_the_same_in_every_form(name: str) -> None:
 def test_the_covariance_of_a_restart_is_larger_than_that_of_a_start() -> None:
     data, _ = upside_down(motion("slow"))
     estimator: Any = make("mekf", dt=0.01)
-    covariance = estimator.run(corrupted(data, "reversed", 5, 0)).covariance[:, 0, 0]
+    covariance = estimator.run(corrupted(data, "reversed", 150, 0)).covariance[:, 0, 0]
     again = int(np.argmax(np.diff(covariance))) + 1
-    assert again * 0.01 < 4.0
+    assert again * 0.01 < 6.0
     assert covariance[again] == pytest.approx(INFLATION * covariance[0])
 
 
