@@ -12,18 +12,19 @@ import numpy as np
 
 from ...filters.adaptation.gains import tunable_filter
 from ...filters.adaptation.tuned import TunedFilter, TunedState
-from ...filters.core.estimator import check_measurements
+from ...filters.core.estimator import Enclosing, check_measurements
 from ...filters.core.kalman import KalmanFilter
-from ...filters.core.quantity import Channel, Estimate, Measurement, Quantity
+from ...filters.core.quantity import Estimate, Measurement
 from .policy import GainPolicy
 
 
 @dataclass(frozen=True)
-class AdaptiveEstimator:
+class AdaptiveEstimator(Enclosing):
     """A Kalman filter tuned by a policy: an :class:`~poise.filters.core.estimator.Estimator` on NumPy arrays.
 
     The policy decides once per interval from the samples so far; between decisions the gains are constant. With
-    a neutral policy it is the filter itself, bit by bit. The state holds arrays only.
+    a neutral policy it is the filter itself, bit by bit. The state holds arrays only. At another
+    sampling interval the time between decisions is kept.
 
     Attributes:
         filter: in its published tuning, a KalmanFilter (or the name of one).
@@ -62,25 +63,6 @@ class AdaptiveEstimator:
     def tuned(self) -> TunedFilter:
         """The filter with the actions and observations of the policy."""
         return TunedFilter(self.filter, self.policy.ranges, self.policy.features)
-
-    @property
-    def dt(self) -> float:
-        """Sampling interval, s."""
-        return self.filter.dt
-
-    @property
-    def channels(self) -> tuple[Channel, ...]:
-        """Required channels."""
-        return self.filter.channels
-
-    @property
-    def outputs(self) -> tuple[Quantity, ...]:
-        """Estimated quantities."""
-        return self.filter.outputs
-
-    def with_dt(self, dt: float) -> AdaptiveEstimator:
-        """The same for another sampling interval; the time between decisions is kept."""
-        return replace(self, filter=self.filter.with_dt(dt))
 
     def init(self, measurement: Measurement) -> TunedState:
         """Initial state with the batch shape of ``measurement``."""

@@ -98,8 +98,8 @@ _GROWN = """
                     noise = grown"""
 
 _GROWN_ONE = """
-                    ω = squared(present, {start}, {stop})
-                    grown[{i}] = grow(p[{i}], age[b, {c}], ω, p[{dt}], p[{dt}]**{power}, {constants})"""
+                    ω, dt = squared(present, {start}, {stop}), p[{dt}]
+                    grown[{i}] = max(grown[{i}], grow(p[{i}], age[b, {c}], ω, dt, dt**{power}, {constants}))"""
 
 _REJECTED = f"""
             if restart and started[b]:
@@ -208,7 +208,9 @@ def _number_of(item: Any) -> float | None:
 
 def _print_entries(F: np.ndarray, H: np.ndarray) -> tuple[list[str], int]:
     """Functions that keep and restore the elements of F and H which are no constants; and how many these are."""
-    stored, fetched, constants = [], [], []
+    stored: list[str] = []
+    fetched: list[str] = []
+    constants: list[str] = []
     for name, array in (("F", F), ("H", H)):
         for i, j in np.ndindex(array.shape):
             item, number = f"{name}[{i}, {j}]", _number_of(array[i, j])

@@ -8,6 +8,7 @@ they remember is in the state, which is all that saving, restoring, batching and
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from typing import Any, Protocol, Self, TypeVar, runtime_checkable
 
 import numpy as np
@@ -48,6 +49,36 @@ class Estimator(Protocol[S]):
     def step(self, state: S, measurement: Measurement) -> tuple[S, Estimate]:
         """Process one sample (arrays ``(*batch, size)``); NaN where a channel has no valid sample."""
         ...
+
+
+@dataclass(frozen=True)
+class Enclosing:
+    """Base class of estimators that run another one in their own way: its interval, channels and outputs are theirs.
+
+    Attributes:
+        filter: the other estimator.
+    """
+
+    filter: Any
+
+    @property
+    def dt(self) -> float:
+        """Sampling interval, s."""
+        return float(self.filter.dt)
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        """Required channels."""
+        return tuple(self.filter.channels)
+
+    @property
+    def outputs(self) -> tuple[Quantity, ...]:
+        """Estimated quantities."""
+        return tuple(self.filter.outputs)
+
+    def with_dt(self, dt: float) -> Self:
+        """The same for samples ``dt`` seconds apart."""
+        return replace(self, filter=self.filter.with_dt(dt))
 
 
 def check_measurements(

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, NoReturn, Self
+from typing import Any, NoReturn
 
-from .estimator import Estimator
-from .quantity import Channel, Estimate, Measurement, Quantity
+from .estimator import Enclosing, Estimator
+from .quantity import Estimate, Measurement
 
 SUFFIX = " (offline)"
 """Suffix of an estimator's name that selects its smoother."""
 
 
 @dataclass(frozen=True)
-class Offline:
+class Offline(Enclosing):
     """The fixed-interval smoother of an estimator.
 
     Attributes:
@@ -33,25 +33,6 @@ class Offline:
                 f"{kind} has no smoother: smoothing needs a Kalman filter of this package, such as bounded-motion or "
                 "mekf, or vqf"
             )
-
-    @property
-    def dt(self) -> float:
-        """Sampling interval, s."""
-        return self.filter.dt
-
-    @property
-    def channels(self) -> tuple[Channel, ...]:
-        """Channels that it reads."""
-        return self.filter.channels
-
-    @property
-    def outputs(self) -> tuple[Quantity, ...]:
-        """Quantities that it estimates."""
-        return self.filter.outputs
-
-    def with_dt(self, dt: float) -> Self:
-        """The same smoother for samples ``dt`` seconds apart."""
-        return type(self)(self.filter.with_dt(dt))
 
     def run(self, measurements: Mapping[str, Any]) -> Estimate:
         """Smoothed estimates of a whole sequence, ``(T, *batch, size)`` in and out."""

@@ -22,10 +22,11 @@ from dataclasses import dataclass
 from typing import ClassVar, Literal
 
 from ...core.backend import Array, expand, namespace
+from ...core.held_inputs import HeldInput
 from ...core.model import Recurrence
 from ...core.quantity import Channel, Measurement
 from ...core.rotation import wrap
-from .orientation import PLANAR_ANGLE, PlanarEquations
+from .orientation import PLANAR_ANGLE, TURNED_IN_A_PLANE, PlanarEquations
 
 Method = Literal["weighted", "integration", "tilt"]
 
@@ -47,6 +48,11 @@ class PlanarMean(PlanarEquations, Recurrence):
     def channels(self) -> tuple[Channel, ...]:  # type: ignore[override]
         """Gyroscope and readings of the array; tilt needs no gyroscope."""
         return super().channels[1:] if self.method == "tilt" else super().channels
+
+    @property
+    def held_inputs(self) -> tuple[HeldInput, ...]:  # type: ignore[override]
+        """The gyroscope; tilt needs none."""
+        return () if self.method == "tilt" else (TURNED_IN_A_PLANE,)
 
     def prior(self, z: Measurement) -> Array:
         """Angle and variance of the start, ρ = 1."""

@@ -28,6 +28,7 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from ...core.backend import Array, constant, expand, namespace
+from ...core.held_inputs import HeldInput
 from ...core.model import Gain, Model
 from ...core.quantity import GRAVITY, Channel, Measurement, Quantity
 from ...core.rotation import wrap
@@ -41,6 +42,11 @@ PLANAR_ANGLE = Quantity("planar/angle", "angle", 1, "rad")
 
 UNKNOWN_ANGLE = math.pi**2 / 3.0
 """rad²: variance of a uniformly distributed angle"""
+
+TURNED_IN_A_PLANE = HeldInput(
+    PLANAR_GYROSCOPE.name, "gyroscope_noise", power=2, spread=0.1, share=0.7, time=0.075, bound=UNKNOWN_ANGLE
+)
+"""The rate of a controller in a plane, chosen as that of a hand on the gestures planar-walk and infinity."""
 
 
 @dataclass(frozen=True)
@@ -129,6 +135,7 @@ class PlanarOrientation(PlanarEquations, Model):
 
     state_size: ClassVar[int] = 1
     error_size: ClassVar[int] = 1
+    held_inputs: ClassVar[tuple[HeldInput, ...]] = (TURNED_IN_A_PLANE,)
     gains: ClassVar[dict[str, Gain]] = {
         "process": Gain("gyroscope_noise", description="process variance σ_ω²"),
         "measurement": Gain("inertial_acceleration", description="variance σ_b̈² of the inertial acceleration"),

@@ -17,8 +17,8 @@ import numpy as np
 from ...core.backend import constant, to_numpy
 from ...core.estimator import check_measurements, run_by_steps
 from ...core.quantity import Estimate, Measurement
-from ...core.sampling import check_batch, filled, hold, join, split
-from .orientation import PLANAR_ANGLE, PlanarEquations, PlanarOrientation
+from ...core.sampling import aged, check_batch, filled, hold, join, split
+from .orientation import PLANAR_ANGLE, PLANAR_GYROSCOPE, TURNED_IN_A_PLANE, PlanarEquations, PlanarOrientation
 
 
 class UnscentedState(NamedTuple):
@@ -28,12 +28,14 @@ class UnscentedState(NamedTuple):
         x: ``(*batch, 1)`` angle, rad; zero before the start.
         covariance: ``(*batch, 1, 1)``, rad².
         held: ``(*batch, d)`` last finite sample of every channel element, NaN if there was none.
+        age: ``(*batch, channels)`` s since the last sample of each channel.
         started: ``(*batch,)`` bool.
     """
 
     x: np.ndarray
     covariance: np.ndarray
     held: np.ndarray
+    age: np.ndarray
     started: np.ndarray
 
 
@@ -67,7 +69,6 @@ class PlanarUnscented(PlanarEquations):
 
         points = MerweScaledSigmaPoints(1, alpha=self.spread, beta=self.weight, kappa=2.0)
         made = UnscentedKalmanFilter(1, 2, self.dt, hx=model.expected, fx=_turned, points=points)
-        made.Q = np.array([[self.dt**2 * self.gyroscope_noise**2]])
         made.R = model.force_covariance(np.zeros(1))
         return made
 
@@ -76,7 +77,11 @@ class PlanarUnscented(PlanarEquations):
         sample = to_numpy(join(check_measurements(self.channels, measurement, time_axis=False), self.channels))
         batch = sample.shape[:-1]
         return UnscentedState(
-            np.zeros((*batch, 1)), np.zeros((*batch, 1, 1)), np.full(sample.shape, np.nan), np.zeros(batch, bool)
+            np.zeros((*batch, 1)),
+            np.zeros((*batch, 1, 1)),
+            np.full(sample.shape, np.nan),
+            np.zeros((*batch, len(self.channels))),
+            np.zeros(batch, bool),
         )
 
     def step(self, state: UnscentedState, measurement: Measurement) -> tuple[UnscentedState, Estimate]:
@@ -88,6 +93,9 @@ class PlanarUnscented(PlanarEquations):
         sample = to_numpy(join(arrays, self.channels)).astype(float)
         current = hold(sample, state.held)
         now, before = (split(filled(part), self.channels) for part in (current, state.held))
+        age = aged(state.age, sample, self.channels, self.dt)
+        rate = PLANAR_GYROSCOPE.name
+        noise = TURNED_IN_A_PLANE.noise(np.array(self.gyroscope_noise), age[..., 0], now[rate], self.dt)
         turn = model.integrated(np.zeros_like(state.x), now, before)
         force = model.specific_force(split(sample, self.channels))
         first, variance = model.first(split(current, self.channels))
@@ -95,6 +103,7 @@ class PlanarUnscented(PlanarEquations):
         for index in np.ndindex(started.shape):
             if started[index]:
                 engine.x, engine.P = x[index].copy(), P[index].copy()
+                engine.Q = np.array([[self.dt**2 * noise[index] ** 2]])
                 engine.predict(turn=turn[index])
                 if np.isfinite(force[index]).all():
                     engine.update(force[index])
@@ -104,7 +113,7 @@ class PlanarUnscented(PlanarEquations):
         angle = np.where(started[..., None], x, np.nan)
         covariance = np.where(started[..., None, None], P, np.nan)
         estimate = Estimate({PLANAR_ANGLE.name: constant(angle, like)}, constant(covariance, like))
-        return UnscentedState(x, P, current, started), estimate
+        return UnscentedState(x, P, current, age, started), estimate
 
     def run(self, measurements: Mapping[str, Any]) -> Estimate:
         """Estimates of a whole sequence, ``(T, *batch, size)`` in and out; equal to stepping."""

@@ -106,7 +106,9 @@ class ForceInertial(ForceInertialParameters, Model):
     state_size: ClassVar[int] = 27
     error_size: ClassVar[int] = 7
     residual_size: ClassVar[int] = 4
-    held_inputs: ClassVar = (ridden("trunk_imu/gyr", "gyroscope_noise", power=2),)
+    held_inputs: ClassVar = tuple(
+        ridden(f"{site}/gyr", "gyroscope_noise", power=2) for site in ("trunk_imu", "bicycle_imu")
+    )
     gains: ClassVar[dict[str, Gain]] = {
         "process": Gain("gyroscope_noise", description="process variance of the angles, from the gyroscopes"),
         "bias": Gain("bias_std", description="process variance of the gyroscope bias"),

@@ -157,7 +157,8 @@ class WholeBody(RiderLinkage, Model):
     held_inputs: ClassVar = (
         ridden("bicycle_imu/gyr", "bicycle_gyroscope_noise"),
         ridden("trunk_imu/gyr", "trunk_gyroscope_noise"),
-        pedalled("thigh_right/gyr", "limb_gyroscope_noise"),
+        *(ridden(f"upper_arm_{side}/gyr", "limb_gyroscope_noise") for side in ("right", "left")),
+        *(pedalled(f"thigh_{side}/gyr", "limb_gyroscope_noise") for side in ("right", "left")),
     )
     gains: ClassVar = {
         "bicycle": Gain("bicycle_gyroscope_noise", description="process variance of roll"),

@@ -11,7 +11,9 @@ from scipy.integrate import quad
 
 from poise.baselines.speed.fixtures import plausible_measurements
 from poise.envs.hand.sensing import simulate_hand
+from poise.filters.arrays.planar.orientation import PlanarOrientation
 from poise.filters.core import rotation
+from poise.filters.core.consistency import consistency, nees
 from poise.filters.core.held_inputs import HeldInput, grown
 from poise.filters.core.kalman import KalmanFilter
 from poise.filters.imu.mekf import MEKF9
@@ -101,6 +103,54 @@ def test_the_age_is_in_the_state() -> None:
     np.testing.assert_allclose(state.age, 0.08)
     rest, _ = kalman.run_from(state, {name: samples[20:] for name, samples in data.items()})
     np.testing.assert_array_equal(rest.covariance, whole.covariance[20:])
+
+
+@pytest.mark.parametrize("gap", [1, 10, 50, 200, 1000])
+def test_an_ensemble_that_follows_the_model_is_inside_both_bounds(gap: int) -> None:
+    """Angles in a plane that turn by the held rate and exactly the noise of the model."""
+    model = PlanarOrientation(dt=0.01, start="known", initial_noise=0.1)
+    rng, runs = np.random.default_rng(gap), 500
+    rate = rng.normal(0.0, 1.5, (runs, 1))
+    gyroscope, readings = np.full((gap + 2, runs, 1), np.nan), np.full((gap + 2, runs, model.array.size), np.nan)
+    gyroscope[:2], readings[0] = rate, 1.0
+    angle = rng.normal(0.0, model.initial_noise, (runs, 1))
+    (held,) = model.held_inputs
+    for age in model.dt * np.arange(gap + 1):
+        noise = held.noise(np.array(model.gyroscope_noise), np.full(runs, age), rate, model.dt)[:, None]
+        angle = angle + model.dt * (rate + noise * rng.normal(size=(runs, 1)))
+    data = {"planar/gyr": gyroscope, model.array.channel.name: readings}
+    estimate = KalmanFilter(model).run(data)
+    error = estimate.pose["planar/angle"][-1] - angle
+    assert estimate.covariance is not None
+    found = consistency(nees(error, estimate.covariance[-1]), 1, level=0.99)
+    assert found.consistent, found
+
+
+def test_the_oldest_of_the_inputs_that_share_a_noise_counts() -> None:
+    kalman: Any = make("force-inertial", dt=0.01)
+    samples = plausible_measurements(kalman, 0, length=120)
+
+    def trace(*lost: str) -> float:
+        data = {name: array.copy() for name, array in samples.items()}
+        for name in lost:
+            data[name][60:110] = np.nan
+        return float(np.trace(kalman.run(data).covariance[109]))
+
+    trunk, bicycle = trace("trunk_imu/gyr"), trace("bicycle_imu/gyr")
+    assert min(trunk, bicycle) > 1.5 * trace()
+    assert trace("trunk_imu/gyr", "bicycle_imu/gyr") >= 0.9 * max(trunk, bicycle)
+
+
+@pytest.mark.parametrize("name", ["planar-orientation", "planar-unscented"])
+def test_a_controller_in_a_plane_knows_less_after_a_gap(name: str) -> None:
+    filter_: Any = make(name, dt=0.01)
+    samples = plausible_measurements(filter_, 0, length=120)
+    lost = {channel: array.copy() for channel, array in samples.items()}
+    for array in lost.values():
+        array[50:100] = np.nan
+    gap, whole = filter_.run(lost).covariance, filter_.run(samples).covariance
+    np.testing.assert_array_equal(gap[:50], whole[:50])
+    assert gap[99].item() > 2.0 * gap[49].item()
 
 
 @pytest.mark.parametrize("name", ["odometry-aided", "platform-gyro", "two-gyro", "force-inertial", "whole-body"])
