@@ -31,7 +31,6 @@ from .steering import (
     OFFSET,
     TARGET,
     TORQUE,
-    Moving,
     Piloted,
     steer_exactly,
 )
@@ -149,7 +148,8 @@ class Pilot:
         self._ahead = PREVIEW_BIN * np.arange(PREVIEW_BINS + 1)
         self._gravity, self._rows = gravity, dict[float, np.ndarray]()
         self.period = 1.0 / self.settings.rate
-        self._numbers = self._piloted()
+        piloted = self._piloted()
+        self._numbers = np.array(piloted[:16]), np.stack(piloted[16:])
         self.start(Path(np.zeros(2)))
 
     def _piloted(self) -> Piloted:
@@ -159,8 +159,6 @@ class Pilot:
             period=self.period,
             wheelbase=bicycle.wheelbase,
             tilt=math.cos(bicycle.steer_axis_tilt),
-            still=self._gravity * self.model.K0,
-            moving=self.model.K2,
             mass=mass,
             weight=mass * self._gravity,
             rolling=bicycle.rolling_resistance,
@@ -174,6 +172,8 @@ class Pilot:
             lateral_acceleration=s.lateral_acceleration,
             forward_acceleration=s.forward_acceleration,
             braking=s.braking,
+            still=self._gravity * self.model.K0,
+            moving=self.model.K2,
         )
 
     def start(self, path: Path, speed: float = 0.0) -> None:
@@ -233,7 +233,7 @@ class Pilot:
         """
         low, high, part = self._between(state.speed)
         rows, lean = (self._row(low), self._row(high)), self.lean_effect * lean
-        steer_exactly(self._numbers, self.path.points, *rows, part, moving(state), speed, lean, self._memory)
+        steer_exactly(*self._numbers, self.path.points, *rows, part, moving(state), speed, lean, self._memory)
         return self._decided()
 
     def _decided(self) -> tuple[float, float]:
@@ -250,7 +250,7 @@ class Pilot:
         self._decided()
 
 
-def moving(state: BicycleState) -> Moving:
-    """What a pilot reads of a bicycle."""
+def moving(state: BicycleState) -> tuple[float, ...]:
+    """Numbers of :class:`.Moving`: what a pilot reads of a bicycle."""
     s = state
-    return Moving(s.x, s.y, s.roll, s.pitch, s.yaw, s.roll_rate, s.speed, s.steer, s.steer_rate)
+    return s.x, s.y, s.roll, s.pitch, s.yaw, s.roll_rate, s.speed, s.steer, s.steer_rate

@@ -15,7 +15,7 @@ from ..rider.anthropometry import join
 from ..rider.muscles import TRUNK_DAMPING, TRUNK_STIFFNESS
 from ..rider.posture import Posture
 from .control import ControlSettings, Pilot, PilotMemory, moving
-from .human_steering import STATES, Human, InternalModel, steer_humanly
+from .human_steering import STATES, Human, steer_humanly
 from .internal_model import (
     RIGID,
     TrunkModel,
@@ -116,14 +116,11 @@ class HumanPilot(Pilot):
         s, step = self.settings, self.period
         self._costs = (s.roll, s.steer, s.roll_rate, s.steer_rate, *(human.care * c for c in (s.heading, s.offset)))
         self._costs += (human.care * s.offset_integral,)
-        self._models: dict[float, InternalModel] = {}
+        self._models: dict[float, tuple[np.ndarray, np.ndarray]] = {}
         # the arms themselves: torque and its rate
         A, B = rider_model(bicycle, human, trunk, gravity, 1.0)
         still, faster = (lean_matrices(bicycle, trunk, gravity, speed)[2] for speed in (0.0, 1.0))
-        self._human = Human(
-            sigma=sensing_noise(human, step),
-            still=still,
-            moving=faster - still,
+        numbers = Human(
             reaction=steering_reaction(bicycle, trunk),
             muscles=trunk.stiffness - trunk.support,
             levelling=float(trunk.levelling),
@@ -132,8 +129,12 @@ class HumanPilot(Pilot):
             muscle_sigma=command_noise(human, step),
             tremor=human.tremor,
             motor_noise=human.motor_noise,
+            sigma=sensing_noise(human, step),
             arms=np.hstack(sampled(A[6:8, 6:8], B[6:8, :1], step)),
+            still=still,
+            moving=faster - still,
         )
+        self._human = np.array(numbers[:8]), numbers.sigma, numbers.arms, np.stack(numbers[10:])
 
     def start(self, path: Path, speed: float = 0.0) -> None:
         """Begin a ride at the beginning of a path, at a speed (m/s), upright and with idle hands."""
@@ -149,17 +150,18 @@ class HumanPilot(Pilot):
         noise = self._noise.at(self._count)
         self._count += 1
         steer_humanly(
-            self._numbers, self._human, self.path.points, self._model(low), self._model(high), part, noise,
+            *self._numbers, self._human, self.path.points, self._model(low), self._model(high), part, noise,
             moving(state), speed, lean, self._memory, self._state, self._inputs, self._readings,
         )  # fmt: skip
         return self._decided()
 
-    def _model(self, speed: float) -> InternalModel:
-        """What the rider knows at a speed (m/s) of the table."""
+    def _model(self, speed: float) -> tuple[np.ndarray, np.ndarray]:
+        """What the rider knows at a speed (m/s) of the table, packed, and gains."""
         if speed not in self._models:
-            self._models[speed] = internal_model(
+            model = internal_model(
                 self.bicycle, self.human, self._trunk, self._costs, self._gravity, speed, self.period
             )
+            self._models[speed] = model.packed, model.gains
         return self._models[speed]
 
     def save(self) -> PilotMemory:

@@ -9,7 +9,18 @@ import numpy as np
 
 from ....filters.compile.cache import jit
 from .preview import PREVIEW_BINS
-from .steering import DRIVE, LOWEST_SPEED, OFFSET_INTEGRAL, TORQUE, ahead, drive, follow, turning
+from .steering import (
+    DRIVE,
+    LOWEST_SPEED,
+    OFFSET_INTEGRAL,
+    TORQUE,
+    Moving,
+    ahead,
+    drive,
+    follow,
+    piloted_of,
+    turning,
+)
 
 STATES = 12
 """size of the state of the internal model"""
@@ -20,12 +31,6 @@ CHANNELS = (2, 1, 3, 0, 4, 5)
 class Human(NamedTuple):
     """Numbers of a human pilot."""
 
-    sigma: np.ndarray
-    """(6,) standard deviations of the readings"""
-    still: np.ndarray
-    """(3, 3) stiffness over roll, steer and lean at rest, N·m/rad"""
-    moving: np.ndarray
-    """(3, 3) what a squared speed adds, N·m/rad/(m/s)²"""
     reaction: float
     """1: moment that leans the trunk to the left, per steer torque to the right"""
     muscles: float
@@ -42,8 +47,21 @@ class Human(NamedTuple):
     """N·m"""
     motor_noise: float
     """1"""
+    sigma: np.ndarray
+    """(6,) standard deviations of the readings"""
     arms: np.ndarray
     """(2, 3) torque and its rate after a step: of both before it, and of the command"""
+    still: np.ndarray
+    """(3, 3) stiffness over roll, steer and lean at rest, N·m/rad"""
+    moving: np.ndarray
+    """(3, 3) what a squared speed adds, N·m/rad/(m/s)²"""
+
+
+@jit
+def human_of(numbers, sigma, arms, stiffness):  # type: ignore[no-untyped-def]
+    """:class:`Human` of its numbers ``(8,)``, as :func:`.piloted_of`; both matrices ``(2, 3, 3)``."""
+    n = numbers
+    return Human(n[0], n[1], n[2], n[3], n[4], n[5], n[6], n[7], sigma, arms, stiffness[0], stiffness[1])
 
 
 class InternalModel(NamedTuple):
@@ -64,6 +82,20 @@ class InternalModel(NamedTuple):
     gains: np.ndarray
     """(13 + 3 · PREVIEW_BINS,): command per state (the integral of the offset is the last) and per change of roll,
     steer and arm torque of the steady turn ahead"""
+
+    @property
+    def packed(self) -> np.ndarray:
+        """All matrices side by side ``(12, 33 + 3 Ns + 3 (Ns − Nf))``."""
+        return np.hstack(self[:6])
+
+
+@jit
+def unpacked(packed, gains, delay):  # type: ignore[no-untyped-def]
+    """:class:`InternalModel` of :attr:`InternalModel.packed` and the gains; ``delay``: Ns."""
+    return InternalModel(
+        packed[:, :12], packed[:, 12:15], packed[:, 15:21], packed[:, 21:33],
+        packed[:, 33 : 33 + 3 * delay], packed[:, 33 + 3 * delay :], gains,
+    )  # fmt: skip
 
 
 @jit
@@ -126,19 +158,20 @@ def steady_turn(human, speed, steer, lean):  # type: ignore[no-untyped-def]
 
 @jit
 def steer_humanly(  # type: ignore[no-untyped-def]
-    piloted, human, points, low, high, part, noise, now, wanted, lean, memory, state, inputs, readings
+    numbers, stiffness, human, points, below, above, part, noise, seen, wanted, lean, memory, state, inputs, readings
 ):
     """Decide as a human.
 
     Args:
-        piloted: numbers of the bicycle, :class:`.Piloted`.
-        human: numbers of the pilot.
+        numbers: of :func:`.piloted_of`.
+        stiffness: likewise.
+        human: arguments of :func:`human_of`.
         points: ``(n, 4)`` of the path.
-        low: :class:`InternalModel` at a speed below.
-        high: at a speed above.
+        below: :attr:`InternalModel.packed` and gains at a speed below.
+        above: at a speed above.
         part: how far the speed lies between both, 0 to 1.
         noise: ``(7,)`` standard normal numbers: six senses and the muscles.
-        now: :class:`.Moving`.
+        seen: numbers of :class:`.Moving`.
         wanted: speed, m/s.
         lean: of the trunk to the bicycle that the rider intends besides levelling, rad, right positive.
         memory: of the pilot; the decision is written there.
@@ -146,11 +179,14 @@ def steer_humanly(  # type: ignore[no-untyped-def]
         inputs: ``(Ns + 1, 3)`` remembered, advanced.
         readings: ``(Ns + 1, 6)`` remembered, advanced.
     """
+    piloted, now = piloted_of(numbers, stiffness), Moving(*seen)
+    person, delay = human_of(human[0], human[1], human[2], human[3]), inputs.shape[0] - 1
+    low, high = unpacked(below[0], below[1], delay), unpacked(above[0], above[1], delay)
     curvature, offset, heading = follow(points, now, memory)
     readings[:-1] = readings[1:]
     felt = (now.roll_rate, -now.steer, -now.steer_rate, now.roll, -heading, -offset)
     for sense in range(6):
-        readings[-1, sense] = felt[sense] + human.sigma[sense] * noise[sense]
+        readings[-1, sense] = felt[sense] + person.sigma[sense] * noise[sense]
     # filter and predict, between two speeds of the table
     first, second, expected, later = np.empty(STATES), np.empty(STATES), np.empty(STATES), np.empty(STATES)
     estimate(low, state, inputs, readings, first, expected)
@@ -158,8 +194,8 @@ def steer_humanly(  # type: ignore[no-untyped-def]
     for row in range(STATES):
         state[row] = (1.0 - part) * first[row] + part * second[row]
         expected[row] = (1.0 - part) * expected[row] + part * later[row]
-    left, lean = turning(piloted, curvature, offset), lean + human.levelling * now.roll
-    roll, trunk, torque = steady_turn(human, now.speed, -left, lean)
+    left, lean = turning(piloted, curvature, offset), lean + person.levelling * now.roll
+    roll, trunk, torque = steady_turn(person, now.speed, -left, lean)
     # beyond a metre or half a radian off the path, limit the correction
     steer, offset, heading = expected[1], max(-1.0, min(1.0, expected[5])), max(-0.5, min(0.5, expected[4]))
     memory[OFFSET_INTEGRAL] = max(-2.0, min(2.0, memory[OFFSET_INTEGRAL] + piloted.period * offset))
@@ -182,7 +218,7 @@ def steer_humanly(  # type: ignore[no-untyped-def]
         for kind, change in enumerate((to_roll, to_steer, by_roll * to_roll + by_steer * to_steer)):
             place = STATES + 1 + PREVIEW_BINS * kind + index
             command -= ((1.0 - part) * low.gains[place] + part * high.gains[place]) * change
-    command = human.largest_torque * math.tanh(command / human.largest_torque)
+    command = person.largest_torque * math.tanh(command / person.largest_torque)
     # the path turns the heading; so does what steering does beyond the linear model
     angle = -piloted.tilt * max(-1.2, min(1.2, steer))
     curvature /= max(0.5, 1.0 + curvature * offset)
@@ -191,9 +227,9 @@ def steer_humanly(  # type: ignore[no-untyped-def]
     inputs[-1, 1] = now.speed * (curvature - (math.tan(angle) - angle) / piloted.wheelbase)
     inputs[-1, 2] = lean
     # the arms' torque, right positive, follows the command of muscles that are not steady
-    memory[TORQUE] = -state[12] - human.arm_damping * now.steer_rate
-    driven = command + human.muscle_sigma * math.hypot(human.tremor, human.motor_noise * command) * noise[6]
+    memory[TORQUE] = -state[12] - person.arm_damping * now.steer_rate
+    driven = command + person.muscle_sigma * math.hypot(person.tremor, person.motor_noise * command) * noise[6]
     arm, rate = state[12], state[13]
     for row in range(2):
-        state[12 + row] = human.arms[row, 0] * arm + human.arms[row, 1] * rate + human.arms[row, 2] * driven
+        state[12 + row] = person.arms[row, 0] * arm + person.arms[row, 1] * rate + person.arms[row, 2] * driven
     memory[DRIVE] = drive(piloted, now, min(wanted, limit), memory)

@@ -28,7 +28,11 @@ REACTION = 0.2
 
 
 class Piloted(NamedTuple):
-    """Numbers of a bicycle with its rider, and of the settings of its pilot."""
+    """Numbers of a bicycle with its rider, and of the settings of its pilot.
+
+    Compiled functions take the numbers as an array and the matrices as another one, which costs less at every call
+    than many numbers do, and put them together with :func:`piloted_of`.
+    """
 
     period: float
     """s of control"""
@@ -36,10 +40,6 @@ class Piloted(NamedTuple):
     """m"""
     tilt: float
     """1: cosine of the steering axis' tilt"""
-    still: np.ndarray
-    """(2, 2) stiffness of Whipple's model at rest, N·m/rad"""
-    moving: np.ndarray
-    """(2, 2) what a squared speed adds, N·m/rad/(m/s)²"""
     mass: float
     """kg, of all"""
     weight: float
@@ -66,6 +66,20 @@ class Piloted(NamedTuple):
     """m/s²"""
     braking: float
     """m/s²"""
+    still: np.ndarray
+    """(2, 2) stiffness of Whipple's model at rest, N·m/rad"""
+    moving: np.ndarray
+    """(2, 2) what a squared speed adds, N·m/rad/(m/s)²"""
+
+
+@jit
+def piloted_of(numbers, stiffness):  # type: ignore[no-untyped-def]
+    """:class:`Piloted` of its numbers ``(16,)`` and of both matrices ``(2, 2, 2)``."""
+    n = numbers
+    return Piloted(
+        n[0], n[1], n[2], n[3], n[4], n[5], n[6], n[7], n[8], n[9], n[10], n[11], n[12], n[13], n[14], n[15],
+        stiffness[0], stiffness[1],
+    )  # fmt: skip
 
 
 class Moving(NamedTuple):
@@ -138,21 +152,22 @@ def drive(piloted, now, wanted, memory):  # type: ignore[no-untyped-def]
 
 
 @jit
-def steer_exactly(piloted, points, low, high, part, now, wanted, lean, memory):  # type: ignore[no-untyped-def]
+def steer_exactly(numbers, stiffness, points, low, high, part, seen, wanted, lean, memory):  # type: ignore[no-untyped-def]
     """Decide as a pilot who knows the exact state, without delay.
 
     Args:
-        piloted: numbers of the bicycle.
+        numbers: of :func:`piloted_of`.
+        stiffness: likewise.
         points: ``(n, 4)`` of the path.
         low: gains ``(7 + 2 · PREVIEW_BINS,)`` at a speed below.
         high: gains at a speed above.
         part: how far the speed lies between both, 0 to 1.
-        now: :class:`Moving`.
+        seen: numbers of :class:`Moving`.
         wanted: speed, m/s.
         lean: what the rider's lean adds to the roll, rad.
         memory: of the pilot; the decision is written there.
     """
-    p = piloted
+    p, now = piloted_of(numbers, stiffness), Moving(*seen)
     curvature, offset, heading = follow(points, now, memory)
     memory[OFFSET_INTEGRAL] = max(-2.0, min(2.0, memory[OFFSET_INTEGRAL] + p.period * offset))
     steer = turning(p, curvature, offset)

@@ -53,7 +53,11 @@ MUSCLES = 38
 
 
 class Build(NamedTuple):
-    """Numbers of one rider on one bicycle."""
+    """Numbers of one rider on one bicycle.
+
+    Compiled functions take :attr:`numbers` and the arrays, which costs less at every call than many numbers do, and put
+    them together with :func:`build_of`.
+    """
 
     reach: Reach
     seat: SeatContact
@@ -63,14 +67,14 @@ class Build(NamedTuple):
     """m: rear"""
     grip_arm: float
     """m: of the hands about the steering axis"""
-    pulls: np.ndarray
-    """(2, 2, 3) direction in which each hand moves when the bar turns to the left, and its change with the angle"""
-    axis: np.ndarray
-    """(3,) of steering, upwards"""
     hand_load: float
     """N downwards with each hand"""
     elbow_weight: float
     """N"""
+    pulls: np.ndarray
+    """(2, 2, 3) direction in which each hand moves when the bar turns to the left, and its change with the angle"""
+    axis: np.ndarray
+    """(3,) of steering, upwards"""
     limbs: np.ndarray
     """(2, 3) of arms and legs: length of the upper segment, x and z of the tip in the lower one, m"""
     table: np.ndarray
@@ -80,13 +84,41 @@ class Build(NamedTuple):
     middle: np.ndarray
     """(7,) trunk (rad) and swivels (rad) around which the table is linear"""
 
+    @property
+    def numbers(self) -> np.ndarray:
+        """Saddle, reach, and the five numbers after them ``(28,)``."""
+        r = self.reach
+        reach = (*r.grip, r.lumbar, *r.steer_axis, *r.axle, r.crank, r.pedal, r.trunk_moment, r.pushed_back)
+        return np.array([*self.seat, *reach, *self[2:7]])
+
+    @property
+    def arrays(self) -> tuple[np.ndarray, ...]:
+        """The other fields."""
+        return self[7:]
+
 
 @jit
-def plan(build, intended, bicycle, steer_torque, drive, ratio, state, links, memory):  # type: ignore[no-untyped-def]
+def seat_of(n):  # type: ignore[no-untyped-def]
+    """The saddle in :attr:`Build.numbers`."""
+    return SeatContact(n[0], n[1], n[2], n[3], n[4], n[5], n[6], n[7], n[8], n[9], n[10])
+
+
+@jit
+def build_of(n, arrays):  # type: ignore[no-untyped-def]
+    """:class:`Build` of its numbers and arrays."""
+    grip, steer_axis, axle = (n[11], n[12], n[13]), (n[15], n[16]), (n[17], n[18])
+    reach = Reach(grip, n[14], steer_axis, axle, n[19], n[20], n[21], n[22])
+    pulls, axis, limbs, table, legs, middle = arrays
+    return Build(reach, seat_of(n), n[23], n[24], n[25], n[26], n[27], pulls, axis, limbs, table, legs, middle)
+
+
+@jit
+def plan(numbers, arrays, intended, bicycle, steer_torque, drive, ratio, state, links, memory):  # type: ignore[no-untyped-def]
     """Decide what the muscles do during the next control period.
 
     Args:
-        build: of the rider.
+        numbers: of :class:`Build`.
+        arrays: likewise.
         intended: ``(8,)`` change of the trunk's flexion, lean and twist, four swivels (rad), unsteady torque (N·m).
         bicycle: steer, crank (rad), rates of crank and rear wheel (rad/s).
         steer_torque: N·m on the handlebar, left positive.
@@ -96,6 +128,7 @@ def plan(build, intended, bicycle, steer_torque, drive, ratio, state, links, mem
         links: see above.
         memory: written.
     """
+    build = build_of(numbers, arrays)
     reach, seat = build.reach, build.seat
     steer, crank, crank_rate, wheel_rate = bicycle
     first, rates, joints = 13, 13 + (state.shape[0] - 13) // 2, (memory.shape[0] - MUSCLES) // 2
@@ -166,11 +199,11 @@ def plan(build, intended, bicycle, steer_torque, drive, ratio, state, links, mem
 
 
 @jit
-def act(seat, tree, state, frames, links, rigid, memory, forces):  # type: ignore[no-untyped-def]
+def act(numbers, tree, state, frames, links, rigid, memory, forces):  # type: ignore[no-untyped-def]
     """Add what rider and saddle do in the next physics step to the generalised forces.
 
     Args:
-        seat: the saddle.
+        numbers: of :class:`Build`.
         tree: see :mod:`poise.envs.physics.kinematics`, as of the next two.
         state: now.
         frames: now.
@@ -182,7 +215,7 @@ def act(seat, tree, state, frames, links, rigid, memory, forces):  # type: ignor
     first, rates, joints = 13, 13 + (state.shape[0] - 13) // 2, (memory.shape[0] - MUSCLES) // 2
     pitch, roll, rise = state[first + links[0]], state[first + links[1]], state[first + links[2]]
     pitching, rolling, rising = state[rates + links[0]], state[rates + links[1]], state[rates + links[2]]
-    target, support = memory[TARGET], memory[SUPPORT]
+    seat, target, support = seat_of(numbers), memory[TARGET], memory[SUPPORT]
     applied = memory[MUSCLES + joints :]
     applied[:] = memory[MUSCLES : MUSCLES + joints]
     # the trunk keeps its posture in the bicycle, whatever the pelvis does below it

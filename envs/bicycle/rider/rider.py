@@ -137,21 +137,22 @@ class Rider:
         self.constraints = []
         tables = LimbTables(self.posture, target, first_swivel, physics.gravity)
         bike, limbs = self.posture.bicycle, (self.posture.arm, self.posture.leg)
-        self._build = Build(
+        build = Build(
             self._reach,
             self.saddle,
             self.posture.flexion,
             bike.rear_wheel.radius,
             self._grip_arm,
-            self._pulls,
-            self._axis,
             hand_load + arm_weight,
             self._elbow_weight,
+            self._pulls,
+            self._axis,
             np.array([(limb.upper, *limb.tip) for limb in limbs]),
             tables.table,
             tables.legs,
             tables.middle,
         )
+        self._numbers, self._arrays = build.numbers, build.arrays
         self._memory = np.zeros(MUSCLES + 2 * len(self.joints))
         self._memory[TARGET], self._memory[WANTED] = target, first_swivel
         abductions(tables.table, tables.middle, 0.0, crank, self._memory[TARGET], first_swivel, self._memory[SWIVEL])
@@ -189,11 +190,10 @@ class Rider:
             drive: desired propulsive force at the wheel, N, without braking.
         """
         since = state.time - self._began
-        trunk, swivel, unsteady = self.motion.at(since, curvature, state.roll, state.crank, state.speed)
-        intended = np.array([*trunk.tolist(), *swivel.tolist(), unsteady])
+        intended = self.motion.intended(since, curvature, state.roll, state.crank, state.speed)
         bicycle = (state.steer, state.crank, state.crank_rate, state.wheel_rate)
         ratio, now = self.bicycle.ratio, self.bicycle.body.state
-        plan(self._build, intended, bicycle, steer_torque, drive, ratio, now, self._links, self._memory)
+        plan(self._numbers, self._arrays, intended, bicycle, steer_torque, drive, ratio, now, self._links, self._memory)
 
     def act(self) -> None:
         """Add what muscles and saddle do in the next step to the forces on the bodies.
@@ -201,7 +201,7 @@ class Rider:
         To be called after :meth:`plan`.
         """
         body = self.bicycle.body
-        act(self.saddle, body.tree, body.state, body.frames, self._links, self._rigid, self._memory, body.forces)
+        act(self._numbers, body.tree, body.state, body.frames, self._links, self._rigid, self._memory, body.forces)
 
     def grips(self) -> np.ndarray:
         """Positions ``(2, 3)`` of left and right hand now, world, m."""
