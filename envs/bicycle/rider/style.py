@@ -27,6 +27,8 @@ LARGEST_LEAN = 0.4
 """rad into a turn, to the bicycle"""
 AT_EASE, LEAST_EASE = 3.0, 0.3
 """m/s above which a rider sways and bends freely, and the part of it that is left at walking pace, to keep balance"""
+MOST_TWISTED = 0.2
+"""rad by which the shoulders turn at most against the bar: both hands stay on it"""
 MOST_UPRIGHT = 0.04
 """rad by which the trunk straightens at most: beyond, the arms would be straight, above all the outer one in a turn"""
 
@@ -163,6 +165,7 @@ def intentions(table, habits, time, curvature, roll, crank, speed):  # type: ign
         values[0] = MOST_UPRIGHT * math.tanh(values[0] / MOST_UPRIGHT)
     values[1] += habits[2] * math.sin(crank + habits[4])
     values[2] += habits[2] * math.sin(crank + habits[5])
+    values[2] = MOST_TWISTED * math.tanh(values[2] / MOST_TWISTED)
     turn = max(-LARGEST_LEAN, min(LARGEST_LEAN, habits[0] * curvature))
     values[1] += -turn - habits[1] * roll
     for index in (0, 1, 2, 7):
