@@ -190,7 +190,7 @@ def sensor_checks(duration: float = 10.0) -> Iterator[Check]:
     """Strapdown, gaps, and what half the physics step changes."""
     channels = ["bicycle_imu/gyr", "bicycle_imu/acc", "trunk_imu/gyr"]
     for name in ("indoor_circle", "outdoor"):
-        ride = ridden(2, scenario=name, suite=channels, duration=duration)
+        ride = ridden(2, scenario=name, suite=channels, duration=duration, surface="smooth")
         position, attitude = strapdown_errors(ride)
         what = f"strapdown of the ideal bicycle IMU, {name}, {duration:g} s"
         holds = position <= 0.01 and math.degrees(attitude) <= 0.01
@@ -199,7 +199,9 @@ def sensor_checks(duration: float = 10.0) -> Iterator[Check]:
         yield Check(
             f"largest gap of hands and feet, {name}, {duration:g} s", "1 mm", f"{1e3 * gap:.3f} mm", bool(gap <= 1e-3)
         )
-    rides = [ridden(3, suite=channels, duration=duration, physics_rate=rate) for rate in (500.0, 1000.0)]
+    rides = [
+        ridden(3, suite=channels, duration=duration, physics_rate=rate, surface="smooth") for rate in (500.0, 1000.0)
+    ]
     for channel, limit, unit in zip(channels, (0.02, 0.1, 0.02), ("rad/s", "m/s²", "rad/s"), strict=True):
         first, second = (ride.measurements[channel][1:] for ride in rides)
         found = float(np.sqrt(np.mean((first - second) ** 2)))
