@@ -62,7 +62,8 @@ def rides(study: Study, report: Report, scenarios: Sequence[str], fidelity: str)
     )
     accepted = f"Accepted: no cell below -{PULL:g} N but in flight; ±{ALONG:g} mm along and ±{ACROSS:g} mm across."
     report.table(f"Saddle by scenario, worst of the riders, {fidelity} rider", list(saddle_rows(found)), accepted)
-    report.claims("Beside the papers, range over riders", comparison(found))
+    if claims := comparison(found):
+        report.claims("Beside the papers, range over riders", claims)
     draw(study, report, scenarios, fidelity, seeds)
     return found
 
