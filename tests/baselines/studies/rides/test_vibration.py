@@ -23,6 +23,7 @@ def test_the_level_of_each_surface(name, low, high):
     assert BANDWIDTH[0] < bandwidth < (BANDWIDTH[1] if name != "cobbles" else 80.0)
 
 
-def test_rougher_is_more_and_smooth_is_nothing():
+def test_a_hall_floor_adds_little_to_what_pedalling_shakes():
     smooth, hall = (vibration(name, 3.0, fidelity="lumped")[0] for name in ("smooth", "hall"))
-    assert smooth < 0.1 < hall < 0.5
+    assert smooth < 0.3
+    assert 1.2 * smooth < hall < 0.6
