@@ -213,6 +213,10 @@ def sequence_of(trajectory: Trajectory, front_end: FrontEnd, head: Head) -> tupl
     front_end = front_end.with_dt(trajectory.dt).configured(trajectory.metadata)
     arrays = check_measurements(front_end.channels, trajectory.measurements, time_axis=True)
     seen = front_end.run(arrays)
+    kalman = getattr(front_end, "kalman", None)
+    if kalman is not None:
+        # a paper's own angles follow from the truth
+        trajectory = trajectory.replace(truth={**trajectory.truth, **kalman.model.truth(trajectory.truth)})
     due = seen.due == 1.0
     if not due.any():
         raise ValueError(f"{trajectory.name} is too short: {len(trajectory)} samples hold no interval of the network")
