@@ -5,10 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
+import gymnasium
 import numpy as np
 import pytest
 from scipy.integrate import quad
 
+import poise
+from poise.baselines.registry import make_estimator
 from poise.baselines.speed.fixtures import plausible_measurements
 from poise.envs.hand.sensing import simulate_hand
 from poise.filters.arrays.planar.orientation import PlanarOrientation
@@ -171,3 +174,38 @@ def test_filters_of_rides_know_less_after_a_gap(name: str) -> None:
     assert np.isfinite(trace).all()
     array_form = replace(filter_, compiled=False).run(lost)
     np.testing.assert_allclose(array_form.covariance[149], gap.covariance[149], rtol=1e-6, atol=1e-9)
+
+
+@pytest.fixture(scope="module")
+def ride() -> Any:
+    """A ride on a seed that no constant was chosen on."""
+    pytest.importorskip("pybullet")
+    env = gymnasium.make("poise/RiderBicycle-v0", scenario="outdoor", fidelity="lumped", suite="all", duration=50.0)
+    trajectory = poise.record(env, seed=11)
+    env.close()
+    return trajectory
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("gap", [10, 50, 200, 1000])
+@pytest.mark.parametrize(
+    ("name", "place"), [("two-gyro", 0), ("force-inertial", 3), ("whole-body", 0), ("odometry-aided", None)]
+)
+def test_the_roll_of_a_ride_is_inside_its_covariance_after_a_gap(
+    name: str, place: int | None, gap: int, ride: Any
+) -> None:
+    """Every sensor is lost; ``place`` is that of the roll in the error state, None for an attitude in world axes."""
+    filter_: Any = make_estimator(name, dt=ride.dt, metadata=ride.metadata)
+    starts = list(range(1000, len(ride) - gap, max(gap, 100)))[:24]
+    data = {
+        channel.name: np.repeat(ride.measurements[channel.name][:, None], len(starts), axis=1)
+        for channel in filter_.channels
+    }
+    for index, start in enumerate(starts):
+        for samples in data.values():
+            samples[start : start + gap, index] = np.nan
+    estimate, index, last = filter_.run(data), np.arange(len(starts)), np.array(starts) + gap - 1
+    error = estimate.pose["bicycle/roll"][last, index, 0] - ride.truth["bicycle/roll"][last, 0]
+    P = estimate.covariance[last, index]
+    variance = 0.5 * (P[:, 0, 0] + P[:, 1, 1]) if place is None else P[:, place, place]
+    assert 0.03 < np.mean(error**2 / variance) < 5.0
