@@ -38,8 +38,8 @@ SWIVEL_STIFFNESS, SWIVEL_DAMPING = 60.0, 2.0
 """N·m/rad, N·m·s/rad: hold elbows and knees in their plane"""
 HEAVIEST = 3.0
 """1: weight of a lumped rider's legs on the pedals over a bump at most, in parts of that at rest"""
-RESTING = -math.inf
-"""N: drive of a rider whose legs rest while the bicycle coasts"""
+RESTING = -1e-6
+"""N: the drive that says that the legs rest while the bicycle coasts"""
 KEEPING_UP = 4.0
 """N·m/(rad/s) on the crank, towards the wheel's pace"""
 
@@ -147,7 +147,7 @@ def plan(numbers, arrays, intended, bicycle, steer_torque, drive, ratio, state, 
     turning = -math.sin(left_phase) * left_weight[0] - math.cos(left_phase) * left_weight[2]
     turning -= math.sin(right_phase) * right_weight[0] + math.cos(right_phase) * right_weight[2]
     # and keep the crank at the speed of the wheel, so that the chain stays nearly taut
-    pace = wheel_rate / ratio if drive > RESTING else 0.0
+    pace = wheel_rate / ratio if drive != RESTING else 0.0
     pace = max(-15.0, min(15.0, KEEPING_UP * (pace - crank_rate)))
     around = push * AROUND + 0.5 * (pace / reach.crank - turning)
     draw = held_down(seat, rise, rising)
