@@ -198,10 +198,8 @@ def internal_model(
         to_readings = kept @ A @ to_readings
         if index < slow - fast:
             to_readings = np.hstack([to_readings, gain])
-    return InternalModel(
-        *(np.ascontiguousarray(each) for each in (A, B, K, carry, to_inputs, to_readings)),
-        _command_gains(continuous, inputs, pilot, costs, step),
-    )
+    arrays = [np.ascontiguousarray(each) for each in (A, B, K, carry, to_inputs, to_readings)]
+    return InternalModel._make([*arrays, _command_gains(continuous, inputs, pilot, costs, step)])
 
 
 def _noise(pilot: PilotParameters, step: float) -> np.ndarray:
