@@ -104,7 +104,7 @@ class Multibody:
         """State ``(13 + 2 n,)`` of :mod:`.kinematics` now; overwritten when it is read after a change."""
         if self._read_at != self.physics.changes:
             position, orientation, velocity, turning = self.physics.base_tuples(self.body)
-            self._rows = rows = pybullet.getJointStates(self.body, self._all, physicsClientId=self.physics.client)
+            self._rows = rows = pybullet.getJointStates(self.body, self._all, self.physics.client)
             angles, rates = [row[0] for row in rows], [row[1] for row in rows]
             self._pack(self._state, 0, *position, *orientation, *velocity, *turning, *angles, *rates)
             self._read_at = self.physics.changes
@@ -149,12 +149,12 @@ class Multibody:
         """Let :attr:`forces` act during the next step, and begin anew with zeros."""
         client, values = self.physics.client, self.forces.tolist()
         centre = self.state[:3].tolist()
-        pybullet.applyExternalForce(self.body, BASE, values[:3], centre, pybullet.WORLD_FRAME, physicsClientId=client)
-        pybullet.applyExternalTorque(self.body, BASE, values[3:6], pybullet.WORLD_FRAME, physicsClientId=client)
+        pybullet.applyExternalForce(self.body, BASE, values[:3], centre, pybullet.WORLD_FRAME, client)
+        pybullet.applyExternalTorque(self.body, BASE, values[3:6], pybullet.WORLD_FRAME, client)
         pybullet.setJointMotorControlArray(
             self.body, self._all, pybullet.TORQUE_CONTROL, forces=values[6:], physicsClientId=client
         )
-        self.forces[:] = 0.0
+        self.forces.fill(0.0)
 
     def release(self, constraint: int) -> None:
         """Remove a constraint between points."""

@@ -223,8 +223,9 @@ class Physics:
 
     def base_tuples(self, body: int) -> TupleState:
         """State of the base's centre-of-mass frame as plain tuples: the fast way for loops over physics steps."""
-        position, (x, y, z, w) = pybullet.getBasePositionAndOrientation(body, physicsClientId=self.client)
-        velocity, angular_velocity = pybullet.getBaseVelocity(body, physicsClientId=self.client)
+        # by position, because names of arguments take a tenth of the time
+        position, (x, y, z, w) = pybullet.getBasePositionAndOrientation(body, self.client)
+        velocity, angular_velocity = pybullet.getBaseVelocity(body, self.client)
         return position, (w, x, y, z), velocity, angular_velocity
 
     def set_base_tuples(
