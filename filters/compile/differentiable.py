@@ -33,7 +33,7 @@ from poise.filters.compile.cache import jit
 from poise.filters.compile.kernel import (
     begin, copy, copy_matrix, correct, fill, propagate, scratch, squared, take, zeros
 )
-from {primal} import finish, pose, predict, prior, residual, retract{grow}
+from {primal} import F_column, F_first, H_column, H_first, finish, pose, predict, prior, residual, retract{grow}
 
 inf, nan = np.inf, np.nan
 starts = np.array({starts})
@@ -53,11 +53,10 @@ def follow(x, P, held, age, started, Z, parameters, poses, covariances, whites, 
            stages, xs, Ps, presents, befores, ages):
     # Forward; what the way back needs is kept: the state before each sample, and the samples as they were used.
     sizes = x.shape[1], P.shape[1], whites.shape[2], Z.shape[2], parameters.shape[2]
-    vectors, square, measured, lists = scratch(*sizes)
+    vectors, square, measured, rows = scratch(*sizes)
     current, present, before, x1, x0, r, dx, noise = vectors
     P0, F, Q, work = square
     H, R, S, HP, K = measured
-    every, first, column, rows = lists
     for t in range(Z.shape[0]):
         for b in range(Z.shape[1]):
             p = parameters[t if parameters.shape[0] > 1 else 0, b if parameters.shape[1] > 1 else 0]
@@ -72,11 +71,11 @@ def follow(x, P, held, age, started, Z, parameters, poses, covariances, whites, 
             if started[b]:
                 noise_of(present, age[b], p, noise)
                 predict(state, present, before, noise, x1, F, Q)
-                propagate(F, P1, Q, work, every, first, column)
+                propagate(F, P1, Q, work, F_first, F_column)
                 residual(x1, z, p, r, H, R)
                 for a in range(r.shape[0]):
                     S[a, a] = 1.0
-                nis[t, b] = correct(r, H, R, P1, dx, white, rows, S, HP, K, first, column)
+                nis[t, b] = correct(r, H, R, P1, dx, white, rows, S, HP, K, H_first, H_column)
                 if nis[t, b] != 0.0:
                     for a in range(r.shape[0]):
                         logarithms[t, b] += 2.0 * np.log(S[a, a])
@@ -99,15 +98,13 @@ def follow(x, P, held, age, started, Z, parameters, poses, covariances, whites, 
 def back(Z, parameters, stages, xs, Ps, presents, befores, ages, gposes, gcovariances, gnis, glogarithms,
          gx, gP, gparameters):
     # Backward; gx and gP, in: of the last state, out: of the first.
-    n, e, m, d, w = xs.shape[2], Ps.shape[2], {m}, Z.shape[2], parameters.shape[2]
+    n, e, m, w = xs.shape[2], Ps.shape[2], {m}, parameters.shape[2]
     x1, x2, x3, r, dx, noise, y = (
         np.empty(n), np.empty(n), np.empty(n), np.empty(m), np.empty(e), np.empty(w), np.empty(m)
     )
     F, Q, P1, square, H, R = zeros(e, e), zeros(e, e), zeros(e, e), zeros(e, e), zeros(m, e), zeros(m, m)
     A, S, W, factor = zeros(e, m), zeros(m, m), zeros(m, m), zeros(m, m)
-    every, first, column, rows = scratch(n, e, m, d, w)[3]
-    for i in range(e):
-        every[i] = i
+    rows = np.empty(m, np.int64)
     gr, gH, gR, gdx, gF = np.empty(m), zeros(m, e), zeros(m, m), np.empty(e), zeros(e, e)
     more, passed, gp = np.empty(n), np.empty(n), np.empty({k})
     work = zeros(e, m), zeros(e, m), zeros(m, m), np.empty(m)
@@ -127,7 +124,7 @@ def back(Z, parameters, stages, xs, Ps, presents, befores, ages, gposes, gcovari
             noise_of(present, ages[t, b], p, noise)
             predict(xs[t, b], present, before, noise, x1, F, Q)
             copy_matrix(Ps[t, b], P1)
-            propagate(F, P1, Q, square, every, first, column)
+            propagate(F, P1, Q, square, F_first, F_column)
             residual(x1, z, p, r, H, R)
             count, _ = innovation(r, H, R, P1, rows, A, S, W, y, factor)
             gain_times(A, y, count, dx)
@@ -169,9 +166,9 @@ _SHARE = """
                 gp[{g}] *= p[{i}] / noise[{i}]"""
 
 _GROWN = """
-    noise[{i}] = grow(
+    noise[{i}] = max(noise[{i}], grow(
         p[{i}], age[{c}], squared(present, {start}, {stop}), p[{dt}], p[{dt}]**{power}, {constants}
-    )"""
+    ))"""
 
 
 def print_back(model: Model, primal: str, shared: str, gains: Sequence[str]) -> str:
@@ -238,6 +235,7 @@ def print_back(model: Model, primal: str, shared: str, gains: Sequence[str]) -> 
         grown += _GROWN.format(
             i=i, c=c, start=begins[c], stop=begins[c + 1], dt=dt, power=item.power, constants=constants
         )
+    for i in {names.index(item.parameter): None for item in model.held_inputs}:
         share += "".join(_SHARE.format(i=i, g=g) for g, place in enumerate(places) if place == i)
     grow = f"\nfrom {shared} import grow" if model.held_inputs else ""
     text = [_HEAD.format(primal=primal, grow=grow, starts=begins)]
