@@ -207,7 +207,7 @@ def _number_of(item: Any) -> float | None:
 
 
 def _print_entries(F: np.ndarray, H: np.ndarray) -> tuple[list[str], int]:
-    """Functions that keep and restore the elements of F and H which are no constants; and how many these are."""
+    """Functions that keep and restore the elements of F and H that vary, and the number of these."""
     stored: list[str] = []
     fetched: list[str] = []
     constants: list[str] = []
