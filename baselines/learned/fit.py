@@ -76,11 +76,13 @@ class FitResult(NamedTuple):
         history: one dictionary an epoch: ``epoch``, ``training`` and ``validation`` loss, ``validation_deg`` (mean over
             parts of the root mean square error), ``skipped`` updates.
         best_epoch: the one with the lowest validation loss; 0: the weights before the first.
+        residuals: root mean square errors of the parts that are held out, rad.
     """
 
     estimator: LearnedEstimator
     history: list[dict[str, float]]
     best_epoch: int
+    residuals: tuple[float, ...]
 
 
 @contextmanager
@@ -157,10 +159,12 @@ def fit(
                     )
         finally:
             log(None)
-    module.load_state_dict(trainer.best)
+        module.load_state_dict(trainer.best)
+        _, residuals = validation_loss(trainer, validation)
     module.eval()
     network = module.export() if hasattr(module, "export") else trainer.network  # type: ignore[operator]
-    return FitResult(LearnedEstimator(network, front_end, head), trainer.history, trainer.best_epoch)
+    estimator = LearnedEstimator(network, front_end, head)
+    return FitResult(estimator, trainer.history, trainer.best_epoch, tuple(residuals.tolist()))
 
 
 class Trainer:
@@ -239,7 +243,8 @@ class Trainer:
             else:
                 skipped += 1
                 memory = None if memory is None else torch.nan_to_num(memory)
-        held_out, degrees = validation_loss(self, validation)
+        held_out, parts = validation_loss(self, validation)
+        degrees = math.degrees(float(parts.mean()))
         self.epoch += 1
         if held_out < self.best_loss:
             self.best, self.best_epoch = copy.deepcopy(self.module.state_dict()), self.epoch
@@ -291,8 +296,10 @@ class Trainer:
         self.best_loss, self.history, self.best = state["best_loss"], state["history"], state["best"]
 
 
-def validation_loss(trainer: Trainer, data: SequenceData, size: int = 64, length: int = 1000) -> tuple[float, float]:
-    """Loss of whole sequences, without gradients, and mean over parts of the root mean square error, deg."""
+def validation_loss(
+    trainer: Trainer, data: SequenceData, size: int = 64, length: int = 1000
+) -> tuple[float, np.ndarray]:
+    """Loss of whole sequences, without gradients, and the root mean square error of each part, rad."""
     trainer.module.eval()
     total, count, squares, scored = 0.0, 0, 0.0, 0
     with torch.no_grad():
@@ -312,8 +319,7 @@ def validation_loss(trainer: Trainer, data: SequenceData, size: int = 64, length
             error = trainer.head.errors(outputs, target, spread)
             squares = squares + (error * error)[mask].sum(dim=0).double()
             count, scored = count + counted, scored + int(mask.sum())
-    degrees = math.degrees(float(torch.as_tensor(squares / max(scored, 1)).sqrt().mean()))
-    return total / max(count, 1), degrees
+    return total / max(count, 1), np.sqrt(np.atleast_1d(np.asarray(squares)) / max(scored, 1))
 
 
 def open_log(folder: Path) -> Callable[[dict[str, float] | None], None]:

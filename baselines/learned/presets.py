@@ -16,12 +16,14 @@ from ...filters.support.names import look_up
 from ...filters.support.seeds import child_seeds
 from .data import SequenceData, taught, with_errors
 from .estimator import LearnedEstimator
+from .filter_features import FilterFeatures
 from .fit import FitConfig, FitResult, fit
 from .front_end import FrontEnd
 from .gru import GruNetwork
-from .head import Head, TiltHead
+from .head import AngleHead, Head, TiltHead
 from .level_frame import LevelFrame
 from .modules import GruModule, TcnModule
+from .rides import RideSource, ride_data
 
 
 @dataclass(frozen=True)
@@ -34,8 +36,12 @@ class Preset:
 
     summary: str
     """what it is, in one line"""
-    sources: Mapping[str, int]
-    """recipe → training episodes"""
+    sources: Mapping[str, int] = field(default_factory=dict)
+    """recipe of hand motion → training episodes"""
+    rides: RideSource | None = None
+    """rides to train on instead"""
+    parameters: Mapping[str, float] = field(default_factory=dict)
+    """of the filter, where they differ from the registered ones"""
     validation: float = 0.15
     """held-out episodes of each recipe, as a share of the training episodes"""
     network: str = "gru"
@@ -55,29 +61,41 @@ class Preset:
     """settings of a training that starts from weights"""
 
     def __post_init__(self) -> None:
-        if not self.sources or any(count < 1 for count in self.sources.values()):
-            raise ValueError(f"sources must map recipes to episodes, 1 or more, got {dict(self.sources)}")
+        if any(count < 1 for count in self.sources.values()) or bool(self.sources) == (self.rides is not None):
+            raise ValueError(
+                f"either rides, or sources that map recipes to 1 or more episodes, got {dict(self.sources)}"
+            )
+        if self.rides is not None and self.filter is None:
+            raise ValueError("a network for rides corrects a filter: name it")
         if self.units < 1:
             raise ValueError(f"units must be at least 1, got {self.units}")
 
     def front_end(self) -> FrontEnd:
         """What the network sees."""
-        return LevelFrame(None if self.filter is None else make(self.filter))  # type: ignore[arg-type]
+        kalman: Any = None if self.filter is None else make(self.filter, **self.parameters)
+        return LevelFrame(kalman) if self.rides is None else FilterFeatures(kalman)
 
     def head(self) -> Head:
-        """What it says."""
-        return TiltHead(self.limit)
+        """What it says: an inclination, or corrections of all angles of a rider's filter."""
+        if self.rides is None:
+            return TiltHead(self.limit)
+        outputs = tuple(quantity for quantity in make(str(self.filter)).outputs if quantity.kind == "angle")
+        return AngleHead(outputs, (self.scale,) * sum(quantity.size for quantity in outputs), self.limit)
 
     def module(self, features: int, outputs: int, seed: int) -> Any:
         """The network before its training."""
         kinds: dict[str, Any] = {"gru": GruModule, "tcn": TcnModule}
         kind = look_up("network", self.network, kinds)
-        return kind(features, outputs, self.units, seed=seed, scale=self.scale, noise=self.noise)
+        # the head of angles has a scale of its own
+        scale = self.scale if self.rides is None else 1.0
+        return kind(features, outputs, self.units, seed=seed, scale=scale, noise=self.noise)
 
     def quick(self) -> Preset:
         """A small version that learns visibly within minutes."""
         sources = {name: min(count, 48) for name, count in self.sources.items()}
-        return replace(self, sources=sources, units=min(self.units, 32), fit=replace(self.fit, epochs=4, batch=16))
+        rides = None if self.rides is None else replace(self.rides, rides=6, draws=3)
+        fit = replace(self.fit, epochs=4, batch=16)
+        return replace(self, sources=sources, rides=rides, units=min(self.units, 32), fit=fit)
 
     def describe(self) -> dict[str, Any]:
         """All settings, for a card."""
@@ -86,6 +104,10 @@ class Preset:
 
 COPIES = 4
 """of each recording that a teacher explains"""
+TRAINED = {"scenarios": ["indoor_circle", "outdoor", "straight", "slalom"], "styles": ["mild", "normal"]}
+"""Rides that networks train on; other scenarios and aggressive riders are kept aside."""
+RIDES = RideSource(rides=60, draws=6, duration=40.0, changes=TRAINED)
+RIDDEN = FitConfig(epochs=12, window=125, learning_rate=3e-3)
 HANDS = {"hand-held": 300, "carried": 60}
 PRESETS: dict[str, Preset] = {
     "gru": Preset("inclination from six axes by a recurrent network alone", HANDS, fit=FitConfig(epochs=8)),
@@ -100,6 +122,13 @@ PRESETS: dict[str, Preset] = {
         limit=3.0,
         scale=0.02,
     ),
+    **{
+        f"{name}+network": Preset(
+            f"{name}, all its angles corrected by a recurrent network", rides=RIDES, filter=name,
+            parameters=parameters, scale=0.03, noise=0.1, fit=RIDDEN,
+        )
+        for name, parameters in (("two-gyro", {}), ("force-inertial", {}), ("whole-body", {}))
+    },
 }  # fmt: skip
 """Name of the weights → training."""
 
@@ -143,6 +172,10 @@ def train_preset(
     train_seed, validation_seed, weights_seed, _ = seeds_of(seed)
 
     def simulated(root: int, share: float, words: str) -> SequenceData:
+        if preset.rides is not None:
+            label = "" if say is None else f"{words} rides"
+            some = replace(preset.rides, rides=max(2, round(share * preset.rides.rides)))
+            return ride_data(some, root, front_end, head, processes=processes, label=label)
         parts = [
             SequenceData.from_recipe(
                 *(recipe(name), root, max(1, round(share * count)), front_end, head),
@@ -179,4 +212,9 @@ def train_preset(
             raise ValueError(f"start must be weights of a recurrent network, got a {network.kind} in {start}")
         module, config = GruModule.of(network, preset.scale), preset.refined
     config = replace(config, seed=number)
-    return fit(module, front_end, head, data, validation, config, folder=folder, resume=resume, say=say)
+    result = fit(module, front_end, head, data, validation, config, folder=folder, resume=resume, say=say)
+    if isinstance(head, AngleHead):
+        # the covariance that what is held out asks for
+        calibrated = replace(head, deviations=result.residuals)
+        result = result._replace(estimator=replace(result.estimator, head=calibrated))
+    return result

@@ -7,22 +7,22 @@ exchanged; without that, networks learn the few draws by heart.
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ...envs.data.trajectory import Trajectory, load_trajectory
+from ...envs.data.trajectory import Trajectory
+from ...envs.episodes import EpisodeStore
 from ...envs.recipes.recipe import Recipe
 from ...envs.recipes.registry import described_recipe, recipe
 from ...filters.support.parallel import in_parallel
-from ...filters.support.version import code_version
 from .data import SequenceData, sequence_of
 from .front_end import FrontEnd
 from .head import Head
 
+ON_DISK = 4 * 10**9
+"""bytes of rides that are kept"""
 SETTLED = 5.0
 """s of a ride that are not scored: filters settle"""
 
@@ -55,86 +55,63 @@ class RideSource:
         return described_recipe(described)
 
 
-def ride_files(source: RideSource, seed: int, folder: str | Path, *, processes: int = 1, label: str = "") -> list[Path]:
-    """Ride with ideal sensors, each ride once a folder and version of the code; what is finished stays.
+def ride(source: RideSource, seed: int, index: int) -> Trajectory:
+    """A ride with ideal sensors; kept in the user's cache folder for all networks that train on it.
 
     Args:
         source: which rides.
         seed: root seed; rides of different seeds share neither riders nor courses.
-        folder: where the files go.
-        processes: how many ride at a time; the rides do not depend on it.
-        label: words before a progress bar; empty for none.
+        index: of the ride.
     """
-    origin = {"recipe": source.recipe().describe(), "seed": seed, "code": code_version("filters", "envs")}
-    home = Path(folder) / f"rides-{seed}"
-    paths = [home / f"ride_{index:04d}.h5" for index in range(source.rides)]
-    home.mkdir(parents=True, exist_ok=True)
-    note = home / "origin.json"
-    if note.is_file() and json.loads(note.read_text(encoding="utf-8")) != json.loads(json.dumps(origin)):
-        for path in home.glob("ride_*.h5"):
-            path.unlink()
-    note.write_text(json.dumps(origin, indent=2), encoding="utf-8")
-    missing = [(source, seed, index, path) for index, path in enumerate(paths) if not path.exists()]
-    for _ in in_parallel(ride_one, missing, processes, label=label, unit="ride"):
-        pass
-    return paths
-
-
-def ride_one(source: RideSource, seed: int, index: int, path: Path) -> Path:
-    """One ride with ideal sensors; the file appears whole or not at all."""
     made: Any = source.recipe()
-    return made.ride(np.random.SeedSequence(seed, spawn_key=(index,)), path.stem).save(path)
+    store = EpisodeStore("training-rides", made.describe(), in_memory=1, on_disk=ON_DISK)
+    sequence = np.random.SeedSequence(seed, spawn_key=(index,))
+    return store.episode((seed, index), lambda: made.ride(sequence, f"ride-{seed}-{index}"))
 
 
-def drawn(source: RideSource, seed: int, index: int, path: Path) -> list[Trajectory]:
-    """The draws of devices and geometry on one recorded ride."""
+def drawn(source: RideSource, seed: int, index: int) -> list[Trajectory]:
+    """The draws of devices and geometry on one ride; what is not settled is left out of the mask."""
     made: Any = source.recipe()
-    ride = load_trajectory(path)
+    ridden = ride(source, seed, index)
     children = np.random.SeedSequence(seed, spawn_key=(index, 1)).spawn(source.draws)
-    return [made.sensed(ride, child).replace(mask=ride.time > SETTLED) for child in children]
+    return [made.sensed(ridden, child).replace(mask=ridden.time > SETTLED) for child in children]
 
 
 def ride_data(
-    source: RideSource,
-    seed: int,
-    folder: str | Path,
-    front_end: FrontEnd,
-    head: Head,
-    *,
-    processes: int = 1,
-    label: str = "",
+    source: RideSource, seed: int, front_end: FrontEnd, head: Head, *, processes: int = 1, label: str = ""
 ) -> SequenceData:
     """Sequences of all draws on all rides; a ride of less than twice :data:`SETTLED` seconds is left out.
 
     Args:
         source: which rides.
         seed: root seed.
-        folder: where rides are kept; filters that see the same rides share them.
         front_end: what the network sees.
         head: what it should say.
-        processes: how many ride at a time.
+        processes: how many ride at a time; the numbers do not depend on it.
         label: words before a progress bar; empty for none.
 
     Raises:
         ValueError: no ride is long enough.
     """
-    paths = ride_files(source, seed, folder, processes=processes, label=label)
-    jobs = [(source, seed, index, path, front_end, head) for index, path in enumerate(paths)]
-    done: dict[int, list[tuple[np.ndarray, ...]]] = dict(in_parallel(ride_sequences, jobs, processes))
-    parts = [part for index in range(len(paths)) for part in done[index]]
+    jobs = [(source, seed, index, front_end, head) for index in range(source.rides)]
+    done: dict[int, list[tuple[np.ndarray, ...]]] = dict(
+        in_parallel(ride_sequences, jobs, processes, label=label, unit="ride")
+    )
+    parts = [part for index in range(source.rides) for part in done[index]]
     if not parts:
-        raise ValueError(f"none of the {len(paths)} rides lasts {2.0 * SETTLED:g} s: the riders fell")
-    names = [f"ride-{seed}-{index}" for index in range(len(paths)) for _ in done[index]]
+        raise ValueError(f"none of the {source.rides} rides lasts {2.0 * SETTLED:g} s: the riders fell")
+    names = [f"ride-{seed}-{index}" for index in range(source.rides) for _ in done[index]]
     return SequenceData.joined(parts, names)
 
 
 def ride_sequences(
-    source: RideSource, seed: int, index: int, path: Path, front_end: FrontEnd, head: Head
+    source: RideSource, seed: int, index: int, front_end: FrontEnd, head: Head
 ) -> tuple[int, list[tuple[np.ndarray, ...]]]:
     """The index, and the sequences of one ride's draws, for parallel processes."""
-    if float(load_trajectory(path).time[-1]) < 2.0 * SETTLED:
+    draws = drawn(source, seed, index)
+    if float(draws[0].time[-1]) < 2.0 * SETTLED:
         return index, []
-    return index, [sequence_of(each, front_end, head) for each in drawn(source, seed, index, path)]
+    return index, [sequence_of(each, front_end, head) for each in draws]
 
 
 def held_out(source: RideSource, **changes: Any) -> RideSource:

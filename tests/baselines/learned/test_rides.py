@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from collections.abc import Iterator
 
 import numpy as np
 import pytest
 
 from poise.baselines.learned.filter_features import FilterFeatures
 from poise.baselines.learned.head import AngleHead
-from poise.baselines.learned.rides import RideSource, drawn, held_out, ride_data, ride_files
+from poise.baselines.learned.rides import RideSource, drawn, held_out, ride, ride_data
+from poise.envs import episodes
 from poise.filters.registry import make
 
 SHORT = RideSource(
@@ -17,45 +18,41 @@ SHORT = RideSource(
 )
 
 
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    home = tmp_path_factory.mktemp("rides")
-    ride_files(SHORT, 5, home)
-    return home
+@pytest.fixture(scope="module", autouse=True)
+def cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(episodes, "user_cache", lambda name: tmp_path_factory.mktemp("kept") / name)
+        yield
 
 
-def test_rides_are_kept_and_drawn_anew(folder: Path) -> None:
-    paths = ride_files(SHORT, 5, folder)
-    stamps = [path.stat().st_mtime_ns for path in paths]
-    first, second = drawn(SHORT, 5, 0, paths[0])
-    assert [path.stat().st_mtime_ns for path in ride_files(SHORT, 5, folder)] == stamps
+def test_rides_are_drawn_anew_and_repeatable() -> None:
+    first, second = drawn(SHORT, 5, 0)
     assert not np.array_equal(first.measurements["trunk_imu/gyr"], second.measurements["trunk_imu/gyr"])
-    again = drawn(SHORT, 5, 0, paths[0])[0]
+    again = drawn(SHORT, 5, 0)[0]
     np.testing.assert_array_equal(again.measurements["trunk_imu/gyr"], first.measurements["trunk_imu/gyr"])
     assert not first.mask[:400].any()
+    assert first.mask[600:].all()
 
 
-def test_rides_of_another_recipe_are_ridden_anew(tmp_path: Path) -> None:
+def test_another_recipe_rides_otherwise() -> None:
     one = RideSource(1, 1, 0.5, SHORT.changes)
-    (path,) = ride_files(one, 5, tmp_path)
-    before = path.read_bytes()
-    (path,) = ride_files(held_out(one, styles=("aggressive",)), 5, tmp_path)
-    assert path.read_bytes() != before
+    plain, wild = ride(one, 5, 0), ride(held_out(one, styles=("aggressive",)), 5, 0)
+    assert not np.array_equal(plain.truth["trunk/angles"], wild.truth["trunk/angles"])
 
 
-def test_targets_are_the_errors_of_the_filter(folder: Path) -> None:
+def test_targets_are_the_errors_of_the_filter() -> None:
     kalman = make("two-gyro")
     front_end = FilterFeatures(kalman)
     outputs = tuple(quantity for quantity in kalman.outputs if quantity.kind == "angle")
     head = AngleHead(outputs, (0.02,) * 4)
-    data = ride_data(SHORT, 5, folder, front_end, head)
+    data = ride_data(SHORT, 5, front_end, head)
     assert data.features.shape[0] == 4
     assert data.features.shape[2] == front_end.size
-    ride = drawn(SHORT, 5, 0, ride_files(SHORT, 5, folder)[0])[0]
-    told = front_end.with_dt(ride.dt).configured(ride.metadata)
-    seen = told.run({channel.name: ride.measurements[channel.name] for channel in told.channels})
+    ridden = drawn(SHORT, 5, 0)[0]
+    told = front_end.with_dt(ridden.dt).configured(ridden.metadata)
+    seen = told.run({channel.name: ridden.measurements[channel.name] for channel in told.channels})
     due = seen.due == 1.0
-    roll = ride.truth["bicycle/roll"][due, 0] - seen.base["bicycle/roll"][due, 0]
+    roll = ridden.truth["bicycle/roll"][due, 0] - seen.base["bicycle/roll"][due, 0]
     scored = data.mask[0, : due.sum()]
     assert scored.sum() > 100
     np.testing.assert_allclose(data.target[0, : due.sum(), 0][scored], roll[scored], atol=1e-6)
