@@ -129,6 +129,13 @@ def ranges(summaries: Sequence[Summary], bandwidth: float) -> dict[str, tuple[fl
     return found
 
 
+def totals(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """How many values of :func:`containment_rows` are inside, and the statistics of which one is not."""
+    inside, count = (sum(int(row["inside"].split("/")[part]) for row in rows) for part in (0, 1))
+    outside = [row["statistic"] for row in rows if row["outside"] != "none"]
+    return {"inside": f"{inside}/{count}", "outside in": ", ".join(outside) or "none"}
+
+
 def containment_rows(recorded: Sequence[Summary], simulated: Sequence[Summary]) -> list[dict[str, Any]]:
     """One row a statistic: the simulated range, the recorded values, and which recordings lie outside.
 

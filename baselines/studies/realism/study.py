@@ -13,7 +13,7 @@ from ....envs.recipes.registry import recipe
 from ...scoring import COLUMNS
 from ..kit import Study
 from ..report import Report
-from .containment import HIGH, LOW, Summary, containment_rows, simulated_summaries, summary
+from .containment import HIGH, LOW, Summary, containment_rows, simulated_summaries, summary, totals
 from .figures import spectra
 from .motion import SHARE_OF_RATE, UNITS
 from .ranks import agreement, inclination_errors, installed, matrix, simulated_errors
@@ -51,8 +51,10 @@ class Settings:
 
 def containment(study: Study, report: Report, settings: Settings, groups: Sequence[Recorded]) -> None:
     """Statistics and spectra of every group of recordings beside its recipe."""
-    if groups:
-        report.text(CONTAINED, "Recordings inside of recipes")
+    if not groups:
+        return
+    report.text(CONTAINED, "Recordings inside of recipes")
+    whole = []
     for (name, site), members in by_recipe(groups).items():
         made = recipe(name)
         found: dict[str, list[Summary]] = {}
@@ -70,10 +72,13 @@ def containment(study: Study, report: Report, settings: Settings, groups: Sequen
             report.text(f"{falls} of {len(simulated)} rides of the recipe {name} ended in a fall.")
         for label, summaries in found.items():
             title = f"{label} in {name} at {site}"
-            report.table(title, containment_rows(summaries, simulated))
+            rows = containment_rows(summaries, simulated)
+            report.table(title, rows)
+            whole.append({"recordings": label, "recipe": name, "episodes": len(simulated)} | totals(rows))
             report.numbers(results(label, summaries))
         report.figure(f"spectra {name} {site}", spectra(simulated, found), f"Spectra: recipe {name} at {site}")
         report.numbers(results(name, simulated))
+    report.table("Statistics of recordings inside of recipes", whole)
 
 
 def results(label: str, summaries: Sequence[Summary]) -> list[dict[str, Any]]:

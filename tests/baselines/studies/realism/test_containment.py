@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from poise.baselines.studies.kit import Study
-from poise.baselines.studies.realism.containment import containment_rows, ranges, simulated_summaries, summary
+from poise.baselines.studies.realism.containment import containment_rows, ranges, simulated_summaries, summary, totals
 from poise.baselines.studies.realism.ranks import agreement, kendall
 from poise.baselines.studies.realism.roles import recorded
 from poise.envs.hand.hand_held import HandHeld
@@ -26,7 +26,10 @@ def test_episodes_of_the_recipe_lie_inside_and_a_stronger_motion_outside(tmp_pat
     simulated = simulated_summaries(study, SHORT, 20, "imu", WIDTHS, rate=120.0)
     assert [each.rate for each in simulated] == pytest.approx([120.0] * 20)
     own = [each._replace(statistics={25.0: each.statistics[25.0]}) for each in simulated]
-    for row in containment_rows(own, simulated):
+    rows = containment_rows(own, simulated)
+    inside, count = map(int, totals(rows)["inside"].split("/"))
+    assert count - inside == 2 * len(rows)
+    for row in rows:
         inside, count = map(int, row["inside"].split("/"))
         # two of twenty values lie beyond 5 and 95 %
         assert count - inside == 2, row
