@@ -128,7 +128,16 @@ def test(result: FitResult, preset: Preset, args: Args, out: Output) -> pandas.D
     from ..baselines.evaluation import evaluate
 
     contenders: dict[str, Any] = {args.preset: result.estimator}
-    contenders |= {name: name for name in dict.fromkeys([preset.filter or CONTENDERS[0], *CONTENDERS])}
+    others = CONTENDERS if preset.rides is None else ()
+    contenders |= {name: name for name in dict.fromkeys([preset.filter or CONTENDERS[0], *others])}
+    if preset.rides is not None:
+        groups, tables = test_rides(preset, args.seed, args.test_episodes), []
+        for group, rides in groups.items():
+            tables.append(evaluate(contenders, rides, progress=True))
+            tables[-1]["trajectory"] = group + ":" + tables[-1]["trajectory"].astype(str)
+        table = pandas_concat(tables)
+        angles = {quantity.name for quantity in result.estimator.outputs}
+        return table[table["quantity"].isin(angles) & (table["metric"] != "nis")]
     table = evaluate(contenders, test_trajectories(preset, args.seed, args.test_episodes), progress=True)
     for name, reason in dict.fromkeys((name, reason) for name, _, reason in table.attrs["skipped"]):
         out.say(f"not compared with {name}: {reason}")

@@ -20,8 +20,8 @@ class PilotParameters:
     """A human control model of steering.
 
     Noise of a sense is white; its level is the standard deviation of the mean over one second. Delays and muscles are
-    published. Levels and weights are choices of this project: riders stay up, and steering grows towards low speeds, though
-    less than published (three times from 20 to 5 km/h, where measurements have six).
+    published. Levels and weights are choices of this project: riders stay up, and steering grows towards low speeds,
+    though less than published (three times from 20 to 5 km/h, where measurements have six).
 
     Raises:
         ValueError: a number that is negative or not finite, a delay, frequency or torque that is zero, or senses of
