@@ -13,7 +13,7 @@ from ..filters.core import rotation
 from ..filters.core.consistency import consistency
 from ..filters.core.estimator import Estimator
 from ..filters.core.metrics import score
-from ..filters.core.model import Equations, equations_of
+from ..filters.core.model import equations_of
 from ..filters.core.quantity import ORIENTATION, RELATIVE_ORIENTATION, UP, Estimate, Quantity
 from .run import fitted, run_on
 
@@ -96,7 +96,7 @@ def errors(estimator: Estimator[Any], estimate: Estimate, trajectory: Trajectory
     """Rows of one run: errors against the truth, distances to others where it is unknown, shares, consistency."""
     pose = with_up(estimate.pose)
     equations = equations_of(estimator)
-    derived = equations.truth(trajectory.truth) if isinstance(equations, Equations) else {}
+    derived = dict(equations.truth(trajectory.truth)) if callable(getattr(equations, "truth", None)) else {}
     if derived:
         trajectory = trajectory.replace(truth={**derived, **trajectory.truth})
     outputs = {quantity.name: quantity for quantity in (UP, *estimator.outputs)}

@@ -125,6 +125,8 @@ def chosen(args: Args) -> Preset:
 
 def test(result: FitResult, preset: Preset, args: Args, out: Output) -> pandas.DataFrame:
     """Errors on episodes that training never saw, beside those of others."""
+    import pandas
+
     from ..baselines.evaluation import evaluate
 
     contenders: dict[str, Any] = {args.preset: result.estimator}
@@ -134,10 +136,10 @@ def test(result: FitResult, preset: Preset, args: Args, out: Output) -> pandas.D
         groups, tables = test_rides(preset, args.seed, args.test_episodes), []
         for group, rides in groups.items():
             tables.append(evaluate(contenders, rides, progress=True))
-            tables[-1]["trajectory"] = group + ":" + tables[-1]["trajectory"].astype(str)
-        table = pandas_concat(tables)
+            tables[-1]["trajectory"] = f"{group}:" + tables[-1]["trajectory"].astype(str)
+        table = pandas.concat(tables)
         angles = {quantity.name for quantity in result.estimator.outputs}
-        return table[table["quantity"].isin(angles) & (table["metric"] != "nis")]
+        return table[table["quantity"].isin(angles) & (table["metric"] == "angle")]
     table = evaluate(contenders, test_trajectories(preset, args.seed, args.test_episodes), progress=True)
     for name, reason in dict.fromkeys((name, reason) for name, _, reason in table.attrs["skipped"]):
         out.say(f"not compared with {name}: {reason}")
@@ -164,6 +166,28 @@ def test_trajectories(preset: Preset, seed: int, episodes: int) -> list[Trajecto
     return trajectories
 
 
+def test_rides(preset: Preset, seed: int, rides: int) -> dict[str, list[Trajectory]]:
+    """Rides of riders that training never saw: as those of the training, in other scenarios, of aggressive riders."""
+    from ..baselines.learned.presets import seeds_of
+    from ..baselines.learned.rides import drawn, held_out
+
+    assert preset.rides is not None
+    root, source = seeds_of(seed)[3], replace(preset.rides, rides=max(1, rides // 3), draws=2)
+    groups = {
+        "unseen riders": source,
+        "other scenarios": held_out(source, scenarios=("bumps", "pitch", "slow")),
+        "aggressive riders": held_out(source, styles=("aggressive",)),
+    }
+    return {
+        name: [
+            each.replace(metadata={**each.metadata, "name": f"{index}-{number}"})
+            for index in range(own.rides)
+            for number, each in enumerate(drawn(own, root + place, index))
+        ]
+        for place, (name, own) in enumerate(groups.items())
+    }
+
+
 def means(table: pandas.DataFrame) -> dict[str, dict[str, dict[str, float]]]:
     """Group of trajectories → estimator → mean and median over its trajectories, deg."""
     groups: dict[str, dict[str, dict[str, float]]] = {}
@@ -181,11 +205,13 @@ def card_of(args: Args, preset: Preset, result: FitResult, table: pandas.DataFra
         "description": preset.summary,
         "estimator": "poise.baselines.learned.estimator.LearnedEstimator",
         "command": command_line("train", args, OPTIONS),
-        "data": dict(preset.sources) if not args.recordings else [path.name for path in args.recordings],
+        "data": preset.describe()["rides"] or dict(preset.sources)
+        if not args.recordings
+        else [path.name for path in args.recordings],
         "training": preset.describe(),
         "best_epoch": result.best_epoch,
         "history": [{name: round(value, 6) for name, value in entry.items()} for entry in result.history],
-        "test_inclination": means(table),
+        "test": means(table),
         "versions": versions(("numpy", "numba", "torch", "scipy")),
         "date": date.today().isoformat(),
         "licence": "MIT",
