@@ -20,12 +20,21 @@ ENTRY_POINTS: dict[str, str] = {
 }
 """Id → ``module:class``. Episodes end by themselves (gesture or recording), so no time limit is registered."""
 
+VECTOR_ENTRY_POINTS: dict[str, str] = {
+    "poise/Replay-v0": "poise.envs.replay_vector:ReplayVectorEnv",
+    "poise/RiderBicycleGain-v0": "poise.envs.ride_gain_tuning:RiderBicycleGainVectorEnv",
+    "poise/HandMotionGain-v0": "poise.envs.gain_tuning:HandMotionGainVectorEnv",
+    "poise/ReplayGain-v0": "poise.envs.gain_tuning:ReplayGainVectorEnv",
+}
+"""Id → ``module:class`` of the environments whose episodes are computed together."""
+
 
 def register_environments() -> None:
     """Register all environments with Gymnasium; calling it again changes nothing."""
     for identity, entry_point in ENTRY_POINTS.items():
         if identity not in gymnasium.registry:
-            gymnasium.register(id=identity, entry_point=entry_point)
+            together = VECTOR_ENTRY_POINTS.get(identity)
+            gymnasium.register(id=identity, entry_point=entry_point, vector_entry_point=together)
 
 
 def make_environment(identity: str, **options: Any) -> gymnasium.Env[Any, Any]:

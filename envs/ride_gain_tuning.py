@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
+import numpy as np
+
 from ..filters.core.kalman import KalmanFilter
 from ..filters.support.seeds import child_seeds, root_seed
 from .base import renamed
@@ -18,7 +20,8 @@ from .bicycle.sensors.single_imu import SITES, imu_of
 from .data.trajectory import Trajectory
 from .drawn import Scene, Shown
 from .episodes import EpisodeStore
-from .gain_tuning import GainTuningEnv
+from .gain_env import Drawn, GainTuningEnv
+from .gain_vector import GainTuningVectorEnv
 from .record import record
 from .sensors.ideal import Sampling
 
@@ -93,7 +96,7 @@ class RiderBicycleGainEnv(GainTuningEnv):
         rides: number of different rides, each as likely as any other; None for a new one in every episode.
         rides_seed: root seed of these rides; evaluate with another one than in training.
         common: ``gains``, ``quantity``, ``interval`` (s), ``reward``, ``consistency`` of
-            :class:`poise.envs.gain_tuning.GainTuningEnv`, and ``render_mode``.
+            :class:`poise.envs.gain_env.GainTuningEnv`, and ``render_mode``.
 
     Raises:
         ValueError: an unknown site, filter, scenario or rider, or a number out of its range.
@@ -103,7 +106,7 @@ class RiderBicycleGainEnv(GainTuningEnv):
     * v0: first release.
     """
 
-    _episode_fields = (*GainTuningEnv._episode_fields, "_ridden", "_rider")
+    _episode_fields = (*GainTuningEnv._episode_fields, "_ridden", "_present")
 
     @renamed(grade="noise_scale", place="site")
     def __init__(
@@ -139,6 +142,7 @@ class RiderBicycleGainEnv(GainTuningEnv):
         scenarios = [scenario] if isinstance(scenario, str | Scenario) else list(scenario)
         if not scenarios:
             raise ValueError("scenario must name at least one scenario, got none")
+        self._present: tuple[tuple[int, int], Trajectory] | None = None
         self._seeds = None if rides is None else child_seeds(root_seed(rides_seed), rides)
         settings = (subject, style, names, sensors, rate, duration, fidelity, physics_rate, noise_scale, sampling)
         self._store = EpisodeStore("rides", (scenarios, *settings))
@@ -162,28 +166,42 @@ class RiderBicycleGainEnv(GainTuningEnv):
         if duration < longest:
             raise ValueError(f"duration must be one interval at least ({longest:g} s), got {duration}")
 
-    def next_trajectory(self) -> Trajectory:
+    def draw(self, generator: np.random.Generator) -> Drawn:
         """A ride and its sensor errors."""
-        generator = self.np_random.spawn(1)[0]
-        number = int(generator.integers(len(self.rides)))
-        ride = self.rides[number]
+        own = generator.spawn(1)[0]
+        number = int(own.integers(len(self.rides)))
         if self._seeds is None:
-            self._ridden = record(ride, seed=int(generator.integers(2**32)))
+            key, seed = None, int(own.integers(2**32))
         else:
-            seed = self._seeds[int(generator.integers(len(self._seeds)))]
-            self._ridden = self._store.episode((number, seed), partial(record, ride, seed=seed))
-        self._rider = number
+            seed = self._seeds[int(own.integers(len(self._seeds)))]
+            key = (number, seed)
+        self._ridden = number, seed
         # another person or another ground: the scene is recreated on demand
         super().close()
-        return self._ridden if self.of_rides else imu_of(self._ridden, self.site)
+        return key, partial(self._ride, number, seed)
+
+    def _ride(self, number: int, seed: int) -> Trajectory:
+        """A ride, kept where rides are limited; what the filter reads of it."""
+        ridden = self._whole(number, seed)
+        return ridden if self.of_rides else imu_of(ridden, self.site)
+
+    def _whole(self, number: int, seed: int) -> Trajectory:
+        """A ride with all that is known of it; a ride that is never drawn again is kept while it lasts."""
+        simulate = partial(record, self.rides[number], seed=seed)
+        if self._seeds is not None:
+            return self._store.episode((number, seed), simulate)
+        if self._present is None or self._present[0] != (number, seed):
+            self._present = (number, seed), simulate()
+        return self._present[1]
 
     def make_scene(self, gui: bool) -> Scene:
         """Rider, bicycle and ground of the episode."""
         from .bicycle.course.scene import RideScene
 
-        ride = self.rides[self._rider]
+        number, seed = self._ridden
+        ride = self.rides[number]
         # a ride that was read has no world yet
-        ride.reset(seed=self._ridden.metadata["seed"])
+        ride.reset(seed=seed)
         return RideScene(*ride.scenery, gui=gui)
 
     def shown(self) -> Shown | None:
@@ -191,7 +209,7 @@ class RiderBicycleGainEnv(GainTuningEnv):
         shown = super().shown()
         if shown is None:
             return None
-        truth = {name: values[max(self._step - 1, 0)] for name, values in self._ridden.truth.items()}
+        truth = {name: values[max(self._step - 1, 0)] for name, values in self._whole(*self._ridden).truth.items()}
         return Shown(truth, truth, shown.estimate)
 
     def close(self) -> None:
@@ -199,3 +217,9 @@ class RiderBicycleGainEnv(GainTuningEnv):
         super().close()
         for ride in self.rides:
             ride.close()
+
+
+class RiderBicycleGainVectorEnv(GainTuningVectorEnv):
+    """Episodes of :class:`RiderBicycleGainEnv` that are computed together."""
+
+    kind = RiderBicycleGainEnv

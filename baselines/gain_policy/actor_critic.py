@@ -7,16 +7,16 @@ in simulation only and are inputs of the value function alone, so the policy run
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from gymnasium import spaces
 
+from ...envs.gain_episode import PRIVILEGED, GainEpisode
 from ...filters.adaptation.tuned import TunedFilter
 from ...filters.support.optional import extra
-from .batch import PRIVILEGED, TuningBatch
 from .config import TrainingConfig
 from .oracle_warm_start import OracleNetwork
 from .policy import GainPolicy
@@ -94,7 +94,7 @@ def make_model(config: TrainingConfig, env: VecNormalize, start: np.ndarray, log
 
     Args:
         config: its settings.
-        env: normalised :class:`~poise.baselines.gain_policy.batch.TuningBatch`.
+        env: normalised environment whose observations end with :data:`.PRIVILEGED` numbers for the critic.
         start: action ``(k,)``.
         logs: folder of the TensorBoard log; None for none.
     """
@@ -140,16 +140,18 @@ def actor_layers(model: PPO) -> list[Any]:
     return [module for module in (*policy.mlp_extractor.policy_net, policy.action_net) if hasattr(module, "weight")]
 
 
-def warm_start(model: PPO, env: VecNormalize, oracle: OracleNetwork, batch: TuningBatch) -> None:
+def warm_start(model: PPO, env: VecNormalize, oracle: OracleNetwork, episodes: Sequence[GainEpisode]) -> None:
     """Give the actor the weights of the oracle's clone, and ``env`` the normalisation that it was trained with."""
     with torch.no_grad():
         for mine, theirs in zip(actor_layers(model), oracle.linear, strict=True):
             mine.weight.copy_(theirs.weight)
             mine.bias.copy_(theirs.bias)
-    mean, std = batch.privileged_statistics()
+    known = np.concatenate([episode.foresight for episode in episodes])
+    # The agent's own error is not known beforehand; it is about that of the reference.
+    table = np.concatenate([known, known[:, 1:2]], axis=1)
     statistics: Any = env.obs_rms
-    statistics.mean = np.concatenate([oracle.mean, mean])
-    statistics.var = np.concatenate([oracle.std**2, std**2])
+    statistics.mean = np.concatenate([oracle.mean, table.mean(axis=0)])
+    statistics.var = np.concatenate([oracle.std**2, (table.std(axis=0) + 1e-3) ** 2])
     # From here on the normalisation is part of the actor and must not drift.
     statistics.count = 1e12
 

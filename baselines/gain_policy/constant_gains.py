@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...envs.data.trajectory import Trajectory
-from ...envs.gain_tuning import scored_quantity
+from ...envs.gain_reward import scored_quantity
 from ...filters.adaptation.tuned import TunedFilter
 from ...filters.core.kalman import KalmanFilter
 from ...filters.core.metrics import error, rms

@@ -9,7 +9,7 @@ from typing import Self
 import numpy as np
 
 from ...envs.data.trajectory import Trajectory
-from ...envs.gain_tuning import scored_quantity
+from ...envs.gain_reward import scored_quantity
 from ...filters.adaptation.tuned import TunedFilter
 from ...filters.core.metrics import error
 from ...filters.core.quantity import Quantity

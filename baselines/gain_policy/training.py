@@ -19,11 +19,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...envs.data.trajectory import Trajectory
+from ...envs.gain_tuning import ReplayGainVectorEnv
 from ...filters.adaptation.features import InnovationFeatures
 from ...filters.adaptation.gains import tunable_filter
 from ...filters.adaptation.tuned import TunedFilter
 from ...filters.core.kalman import KalmanFilter
 from ...filters.support.optional import extra
+from ...filters.support.seeds import child_seeds, root_seed
 from ...filters.support.version import package_version
 from ..checkpoint import load_checkpoint, save_checkpoint
 from .config import TrainingConfig
@@ -33,7 +35,7 @@ from .policy import GainPolicy
 
 if TYPE_CHECKING:
     from .actor_critic import GainPPO
-    from .batch import TuningBatch
+    from .vec_env import SB3VecEnv
 
 CHECKPOINT = "checkpoint.pt"
 """File of the run folder that a stopped training resumes from."""
@@ -155,21 +157,30 @@ class PolicyTraining:
         from stable_baselines3.common.vec_env import VecNormalize
 
         from .actor_critic import make_model
-        from .batch import TuningBatch
+        from .vec_env import SB3VecEnv
 
         self.config, self.tuned, self.motions, self.start = config, tuned, motions, start
         self.home, self.key, self.report, self.validate = home, key, report, validate
         self.started, self.earlier = time.perf_counter(), 0.0
-        self.batch: TuningBatch = TuningBatch(
-            *(tuned, motions, config.n_envs),
-            seed=config.seed,
-            reference=start,
+        self.rows = ReplayGainVectorEnv(
+            config.n_envs,
+            trajectory=motions,
+            filter=tuned.kalman,
+            gains=tuple(part.gain for part in tuned.ranges),
+            interval=config.interval,
+            reward="relative",
+            reference=tuple(start.tolist()),
             error_scale=config.error_scale,
-            relative=True,
+            privileged=True,
+            autoreset_mode="SameStep",
+            staggered=True,
+            infos=False,
         )
+        self.batch: SB3VecEnv = SB3VecEnv(self.rows)
         # Any, because its statistics are typed as those of observations in dictionaries too.
         self.env: Any = VecNormalize(self.batch, gamma=config.gamma, clip_obs=1e6)
         self.model: GainPPO = make_model(config, self.env, start, home)
+        self.batch.seed(child_seeds(root_seed(config.seed), config.n_envs))
         self.best: GainPolicy | None = None
         self.best_score, self.best_steps, self.looked = np.inf, 0, 0
 
@@ -192,7 +203,7 @@ class PolicyTraining:
             centre = self.start if config.warm_start_centre is None else np.asarray(config.warm_start_centre)
             motions = self.motions[: config.warm_start]
             oracle = fit_oracle(self.tuned, motions, centre, net_arch=config.net_arch, seed=config.seed)
-            warm_start(self.model, self.env, oracle, self.batch)
+            warm_start(self.model, self.env, oracle, [self.rows.single.episode_over(motion) for motion in self.motions])
             self.look()
         # As the model itself would at the start of `learn`, but a checkpoint can be written before it.
         self.model._last_obs = self.env.reset()
@@ -230,7 +241,7 @@ class PolicyTraining:
             self.look()
         if self.report is not None:
             finished: list[Any] = list(self.model.ep_info_buffer or ())
-            gain = float(np.mean([episode["r"] for episode in finished])) if finished else float("nan")
+            gain = float(np.mean([episode["r"] / episode["l"] for episode in finished])) if finished else float("nan")
             self.report({"steps": float(self.steps), "gain": gain, "seconds": self.seconds})
         self.save()
 
@@ -267,7 +278,8 @@ class PolicyTraining:
             "observation": [model._last_obs, model._last_episode_starts],
             "normalisation": normalisation,
             "counts": [float(env.obs_rms.count), float(env.ret_rms.count)],
-            "batch": self.batch.snapshot(),
+            "rows": self.rows.snapshot(),
+            "unfinished": [self.batch.returns, self.batch.lengths],
             "best_score": float(self.best_score),
             "best": None if self.best is None else [array for layer in self.best.layers for array in layer],
             "generators": {
@@ -292,7 +304,8 @@ class PolicyTraining:
         obs_rms, ret_rms = env.obs_rms, env.ret_rms
         obs_rms.mean, obs_rms.var, ret_rms.mean, ret_rms.var, env.returns = state["normalisation"]
         obs_rms.count, ret_rms.count = state["counts"]
-        self.batch.restore(state["batch"])
+        self.rows.restore(state["rows"])
+        self.batch.returns, self.batch.lengths = state["unfinished"]
         if state["best"] is not None:
             layers = tuple(zip(state["best"][::2], state["best"][1::2], strict=True))
             self.best = GainPolicy(self.tuned.name, self.tuned.ranges, self.tuned.features, layers)

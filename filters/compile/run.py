@@ -112,12 +112,25 @@ class CompiledEquations:
     ) -> tuple[Estimate, FilterState]:
         """A whole sequence; see :meth:`poise.filters.core.recursion.Recursion.run_from`."""
         Z = np.asarray(join(arrays, model.channels), dtype=float)
+        parameters = self._parameters(model, gains, Z.shape[0], Z.shape[1:-1])
+        return self.run_samples(model, state, Z, parameters, restart, keep_covariance)
+
+    def run_samples(
+        self,
+        model: Equations,
+        state: FilterState,
+        Z: np.ndarray,
+        parameters: np.ndarray,
+        restart: bool,
+        keep_covariance: bool,
+    ) -> tuple[Estimate, FilterState]:
+        """As :meth:`run`, of samples ``(T, *batch, d)`` with parameters ``(T or 1, B or 1, count)``."""
         length, batch = Z.shape[0], Z.shape[1:-1]
         count = math.prod(batch)
         Z = np.require(Z.reshape(length, count, Z.shape[-1]), requirements=["C", "W"])
         states = [np.array(array).reshape(count, *array.shape[len(batch) :]) for array in state]
         outputs = self._outputs(model, length, count, length if keep_covariance else 0)
-        self._execute(states, Z, self._parameters(model, gains, length, batch), restart, outputs)
+        self._execute(states, Z, parameters, restart, outputs)
         poses, covariances, whites, nis = (array.reshape((len(array), *batch, *array.shape[2:])) for array in outputs)
         estimate = self._estimate(model, poses, covariances if keep_covariance else None, whites, nis)
         return estimate, FilterState(*(array.reshape((*batch, *array.shape[1:])) for array in states))

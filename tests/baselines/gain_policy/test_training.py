@@ -4,7 +4,6 @@ import csv
 import dataclasses
 import json
 
-import gymnasium as gym
 import numpy as np
 import pytest
 
@@ -12,6 +11,7 @@ from poise.baselines.gain_policy.config import TrainingConfig, shipped_config
 from poise.baselines.gain_policy.constant_gains import constant_errors, policy_errors
 from poise.baselines.gain_policy.policy import GainPolicy
 from poise.baselines.gain_policy.training import train_policy
+from poise.envs.gain_episode import PRIVILEGED
 from poise.envs.gain_tuning import ReplayGainEnv
 from poise.envs.hand.trajectories import HandTrajectories
 from poise.filters.adaptation.gains import tunable_filter
@@ -69,10 +69,11 @@ def test_the_exported_policy_is_the_trained_one(trajectories):
     from stable_baselines3.common.vec_env import VecNormalize
 
     from poise.baselines.gain_policy.actor_critic import export_policy, make_model
-    from poise.baselines.gain_policy.batch import TuningBatch
+    from poise.baselines.gain_policy.vec_env import SB3VecEnv
 
     tuned = TunedFilter.of(tunable_filter("external-acceleration"))
-    env = VecNormalize(TuningBatch(tuned, trajectories, 16), clip_obs=1e6)
+    batch = SB3VecEnv.make("poise/ReplayGain-v0", 16, trajectory=trajectories, privileged=True)
+    env = VecNormalize(batch, clip_obs=1e6)
     model = make_model(dataclasses.replace(SMALL, gains=None, net_arch=(32, 32)), env, np.array([0.5, -0.5, 0.1]))
     model.learn(2048)
     env.training = False
@@ -84,37 +85,15 @@ def test_the_exported_policy_is_the_trained_one(trajectories):
         observation, *_ = env.step(action)
 
 
-def test_the_batch_is_the_registered_environment(trajectories):
-    from poise.baselines.gain_policy.batch import TuningBatch
-
-    tuned = TunedFilter.of(tunable_filter("external-acceleration"))
-    one = trajectories[0]
-    batch = TuningBatch(tuned, [one], 2, seed=3)
-    env = gym.make("poise/ReplayGain-v0", trajectory=one, reward="improvement")
-    many, single = batch.reset()[0], env.reset(seed=0)[0]
-    rng = np.random.default_rng(0)
-    batch.groups[0].end[:] = batch.groups[0].stack.decisions
-    for _ in range(batch.groups[0].stack.decisions):
-        np.testing.assert_allclose(many[: tuned.observation_size], single, atol=1e-6)
-        action = rng.uniform(-1.0, 1.0, 3).astype(np.float32)
-        observations, rewards, overs, infos = batch.step(np.stack([action, action]))
-        single, reward, _, truncated, _ = env.step(action)
-        assert overs[0] == truncated
-        np.testing.assert_allclose(rewards[0], np.degrees(reward), atol=1e-5)
-        many = infos[0]["terminal_observation"] if overs[0] else observations[0]
-    fresh = batch.groups[0].tuned.observe(batch.groups[0].initial)[0]
-    np.testing.assert_allclose(observations[0, : tuned.observation_size], fresh)
-
-
 def test_what_only_the_critic_knows_reaches_no_action(trajectories):
     import torch
     from stable_baselines3.common.vec_env import VecNormalize
 
     from poise.baselines.gain_policy.actor_critic import make_model
-    from poise.baselines.gain_policy.batch import PRIVILEGED, TuningBatch
+    from poise.baselines.gain_policy.vec_env import SB3VecEnv
 
-    tuned = TunedFilter.of(tunable_filter("bounded-motion"))
-    env = VecNormalize(TuningBatch(tuned, trajectories, 4))
+    options = {"filter": "bounded-motion", "trajectory": trajectories, "privileged": True}
+    env = VecNormalize(SB3VecEnv.make("poise/ReplayGain-v0", 4, **options))
     model = make_model(dataclasses.replace(SMALL, gains=None), env, np.zeros(3))
     observation = torch.as_tensor(env.reset())
     other = observation.clone()
@@ -146,17 +125,6 @@ def test_stable_baselines_trains_on_the_registered_environment(trajectories):
 def test_wrong_configurations_are_explained(arguments, words):
     with pytest.raises(ValueError, match=words):
         TrainingConfig(**arguments)
-
-
-def test_more_rates_than_episodes_are_refused():
-    from poise.baselines.gain_policy.batch import TuningBatch
-
-    both = [
-        *HandTrajectories(duration=1.0, rates=50.0).draw_many(0, 1),
-        *HandTrajectories(duration=1.0).draw_many(0, 1),
-    ]
-    with pytest.raises(ValueError, match="number of rates"):
-        TuningBatch(TunedFilter.of(tunable_filter("bounded-motion")), both, 1)
 
 
 def test_the_command_tunes_compares_and_exports(tmp_path, capsys):

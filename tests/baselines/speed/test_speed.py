@@ -8,6 +8,7 @@ import pytest
 from poise.baselines.speed import environments as speed_environments
 from poise.baselines.speed import filters as speed_filters
 from poise.baselines.speed import measure as speed_measure
+from poise.baselines.speed import vectors as speed_vectors
 from poise.filters.core.estimator import run
 from poise.filters.core.kalman import KalmanFilter
 from poise.filters.imu.external_acceleration import ExternalAcceleration
@@ -45,3 +46,16 @@ def test_the_command_prints_rates_and_ratios(capsys):
         steps, factor = (riding[fidelity, f"RiderBicycle{what}"] for what in ("", ", real-time factor"))
         assert factor == pytest.approx(steps / speed_environments.RIDER_RATE)
     assert {"batch of 8, compiled", "whole sequence, compiled"} <= {row["what"] for row in rows}
+
+
+def test_vector_environments_stand_beside_the_learner(capsys, monkeypatch):
+    for name, value in (("ENVS", 2), ("STEPS", 2), ("LEARNED", 128), ("REPEATS", 1)):
+        monkeypatch.setattr(speed_vectors, name, value)
+    short = (("hand", "poise/HandMotionGain-v0", {"duration": 1.0}), ("replay", "poise/Replay-v0", {}))
+    monkeypatch.setattr(speed_vectors, "CASES", short)
+    assert main(["speed", "--what", "vectors", "--json"]) == 0
+    rows = json.loads(capsys.readouterr().out)["rows"]
+    assert [row["group"].split(",")[0] for row in rows] == ["hand", "hand", "replay", "replay"]
+    for learner, ours in (rows[:2], rows[2:]):
+        assert learner["ratio"] == 1.0
+        assert ours["ratio"] == pytest.approx(ours["rate"] / learner["rate"])

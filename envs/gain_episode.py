@@ -1,0 +1,134 @@
+"""An episode of gain tuning: the filter as configured for a trajectory, its samples, the truth, and the reference."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from ..filters.adaptation.tuned import TunedFilter
+from ..filters.core.estimator import check_measurements
+from ..filters.core.kalman import KalmanFilter
+from ..filters.core.quantity import Quantity
+from .data.trajectory import Trajectory
+from .gain_reward import GainReward, errors_of, true_values
+
+AHEAD = (1, 10, 40)
+"""Decisions over which the privileged part of an observation looks ahead."""
+PRIVILEGED = 2 + 2 * len(AHEAD)
+"""Numbers of the privileged part: for the critic of a training only."""
+
+
+@dataclass(frozen=True, eq=False)
+class GainEpisode:
+    """What an episode of gain tuning runs on.
+
+    Attributes:
+        trajectory: the motion and its measurements.
+        kalman: the filter in its published tuning, at the trajectory's rate and for its rider, vehicle or device.
+        samples: channel of the filter → ``(T, size)``, NaN where there is no possible sample.
+        truth: ``(T, sizes)`` of the scored quantities, one after the other.
+        reference: costs ``(T,)`` of the reference gains; zeros where nothing needs them.
+        weight: factor on the rewards.
+        decisions: whole intervals in the trajectory.
+        interval_samples: samples of an interval.
+    """
+
+    trajectory: Trajectory
+    kalman: KalmanFilter
+    samples: dict[str, np.ndarray]
+    truth: np.ndarray
+    reference: np.ndarray
+    weight: float
+    decisions: int
+    interval_samples: int
+
+    @classmethod
+    def of(
+        cls,
+        trajectory: Trajectory,
+        tuned: TunedFilter,
+        quantities: Sequence[Quantity],
+        reward: GainReward,
+        reference: np.ndarray | None,
+    ) -> GainEpisode:
+        """An episode over a trajectory.
+
+        Args:
+            trajectory: the motion and its measurements.
+            tuned: the filter with the published constants of any device.
+            quantities: what is scored.
+            reward: how.
+            reference: action of the reference gains; None where no reference is needed.
+
+        Raises:
+            ValueError: the trajectory lacks a channel of the filter, or the truth of a scored quantity.
+        """
+        channels = tuned.kalman.channels
+        missing = [channel.name for channel in channels if channel.name not in trajectory.measurements]
+        if missing:
+            raise ValueError(f"trajectory {trajectory.name!r} lacks the channels {missing} that the filter reads")
+        kalman = tuned.kalman.with_dt(trajectory.dt)
+        kalman = replace(kalman, model=kalman.model.configured(trajectory.metadata))
+        samples = check_measurements(channels, trajectory.measurements, time_axis=True)
+        truth = np.concatenate([true_values(trajectory, quantity, kalman) for quantity in quantities], axis=-1)
+        costs, weight = np.zeros(len(trajectory)), 1.0
+        if reference is not None:
+            gains = {} if not reference.any() else replace(tuned, kalman=kalman).gains(reference)
+            costs = reward.cost(errors_of(quantities, kalman.run(samples, gains).pose, truth))
+            weight = reward.weight(costs, trajectory.mask)
+        interval = tuned.features.interval_samples(trajectory.dt)
+        return cls(trajectory, kalman, samples, truth, costs, weight, len(trajectory) // interval, interval)
+
+    @cached_property
+    def table(self) -> np.ndarray:
+        """Samples of all channels, truth, mask and reference costs side by side ``(T, columns)``: one copy a step."""
+        mask = self.trajectory.mask[:, None].astype(float)
+        return np.concatenate([*self.samples.values(), self.truth, mask, self.reference[:, None]], axis=-1)
+
+    @cached_property
+    def known(self) -> tuple[tuple[tuple[str, int], ...], np.ndarray]:
+        """Names and sizes of the trajectory's truth, and its values behind the time ``(T, 1 + sizes)``."""
+        truth = self.trajectory.truth
+        values = np.concatenate([self.trajectory.time[:, None], *truth.values()], axis=-1)
+        return tuple((name, part.shape[1]) for name, part in truth.items()), values
+
+    @cached_property
+    def foresight(self) -> np.ndarray:
+        """Privileged numbers at every decision ``(decisions + 1, PRIVILEGED - 1)``.
+
+        The gyroscope's bias, and over each of :data:`AHEAD` the mean cost of the reference and the mean acceleration.
+        """
+        length, truth = self.decisions * self.interval_samples, self.trajectory.truth
+        absent = np.zeros((length, 3))
+        bias, force = (
+            np.linalg.norm(truth.get(name, absent)[:length], axis=-1)
+            for name in ("gyroscope_bias", "external_acceleration")
+        )
+        columns = [np.log1p(np.degrees(np.nan_to_num(bias[:: self.interval_samples])))]
+        for values in (np.degrees(self.reference[:length]), force):
+            means = np.nan_to_num(values).reshape(self.decisions, self.interval_samples).mean(axis=-1)
+            columns += [np.log1p(mean_ahead(means, ahead)) for ahead in AHEAD]
+        table = np.stack(columns, axis=-1)
+        return np.concatenate([table, table[-1:]])
+
+    def privileged(self, decision: int, last_error: float) -> np.ndarray:
+        """The privileged part ``(PRIVILEGED,)`` of an observation.
+
+        Args:
+            decision: its number.
+            last_error: of the last sample, rad; NaN where it is not known.
+        """
+        own = 0.0 if math.isnan(last_error) else np.log1p(np.degrees(last_error))
+        return np.append(self.foresight[decision], own).astype(np.float32)
+
+
+def mean_ahead(values: np.ndarray, ahead: int) -> np.ndarray:
+    """Mean of each entry of ``(n,)`` and those after it, ``ahead`` in all or as many as there are."""
+    total = np.concatenate([np.zeros(1), np.cumsum(values)])
+    first = np.arange(len(values))
+    last = np.minimum(first + ahead, len(values))
+    return (total[last] - total[first]) / (last - first)
