@@ -16,13 +16,12 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import solve_discrete_are
 
 from ..frame.parameters import BicycleParameters
 from ..frame.whipple import whipple_model
 from .human_steering import CHANNELS, STATES, InternalModel
 from .pilot import PilotParameters
-from .regulator import preview_regulator, sampled
+from .regulator import preview_regulator, riccati, sampled
 
 FAST = 3
 """number of fast senses"""
@@ -179,7 +178,7 @@ def internal_model(
     identity = np.eye(STATES)
 
     # steady Kalman filter at the time of the eyes
-    P = solve_discrete_are(A.T, C.T, Q, R)
+    P = riccati(A.T, C.T, Q, R)
     K = np.linalg.solve(C @ P @ C.T + R, C @ P).T
     P = (identity - K @ C) @ P
 

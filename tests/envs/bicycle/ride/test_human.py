@@ -12,7 +12,7 @@ from poise.envs.bicycle.frame.bicycle import BicycleState
 from poise.envs.bicycle.frame.bicycles import BICYCLES
 from poise.envs.bicycle.frame.whipple import whipple_model
 from poise.envs.bicycle.ride.human import HumanNoise, HumanPilot, leaning_trunk
-from poise.envs.bicycle.ride.human_steering import steady_turn
+from poise.envs.bicycle.ride.human_steering import human_of, steady_turn
 from poise.envs.bicycle.ride.internal_model import RIGID, delays, lean_matrices, rider_model
 from poise.envs.bicycle.ride.pilot import PILOTS, check_pilot, pilot_parameters
 from poise.envs.bicycle.ride.ride import Ride
@@ -51,7 +51,7 @@ def test_model_of_a_rigid_rider_is_whipples():
         np.testing.assert_allclose(damping[:2, :2], speed * model.C1)
         np.testing.assert_allclose(stiffness[:2, :2], model.stiffness(speed))
         pilot = HumanPilot(LOADED, PILOTS["expert"], np.random.SeedSequence(0))
-        roll, _, torque = steady_turn(pilot._human, speed, 0.1, 0.0)
+        roll, _, torque = steady_turn(human_of(*pilot._human), speed, 0.1, 0.0)
         np.testing.assert_allclose((roll, torque), model.steady_turn(speed, 0.1))
 
 
@@ -60,7 +60,7 @@ def test_a_steady_turn_rests_in_the_model():
     trunk = leaning_trunk(POSTURE, False, 0.0)
     pilot = replace(PILOTS["skilled"], arm_damping=0.0)
     A, B = rider_model(LOADED, pilot, trunk, 9.81, 3.0)
-    human = HumanPilot(LOADED, pilot, np.random.SeedSequence(0), trunk)._human
+    human = human_of(*HumanPilot(LOADED, pilot, np.random.SeedSequence(0), trunk)._human)
     for steer, lean in ((0.1, 0.0), (0.0, 0.1), (-0.05, 0.08)):
         roll, leaning, torque = steady_turn(human, 3.0, steer, lean)
         state = np.zeros(12)
