@@ -106,7 +106,7 @@ class Multibody:
             position, orientation, velocity, turning = self.physics.base_tuples(self.body)
             self._rows = rows = pybullet.getJointStates(self.body, self._all, self.physics.client)
             angles, rates = [row[0] for row in rows], [row[1] for row in rows]
-            self._pack(self._state, 0, *position, *orientation, *velocity, *turning, *angles, *rates)
+            self._pack(self._state.data, 0, *position, *orientation, *velocity, *turning, *angles, *rates)
             self._read_at = self.physics.changes
         return self._state
 

@@ -230,7 +230,7 @@ class Rider:
         frame = self.bicycle.physics.state(self.bicycle.body.body, BASE).orientation
         return rotation.rotate(frame, self._memory[HANDS].reshape(2, 3)), self.grips()
 
-    def raw_forces(self) -> list[Sequence[float]]:
+    def raw_forces(self) -> Sequence[Sequence[float]]:
         """Forces of hands and feet in the last step: in world axes (full) or in bicycle axes (lumped)."""
         if not self.full:
             return self._memory[HANDS_AND_FEET].reshape(4, 3).tolist()
