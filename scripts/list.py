@@ -32,7 +32,8 @@ class Args:
 
     lists: tyro.conf.Positional[tuple[str, ...]] = ()
     """which lists: estimators, environments, sensors, sensor-drift, sensor-kinds, timings, magnetics, gestures,
-    scenarios, surfaces, recipes, formats, benchmark, benchmark-heading, benchmark-limits; all if none is named"""
+    scenarios, surfaces, recipes, presets, formats, benchmark, benchmark-heading, benchmark-limits; all if none is
+    named"""
     markdown: bool = False
     """print the tables in Markdown, as the documentation has them"""
     update: tuple[Path, ...] = ()
@@ -248,6 +249,13 @@ def recipes() -> Rows:
     return [{"name": name, "kind": each.kind, "description": each.summary} for name, each in RECIPES.items()]
 
 
+def presets() -> Rows:
+    """Every network that `poise train` trains."""
+    from ..baselines.learned.presets import PRESETS
+
+    return [{"name": name, "description": each.summary} for name, each in PRESETS.items()]
+
+
 def formats() -> Rows:
     """Every file format that :func:`poise.load_recording` reads."""
     from ..envs.data.formats.load import FORMATS
@@ -270,6 +278,7 @@ LISTS: Mapping[str, Callable[[], Rows]] = {
             scenarios,
             surfaces,
             recipes,
+            presets,
             formats,
         ),
         *(benchmark, benchmark_heading, benchmark_limits),

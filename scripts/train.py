@@ -69,7 +69,7 @@ class Args:
 
 def run(args: Args) -> int:
     """Train, test, and write weights with their card."""
-    from ..baselines.learned.presets import train_preset
+    from ..baselines.learned.training import train_preset
 
     preset = chosen(args)
     own = known_recordings(args.recordings) if args.recordings else None

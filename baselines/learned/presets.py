@@ -2,28 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
-from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from ...envs.data.trajectory import Trajectory
-from ...envs.recipes.registry import recipe
 from ...filters.registry import make
 from ...filters.support.names import look_up
 from ...filters.support.seeds import child_seeds
-from .data import SequenceData, taught, with_errors
-from .estimator import LearnedEstimator
+from .config import FitConfig
 from .filter_features import FilterFeatures
-from .fit import FitConfig, FitResult, fit
 from .front_end import FrontEnd
-from .gru import GruNetwork
 from .head import AngleHead, Head, TiltHead
 from .level_frame import LevelFrame
-from .modules import GruModule, TcnModule
-from .rides import RideSource, ride_data
+from .rides import RideSource
 
 
 @dataclass(frozen=True)
@@ -84,6 +75,8 @@ class Preset:
 
     def module(self, features: int, outputs: int, seed: int) -> Any:
         """The network before its training."""
+        from .modules import GruModule, TcnModule
+
         kinds: dict[str, Any] = {"gru": GruModule, "tcn": TcnModule}
         kind = look_up("network", self.network, kinds)
         # the head of angles has a scale of its own
@@ -102,8 +95,6 @@ class Preset:
         return {**asdict(self), "sources": dict(self.sources)}
 
 
-COPIES = 4
-"""of each recording that a teacher explains"""
 TRAINED = {"scenarios": ["indoor_circle", "outdoor", "straight", "slalom"], "styles": ["mild", "normal"]}
 """Rides that networks train on; other scenarios and aggressive riders are kept aside."""
 RIDES = RideSource(rides=60, draws=6, duration=40.0, changes=TRAINED)
@@ -137,84 +128,3 @@ def seeds_of(seed: int) -> tuple[int, int, int, int]:
     """Children of a root seed: training data, validation data, initial weights and order, test data."""
     train, validation, weights, test = child_seeds(seed, 4)
     return train, validation, weights, test
-
-
-def train_preset(
-    preset: Preset,
-    seed: int,
-    folder: str | Path,
-    *,
-    recordings: list[Trajectory] | None = None,
-    teacher: bool = False,
-    start: str | Path | None = None,
-    resume: bool = False,
-    processes: int = 1,
-    say: Callable[[str], object] | None = None,
-) -> FitResult:
-    """Train a network; the same arguments on the same machine give the same weights, interrupted or not.
-
-    Args:
-        preset: what and how.
-        seed: root seed of data, weights and order.
-        folder: where data sets, checkpoints and the TensorBoard log go.
-        recordings: to train on instead of simulated episodes; of five or more the last fifth chooses the best epoch.
-        teacher: learn from the smoother of the corrected filter instead of the recordings' truth, each recording
-            :data:`COPIES` times with further errors of its sensors.
-        start: weights to start from; None: from scratch.
-        resume: continue from the checkpoint in ``folder``.
-        processes: how many episodes are simulated at a time; the weights do not depend on it.
-        say: called with a line an epoch; None for a silent training.
-
-    Raises:
-        ValueError: see :func:`.fit.fit`; a recording lacks a channel or the truth.
-    """
-    front_end, head = preset.front_end(), preset.head()
-    train_seed, validation_seed, weights_seed, _ = seeds_of(seed)
-
-    def simulated(root: int, share: float, words: str) -> SequenceData:
-        if preset.rides is not None:
-            label = "" if say is None else f"{words} rides"
-            some = replace(preset.rides, rides=max(2, round(share * preset.rides.rides)))
-            return ride_data(some, root, front_end, head, processes=processes, label=label)
-        parts = [
-            SequenceData.from_recipe(
-                *(recipe(name), root, max(1, round(share * count)), front_end, head),
-                cache=folder,
-                progress="" if say is None else f"{words} {name}",
-                processes=processes,
-            )
-            for name, count in preset.sources.items()
-        ]
-        return SequenceData.together(parts)
-
-    data = validation = None
-    if teacher and (preset.filter is None or not recordings):
-        raise ValueError("a teacher needs recordings, and a preset that corrects a filter")
-    if recordings and teacher:
-        generator = np.random.default_rng(train_seed)
-        lessons = [taught(each, str(preset.filter)) for each in recordings]
-        copies = [[with_errors(each, generator) for _ in range(COPIES)] for each in lessons]
-        data = SequenceData.from_trajectories([each for own in copies for each in own], front_end, head)
-        validation = SequenceData.from_trajectories(lessons, front_end, head)
-    elif recordings:
-        kept = max(1, len(recordings) * 4 // 5) if len(recordings) >= 5 else len(recordings)
-        data = SequenceData.from_trajectories(recordings[:kept], front_end, head)
-        if recordings[kept:]:
-            validation = SequenceData.from_trajectories(recordings[kept:], front_end, head)
-    data = simulated(train_seed, 1.0, "simulate") if data is None else data
-    validation = simulated(validation_seed, preset.validation, "held out") if validation is None else validation
-    number = weights_seed % 2**31
-    if start is None:
-        module, config = preset.module(front_end.size, head.size, number), preset.fit
-    else:
-        network = LearnedEstimator.load(start).network
-        if not isinstance(network, GruNetwork):
-            raise ValueError(f"start must be weights of a recurrent network, got a {network.kind} in {start}")
-        module, config = GruModule.of(network, preset.scale), preset.refined
-    config = replace(config, seed=number)
-    result = fit(module, front_end, head, data, validation, config, folder=folder, resume=resume, say=say)
-    if isinstance(head, AngleHead):
-        # the covariance that what is held out asks for
-        calibrated = replace(head, deviations=result.residuals)
-        result = result._replace(estimator=replace(result.estimator, head=calibrated))
-    return result

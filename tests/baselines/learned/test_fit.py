@@ -12,9 +12,10 @@ import torch
 from torch import nn
 
 from poise.baselines.learned import fit as fitting
+from poise.baselines.learned.config import FitConfig
 from poise.baselines.learned.data import SequenceData
 from poise.baselines.learned.estimator import LearnedEstimator
-from poise.baselines.learned.fit import FitConfig, FitResult, Trainer, fit
+from poise.baselines.learned.fit import FitResult, Trainer, fit
 from poise.baselines.learned.head import AngleHead, TiltHead
 from poise.baselines.learned.level_frame import LevelFrame
 from poise.baselines.learned.modules import GruModule, TcnModule
