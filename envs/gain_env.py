@@ -11,8 +11,8 @@ from typing import Any, ClassVar
 import numpy as np
 from gymnasium import spaces
 
-from ..filters.adaptation.features import InnovationFeatures
 from ..filters.adaptation.gains import gain_sizes, tunable_filter
+from ..filters.adaptation.named_features import features_of
 from ..filters.adaptation.tuned import TunedFilter
 from ..filters.core.kalman import KalmanFilter
 from .data.trajectory import Trajectory
@@ -71,7 +71,8 @@ class GainTuningEnv(DrawnEnv):
         self.reward = GainReward(reward, float(consistency), math.radians(error_scale))
         super().__init__(render_mode, 1.0 / interval if interval > 0.0 else 1.0)
         names = None if gains is None else tuple(gains)
-        self.tuned = TunedFilter.of(tunable_filter(filter), names, InnovationFeatures(interval))
+        kalman = tunable_filter(filter)
+        self.tuned = TunedFilter.of(kalman, names, features_of(kalman, interval))
         self._published = self.tuned.kalman
         self.quantities = scored_quantities(self.tuned.kalman, quantity)
         size, actions = self.tuned.observation_size, self.tuned.actions

@@ -71,8 +71,7 @@ class GainEpisode:
         missing = [channel.name for channel in channels if channel.name not in trajectory.measurements]
         if missing:
             raise ValueError(f"trajectory {trajectory.name!r} lacks the channels {missing} that the filter reads")
-        kalman = tuned.kalman.with_dt(trajectory.dt)
-        kalman = replace(kalman, model=kalman.model.configured(trajectory.metadata))
+        kalman = filter_for(tuned.kalman, trajectory)
         samples = check_measurements(channels, trajectory.measurements, time_axis=True)
         truth = np.concatenate([true_values(trajectory, quantity, kalman) for quantity in quantities], axis=-1)
         costs, weight = np.zeros(len(trajectory)), 1.0
@@ -124,6 +123,12 @@ class GainEpisode:
         """
         own = 0.0 if math.isnan(last_error) else np.log1p(np.degrees(last_error))
         return np.append(self.foresight[decision], own).astype(np.float32)
+
+
+def filter_for(kalman: KalmanFilter, trajectory: Trajectory) -> KalmanFilter:
+    """The filter at the rate of a trajectory, and for the rider, vehicle or device that its metadata describe."""
+    kalman = kalman.with_dt(trajectory.dt)
+    return replace(kalman, model=kalman.model.configured(trajectory.metadata))
 
 
 def mean_ahead(values: np.ndarray, ahead: int) -> np.ndarray:

@@ -47,7 +47,9 @@ class HandMotionGainEnv(GainTuningEnv):
 
     ``Box(-1, 1, (n,), float32)``: statistics of the whitened innovations, the sensors and the estimated external
     acceleration over five time scales up to 16 s, the time since the start, and the last action
-    (:class:`poise.filters.adaptation.features.InnovationFeatures`; ``env.unwrapped.tuned.features.names``).
+    (:class:`poise.filters.adaptation.features.InnovationFeatures`; ``env.unwrapped.tuned.features.names``). They do not
+    depend on the mounting. A filter of several sensors with known places has the NIS of every row and every number of
+    every channel by name instead (:class:`poise.filters.adaptation.named_features.NamedFeatures`).
 
     ## Reward
 

@@ -51,9 +51,16 @@ class RiderBicycleGainEnv(GainTuningEnv):
     A filter of one IMU reads ``imu/gyr`` and ``imu/acc`` of the chosen ``site``. A filter of rides reads the channels
     of the ride that it needs, and is configured with rider and bicycle of every episode.
 
-    ## Observation Space, Rewards
+    ## Observation Space
 
-    As of :class:`poise.envs.gain_tuning.HandMotionGainEnv`.
+    ``Box(-1, 1, (n,), float32)``. A filter of one IMU: as of :class:`poise.envs.gain_tuning.HandMotionGainEnv`. A
+    filter of rides: the NIS of every row of its measurement, and mean and variation of every number of its sensors
+    (rates, accelerations, speed …) by name, over five time scales up to 16 s, the time since the start, and the last
+    action (:class:`poise.filters.adaptation.named_features.NamedFeatures`; ``env.unwrapped.tuned.features.names``).
+
+    ## Rewards
+
+    As of :class:`poise.envs.gain_tuning.HandMotionGainEnv`; ``quantity`` may name several of a paper's angles.
 
     ## Starting State
 

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from ...envs.data.trajectory import Trajectory
-from ...envs.gain_reward import scored_quantity
+from ...envs.gain_episode import filter_for
+from ...envs.gain_reward import scored_quantity, true_values
 from ...filters.adaptation.tuned import TunedFilter
 from ...filters.core.kalman import KalmanFilter
 from ...filters.core.metrics import error, rms
+from ...filters.core.model import parameters_of, structure_of
 from .adaptive import AdaptiveEstimator
 from .policy import GainPolicy
 
@@ -100,13 +103,16 @@ def best_constant_gains(
 def constant_errors(
     tuned: TunedFilter, trajectories: Sequence[Trajectory], action: np.ndarray, quantity: str | None = None
 ) -> np.ndarray:
-    """Root mean square error of one action on each trajectory ``(trajectories,)``, rad."""
+    """Root mean square error of one action on each trajectory ``(trajectories,)``, rad.
+
+    The filter is that of the rider, vehicle or device of each trajectory.
+    """
     output = scored_quantity(tuned.kalman, quantity)
     errors = []
     for trajectory in trajectories:
-        kalman = tuned.kalman.with_dt(trajectory.dt)
-        estimate = kalman.run(trajectory.measurements, tuned.gains(action))
-        per_tick = error(output, estimate.pose[output.name], trajectory.truth_of(output.name))
+        own = replace(tuned, kalman=filter_for(tuned.kalman, trajectory))
+        estimate = own.kalman.run(trajectory.measurements, own.gains(action))
+        per_tick = error(output, estimate.pose[output.name], true_values(trajectory, output, own.kalman))
         errors.append(float(rms(per_tick, trajectory.mask)))
     return np.array(errors)
 
@@ -116,20 +122,23 @@ def policy_errors(
 ) -> np.ndarray:
     """Root mean square error of a policy on each trajectory ``(trajectories,)``, rad.
 
-    Trajectories of one rate and length run as one batch.
+    The filter is that of the rider, vehicle or device of each trajectory; those that share it, and a length, run as one
+    batch.
     """
     output = scored_quantity(kalman, quantity)
-    groups: dict[tuple[float, int], list[int]] = {}
-    for index, trajectory in enumerate(trajectories):
-        groups.setdefault((round(trajectory.dt, 9), len(trajectory)), []).append(index)
+    groups: dict[Any, list[int]] = {}
+    filters = [filter_for(kalman, trajectory) for trajectory in trajectories]
+    for index, (own, trajectory) in enumerate(zip(filters, trajectories, strict=True)):
+        key = (structure_of(own.model), tuple(parameters_of(own.model).values()), len(trajectory))
+        groups.setdefault(key, []).append(index)
     errors = np.empty(len(trajectories))
-    for (dt, _), members in groups.items():
-        estimator = AdaptiveEstimator(kalman.with_dt(dt), policy)
+    for members in groups.values():
+        estimator = AdaptiveEstimator(filters[members[0]], policy)
         names = [channel.name for channel in estimator.channels]
         batch = {name: np.stack([trajectories[i].measurements[name] for i in members], axis=1) for name in names}
         estimate = estimator.run(batch).pose[output.name]
         for column, index in enumerate(members):
             trajectory = trajectories[index]
-            per_tick = error(output, estimate[:, column], trajectory.truth_of(output.name))
+            per_tick = error(output, estimate[:, column], true_values(trajectory, output, filters[index]))
             errors[index] = float(rms(per_tick, trajectory.mask))
     return errors

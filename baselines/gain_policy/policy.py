@@ -11,6 +11,8 @@ import numpy as np
 
 from ...filters.adaptation.features import InnovationFeatures
 from ...filters.adaptation.gains import GainRange
+from ...filters.adaptation.named_features import NamedFeatures
+from ...filters.adaptation.time_scales import Features
 from ...filters.adaptation.tuned import TunedFilter
 from ..weights_io import load_weights, save_weights
 
@@ -38,7 +40,7 @@ class GainPolicy:
 
     filter: str
     ranges: tuple[GainRange, ...]
-    features: InnovationFeatures
+    features: Features
     layers: tuple[Layer, ...]
     card: dict[str, Any] = field(default_factory=dict)
 
@@ -106,6 +108,8 @@ class GainPolicy:
             "gains": [{"gain": part.gain, "lower": part.lower, "upper": part.upper} for part in self.ranges],
             "layers": len(self.layers),
         }
+        if isinstance(self.features, NamedFeatures):
+            own["rows"], own["channels"] = self.features.rows, [list(entry) for entry in self.features.channels]
         described = dict(self.card if card is None else card)
         described.pop("sha256", None)
         return save_weights(path, arrays, {**own, **{name: described[name] for name in described if name not in own}})
@@ -125,7 +129,12 @@ class GainPolicy:
             ranges = tuple(
                 GainRange(entry["gain"], float(entry["lower"]), float(entry["upper"])) for entry in card["gains"]
             )
-            features = InnovationFeatures(float(card["interval"]), tuple(float(scale) for scale in card["scales"]))
+            features: Features = InnovationFeatures(
+                float(card["interval"]), tuple(float(scale) for scale in card["scales"])
+            )
+            if "channels" in card:
+                channels = tuple((str(name), int(size), str(unit)) for name, size, unit in card["channels"])
+                features = NamedFeatures(features.interval, features.scales, int(card["rows"]), channels)
             layers = tuple((arrays[f"{index}.weight"], arrays[f"{index}.bias"]) for index in range(card["layers"]))
             return cls(card["filter"], ranges, features, layers, card)
         except KeyError as missing:

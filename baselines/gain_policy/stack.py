@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Self
+from dataclasses import dataclass, replace
+from typing import Any, Self
 
 import numpy as np
 
 from ...envs.data.trajectory import Trajectory
-from ...envs.gain_reward import scored_quantity
+from ...envs.gain_episode import filter_for
+from ...envs.gain_reward import scored_quantity, true_values
 from ...filters.adaptation.tuned import TunedFilter
 from ...filters.core.metrics import error
+from ...filters.core.model import parameters_of, structure_of
 from ...filters.core.quantity import Quantity
 
 
@@ -39,8 +41,8 @@ class TrajectoryStack:
 
     @classmethod
     def of(cls, tuned: TunedFilter, trajectories: Sequence[Trajectory], quantity: str | None = None) -> Self:
-        """Stack trajectories of one rate; ``quantity`` None scores ``up``."""
-        tuned = tuned.with_dt(trajectories[0].dt)
+        """Stack trajectories of one rate and of one rider, vehicle or device; ``quantity`` None scores ``up``."""
+        tuned = replace(tuned, kalman=filter_for(tuned.kalman, trajectories[0]))
         output = scored_quantity(tuned.kalman, quantity)
         decisions = min(len(trajectory) for trajectory in trajectories) // tuned.interval_samples
         length = decisions * tuned.interval_samples
@@ -48,17 +50,19 @@ class TrajectoryStack:
             channel.name: np.stack([trajectory.measurements[channel.name][:length] for trajectory in trajectories], 1)
             for channel in tuned.kalman.channels
         }
-        truth = np.stack([trajectory.truth_of(output.name)[:length] for trajectory in trajectories], 1)
+        truth = np.stack([true_values(one, output, tuned.kalman)[:length] for one in trajectories], 1)
         mask = np.stack([trajectory.mask[:length] for trajectory in trajectories], 1)
         return cls(tuned, tuple(trajectories), output, channels, truth, mask, decisions)
 
     @classmethod
     def by_rate(cls, tuned: TunedFilter, trajectories: Sequence[Trajectory], quantity: str | None = None) -> list[Self]:
-        """One stack for each rate among the trajectories, in the order of their first appearance."""
-        rates: dict[int, list[Trajectory]] = {}
+        """One stack for each rate and filter among the trajectories, in the order of their first appearance."""
+        parts: dict[Any, list[Trajectory]] = {}
         for trajectory in trajectories:
-            rates.setdefault(round(1e6 * trajectory.dt), []).append(trajectory)
-        return [cls.of(tuned, part, quantity) for part in rates.values()]
+            model = filter_for(tuned.kalman, trajectory).model.with_dt(1.0)
+            key = (round(1e6 * trajectory.dt), structure_of(model), tuple(parameters_of(model).values()))
+            parts.setdefault(key, []).append(trajectory)
+        return [cls.of(tuned, part, quantity) for part in parts.values()]
 
     def errors(self, action: np.ndarray) -> np.ndarray:
         """Error of constant gains at every sample ``(T, N)``, rad."""

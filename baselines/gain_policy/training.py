@@ -20,8 +20,8 @@ import numpy as np
 
 from ...envs.data.trajectory import Trajectory
 from ...envs.gain_tuning import ReplayGainVectorEnv
-from ...filters.adaptation.features import InnovationFeatures
 from ...filters.adaptation.gains import tunable_filter
+from ...filters.adaptation.named_features import features_of
 from ...filters.adaptation.tuned import TunedFilter
 from ...filters.core.kalman import KalmanFilter
 from ...filters.support.optional import extra
@@ -83,7 +83,7 @@ def train_policy(
         import torch
 
     filter = tunable_filter(config.filter) if kalman is None else kalman
-    tuned = TunedFilter.of(filter, config.gains, InnovationFeatures(config.interval))
+    tuned = TunedFilter.of(filter, config.gains, features_of(filter, config.interval))
     motions = config.motions.draw_many(config.seed, config.trajectories) if trajectories is None else list(trajectories)
     home = None if folder is None else Path(folder)
     key = training_key(config, tuned, motions)

@@ -8,10 +8,7 @@ true accelerations of a hand average out. Of each stream, running means of
 
     1,  v,  |v|²,  |v − v_previous|²        and, of the accelerometer,  ‖f‖ − g  and its square
 
-are computed over each time scale, without missing samples. At the end of each interval there is a decision, and the
-means m over the interval enter
-
-    average ← average + (1 − exp(−interval / τ)) (m − average)
+are computed over each time scale (:mod:`.time_scales`), without missing samples.
 
 The features are invariants of these averages that do not depend on the mounting of the sensor. For every stream and
 scale they are the logarithms of the root mean square, the standard deviation, the length of the mean, and the change
@@ -24,16 +21,15 @@ All features are compressed to [−1, 1]. One memory holds a batch of sequences.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
 from ..core.kalman import KalmanFilter
 from ..core.quantity import GRAVITY, Estimate
 from ..core.rotation import cross
+from .time_scales import FeatureMemory, Features
 
 STREAMS = ("innovation", "gyr", "acc", "external", "lean")
 STATISTICS = ("rms", "deviation", "mean", "change")
@@ -49,48 +45,11 @@ FLOOR = 1e-5
 """Smallest statistic that is distinguished from zero."""
 CHANGE_TIME = 0.01
 """s: changes of the sensors from sample to sample are scaled to this time, so that they do not depend on the rate"""
-START_TIME = 20.0
-"""s: time constant of the feature for the time since the start."""
-
-
-class FeatureMemory(NamedTuple):
-    """State of the features; arrays only.
-
-    Attributes:
-        averages: ``(*batch, scales, moments)`` running means.
-        sums: ``(*batch, moments)`` over the samples of the current interval.
-        previous: ``(*batch, streams, width)`` last sample of every stream; NaN if there was none.
-        samples: ``()`` int, samples of the current interval so far; at 0 a decision is due.
-        decisions: ``(*batch,)`` int, number of completed intervals.
-    """
-
-    averages: np.ndarray
-    sums: np.ndarray
-    previous: np.ndarray
-    samples: np.ndarray
-    decisions: np.ndarray
 
 
 @dataclass(frozen=True)
-class InnovationFeatures:
-    """Statistics over several time scales, computed while a filter runs.
-
-    Attributes:
-        interval: time between decisions, s; rounded to samples of the filter, at least one.
-        scales: time constants of the running means, s; 0 for the last interval alone.
-
-    Raises:
-        ValueError: the interval is not positive, or there is no scale, or a negative one.
-    """
-
-    interval: float = 0.1
-    scales: tuple[float, ...] = (0.0, 0.3, 1.0, 4.0, 16.0)
-
-    def __post_init__(self) -> None:
-        if not 0.0 < self.interval < math.inf:
-            raise ValueError(f"interval must be positive seconds, got {self.interval}")
-        if not self.scales or not all(0.0 <= scale < math.inf for scale in self.scales):
-            raise ValueError(f"scales must be times in seconds, 0 or more, got {self.scales}")
+class InnovationFeatures(Features):
+    """Statistics that do not depend on the mounting of the sensor, for filters of one inertial sensor."""
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -98,14 +57,6 @@ class InnovationFeatures:
         parts = [f"{stream} {statistic}" for stream in STREAMS for statistic in STATISTICS]
         parts += ["norm excess", "norm excess rms"]
         return (*(f"{part} {scale:g} s" for scale in self.scales for part in parts), "time since start")
-
-    def size(self, actions: int) -> int:
-        """Length of :meth:`observe` for that many actions."""
-        return len(self.scales) * (len(STREAMS) * len(STATISTICS) + 2) + 1 + actions
-
-    def interval_samples(self, dt: float) -> int:
-        """Samples of an interval at a sampling interval of ``dt`` seconds."""
-        return max(1, round(self.interval / dt))
 
     def init(self, kalman: KalmanFilter, batch: tuple[int, ...] = ()) -> FeatureMemory:
         """Empty memory for sequences of shape ``batch``.
@@ -123,35 +74,6 @@ class InnovationFeatures:
             np.array(0),
             np.zeros(batch, int),
         )
-
-    def update(
-        self, memory: FeatureMemory, kalman: KalmanFilter, measurements: Mapping[str, np.ndarray], estimate: Estimate
-    ) -> FeatureMemory:
-        """Update with the samples that a filter has just processed.
-
-        Args:
-            memory: from :meth:`init` or the previous update; it is not changed.
-            kalman: the filter.
-            measurements: channel → ``(T, *batch, size)``.
-            estimate: of the filter, ``(T, *batch, …)``.
-
-        Raises:
-            ValueError: the samples reach beyond the end of the interval.
-        """
-        moments, previous = self._moments(memory, kalman, measurements, estimate)
-        taken = int(memory.samples) + len(moments)
-        whole = self.interval_samples(kalman.dt)
-        if taken > whole:
-            beyond = f"{len(moments)} samples after {memory.samples}"
-            raise ValueError(f"{beyond} reach beyond the interval of {whole} samples")
-        # The first axis is summed row by row, so that single samples and blocks give the same sums.
-        sums = np.concatenate([memory.sums[None], moments]).sum(axis=0)
-        if taken < whole:
-            return memory._replace(sums=sums, previous=previous, samples=np.array(taken))
-        duration = whole * kalman.dt
-        rate = np.array([1.0 if scale == 0.0 else -math.expm1(-duration / scale) for scale in self.scales])
-        averages = memory.averages + rate[:, None] * ((sums / whole)[..., None, :] - memory.averages)
-        return FeatureMemory(averages, np.zeros_like(sums), previous, np.array(0), memory.decisions + 1)
 
     def observe(self, memory: FeatureMemory, kalman: KalmanFilter, action: np.ndarray) -> np.ndarray:
         """Features and the action of the last interval: float32 ``(*batch, size)`` in [−1, 1].
@@ -175,11 +97,10 @@ class InnovationFeatures:
         excess = np.where(np.isfinite(excess), excess, 0.0)
         excess_rms = 0.5 * np.log10(np.fmax(excess[..., 1:], FLOOR**2)) + 0.5
         features = np.concatenate([logarithms.reshape(*batch, scales, -1), excess[..., :1], excess_rms], axis=-1)
-        age = memory.decisions * (self.interval_samples(kalman.dt) * kalman.dt / START_TIME)
-        squashed = np.tanh(np.concatenate([features.reshape(*batch, -1), age[..., None]], axis=-1))
+        squashed = np.tanh(np.concatenate([features.reshape(*batch, -1), self.age(memory, kalman.dt)], axis=-1))
         return np.concatenate([squashed, action], axis=-1).astype(np.float32)
 
-    def _moments(
+    def moments(
         self, memory: FeatureMemory, kalman: KalmanFilter, measurements: Mapping[str, np.ndarray], estimate: Estimate
     ) -> tuple[np.ndarray, np.ndarray]:
         """Moments ``(T, *batch, moments)`` of the samples, and the last one of every stream."""

@@ -11,8 +11,9 @@ import numpy as np
 from ..core.estimator import check_measurements
 from ..core.kalman import FilterState, KalmanFilter
 from ..core.quantity import Estimate
-from .features import FeatureMemory, InnovationFeatures
 from .gains import GainRange, filter_name, gain_ranges, log_gains
+from .named_features import features_of
+from .time_scales import FeatureMemory, Features
 
 
 class TunedState(NamedTuple):
@@ -41,14 +42,14 @@ class TunedFilter:
 
     kalman: KalmanFilter
     ranges: tuple[GainRange, ...]
-    features: InnovationFeatures
+    features: Features
 
     @classmethod
     def of(
-        cls, kalman: KalmanFilter, gains: tuple[str, ...] | None = None, features: InnovationFeatures | None = None
+        cls, kalman: KalmanFilter, gains: tuple[str, ...] | None = None, features: Features | None = None
     ) -> TunedFilter:
         """A tuned filter with the ranges of :func:`poise.filters.adaptation.gains.gain_ranges`."""
-        return cls(kalman, gain_ranges(kalman, gains), features or InnovationFeatures())
+        return cls(kalman, gain_ranges(kalman, gains), features or features_of(kalman))
 
     @property
     def name(self) -> str:

@@ -19,7 +19,7 @@ from .cache import jit
 
 @jit
 def remember(K, S, rows, gain, factor, used):  # type: ignore[no-untyped-def]
-    """Keep what :func:`poise.filters.compile.kernel.correct` has left behind, for :func:`carry_back`."""
+    """Keep what :func:`poise.filters.compile.kernel.correct` has left behind, for ``carry_back``."""
     for a in range(rows.shape[0]):
         used[a] = rows[a]
         if rows[a] < 0:

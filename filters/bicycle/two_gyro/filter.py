@@ -210,12 +210,20 @@ class TwoGyro(RiderEquations, Model):
 
     @property
     def gains(self) -> Mapping[str, Gain]:  # type: ignore[override]
-        """Factors on process and measurement noise."""
+        """Factors on process and measurement noise, and on that of the constraint."""
         noise = f"{self.sensor.removesuffix('s')}_noise"
-        return {
+        gains = {
             "process": Gain("process_scale", description="process variance C"),
             "measurement": Gain(noise, description="measurement variance C_y"),
         }
+        if self.constraint:
+            level = Gain(
+                "constraint_noise",
+                description="variance of the pseudo-measurement that the road is level",
+                bounds=(0.1 * DEG, 100.0 * DEG),
+            )
+            gains["constraint"] = level
+        return gains
 
     @property
     def platform_rates(self) -> int:
