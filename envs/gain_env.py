@@ -42,6 +42,8 @@ class GainTuningEnv(DrawnEnv):
         reference: action of the constant gains that ``improvement`` and ``relative`` compare with; None for the
             published tuning.
         error_scale: deg; errors far above it count by their logarithm in relative rewards.
+        smoothing: s; the gains follow the actions with this time constant, so that the noise of an agent's exploration
+            changes them by a sensible factor; 0: at once.
         privileged: whether observations end with what only the truth tells, for the critic of a training.
         render_mode: ``human`` (a window), ``rgb_array`` or None.
 
@@ -65,14 +67,17 @@ class GainTuningEnv(DrawnEnv):
         consistency: float = 0.0,
         reference: Sequence[float] | None = None,
         error_scale: float = 5.0,
+        smoothing: float = 0.0,
         privileged: bool = False,
         render_mode: str | None = None,
     ) -> None:
         self.reward = GainReward(reward, float(consistency), math.radians(error_scale))
         super().__init__(render_mode, 1.0 / interval if interval > 0.0 else 1.0)
         names = None if gains is None else tuple(gains)
+        if not 0.0 <= smoothing < math.inf:
+            raise ValueError(f"smoothing must be 0 or more seconds, got {smoothing}")
         kalman = tunable_filter(filter)
-        self.tuned = TunedFilter.of(kalman, names, features_of(kalman, interval))
+        self.tuned = TunedFilter.of(kalman, names, features_of(kalman, interval), float(smoothing))
         self._published = self.tuned.kalman
         self.quantities = scored_quantities(self.tuned.kalman, quantity)
         size, actions = self.tuned.observation_size, self.tuned.actions

@@ -91,6 +91,11 @@ class Features:
         """Moments ``(T, *batch, moments)`` of the samples, and the last one of every stream."""
         raise NotImplementedError
 
+    def averaged(self, averages: np.ndarray, means: np.ndarray, duration: float) -> np.ndarray:
+        """Averages ``(*batch, scales, moments)`` after an interval of ``duration`` s, means ``(*batch, moments)``."""
+        rate = np.array([1.0 if scale == 0.0 else -math.expm1(-duration / scale) for scale in self.scales])
+        return averages + rate[:, None] * (means[..., None, :] - averages)
+
     def size(self, actions: int) -> int:
         """Length of :meth:`observe` for that many actions."""
         return len(self.names) + actions
@@ -127,7 +132,5 @@ class Features:
         sums = np.concatenate([memory.sums[None], moments]).sum(axis=0)
         if taken < whole:
             return memory._replace(sums=sums, previous=previous, samples=np.array(taken))
-        duration = whole * kalman.dt
-        rate = np.array([1.0 if scale == 0.0 else -math.expm1(-duration / scale) for scale in self.scales])
-        averages = memory.averages + rate[:, None] * ((sums / whole)[..., None, :] - memory.averages)
+        averages = self.averaged(memory.averages, sums / whole, whole * kalman.dt)
         return FeatureMemory(averages, np.zeros_like(sums), previous, np.array(0), memory.decisions + 1)

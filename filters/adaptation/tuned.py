@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
@@ -22,7 +23,7 @@ class TunedState(NamedTuple):
     Attributes:
         filter: state of the filter.
         memory: state of the features.
-        action: ``(*batch, k)`` of the last decision.
+        action: ``(*batch, k)`` in force since the last decision.
     """
 
     filter: FilterState
@@ -38,18 +39,25 @@ class TunedFilter:
         kalman: the filter in its published tuning.
         ranges: of the actions, in order.
         features: observed features, and the interval between decisions.
+        smoothing: s; the gains follow the actions with this time constant, 0: at once. Noise of single decisions, such
+            as that of an agent's exploration, then changes them little.
     """
 
     kalman: KalmanFilter
     ranges: tuple[GainRange, ...]
     features: Features
+    smoothing: float = 0.0
 
     @classmethod
     def of(
-        cls, kalman: KalmanFilter, gains: tuple[str, ...] | None = None, features: Features | None = None
+        cls,
+        kalman: KalmanFilter,
+        gains: tuple[str, ...] | None = None,
+        features: Features | None = None,
+        smoothing: float = 0.0,
     ) -> TunedFilter:
         """A tuned filter with the ranges of :func:`poise.filters.adaptation.gains.gain_ranges`."""
-        return cls(kalman, gain_ranges(kalman, gains), features or features_of(kalman))
+        return cls(kalman, gain_ranges(kalman, gains), features or features_of(kalman), smoothing)
 
     @property
     def name(self) -> str:
@@ -94,8 +102,11 @@ class TunedFilter:
         return log_gains(self.kalman.model, self.ranges, action)
 
     def decide(self, state: TunedState, action: np.ndarray) -> TunedState:
-        """Apply an action ``(*batch, k)``; values beyond [−1, 1] are clipped."""
+        """Apply an action ``(*batch, k)``; values beyond [−1, 1] are clipped. The state holds it smoothed."""
         bounded = np.minimum(np.maximum(np.asarray(action, dtype=float), -1.0), 1.0)
+        if self.smoothing:
+            share = -math.expm1(-self.interval_samples * self.kalman.dt / self.smoothing)
+            bounded = state.action + share * (bounded - state.action)
         return state._replace(action=np.broadcast_to(bounded, state.action.shape))
 
     def advance(self, state: TunedState, measurements: Mapping[str, Any]) -> tuple[Estimate, TunedState]:

@@ -1,0 +1,119 @@
+r"""Rules by hand that set one gain of a filter while it runs: what a trained policy has to beat.
+
+A rule is written as the features of a policy that hands its only feature on. Both rules here raise the variance of the
+pseudo-measurement "the bicycle does not pitch" (:mod:`poise.filters.bicycle.platform_gyro`; the constraint of
+:class:`poise.filters.bicycle.two_gyro.filter.TwoGyro`), which is right on level ground and wrong on ramps and bumps.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..core.kalman import KalmanFilter
+from ..core.quantity import Estimate
+from .time_scales import FeatureMemory, Features
+
+
+@dataclass(frozen=True)
+class Rule(Features):
+    """A log factor λ from means over the last interval; the feature is λ in units of the largest one.
+
+    Attributes:
+        largest: log factor of action 1, of a variance.
+    """
+
+    scales: tuple[float, ...] = (0.0,)
+    largest: float = 1.0
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The only feature."""
+        return ("log factor",)
+
+    def init(self, kalman: KalmanFilter, batch: tuple[int, ...] = ()) -> FeatureMemory:
+        """Empty memory."""
+        averages, sums, last = np.zeros((*batch, 1, 2)), np.zeros((*batch, 2)), np.zeros((*batch, 0, 0))
+        return FeatureMemory(averages, sums, last, np.array(0), np.zeros(batch, int))
+
+    def observe(self, memory: FeatureMemory, kalman: KalmanFilter, action: np.ndarray) -> np.ndarray:
+        """The feature and the action of the last interval: float32 ``(*batch, 1 + k)``."""
+        factor = np.clip(self.factor(memory.averages[..., 0, :]) / self.largest, -1.0, 1.0)
+        return np.concatenate([factor[..., None], action], axis=-1).astype(np.float32)
+
+    def factor(self, averages: np.ndarray) -> np.ndarray:
+        """λ ``(*batch,)`` of the averages ``(*batch, 2)``."""
+        raise NotImplementedError
+
+
+@dataclass(frozen=True)
+class PitchRateRule(Rule):
+    """λ = 2 ln(peak / threshold) where the bicycle pitches faster than the threshold.
+
+    The peak is that of the pitch rate's mean over the interval and decays.
+
+    Attributes:
+        channel: gyroscope whose y axis is the bicycle's.
+        threshold: rad/s; chosen on simulated rides, 4 °/s.
+        decay: s, time constant of the peak.
+    """
+
+    channel: str = "bicycle_imu/gyr"
+    threshold: float = math.radians(4.0)
+    decay: float = 1.0
+
+    def moments(
+        self, memory: FeatureMemory, kalman: KalmanFilter, measurements: Mapping[str, np.ndarray], estimate: Estimate
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Known or not, and the pitch rate ``(T, *batch, 2)``."""
+        rate = np.asarray(measurements[self.channel], dtype=float)[..., 1]
+        known = np.isfinite(rate)
+        return np.stack([known, np.where(known, rate, 0.0)], axis=-1), memory.previous
+
+    def averaged(self, averages: np.ndarray, means: np.ndarray, duration: float) -> np.ndarray:
+        """The peak, twice."""
+        now = np.abs(means[..., 1]) / np.where(means[..., 0] > 0.0, means[..., 0], 1.0)
+        peak = np.maximum(now, averages[..., 0, 1] * math.exp(-duration / self.decay))
+        return np.stack([peak, peak], axis=-1)[..., None, :]
+
+    def factor(self, averages: np.ndarray) -> np.ndarray:
+        """2 ln(peak / threshold), 0 below."""
+        return 2.0 * np.log(np.maximum(averages[..., 1] / self.threshold, 1.0))
+
+
+@dataclass(frozen=True)
+class InnovationRule(Rule):
+    """λ ← λ + ln(average NIS / m): the variance grows until the innovations are as large as the filter expects.
+
+    After R. K. Mehra, "Approaches to adaptive filtering", IEEE Trans. Automatic Control 17(5), 1972, on the NIS.
+
+    Attributes:
+        decay: s, time constant of the average of the NIS.
+        smallest: log factor below which λ does not fall.
+    """
+
+    decay: float = 0.5
+    smallest: float = 0.0
+
+    def moments(
+        self, memory: FeatureMemory, kalman: KalmanFilter, measurements: Mapping[str, np.ndarray], estimate: Estimate
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Number of measured rows, and NIS ``(T, *batch, 2)``."""
+        rows = np.asarray(estimate.innovation) != 0.0
+        return np.stack([rows.sum(axis=-1), np.asarray(estimate.nis)], axis=-1), memory.previous
+
+    def averaged(self, averages: np.ndarray, means: np.ndarray, duration: float) -> np.ndarray:
+        """The average of NIS / m (1 at the start), less 1, and λ."""
+        share = -math.expm1(-duration / self.decay)
+        measured = means[..., 0] > 0.0
+        ratio = means[..., 1] / np.where(measured, means[..., 0], 1.0) - 1.0
+        average = averages[..., 0, 0] + np.where(measured, share * (ratio - averages[..., 0, 0]), 0.0)
+        factor = averages[..., 0, 1] + np.where(measured, np.log(np.maximum(1.0 + average, 1e-6)), 0.0)
+        return np.stack([average, np.clip(factor, self.smallest, self.largest)], axis=-1)[..., None, :]
+
+    def factor(self, averages: np.ndarray) -> np.ndarray:
+        """λ."""
+        return averages[..., 1]

@@ -1,0 +1,79 @@
+"""Rules by hand: what they compute, and that they repair the belief in level ground."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import poise
+from poise.baselines.gain_policy.rules import doubting_level_ground, ruled
+from poise.envs.bicycle.environment import RiderBicycleEnv
+from poise.envs.gain_episode import filter_for
+from poise.envs.gain_reward import true_values
+from poise.filters.adaptation.gains import tunable_filter
+from poise.filters.adaptation.rules import InnovationRule, PitchRateRule
+from poise.filters.bicycle.two_gyro.filter import TwoGyro
+from poise.filters.core.estimator import run_by_steps
+from poise.filters.core.metrics import error
+
+PLATFORM = tunable_filter("platform-gyro")
+LEVEL = dataclasses.replace(PLATFORM, model=TwoGyro(model="sigma1", constraint=True))
+
+
+@pytest.fixture(scope="module")
+def ride():
+    names = [channel.name for channel in LEVEL.channels]
+    return poise.record(RiderBicycleEnv("pitch", 1, suite=names, fidelity="lumped", duration=18.0), seed=0)
+
+
+def roll_error(estimator, ride):
+    """Largest roll error after 10 s, deg."""
+    roll = estimator.outputs[0]
+    found = estimator.run(ride.measurements).pose[roll.name]
+    return np.degrees(error(roll, found, true_values(ride, roll, estimator.filter))[1000:].max())
+
+
+def test_the_gain_follows_the_peak_of_the_pitch_rate(ride):
+    estimator = doubting_level_ground(filter_for(LEVEL, ride))
+    rates = ride.measurements["bicycle_imu/gyr"][:, 1]
+    _, _, actions = estimator.run_with_actions(None, ride.measurements)
+    peak, (part,) = 0.0, estimator.policy.ranges
+    rule = PitchRateRule()
+    for start in range(0, len(rates) - 10, 10):
+        peak = max(abs(np.nanmean(rates[start : start + 10])), peak * np.exp(-0.1 / rule.decay))
+        wanted = 2.0 * np.log(max(peak / rule.threshold, 1.0)) / part.upper
+        assert actions[start + 10, 0] == pytest.approx(min(wanted, 1.0), abs=1e-6)
+    assert actions.max() > 0.1
+    assert (actions[:10] == 0.0).all()
+
+
+def test_stepping_equals_running(ride):
+    short = {name: values[:150] for name, values in ride.measurements.items()}
+    for rule in (PitchRateRule(), InnovationRule()):
+        estimator = doubting_level_ground(filter_for(PLATFORM, ride), rule)
+        stepped, roll = run_by_steps(estimator, short), estimator.outputs[0].name
+        np.testing.assert_array_equal(stepped.pose[roll], estimator.run(short).pose[roll])
+
+
+def test_too_large_innovations_raise_the_variance_and_small_ones_lower_it(ride):
+    def last_action(noise):
+        model = dataclasses.replace(filter_for(PLATFORM, ride).model, pitch_rate_noise=noise)
+        estimator = ruled(dataclasses.replace(PLATFORM, model=model), "measurement", InnovationRule())
+        return estimator.run_with_actions(None, ride.measurements)[2][400, 0]
+
+    assert last_action(1e-3) > 0.2
+    assert last_action(1.0) < -0.2
+
+
+def test_on_a_ramp_the_rule_keeps_the_roll(ride):
+    kalman = filter_for(LEVEL, ride)
+    ruled_error, plain = (
+        roll_error(estimator, ride)
+        for estimator in (doubting_level_ground(kalman), ruled(kalman, "constraint", PitchRateRule(threshold=100.0)))
+    )
+    assert ruled_error < 0.5 * plain
+
+
+def test_filters_without_the_gain_are_refused():
+    with pytest.raises(ValueError, match="gains must be distinct names"):
+        ruled(PLATFORM, "constraint", PitchRateRule())
