@@ -12,8 +12,8 @@ import numpy as np
 from ....envs.bicycle.course.path import Path, smooth_curvature
 from ....envs.bicycle.course.scenarios import list_scenarios
 from ....envs.bicycle.environment import RiderBicycleEnv
-from ....envs.bicycle.frame.bicycle import AIR_DENSITY, Bicycle
-from ....envs.bicycle.frame.parameters import BENCHMARK, MOUNTAIN_BIKE
+from ....envs.bicycle.frame.bicycle import Bicycle
+from ....envs.bicycle.frame.parameters import AIR_DENSITY, BENCHMARK, MOUNTAIN_BIKE
 from ....envs.bicycle.frame.tyre import BENCHMARK_TYRE, TyreParameters
 from ....envs.bicycle.frame.whipple import whipple_model
 from ....envs.bicycle.ride.contact_forces import contact, rider_motion, saddle_point

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..frame.bicycle import AIR_DENSITY
+from ..frame.parameters import AIR_DENSITY
 
 SAMPLES = 50.0
 """Hz: samples of a force over time"""

@@ -21,12 +21,10 @@ from ...sensors.ideal import BodyState
 from ..course.terrain import FlatGround, Ground
 from .drivetrain import Drivetrain
 from .forces import bicycle_forces, bicycle_state
-from .parameters import BicycleParameters, RigidPart
+from .parameters import AIR_DENSITY, BicycleParameters, RigidPart
 from .shapes import bicycle_shapes
 from .tyre import Tyre, TyreForce, TyreParameters, tyre_force_of
 
-AIR_DENSITY = 1.2
-"""kg/m³"""
 WHEELS = ("rear_wheel", "front_wheel")
 BICYCLE_LINKS = ("rear_frame", "rear_wheel", "front_assembly", "front_wheel", "crank")
 

@@ -15,6 +15,9 @@ import numpy as np
 
 Vector3 = tuple[float, float, float]
 
+AIR_DENSITY = 1.2
+"""kg/m³"""
+
 
 @dataclass(frozen=True)
 class RigidPart:

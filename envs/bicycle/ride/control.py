@@ -17,8 +17,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..course.path import Path
-from ..frame.bicycle import AIR_DENSITY, BicycleState
-from ..frame.parameters import BicycleParameters
+from ..frame.bicycle import BicycleState
+from ..frame.parameters import AIR_DENSITY, BicycleParameters
 from ..frame.whipple import WhippleModel, whipple_model
 from .preview import PREVIEW_BIN, PREVIEW_BINS, speed_limits
 from .regulator import lateral_model, preview_regulator, sampled

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from poise.envs.bicycle.course.path import Path, smooth_curvature
-from poise.envs.bicycle.frame.bicycle import AIR_DENSITY
-from poise.envs.bicycle.frame.parameters import BENCHMARK, MOUNTAIN_BIKE
+from poise.envs.bicycle.frame.parameters import AIR_DENSITY, BENCHMARK, MOUNTAIN_BIKE
 from poise.envs.bicycle.ride.contact_forces import LoadCells, contact, rider_motion, saddle_point
 from poise.envs.bicycle.ride.ride import Ride
 from poise.envs.bicycle.rider.anthropometry import MEN, SUBJECTS, WOMEN, RiderBody, random_body, rider_body
