@@ -34,6 +34,16 @@ TRAINED: dict[str, Entry] = {
         "learned",
         {"weights": "gru"},
     ),
+    **{
+        f"{name}+network": Entry(
+            "..baselines.learned.estimator:shipped",
+            f"{name}, its angles corrected by a recurrent network trained on simulated rides",
+            HERE,
+            "learned",
+            {"weights": f"{name}_network"},
+        )
+        for name in ("two-gyro",)
+    },
 }
 """Name → estimator with shipped weights."""
 

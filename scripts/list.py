@@ -32,8 +32,8 @@ class Args:
 
     lists: tyro.conf.Positional[tuple[str, ...]] = ()
     """which lists: estimators, environments, sensors, sensor-drift, sensor-kinds, timings, magnetics, gestures,
-    scenarios, surfaces, recipes, presets, formats, benchmark, benchmark-heading, benchmark-limits; all if none is
-    named"""
+    scenarios, surfaces, recipes, presets, learned, formats, benchmark, benchmark-heading, benchmark-limits; all if
+    none is named"""
     markdown: bool = False
     """print the tables in Markdown, as the documentation has them"""
     update: tuple[Path, ...] = ()
@@ -256,6 +256,21 @@ def presets() -> Rows:
     return [{"name": name, "description": each.summary} for name, each in PRESETS.items()]
 
 
+def learned() -> Rows:
+    """Every shipped network of a preset: its error on simulated episodes that it never saw, deg, from its card."""
+    from ..baselines.weights_io import list_weights, load_weights
+
+    rows: Rows = []
+    for weights in list_weights():
+        card = load_weights(weights)[1]
+        for group, errors in card.get("test", {}).items():
+            others = {name: each for name, each in errors.items() if name != card["name"]}
+            best = min(others, key=lambda name: float(others[name]["mean_deg"]))
+            row = {"network": card["name"], "episodes": group, "error": f"{errors[card['name']]['mean_deg']:.2f}"}
+            rows.append({**row, "best other": f"{best} {others[best]['mean_deg']:.2f}"})
+    return rows
+
+
 def formats() -> Rows:
     """Every file format that :func:`poise.load_recording` reads."""
     from ..envs.data.formats.load import FORMATS
@@ -278,7 +293,7 @@ LISTS: Mapping[str, Callable[[], Rows]] = {
             scenarios,
             surfaces,
             recipes,
-            presets,
+            *(presets, learned),
             formats,
         ),
         *(benchmark, benchmark_heading, benchmark_limits),
