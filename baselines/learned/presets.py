@@ -97,7 +97,7 @@ class Preset:
 
 TRAINED = {"scenarios": ["indoor_circle", "outdoor", "straight", "slalom"], "styles": ["mild", "normal"]}
 """Rides that networks train on; other scenarios and aggressive riders are kept aside."""
-RIDES = RideSource(rides=60, draws=6, duration=40.0, changes=TRAINED)
+RIDES = RideSource(rides=40, draws=6, duration=40.0, changes=TRAINED)
 RIDDEN = FitConfig(epochs=12, window=125, learning_rate=3e-3)
 HANDS = {"hand-held": 300, "carried": 60}
 PRESETS: dict[str, Preset] = {
