@@ -25,6 +25,7 @@ from .filters.support.version import poise_version
 
 if TYPE_CHECKING:
     from .baselines.evaluation import evaluate
+    from .baselines.gain_policy.scores import normalized_score
     from .baselines.registry import EstimatorInfo, list_estimators, make_estimator
     from .baselines.run import run, smooth
     from .envs.data.calibration.records import apply_calibration, load_calibration
@@ -52,6 +53,7 @@ __all__ = [
     "load_recording",
     "load_recordings",
     "make_estimator",
+    "normalized_score",
     "record",
     "register_sensor_kind",
     "run",
@@ -73,6 +75,7 @@ _HOMES = {
     "load_recording": ".envs.data.formats.load",
     "load_recordings": ".envs.data.formats.load",
     "make_estimator": ".baselines.registry",
+    "normalized_score": ".baselines.gain_policy.scores",
     "record": ".envs.record",
     "register_sensor_kind": ".envs.sensors.kinds",
     "run": ".baselines.run",

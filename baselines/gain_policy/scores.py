@@ -1,0 +1,105 @@
+"""Reference scores of the gain environments, and scores of agents between them."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ...envs.gain_env import GainTuningEnv
+from ...envs.gain_episode import filter_for
+from ...envs.gain_reward import errors_of, true_values
+from ...envs.registration import make_environment
+from ...filters.core.metrics import rms
+from ...filters.support.names import look_up
+from ...filters.support.seeds import child_seed
+from .constant_gains import best_constant_gains, constant_errors
+
+EPISODES, POINTS, SEED = 24, 64, 0
+"""Episodes of each split, constant actions that the oracle chooses from, and root seed of the shipped table."""
+
+
+class ReferenceScores(NamedTuple):
+    """Mean over the test episodes of the root mean square error, deg.
+
+    Attributes:
+        random: uniform actions.
+        neutral: the published gains.
+        constant: the best constant gains of other episodes.
+        oracle: the best of :data:`POINTS` constant actions on each episode, which needs the truth.
+    """
+
+    random: float
+    neutral: float
+    constant: float
+    oracle: float
+
+
+SCORES: dict[str, ReferenceScores] = {
+    "poise/HandMotionGain-v0": ReferenceScores(random=19.944, neutral=1.642, constant=1.569, oracle=1.323),
+    "poise/RiderBicycleGain-v0": ReferenceScores(random=8.081, neutral=6.829, constant=5.283, oracle=4.587),
+}
+"""Id with its default arguments → reference scores, as :func:`reference_scores` gives them."""
+
+
+def normalized_score(identity: str, error: float) -> float:
+    """Score of an agent: 0 as the published gains, 1 as the oracle; negative where it is worse than the former.
+
+    Args:
+        identity: of a gain environment with its default arguments.
+        error: mean over test episodes (:func:`episodes_of`, split 1) of the root mean square error, deg.
+
+    Raises:
+        ValueError: an id without reference scores, or an error that is negative or not finite.
+    """
+    scores = look_up("id", identity, SCORES)
+    if not 0.0 <= error < np.inf:
+        raise ValueError(f"error must be 0 deg or more, got {error}")
+    return (scores.neutral - error) / (scores.neutral - scores.oracle)
+
+
+def episodes_of(identity: str, split: int, count: int = EPISODES, seed: int = SEED) -> list[Any]:
+    """Trajectories of a gain environment with its default arguments; both splits of rides are drawn from one set.
+
+    Args:
+        identity: of the environment.
+        split: 0 for training, 1 for the test.
+        count: how many.
+        seed: root seed.
+    """
+    env: Any = make_environment(identity).unwrapped
+    assert isinstance(env, GainTuningEnv)
+    generator = np.random.default_rng(child_seed(seed, split))
+    try:
+        return [env.draw(generator)[1]() for _ in range(count)]
+    finally:
+        env.close()
+
+
+def reference_scores(identity: str, count: int = EPISODES, points: int = POINTS, seed: int = SEED) -> ReferenceScores:
+    """Compute the reference scores of a gain environment with its default arguments.
+
+    Args:
+        identity: of the environment.
+        count: episodes of each split.
+        points: constant actions of the search and of the oracle.
+        seed: root seed.
+    """
+    env: Any = make_environment(identity).unwrapped
+    tuned, quantity = env.tuned, env.quantities[0].name
+    train, test = (episodes_of(identity, split, count, seed) for split in (0, 1))
+    found = best_constant_gains(tuned, train, quantity=quantity, samples=points, refinements=points // 2, seed=seed)
+    neutral, constant = (constant_errors(tuned, test, a, quantity) for a in (np.zeros(tuned.actions), found.action))
+    tried = [constant_errors(tuned, test, action, quantity) for action in found.tried[: points + 1]]
+    rng, random = np.random.default_rng(child_seed(seed, 2)), []
+    for trajectory in test:
+        kalman = filter_for(tuned.kalman, trajectory)
+        interval = tuned.features.interval_samples(trajectory.dt)
+        actions = rng.uniform(-1.0, 1.0, (len(trajectory) // interval + 1, tuned.actions))
+        gains = tuned.gains(np.repeat(actions, interval, axis=0)[: len(trajectory)])
+        pose = kalman.run(trajectory.measurements, gains).pose
+        errors = errors_of(env.quantities, pose, true_values(trajectory, env.quantities[0], kalman))
+        random.append(float(rms(errors, trajectory.mask)))
+    env.close()
+    means = (np.mean(random), neutral.mean(), constant.mean(), np.min(tried, axis=0).mean())
+    return ReferenceScores(*(round(float(np.degrees(mean)), 3) for mean in means))
