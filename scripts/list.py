@@ -266,7 +266,7 @@ def learned() -> Rows:
         for group, errors in card.get("test", {}).items():
             others = {name: each for name, each in errors.items() if name != card["name"]}
             best = min(others, key=lambda name: float(others[name]["mean_deg"]))
-            row = {"network": card["name"], "episodes": group, "error": f"{errors[card['name']]['mean_deg']:.2f}"}
+            row = {"name": card["name"], "episodes": group, "error": f"{errors[card['name']]['mean_deg']:.2f}"}
             rows.append({**row, "best other": f"{best} {others[best]['mean_deg']:.2f}"})
     return rows
 
