@@ -42,7 +42,7 @@ TRAINED: dict[str, Entry] = {
             "learned",
             {"weights": f"{name}_network"},
         )
-        for name in ("two-gyro",)
+        for name in ("two-gyro", "whole-body")
     },
 }
 """Name → estimator with shipped weights."""

@@ -64,7 +64,7 @@ def test_rides_of_one_name_share_the_motion_whatever_the_sensors(study):
     assert paper[0].metadata["group"] == "straight"
     for fast, slow in zip(paper, ideal, strict=True):
         assert set(slow.measurements) == {"bicycle_imu/acc", "bicycle_imu/gyr"}
-        np.testing.assert_array_equal(fast.truth["bicycle/position"][1::2][:50], slow.truth["bicycle/position"][:50])
+        np.testing.assert_array_equal(fast.truth["bicycle/position"][::2][:50], slow.truth["bicycle/position"][:50])
     assert not np.allclose(paper[0].truth["bicycle/position"], paper[1].truth["bicycle/position"])
 
 
