@@ -12,7 +12,7 @@ from typing import Any, NamedTuple, Protocol, Self
 
 import numpy as np
 
-from ...filters.core.backend import Array, namespace
+from ...filters.core.backend import Array
 from ...filters.core.estimator import check_measurements, run_by_steps
 from ...filters.core.quantity import Channel, Estimate, Measurement
 
@@ -238,8 +238,3 @@ def seen_by_steps(front_end: FrontEnd, measurements: Mapping[str, Any]) -> Seen:
     pose = run_by_steps(Stepped(), measurements).pose  # type: ignore[arg-type]
     base = {name.removeprefix("base "): values for name, values in pose.items() if name.startswith("base ")}
     return Seen(pose["features"], pose["due"], base, pose["spread"])
-
-
-def join_features(parts: list[Array]) -> Array:
-    """Features side by side."""
-    return namespace(*parts).concat(parts, axis=-1)
