@@ -115,8 +115,8 @@ class GruNetwork:
 
     def arrays(self) -> dict[str, np.ndarray]:
         """The inverse of :meth:`from_arrays`, float32."""
-        fields = (self.input_weight, self.input_bias, self.gru_weight, self.gru_bias)
-        fields += (self.memory_weight, self.memory_bias, self.output_weight, self.output_bias)
+        fields = [self.input_weight, self.input_bias, self.gru_weight, self.gru_bias]
+        fields += [self.memory_weight, self.memory_bias, self.output_weight, self.output_bias]
         return {name: array.astype(np.float32) for name, array in zip(NAMES, fields, strict=True)}
 
     def step(self, features: Array, memory: Array) -> tuple[Array, Array]:

@@ -31,7 +31,7 @@ class Preset:
     """recipe of hand motion → training episodes"""
     rides: RideSource | None = None
     """rides to train on instead"""
-    parameters: Mapping[str, float] = field(default_factory=dict)
+    parameters: Mapping[str, Any] = field(default_factory=dict)
     """of the filter, where they differ from the registered ones"""
     validation: float = 0.15
     """held-out episodes of each recipe, as a share of the training episodes"""
@@ -116,9 +116,9 @@ PRESETS: dict[str, Preset] = {
     **{
         f"{name}+network": Preset(
             f"{name}, all its angles corrected by a recurrent network", rides=RIDES, filter=name,
-            parameters=parameters, scale=0.03, noise=0.1, fit=RIDDEN,
+            scale=0.03, noise=0.1, fit=RIDDEN,
         )
-        for name, parameters in (("two-gyro", {}), ("force-inertial", {}), ("whole-body", {}))
+        for name in ("two-gyro", "force-inertial", "whole-body")
     },
 }  # fmt: skip
 """Name of the weights → training."""

@@ -97,8 +97,8 @@ class TcnNetwork:
 
     def arrays(self) -> dict[str, np.ndarray]:
         """The inverse of :meth:`from_arrays`, float32."""
-        fields = (self.input_weight, self.input_bias, self.block_weight, self.block_bias)
-        fields += (self.output_weight, self.output_bias)
+        fields = [self.input_weight, self.input_bias, self.block_weight, self.block_bias]
+        fields += [self.output_weight, self.output_bias]
         return {name: array.astype(np.float32) for name, array in zip(NAMES, fields, strict=True)}
 
     def step(self, features: Array, memory: Array) -> tuple[Array, Array]:
