@@ -15,7 +15,7 @@ from ...filters.core.model import equations_of, parameters_of
 from ...filters.core.quantity import Channel, Estimate, Measurement, Quantity
 from ...filters.core.sampling import FilterState
 from ...filters.registry import make, name_of
-from .front_end import Seen, check_interval, interval_ends
+from .front_end import IntervalSums, Seen, check_interval, interval_sums
 
 
 class FeatureState(NamedTuple):
@@ -23,15 +23,11 @@ class FeatureState(NamedTuple):
 
     Attributes:
         filter: of the filter.
-        samples: ``()`` so far.
-        sums: ``(*batch, M)`` of what is averaged, over the interval.
-        known: ``(*batch, M)`` of how many samples.
+        sums: of what is averaged, over the interval.
     """
 
     filter: FilterState
-    samples: np.ndarray
-    sums: np.ndarray
-    known: np.ndarray
+    sums: IntervalSums
 
 
 @dataclass(frozen=True)
@@ -123,38 +119,20 @@ class FilterFeatures:
         """See :class:`.front_end.FrontEnd`."""
         arrays = check_measurements(self.channels, measurement, time_axis=False)
         state = self.kalman.init(arrays)
-        zero = np.zeros((*state.x.shape[:-1], self.size))
-        return FeatureState(state, np.array(0), zero, zero.copy())
+        return FeatureState(state, IntervalSums.empty(state.x.shape[:-1], self.size))
 
     def step(self, state: FeatureState, measurement: Measurement) -> tuple[FeatureState, Seen]:
         """See :class:`.front_end.FrontEnd`."""
         arrays = check_measurements(self.channels, measurement, time_axis=False)
         inner, estimate = self.kalman.step(state.filter, arrays)
-        values = self._values(estimate, arrays)
-        there = np.isfinite(values)
-        sums, known = state.sums + np.where(there, values, 0.0), state.known + there
-        count = int(state.samples)
-        due = bool(interval_ends(count, 1, self.dt, self.interval)[0])
-        seen = self._seen(estimate, sums, known, np.full(values.shape[:-1], float(due)))
-        if due:
-            sums, known = np.zeros_like(sums), np.zeros_like(known)
-        return FeatureState(inner, np.array(count + 1), sums, known), seen
+        after, now, due = state.sums.add(self._values(estimate, arrays), self.dt, self.interval)
+        return FeatureState(inner, after), self._seen(estimate, now, due)
 
     def run(self, measurements: Mapping[str, Any]) -> Seen:
         """See :class:`.front_end.FrontEnd`."""
         arrays = check_measurements(self.channels, measurements, time_axis=True)
         estimate = self.kalman.run(arrays)
-        values = self._values(estimate, arrays)
-        due = interval_ends(0, len(values), self.dt, self.interval)
-        sums, known = np.zeros_like(values), np.zeros_like(values)
-        there = np.isfinite(values)
-        values, begin = np.where(there, values, 0.0), 0
-        for end in (np.flatnonzero(due) + 1).tolist():
-            # features are read where an interval ends; between, only stepping knows them
-            sums[end - 1], known[end - 1] = values[begin:end].sum(axis=0), there[begin:end].sum(axis=0)
-            begin = end
-        column = due.astype(float).reshape(-1, *(1,) * (values.ndim - 2))
-        return self._seen(estimate, sums, known, np.broadcast_to(column, values.shape[:-1]))
+        return self._seen(estimate, *interval_sums(self._values(estimate, arrays), self.dt, self.interval))
 
     def _values(self, estimate: Estimate, arrays: Mapping[str, Any]) -> np.ndarray:
         """What is averaged ``(..., M)``."""
@@ -169,8 +147,8 @@ class FilterFeatures:
         parts += [np.asarray(arrays[channel.name], dtype=float) for channel in self._shown]
         return np.concatenate(parts, axis=-1)
 
-    def _seen(self, estimate: Estimate, sums: np.ndarray, known: np.ndarray, due: np.ndarray) -> Seen:
-        features = np.where(due[..., None] > 0.0, sums / np.maximum(known, 1.0), 0.0)
+    def _seen(self, estimate: Estimate, found: IntervalSums, due: np.ndarray) -> Seen:
+        features = np.where(due[..., None] > 0.0, found.sums / np.maximum(found.known, 1.0), 0.0)
         base = {quantity.name: np.asarray(estimate.pose[quantity.name]) for quantity in self.kalman.outputs}
         return Seen(features, due, base, features[..., :0])
 
@@ -178,7 +156,7 @@ class FilterFeatures:
 def standardisation(features: np.ndarray, mask: np.ndarray, least: float = 1e-3) -> tuple[np.ndarray, np.ndarray]:
     """Mean and standard deviation ``(F,)`` of features ``(E, N, F)`` where the mask ``(E, N)`` says so.
 
-    A feature that hardly varies is left as it is: its deviation is 1.
+    A feature that hardly varies tells nothing: its deviation is infinite, which removes it.
     """
     chosen = features[mask].astype(float)
     if not len(chosen):

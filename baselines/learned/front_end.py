@@ -106,18 +106,49 @@ def interval_ends(first: int, count: int, dt: float, interval: float) -> np.ndar
     return np.diff(numbers) > 0.0
 
 
-class RawState(NamedTuple):
-    """Memory of :class:`RawChannels`.
+class IntervalSums(NamedTuple):
+    """Sums over the samples of an interval so far; arrays only, so a copy of them saves it.
 
     Attributes:
-        samples: ``()`` so far.
-        sums: ``(*batch, F / 2)`` over the interval of the known elements, scaled.
-        known: ``(*batch, F / 2)`` how many those are.
+        samples: ``()`` since the start.
+        sums: ``(*batch, M)`` of the known values.
+        known: ``(*batch, M)`` how many those are.
     """
 
     samples: np.ndarray
     sums: np.ndarray
     known: np.ndarray
+
+    @classmethod
+    def empty(cls, batch: tuple[int, ...], size: int) -> Self:
+        """Sums before the first sample, of ``size`` values."""
+        return cls(np.array(0), np.zeros((*batch, size)), np.zeros((*batch, size)))
+
+    def add(self, values: np.ndarray, dt: float, interval: float) -> tuple[Self, Self, np.ndarray]:
+        """Add a sample ``(*batch, M)``, NaN where nothing is known.
+
+        Returns:
+            The memory for the next sample, the sums with this one, and whether it ends the interval ``(*batch,)``.
+        """
+        there, count = np.isfinite(values), int(self.samples)
+        now = self._replace(sums=self.sums + np.where(there, values, 0.0), known=self.known + there)
+        due = bool(interval_ends(count, 1, dt, interval)[0])
+        after = type(self).empty(values.shape[:-1], values.shape[-1]) if due else now
+        return after._replace(samples=np.array(count + 1)), now, np.full(values.shape[:-1], float(due))
+
+
+def interval_sums(values: np.ndarray, dt: float, interval: float) -> tuple[IntervalSums, np.ndarray]:
+    """As :meth:`IntervalSums.add`, for a sequence ``(T, *batch, M)``: sums after every sample, which end one."""
+    there = np.isfinite(values)
+    due = interval_ends(0, len(values), dt, interval)
+    sums, known = np.where(there, values, 0.0), there.astype(float)
+    begin = 0
+    for end in [*(np.flatnonzero(due) + 1).tolist(), len(due)]:
+        for part in (sums, known):
+            part[begin:end] = np.cumsum(part[begin:end], axis=0)
+        begin = end
+    column = due.astype(float).reshape(-1, *(1,) * (values.ndim - 2))
+    return IntervalSums(np.arange(len(values)), sums, known), np.broadcast_to(column, values.shape[:-1])
 
 
 @dataclass(frozen=True)
@@ -174,50 +205,29 @@ class RawChannels:
         scales = described.get("scales")
         return cls(channels, None if scales is None else tuple(scales), float(described["interval"]), dt)
 
-    def init(self, measurement: Measurement) -> RawState:
+    def init(self, measurement: Measurement) -> IntervalSums:
         """See :class:`FrontEnd`."""
-        batch = np.shape(measurement[self.channels[0].name])[:-1]
-        zero = np.zeros((*batch, self.size // 2))
-        return RawState(np.array(0), zero, zero.copy())
+        return IntervalSums.empty(np.shape(measurement[self.channels[0].name])[:-1], self.size // 2)
 
-    def step(self, state: RawState, measurement: Measurement) -> tuple[RawState, Seen]:
+    def step(self, state: IntervalSums, measurement: Measurement) -> tuple[IntervalSums, Seen]:
         """See :class:`FrontEnd`."""
         values = self._scaled(check_measurements(self.channels, measurement, time_axis=False))
-        there = np.isfinite(values)
-        sums, known = state.sums + np.where(there, values, 0.0), state.known + there
-        count = int(state.samples)
-        due = bool(interval_ends(count, 1, self.dt, self.interval)[0])
-        seen = self._seen(sums, known, np.full(values.shape[:-1], float(due)))
-        if due:
-            sums, known = np.zeros_like(sums), np.zeros_like(known)
-        return RawState(np.array(count + 1), sums, known), seen
+        after, now, due = state.add(values, self.dt, self.interval)
+        return after, self._seen(now, due)
 
     def run(self, measurements: Mapping[str, Any]) -> Seen:
         """See :class:`FrontEnd`."""
-        arrays = check_measurements(self.channels, measurements, time_axis=True)
-        values = self._scaled(arrays)
-        there = np.isfinite(values)
-        due = interval_ends(0, len(values), self.dt, self.interval)
-        totals = []
-        for part in (np.where(there, values, 0.0), there.astype(float)):
-            total = np.zeros_like(part)
-            begin = 0
-            for end in [*(np.flatnonzero(due) + 1).tolist(), len(due)]:
-                total[begin:end] = np.cumsum(part[begin:end], axis=0)
-                begin = end
-            totals.append(total)
-        column = due.astype(float).reshape(-1, *(1,) * (values.ndim - 2))
-        sums, known = totals
-        return self._seen(sums, known, np.broadcast_to(column, values.shape[:-1]))
+        values = self._scaled(check_measurements(self.channels, measurements, time_axis=True))
+        return self._seen(*interval_sums(values, self.dt, self.interval))
 
     def _scaled(self, arrays: Mapping[str, Array]) -> np.ndarray:
         scales = self.scales or (1.0,) * len(self.channels)
         parts = [np.asarray(arrays[c.name], dtype=float) / s for c, s in zip(self.channels, scales, strict=True)]
         return np.concatenate(parts, axis=-1)
 
-    def _seen(self, sums: np.ndarray, known: np.ndarray, due: np.ndarray) -> Seen:
+    def _seen(self, found: IntervalSums, due: np.ndarray) -> Seen:
         length = max(1.0, round(self.interval / self.dt))
-        features = np.concatenate([sums / np.maximum(known, 1.0), known / length], axis=-1)
+        features = np.concatenate([found.sums / np.maximum(found.known, 1.0), found.known / length], axis=-1)
         return Seen(features, due, {}, features[..., :0])
 
 

@@ -19,9 +19,6 @@ from typing import Any
 from .backend import Array, namespace
 from .quantity import Measurement
 
-LONGEST_AGE = 100.0
-"""s: beyond this an age means nothing more."""
-
 
 @dataclass(frozen=True)
 class HeldInput:

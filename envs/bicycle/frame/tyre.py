@@ -73,9 +73,6 @@ class TyreForce(NamedTuple):
     """N: its part along the normal"""
 
 
-AIRBORNE = TyreForce((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0)
-
-
 @jit
 def tyre_force(tyre, ground, time_step, centre, axle, velocity, turning, bristles, found):  # type: ignore[no-untyped-def]
     """Force of the ground on a tyre during the next step.

@@ -17,7 +17,6 @@ from .mapping import RecordingMap, Reference, apply_map, as_columns
 from .names import Group, counter_column, groups, time_column
 from .table import UNITS, Table, factor, plain
 
-LONG_AXIS = {"gyr": "angular rate", "acc": "specific force", "mag": "magnetic field"}
 SATURATED = 0.002
 """Part of samples at the largest magnitude of an axis beyond which an accelerometer is saturated."""
 FITS = 12.0
