@@ -19,8 +19,8 @@ from ...filters.support.files import replacing
 from ...filters.support.parallel import in_parallel, progress_bar
 from ...filters.support.version import code_version
 from ..run import smooth
-from .front_end import FrontEnd
 from .head import Head
+from .inputs.front_end import FrontEnd
 
 SPLITS = {"train": 0.7, "validation": 0.15, "test": 0.15}
 """Shares of the named parts of a set of recordings, see :func:`split`."""

@@ -15,12 +15,12 @@ from ...filters.core.quantity import Channel, Estimate, Measurement, Quantity
 from ...filters.core.sampling import zeros
 from ...filters.support.names import look_up
 from ..weights_io import load_weights, save_weights
-from .filter_features import FilterFeatures
-from .front_end import FrontEnd, RawChannels, Seen
-from .gru import GruNetwork
 from .head import AngleHead, Head, TiltHead
-from .level_frame import LevelFrame
-from .tcn import TcnNetwork
+from .inputs.filter_features import FilterFeatures
+from .inputs.front_end import FrontEnd, RawChannels, Seen
+from .inputs.level_frame import LevelFrame
+from .networks.gru import GruNetwork
+from .networks.tcn import TcnNetwork
 
 FRONT_ENDS: dict[str, Any] = {kind.kind: kind for kind in (LevelFrame, FilterFeatures, RawChannels)}
 HEADS: dict[str, Any] = {kind.kind: kind for kind in (TiltHead, AngleHead)}

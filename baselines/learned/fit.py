@@ -17,10 +17,10 @@ from ..checkpoint import load_checkpoint, save_checkpoint
 from .config import FitConfig
 from .data import SequenceData
 from .estimator import LearnedEstimator
-from .filter_features import standardisation
-from .front_end import FrontEnd
 from .head import Head
-from .modules import TorchNetwork
+from .inputs.filter_features import standardisation
+from .inputs.front_end import FrontEnd
+from .networks.modules import TorchNetwork
 
 with extra("learn"):
     import torch

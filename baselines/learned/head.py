@@ -13,8 +13,8 @@ from ...filters.core import rotation
 from ...filters.core.backend import Array, constant, namespace
 from ...filters.core.metrics import direction_error, rms, scored
 from ...filters.core.quantity import UP, Estimate, Quantity
-from .front_end import Seen
-from .gravity_aligned_frame import VECTORS
+from .inputs.front_end import Seen
+from .inputs.gravity_aligned_frame import VECTORS
 
 
 class Head(Protocol):

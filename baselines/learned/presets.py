@@ -10,10 +10,10 @@ from ...filters.registry import make
 from ...filters.support.names import look_up
 from ...filters.support.seeds import child_seeds
 from .config import FitConfig
-from .filter_features import FilterFeatures
-from .front_end import FrontEnd
 from .head import AngleHead, Head, TiltHead
-from .level_frame import LevelFrame
+from .inputs.filter_features import FilterFeatures
+from .inputs.front_end import FrontEnd
+from .inputs.level_frame import LevelFrame
 from .rides import RideSource
 
 
@@ -75,7 +75,7 @@ class Preset:
 
     def module(self, features: int, outputs: int, seed: int) -> Any:
         """The network before its training."""
-        from .modules import GruModule, TcnModule
+        from .networks.modules import GruModule, TcnModule
 
         kinds: dict[str, Any] = {"gru": GruModule, "tcn": TcnModule}
         kind = look_up("network", self.network, kinds)

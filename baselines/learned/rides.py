@@ -18,8 +18,8 @@ from ...envs.recipes.recipe import Recipe
 from ...envs.recipes.registry import described_recipe, recipe
 from ...filters.support.parallel import in_parallel
 from .data import SequenceData, sequence_of
-from .front_end import FrontEnd
 from .head import Head
+from .inputs.front_end import FrontEnd
 
 ON_DISK = 4 * 10**9
 """bytes of rides that are kept"""

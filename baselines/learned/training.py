@@ -13,9 +13,9 @@ from ...envs.recipes.registry import recipe
 from .data import SequenceData, taught, with_errors
 from .estimator import LearnedEstimator
 from .fit import FitResult, fit
-from .gru import GruNetwork
 from .head import AngleHead
-from .modules import GruModule
+from .networks.gru import GruNetwork
+from .networks.modules import GruModule
 from .presets import Preset, seeds_of
 from .rides import ride_data
 

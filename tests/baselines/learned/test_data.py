@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from poise.baselines.learned.data import SequenceData, sequence_of, simulation_digest, split
-from poise.baselines.learned.gravity_aligned_frame import FEATURES, GravityAlignedFrame
 from poise.baselines.learned.head import TiltHead, turned
-from poise.baselines.learned.level_frame import LevelFrame
+from poise.baselines.learned.inputs.gravity_aligned_frame import FEATURES, GravityAlignedFrame
+from poise.baselines.learned.inputs.level_frame import LevelFrame
 from poise.envs.data.trajectory import Trajectory
 from poise.envs.hand.hand_held import HandHeld
 from poise.envs.recipes.hand import HandRecipe

@@ -15,11 +15,11 @@ import torch
 
 from poise.baselines.learned.data import SequenceData
 from poise.baselines.learned.estimator import LearnedEstimator, shipped
-from poise.baselines.learned.gravity_aligned_frame import FEATURES
-from poise.baselines.learned.gru import GruNetwork
 from poise.baselines.learned.head import AngleHead, TiltHead
-from poise.baselines.learned.level_frame import LevelFrame
-from poise.baselines.learned.modules import GruModule
+from poise.baselines.learned.inputs.gravity_aligned_frame import FEATURES
+from poise.baselines.learned.inputs.level_frame import LevelFrame
+from poise.baselines.learned.networks.gru import GruNetwork
+from poise.baselines.learned.networks.modules import GruModule
 from poise.baselines.weights_io import save_weights
 from poise.envs.data.trajectory import Trajectory
 from poise.envs.hand.gestures import make_gesture

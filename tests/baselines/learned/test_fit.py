@@ -17,8 +17,8 @@ from poise.baselines.learned.data import SequenceData
 from poise.baselines.learned.estimator import LearnedEstimator
 from poise.baselines.learned.fit import FitResult, Trainer, fit
 from poise.baselines.learned.head import AngleHead, TiltHead
-from poise.baselines.learned.level_frame import LevelFrame
-from poise.baselines.learned.modules import GruModule, TcnModule
+from poise.baselines.learned.inputs.level_frame import LevelFrame
+from poise.baselines.learned.networks.modules import GruModule, TcnModule
 from poise.baselines.weights_io import load_weights
 from poise.filters.core.metrics import direction_error
 from poise.filters.core.quantity import Quantity

@@ -7,8 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from poise.baselines.learned.filter_features import FilterFeatures
 from poise.baselines.learned.head import AngleHead
+from poise.baselines.learned.inputs.filter_features import FilterFeatures
 from poise.baselines.learned.rides import RideSource, drawn, held_out, ride, ride_data
 from poise.envs import episodes
 from poise.filters.registry import make

@@ -18,8 +18,8 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from ...filters.compile.cache import jit
-from ...filters.core.backend import Array, constant, namespace
+from ....filters.compile.cache import jit
+from ....filters.core.backend import Array, constant, namespace
 
 TAPS = 3
 NAMES = ("input.weight", "input.bias", "blocks.weight", "blocks.bias", "output.weight", "output.bias")
@@ -123,7 +123,7 @@ class TcnNetwork:
         return xp.concat(kept, axis=-1), affine(self.output_weight, h) + constant(self.output_bias, h)
 
     def advance(self, features: np.ndarray, due: np.ndarray, memory: np.ndarray, output: np.ndarray) -> np.ndarray:
-        """All samples of all sequences, compiled; see :meth:`poise.baselines.learned.gru.GruNetwork.advance`."""
+        """All samples, compiled; see :meth:`~poise.baselines.learned.networks.gru.GruNetwork.advance`."""
         outputs = np.empty((*due.shape, self.outputs))
         fields = (self.input_weight, self.input_bias, self.block_weight, self.block_bias)
         compiled_kernel()(features, due, memory, output, outputs, *fields, self.output_weight, self.output_bias)

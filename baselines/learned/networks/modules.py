@@ -6,8 +6,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ...filters.core.backend import to_numpy
-from ...filters.support.optional import extra
+from ....filters.core.backend import to_numpy
+from ....filters.support.optional import extra
 from .gru import GruNetwork
 from .tcn import TAPS, TcnNetwork
 
@@ -225,7 +225,7 @@ class TorchNetwork:
         return kept.reshape(*batch, -1), output.reshape(*batch, -1)
 
     def advance(self, features: np.ndarray, due: np.ndarray, memory: np.ndarray, output: np.ndarray) -> np.ndarray:
-        """All samples of all sequences; see :meth:`poise.baselines.learned.gru.GruNetwork.advance`."""
+        """All samples of all sequences; see :meth:`poise.baselines.learned.networks.gru.GruNetwork.advance`."""
         outputs = np.empty((*due.shape, self.outputs))
         self.module.eval()
         with torch.no_grad():

@@ -19,8 +19,8 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from ...filters.compile.cache import jit
-from ...filters.core.backend import Array, constant, namespace
+from ....filters.compile.cache import jit
+from ....filters.core.backend import Array, constant, namespace
 
 NAMES = (
     "input.weight",

@@ -12,9 +12,9 @@ from typing import Any, NamedTuple, Protocol, Self
 
 import numpy as np
 
-from ...filters.core.backend import Array
-from ...filters.core.estimator import check_measurements, run_by_steps
-from ...filters.core.quantity import Channel, Estimate, Measurement
+from ....filters.core.backend import Array
+from ....filters.core.estimator import check_measurements, run_by_steps
+from ....filters.core.quantity import Channel, Estimate, Measurement
 
 
 class Seen(NamedTuple):

@@ -9,12 +9,12 @@ from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
-from ...filters.core.estimator import check_measurements
-from ...filters.core.kalman import KalmanFilter
-from ...filters.core.model import equations_of, parameters_of
-from ...filters.core.quantity import Channel, Estimate, Measurement, Quantity
-from ...filters.core.sampling import FilterState
-from ...filters.registry import make, name_of
+from ....filters.core.estimator import check_measurements
+from ....filters.core.kalman import KalmanFilter
+from ....filters.core.model import equations_of, parameters_of
+from ....filters.core.quantity import Channel, Estimate, Measurement, Quantity
+from ....filters.core.sampling import FilterState
+from ....filters.registry import make, name_of
 from .front_end import IntervalSums, Seen, check_interval, interval_sums
 
 

@@ -9,10 +9,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from ...filters.core.backend import Array, constant, expand, namespace
-from ...filters.core.model import Recurrence
-from ...filters.core.quantity import ACCELEROMETER, GYROSCOPE, RELATIVE_ORIENTATION, Channel, Measurement, Quantity
-from ...filters.core.rotation import cross, exp, level, multiply, normalize, rotate, rotate_back
+from ....filters.core.backend import Array, constant, expand, namespace
+from ....filters.core.model import Recurrence
+from ....filters.core.quantity import ACCELEROMETER, GYROSCOPE, RELATIVE_ORIENTATION, Channel, Measurement, Quantity
+from ....filters.core.rotation import cross, exp, level, multiply, normalize, rotate, rotate_back
 
 VECTORS = 6
 """Features that are vectors in the gravity-aligned frame; they rotate with its heading."""

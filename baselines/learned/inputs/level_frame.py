@@ -6,15 +6,15 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any, ClassVar, NamedTuple, Self
 
-from ...filters.core.backend import Array, namespace
-from ...filters.core.estimator import check_measurements
-from ...filters.core.kalman import KalmanFilter
-from ...filters.core.model import equations_of, parameters_of
-from ...filters.core.observer import Observer
-from ...filters.core.quantity import ACCELEROMETER, GYROSCOPE, Channel, Estimate, Measurement, Quantity
-from ...filters.core.rotation import exp, multiply, rotate
-from ...filters.core.sampling import FilterState
-from ...filters.registry import make, name_of
+from ....filters.core.backend import Array, namespace
+from ....filters.core.estimator import check_measurements
+from ....filters.core.kalman import KalmanFilter
+from ....filters.core.model import equations_of, parameters_of
+from ....filters.core.observer import Observer
+from ....filters.core.quantity import ACCELEROMETER, GYROSCOPE, Channel, Estimate, Measurement, Quantity
+from ....filters.core.rotation import exp, multiply, rotate
+from ....filters.core.sampling import FilterState
+from ....filters.registry import make, name_of
 from .front_end import Seen, check_interval
 from .gravity_aligned_frame import DUE, FEATURES, GravityAlignedFrame
 

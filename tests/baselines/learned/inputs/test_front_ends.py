@@ -7,9 +7,9 @@ import json
 import numpy as np
 import pytest
 
-from poise.baselines.learned.filter_features import FilterFeatures, standardisation
-from poise.baselines.learned.front_end import FrontEnd, RawChannels, interval_ends, seen_by_steps
-from poise.baselines.learned.level_frame import LevelFrame
+from poise.baselines.learned.inputs.filter_features import FilterFeatures, standardisation
+from poise.baselines.learned.inputs.front_end import FrontEnd, RawChannels, interval_ends, seen_by_steps
+from poise.baselines.learned.inputs.level_frame import LevelFrame
 from poise.envs.hand.sensing import simulate_hand
 from poise.filters.core.quantity import ACCELEROMETER, GYROSCOPE
 from poise.filters.registry import make

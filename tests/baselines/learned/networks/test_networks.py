@@ -7,9 +7,9 @@ import pytest
 import torch
 from torch import nn
 
-from poise.baselines.learned.gru import NAMES, GruNetwork
-from poise.baselines.learned.modules import GruModule, Standardised, TcnModule, TorchNetwork
-from poise.baselines.learned.tcn import TcnNetwork
+from poise.baselines.learned.networks.gru import NAMES, GruNetwork
+from poise.baselines.learned.networks.modules import GruModule, Standardised, TcnModule, TorchNetwork
+from poise.baselines.learned.networks.tcn import TcnNetwork
 
 F, OUT, B, N = 7, 3, 2, 60
 

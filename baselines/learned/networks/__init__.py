@@ -1,0 +1,1 @@
+"""Networks: in NumPy to run, in torch to train."""
