@@ -46,6 +46,20 @@ def new_figure(width: float, height: float, rows: int = 1, columns: int = 1) -> 
     return figure, list(axes)
 
 
+def new_spatial_figure(
+    width: float, height: float, rows: int = 1, columns: int = 1, dpi: int = 140
+) -> tuple[Figure, list[Any]]:
+    """A figure in inches with ``rows`` × ``columns`` axes in three dimensions, row by row, drawn without a screen."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width, height), dpi=dpi)
+    FigureCanvasAgg(figure)
+    axes = [figure.add_subplot(rows, columns, index + 1, projection="3d") for index in range(rows * columns)]
+    figure.subplots_adjust(0.0, 0.02, 1.0, 0.97, 0.0, 0.0)
+    return figure, axes
+
+
 def legend_above(ax: Any) -> None:
     """Put the legend above the axes, off the curves."""
     ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=6, frameon=False, fontsize=8, borderaxespad=0.1)
@@ -54,6 +68,19 @@ def legend_above(ax: Any) -> None:
 def save(figure: Figure, path: Path) -> Path:
     """Write a figure as PNG, without a date, so that equal runs give equal files."""
     figure.savefig(path, metadata={"Software": None})
+    return path
+
+
+def save_animation(figures: Sequence[Figure], interval: float, path: Path) -> Path:
+    """Write figures of equal size as an animated GIF that repeats, ``interval`` s from frame to frame."""
+    from PIL import Image
+
+    frames = []
+    for figure in figures:
+        figure.canvas.draw()
+        pixels = np.asarray(figure.canvas.buffer_rgba())[..., :3]  # type: ignore[attr-defined]
+        frames.append(Image.fromarray(pixels.copy()).quantize(64))
+    frames[0].save(path, save_all=True, append_images=frames[1:], duration=round(1000.0 * interval), loop=0)
     return path
 
 

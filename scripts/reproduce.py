@@ -1,7 +1,7 @@
 """Reproduce the study of a paper: its tables and figures beside the results of this package.
 
-Papers: two-gyro, force-inertial, whole-body, accelerometer-array, external-acceleration. Results are kept in the run
-folder; --resume continues an interrupted study.
+Papers: two-gyro, force-inertial, whole-body, accelerometer-array, external-acceleration; all does the five, several at
+a time, and prints one page of coverage. Results are kept in the run folder; --resume continues an interrupted study.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import tyro
 
-from .experiment import Run, open_run
+from .experiment import Run, command_line, open_run
 from .main import run_command
 from .output import Output
 
@@ -25,12 +25,16 @@ if TYPE_CHECKING:
     from ..baselines.studies.report import Entry, Report
 
 
+EVERY = "all"
+"""In the place of a paper: all of them."""
+
+
 @dataclass
 class Args:
     """Arguments of ``poise reproduce``."""
 
     paper: tyro.conf.Positional[str]
-    """two-gyro, force-inertial, whole-body, accelerometer-array or external-acceleration"""
+    """two-gyro, force-inertial, whole-body, accelerometer-array, external-acceleration, or all"""
     quick: bool = False
     """less than five minutes: two riders, one ride each of 20 s, unless given otherwise"""
     seed: int = 0
@@ -49,6 +53,8 @@ class Args:
     """folder of an interrupted run; its results are kept"""
     runs: Path = Path("runs")
     """parent of the run folder"""
+    page: Path | None = None
+    """with all: file to which the page of coverage is written too, as Markdown"""
     json: bool = False
     """print one JSON document instead of tables"""
 
@@ -57,16 +63,68 @@ def run(args: Args) -> int:
     """Do the study, print results as they are computed, and write a run folder with a report."""
     from ..baselines.studies import find_paper
 
-    reproduce = find_paper(args.paper)
+    reproduce = None if args.paper == EVERY else find_paper(args.paper)
+    if args.page is not None and args.paper != EVERY:
+        raise ValueError(f"--page is the page of all papers: use it with {EVERY!r}, not with {args.paper!r}")
     args = filled(args)
     for path in args.recordings:
         if not path.exists():
             raise FileNotFoundError(f"no recording at {path}: there is no such file or folder")
     shared = ("quick", "seed", "subjects", "seeds", "duration", "processes", "recordings")
     settings = {name: getattr(args, name) for name in shared}
+    if reproduce is None:
+        return run_every(args, settings)
     with studying("reproduce", args, settings, f"poise reproduce {args.paper}") as (study, _, report):
         reproduce(study, report)
     return 0
+
+
+def run_every(args: Args, settings: dict[str, Any]) -> int:
+    """Do all studies, one in each process; a study that is done is not done again when the run is resumed."""
+    from ..baselines.studies import PAPERS, coverage
+    from ..filters.support.files import write_text
+    from ..filters.support.parallel import in_parallel
+    from .report import provenance
+
+    check(settings)
+    folder = open_run("reproduce", args, may_differ=("page",))
+    jobs = [(paper, {**settings, "processes": 1, "progress": False}, folder) for paper in PAPERS]
+    with Output("reproduce", args) as out:
+        for paper in in_parallel(one_study, jobs, args.processes, label="works", unit="work"):
+            if not out.as_json:
+                out.say(f"{paper}: {coverage.counted(coverage.read(folder.folder / paper))}")
+        works = {paper: coverage.read(folder.folder / paper) for paper in PAPERS}
+        for paper, rows in works.items():
+            shown = [{name: row[name] for name in ("item", "content", "verdict")} for row in rows]
+            out.table(shown, paper, console=console(None))
+        command = command_line("reproduce", args, ("quick", "seed", "subjects", "seeds", "duration"))
+        page = coverage.page(works, f"- `{command}`\n{provenance(folder)}")
+        if args.page is not None:
+            write_text(args.page, page)
+        out.report(write_text(folder.folder / "report.md", page))
+    return 0
+
+
+def one_study(paper: str, settings: dict[str, Any], run: Run) -> str:
+    """Do the study of one paper in a folder of its own in the run's, unless it is done; returns the paper's name."""
+    from ..baselines.studies import find_paper
+    from ..baselines.studies.kit import Study
+    from ..baselines.studies.report import Report
+    from ..filters.support.resume import is_kept, keep
+
+    folder = dataclasses.replace(run, folder=run.folder / paper)
+    done, key = folder.folder / "done.json", {"paper": paper}
+    if is_kept(done, key):
+        return paper
+    folder.figures.mkdir(parents=True, exist_ok=True)
+    versions = (run.folder / "versions.json").read_text(encoding="utf-8")
+    (folder.folder / "versions.json").write_text(versions, encoding="utf-8")
+    report = Report(folder.folder)
+    find_paper(paper)(Study(folder.folder.resolve(), **settings), report)
+    folder.write_results(report.results)
+    write(f"poise reproduce {paper}", folder, report)
+    keep(done, key, len(report.entries))
+    return paper
 
 
 @contextmanager
@@ -87,12 +145,8 @@ def studying(
     """
     from ..baselines.studies.kit import Study
     from ..baselines.studies.report import Report
-    from ..envs.bicycle.rider.anthropometry import SUBJECTS
 
-    if not all(0 <= subject < len(SUBJECTS) for subject in settings["subjects"]):
-        raise ValueError(f"subjects must be numbers from 0 to {len(SUBJECTS) - 1}, got {list(settings['subjects'])}")
-    # Refuses wrong numbers before a folder is made.
-    Study(Path(), **settings)
+    check(settings)
     folder = open_run(command, args)
     study = Study(folder.folder.resolve(), **settings)
     with Output(command, args) as out:
@@ -105,6 +159,20 @@ def studying(
         yield study, out, report
         folder.write_results(report.results)
         out.report(write(title, folder, report))
+
+
+def check(settings: dict[str, Any]) -> None:
+    """Refuse wrong settings of a study, before a folder is made.
+
+    Raises:
+        ValueError: names the setting.
+    """
+    from ..baselines.studies.kit import Study
+    from ..envs.bicycle.rider.anthropometry import SUBJECTS
+
+    if not all(0 <= subject < len(SUBJECTS) for subject in settings["subjects"]):
+        raise ValueError(f"subjects must be numbers from 0 to {len(SUBJECTS) - 1}, got {list(settings['subjects'])}")
+    Study(Path(), **settings)
 
 
 def filled(args: Args) -> Args:

@@ -19,6 +19,10 @@ class Claim:
     holds: bool | None
     """whether they confirm the statement; None if the run has no such number (rides that are too short)"""
 
+    def __post_init__(self) -> None:
+        # Comparisons of arrays' elements give their booleans, which are not ``True`` or ``False`` themselves.
+        object.__setattr__(self, "holds", None if self.holds is None else bool(self.holds))
+
     @classmethod
     def less(
         cls,

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..plots import save
+from ..plots import save, save_animation
 from ..scoring import COLUMNS
 from .claims import Claim
 
@@ -51,6 +51,8 @@ class Report:
     entries: list[Entry] = field(default_factory=list)
     results: list[dict[str, Any]] = field(default_factory=list)
     """rows of ``results.csv``"""
+    claimed: dict[str, list[Claim]] = field(default_factory=dict)
+    """title of a table of claims → its claims"""
     files: set[Path] = field(default_factory=set)
     """of tables and figures"""
 
@@ -86,6 +88,23 @@ class Report:
             ValueError: a name or title that another entry has.
         """
         path = save(figure, self._new_file("figures", name, ".png"))
+        self._add(Entry(title, note.strip(), figure=path))
+        return path
+
+    def animation(self, name: str, frames: Sequence[Figure], interval: float, title: str, note: str = "") -> Path:
+        """Add a moving picture, written to ``figures/<name>.gif``; returns the file.
+
+        Args:
+            name: of the file.
+            frames: pictures of equal size.
+            interval: s from frame to frame.
+            title: heading.
+            note: Markdown beneath.
+
+        Raises:
+            ValueError: a name or title that another entry has.
+        """
+        path = save_animation(frames, interval, self._new_file("figures", name, ".gif"))
         self._add(Entry(title, note.strip(), figure=path))
         return path
 
@@ -143,6 +162,7 @@ class Report:
         """
         rows = [{"statement": each.statement, "number": each.number, "holds": each.holds} for each in claims]
         self.table(title, rows, note)
+        self.claimed[title] = list(claims)
 
     def _new_file(self, folder: str, name: str, suffix: str) -> Path:
         path = self.folder / folder / (re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-")[:80] + suffix)

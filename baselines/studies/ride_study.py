@@ -17,7 +17,6 @@ from ...filters.core.kalman import KalmanFilter
 from ...filters.core.observer import Observer
 from ...filters.core.quantity import Estimate
 from ..evaluation import COLUMNS
-from ..plots import TRUTH_COLOR, legend_above, new_figure
 from .averages import largest, mean_of, mean_rms, rounded, windowed
 from .claims import Claim
 from .kit import Study, load_ride
@@ -27,6 +26,10 @@ SETTLED = 10.0
 """s: errors count from here, when a filter has forgotten its start"""
 ZERO, MEAN = "always zero", "always the ride's mean"
 """Baselines: what needs no sensor, and the best constant, which only hindsight knows."""
+STRAPDOWN = "integration"
+"""Variant that integrates the gyroscopes alone."""
+SPACING = 0.25
+"""s from sample to sample of the errors over time that are kept of a ride"""
 Samples = Mapping[str, np.ndarray]
 
 
@@ -82,7 +85,8 @@ class RideStudy:
         drawn: methods in the figure of a ride; the last sets the scale.
         windows: time → named spans in which errors are averaged, ``settled`` among them.
         prepare: cuts or completes a ride before it is used.
-        extra: further numbers of a ride, from the ride and the estimates of its variants.
+        extra: further numbers of a ride, from the ride and the estimates of its variants; ``bound`` (angle → deg, RMS
+            over time of the posterior bound) goes into the table of skill.
         cells: a row of errors as cells of a table; None rounds them.
     """
 
@@ -148,8 +152,9 @@ class RideStudy:
 
         Returns:
             ``name``, ``subject``, ``ended``, ``length`` (s); ``rms`` and ``peak`` (method → window → angle → deg) of
-            variants, ablations and baselines; ``consistency`` (variant → statistic → value a degree of freedom); and
-            what ``extra`` gives.
+            variants, ablations and baselines; ``consistency`` (variant → statistic → value a degree of freedom);
+            ``nees`` of each angle that is a state, and ``over time``, its errors (deg) every :data:`SPACING` s, both of
+            the first variant; and what ``extra`` gives.
         """
         truth, spans = self.truth(ride.truth), self.windows(ride.time)
         estimates = {name: self.estimate(ride, variant) for name, variant in self.variants.items()}
@@ -170,22 +175,31 @@ class RideStudy:
             "peak": {name: windowed(each, ride.time, SETTLED, statistic=largest) for name, each in errors.items()},
             "consistency": {name: self.consistency(ride, estimates[name], errors[name]) for name in self.checked},
         }
+        first = next(iter(self.variants))
+        every = max(1, round(SPACING / ride.dt))
+        found["over time"] = {angle: error[::every].tolist() for angle, error in errors[first].items()}
+        found["nees"] = {
+            angle: self.normalised(ride, estimates[first], errors[first], [angle]) for angle in self.states
+        }
         return found | ({} if self.extra is None else self.extra(self, ride, estimates))
 
     def consistency(self, ride: Trajectory, estimate: Estimate, errors: Mapping[str, np.ndarray]) -> dict[str, float]:
         """NEES of every part and NIS, each a degree of freedom: 1 if the filter's covariance is right."""
-        assert estimate.covariance is not None
         assert estimate.innovation is not None
-        settled = ride.time >= min(SETTLED, 0.5 * float(ride.time[-1]))
-        found = {}
-        for name, angles in self.parts.items():
-            states = [self.states[angle] for angle in angles]
-            error = np.radians(np.stack([errors[angle][settled] for angle in angles], axis=-1))
-            P = estimate.covariance[settled][:, states][:, :, states]
-            found[name] = float(np.mean(nees(error, P))) / len(states)
+        settled = _settled(ride)
+        found = {name: self.normalised(ride, estimate, errors, angles) for name, angles in self.parts.items()}
         if self.sampled is not None:
             settled = settled & np.isfinite(ride.measurements[self.sampled][:, 0])
         return found | {"NIS": float(np.mean(estimate.innovation[settled] ** 2))}
+
+    def normalised(
+        self, ride: Trajectory, estimate: Estimate, errors: Mapping[str, np.ndarray], angles: Sequence[str]
+    ) -> float:
+        """Mean NEES of some angles that are states, each a degree of freedom."""
+        assert estimate.covariance is not None
+        settled, states = _settled(ride), [self.states[angle] for angle in angles]
+        error = np.radians(np.stack([errors[angle][settled] for angle in angles], axis=-1))
+        return float(np.mean(nees(error, estimate.covariance[settled][:, states][:, :, states]))) / len(states)
 
     def run(self, study: Study, scenario: str, suite: str) -> tuple[list[Path], list[dict[str, Any]]]:
         """Record the rides of a scenario and assess each, several at a time; returns their files and their numbers."""
@@ -212,6 +226,7 @@ class RideStudy:
                     rows.append(row | {"values": values, "unit": "deg"})
         if rows:
             report.compare(f"{self.table}, {course}", rows, f"RMS from {SETTLED:g} s on.", interval=STD)
+        report.table(f"Skill, {course}, RMS in deg", self.skill(course, results), SKILL)
         cells = self.cells or rounded
         methods = [*self.variants, ZERO, MEAN]
         report.table(
@@ -239,6 +254,23 @@ class RideStudy:
         )
         report.claims(f"What holds, {course}", [*self.claims(course, results), *claims])
         report.numbers(self.results(results))
+
+    def skill(self, course: str, results: list[dict[str, Any]]) -> list[dict[str, Any]]:
+        """A row for each angle: what is published, the filter, what it must beat, its bound, and its consistency."""
+        first = next(iter(self.variants))
+        published = self.published.get((course, first), {})
+        methods = (first, STRAPDOWN, ZERO, MEAN)
+        means = {name: mean_rms(results, name) for name in methods if name in results[0]["rms"]}
+        bound = mean_of(each.get("bound", {}) for each in results)
+        rows = []
+        for angle in self.angles:
+            row: dict[str, Any] = {"angle": angle, "published": published.get(angle)}
+            row |= {name: _rounded(mean.get(angle)) for name, mean in means.items()}
+            row["posterior bound"] = _rounded(bound.get(angle))
+            values = [each["nees"][angle] for each in results if angle in each["nees"]]
+            row["NEES, 95 % interval"] = interval_of_mean(values) if values else None
+            rows.append(row)
+        return rows
 
     def claims(self, course: str, results: list[dict[str, Any]]) -> list[Claim]:
         """What holds of the errors of a course: against the paper, the baselines and each other; and of consistency."""
@@ -271,35 +303,39 @@ class RideStudy:
             for angle, value in spans["settled"].items()
         ]
 
-    def figure(self, report: Report, path: Path, title: str, angles: Sequence[str] | None = None) -> None:
-        """Angles of one ride, true and estimated; the scale is that of the truth and of the last method drawn."""
-        ride, shown = self.load(path), list(angles or self.angles)
-        truth = self.truth(ride.truth)
-        errors = {name: self.errors(self.estimate(ride, self.variants[name]).pose, truth) for name in self.drawn}
-        figure, axes = new_figure(7.5, 0.6 + 1.9 * len(shown), len(shown))
-        for ax, angle in zip(axes, shown, strict=True):
-            name, part = self.angles[angle]
-            true = np.degrees(np.unwrap(truth[name][:, part]))
-            ax.plot(ride.time, true, color=TRUTH_COLOR, linewidth=1.2, label="truth")
-            for method, color in zip(self.drawn, DRAWN[-len(self.drawn) :], strict=True):
-                if angle in errors[method]:
-                    ax.plot(ride.time, true + errors[method][angle], color=color, linewidth=0.9, label=method)
-            scale = np.concatenate([true, true + errors[self.drawn[-1]][angle]])
-            low, high = np.nanmin(scale), np.nanmax(scale)
-            margin = 0.25 * (high - low) + 1.0
-            ax.set(ylabel=f"{angle}, deg", ylim=(low - margin, high + margin))
-            legend_above(ax)
-        axes[-1].set_xlabel("time, s")
-        report.figure(title, figure, title, "Scales are those of truth and filter; what drifts leaves the picture.")
-
-
-DRAWN = ("#2c8c5a", "#c2571a", "#b08d1a", "#1f5fa8")
-"""Colours of the methods of a figure; the last is that of the study's filter, the one before that of integration."""
-
 
 def assessed(study: RideStudy, path: Path) -> dict[str, Any]:
     """:meth:`RideStudy.assess` of a recorded ride."""
     return study.assess(study.load(path))
+
+
+SKILL = (
+    f"Mean over rides from {SETTLED:g} s on. *{STRAPDOWN}*: gyroscopes alone. *Posterior bound*: for the noises that "
+    "the "
+    "filter assumes. *NEES*: of the angle alone, 1 if the covariance is right; mean over rides, with the 95 % "
+    "interval of "
+    "that mean by the spread between rides, since errors within a ride are correlated."
+)
+
+
+def interval_of_mean(values: Sequence[float]) -> str:
+    """Mean and its 95 % interval by Student's t, as text; a single value has no interval."""
+    from scipy.stats import t
+
+    found = np.asarray([value for value in values if np.isfinite(value)])
+    if len(found) < 2:
+        return f"{found.mean():.2g}" if len(found) else "–"
+    half = float(t.ppf(0.975, len(found) - 1) * found.std(ddof=1) / np.sqrt(len(found)))
+    return f"{found.mean():.2g} ({max(0.0, found.mean() - half):.2g} … {found.mean() + half:.2g})"
+
+
+def _settled(ride: Trajectory) -> np.ndarray:
+    """Samples ``(T,)`` whose consistency counts."""
+    return ride.time >= min(SETTLED, 0.5 * float(ride.time[-1]))
+
+
+def _rounded(value: float | None) -> float | None:
+    return None if value is None or np.isnan(value) else round(value, 2)
 
 
 def _circular_mean(angles: np.ndarray) -> np.ndarray:

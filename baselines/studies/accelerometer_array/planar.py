@@ -19,7 +19,6 @@ from ....filters.core import metrics
 from ....filters.core.estimator import Estimator, run
 from ....filters.core.rotation import wrap
 from ....filters.registry import make
-from ...plots import new_figure
 from ..claims import Claim
 from ..kit import Study
 from ..report import OVER_MOTIONS, Report
@@ -82,7 +81,6 @@ PUBLISHED: tuple[tuple[str, str, str], ...] = (
     ("infinity", EXTENDED, "about 10 (Fig. 3.10)"),
 )
 """Motion, method, largest error that the figure shows, deg"""
-SHOWN = (INTEGRATION, "tilt", EXTENDED, POSE, "mean, wrapped difference")
 
 
 def estimator(method: str, motion: str, **parameters: Any) -> Estimator[Any]:
@@ -158,17 +156,6 @@ def planar_table(rows: list[Row], key: str = "method") -> list[Row]:
     return grouped(rows, {"motion": "motion", key: key}, columns)
 
 
-def planar_curves(seed: int, motion: str, duration: float = DURATION, every: int = 10) -> dict[str, Any]:
-    """Errors over time as in Figures 3.5, 3.6, 3.9, 3.10 and 3.12: name → list in degrees, for a figure."""
-    trajectory = moved(seed, motion, duration)
-    curves: dict[str, Any] = {"time": trajectory.time[::every].tolist()}
-    for method in METHODS:
-        angle = run(estimator(method, motion), trajectory.measurements).pose[PLANAR_ANGLE.name]
-        error = wrap(angle - trajectory.truth[PLANAR_ANGLE.name])
-        curves[method] = np.rad2deg(error[::every, 0]).tolist()
-    return curves
-
-
 def claims(rows: list[Row], inflated: list[Row], difference: float) -> list[Claim]:
     """What chapter 3 says, and what one would read off the tables."""
     found = []
@@ -181,6 +168,12 @@ def claims(rows: list[Row], inflated: list[Row], difference: float) -> list[Clai
             Claim.less(f"{motion}: the extended filter never errs by more than 10° (Figure {figure})", largest, 10.0),
             Claim.within(f"{motion}: it is within 10° in at least four of five samples", share, 0.8, 1.0),
             Claim.less(f"{motion}: the linear filter fails by averaging raw angles", wrapped, literal, factor=0.5),
+            Claim.less(
+                f"{motion}: a linear filter cannot be near the extended one, at least twice as wrong",
+                extended,
+                wrapped,
+                factor=0.5,
+            ),
             Claim.less(f"{motion}: wrapped, it is near the extended filter", wrapped, extended, factor=1.5),
             Claim.less(f"{motion}: the thesis' complete pose is worse than that", extended, rms[POSE]),
         ]
@@ -198,11 +191,53 @@ def claims(rows: list[Row], inflated: list[Row], difference: float) -> list[Clai
         Claim.best("infinity: a complete pose whose acceleration returns to zero (ours) is the best", RETURNING, rms),
         Claim.less(wide, INFINITY_ACCELERATION[1] ** 2, best, "(m/s²)²", names=names),
         Claim.less("Unscented and extended filter are about equal (Figure 3.12)", difference, 0.1),
+        *likenesses(rows),
+    ]
+
+
+def likenesses(rows: list[Row]) -> list[Claim]:
+    """What the figures say in words: what drifts, what is as bad as the tilt angle, and where rates are poor."""
+    found = []
+    for motion, figure in (("planar-walk", "3.5"), ("infinity", "3.9")):
+        rms = {method: mean_of(rows, "rms", motion=motion, method=method) for method in METHODS}
+        drift = mean_of(rows, "largest", motion=motion, method=INTEGRATION)
+        tilt, extended = rms["tilt"], rms[EXTENDED]
+        rate = mean_of(rows, "rate", motion=motion, method=POSE)
+        returning = mean_of(rows, "rate", motion=motion, method=RETURNING)
+        found += [
+            Claim.within(f"Figure {figure}: integration drifts by tens of degrees in 100 s", drift, 20.0, 90.0, "deg"),
+            Claim.less(
+                f"Figure {figure}: the tilt angle is five times as wrong",
+                extended,
+                tilt,
+                factor=0.2,
+            ),
+            Claim.less(
+                f"{motion}: the complete pose estimates ω poorly, above 0.3 rad/s",
+                0.3,
+                rate,
+                "rad/s",
+            ),
+            Claim.less(
+                f"{motion}: it does so because its acceleration does not return to zero",
+                returning,
+                rate,
+                "rad/s",
+                factor=0.5,
+            ),
+        ]
+    walk = {method: mean_of(rows, "rms", motion="planar-walk", method=method) for method in METHODS}
+    averaged = walk["mean, literal"] / walk["tilt"]
+    linear = max(values_of(rows, "largest", motion="planar-walk", method=LITERAL))
+    return [
+        *found,
+        Claim.within("Figure 3.12: averaging raw angles is close to the tilt angle", averaged, 0.8, 1.25, "times"),
+        Claim.less("Figure 3.12: the linear filter's error reaches half a turn", 170.0, linear),
     ]
 
 
 def planar(study: Study, report: Report) -> None:
-    """Figures 3.5 to 3.15."""
+    """Errors of figures 3.5 to 3.12."""
     seeds, duration = (2, 30.0) if study.quick else (10, DURATION)
     roots = [study.seed_of("planar", index) for index in range(seeds)]
     jobs = [(seed, motion, duration) for motion in MOTIONS for seed in roots]
@@ -224,15 +259,3 @@ def planar(study: Study, report: Report) -> None:
     report.table("Extended filter on the ∞ by R", planar_table(inflated, "R"), "R in (m/s²)².")
     difference = study.cached("unscented", unscented_difference, roots[0], "planar-walk")
     report.claims("Chapter 3: what holds here", claims(rows, inflated, difference))
-    for motion, number in (("planar-walk", "3.5 and 3.6"), ("infinity", "3.9 and 3.10")):
-        curves = study.cached(f"planar curves {motion}", planar_curves, roots[0], motion, duration)
-        figure, (ax,) = new_figure(7.5, 3.2)
-        for name in SHOWN:
-            faint = name == "tilt"
-            style: dict[str, Any] = {"linewidth": 0.5 if faint else 1.0, "alpha": 0.4 if faint else 1.0}
-            ax.plot(curves["time"], curves[name], label=name, zorder=1 if faint else 2, **style)
-        ax.set_ylim(-60.0, 60.0)
-        ax.set_xlabel("time, s")
-        ax.set_ylabel("error of the angle, °")
-        figure.legend(fontsize=7.5, ncols=3, loc="outside lower center")
-        report.figure(f"planar-{motion}", figure, f"Figures {number}: errors on {motion}", "Errors beyond 60° are cut.")

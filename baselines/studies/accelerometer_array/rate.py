@@ -71,6 +71,10 @@ SPEEDS = {"below 1 rad/s": 0.0, "1 to 3": 1.0, "3 to 6": 3.0, "above 6": 6.0}
 """Column → smallest |ω|, rad/s, of the range in which weights are averaged"""
 
 
+MOVING = 2.0
+"""rad/s from which on the direction of a rate is judged"""
+
+
 def estimator(method: str) -> Observer:
     """The estimator of that name; only the one with biases uses the white noise of 0.1 m/s²."""
     return Observer(ArrayRate(dt=1.0 / RATE, **{"bias_noise": 0.0, "accelerometer_noise": 0.1} | METHODS[method]))
@@ -86,7 +90,7 @@ def rate_errors(seed: int, errors: str, duration: float = DURATION) -> list[Row]
 
     Returns:
         A row for each of :data:`METHODS`: ``method``, ``errors``, ``seed``, ``rms``; ``weights`` (None unless
-        weighted).
+        weighted); and what :func:`over_time` gives.
     """
     trajectory, rows = shaken(seed, errors, duration), []
     truth = trajectory.truth["angular_rate"]
@@ -94,8 +98,20 @@ def rate_errors(seed: int, errors: str, duration: float = DURATION) -> list[Row]
         pose = run(estimator(method), trajectory.measurements).pose
         rms = float(metrics.rms(metrics.error(ANGULAR_RATE, pose[ANGULAR_RATE.name], truth)))
         weights = weights_by_speed(pose["array-rate/weights"], truth) if "array-rate/weights" in pose else None
-        rows.append({"method": method, "errors": errors, "seed": seed, "rms": rms, "weights": weights})
+        row = {"method": method, "errors": errors, "seed": seed, "rms": rms, "weights": weights}
+        rows.append(row | over_time(pose[ANGULAR_RATE.name], truth))
     return rows
+
+
+def over_time(found: np.ndarray, truth: np.ndarray) -> dict[str, float]:
+    """``reversed``: share of samples above :data:`MOVING` whose rate points the wrong way; ``growth``: of the error.
+
+    Growth is the RMS of the second half over that of the first.
+    """
+    moving = np.linalg.norm(truth, axis=-1) > MOVING
+    wrong = np.sum(found * truth, axis=-1) < 0.0
+    early, late = np.array_split(np.linalg.norm(found - truth, axis=-1), 2)
+    return {"reversed": float(wrong[moving].mean()), "growth": float(metrics.rms(late) / metrics.rms(early))}
 
 
 def weights_by_speed(weights: np.ndarray, truth: np.ndarray) -> dict[str, float | None]:
@@ -150,7 +166,16 @@ def claims(rows: list[Row]) -> list[Claim]:
     noise = "White noise of the data sheet alone explains less than a tenth of the published error"
     jacobian = "With white noise, the Jacobian at the integrated rate (ω_TI) is better than at the polynomial roots"
     weighted = {name: value for name, value in white_only.items() if name.startswith("weighted")}
+    wrong = {name: 100.0 * mean_of(rows, "reversed", method=name, errors=CALIBRATED) for name in METHODS}
+    growth_of = {
+        name: mean_of(rows, "growth", method=name, errors=CALIBRATED) for name in (DEFAULT, "Parsa", "polynomial roots")
+    }
+    integrated = mean["time integration"]
     return [
+        Claim.less("Figure 2.9: integration is useless, its error exceeds 10 rad/s", 10.0, integrated, "rad/s"),
+        Claim.less("Figure 2.10: polynomial roots point the wrong way at times", 0.1, wrong["polynomial roots"], "%"),
+        Claim.less("Figure 2.10: the weighted method hardly does", wrong[DEFAULT], 0.1, "% of samples"),
+        Claim.every("Figure 2.11: errors do not grow from the first to the second half", growth_of, 1.5, "×"),
         Claim.best("Table 2.1: the weighted method has the smallest error", "weighted", named, "rad/s"),
         Claim.ranked("Table 2.1: weighted before polynomial roots before Parsa", order, named, "rad/s"),
         Claim.within(published, mean[DEFAULT], min(thesis), max(thesis), "rad/s"),

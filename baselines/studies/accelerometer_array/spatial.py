@@ -31,7 +31,7 @@ from ....filters.imu.marins import Marins
 from ..claims import Claim
 from ..kit import Study
 from ..report import OVER_MOTIONS, Report
-from .figures import pointing_figures
+from .figures import motion_figure, pointing_figures
 from .tables import Row, grouped, mean_of, values_of
 
 RATE = 100.0
@@ -293,8 +293,8 @@ def claims(rows: list[Row]) -> list[Claim]:
     ]
 
 
-def spatial(study: Study, report: Report) -> None:
-    """Tables and figures of the pointing simulation."""
+def spatial(study: Study, report: Report) -> list[Row]:
+    """Tables and figures of the pointing simulation; returns the errors of every motion."""
     seeds, duration = (2, 30.0) if study.quick else (10, DURATION)
     roots = [study.seed_of("pointing", index) for index in range(seeds)]
     jobs: list[tuple[Any, ...]] = [("controller", seed, duration, 0.0, ()) for seed in roots]
@@ -324,6 +324,9 @@ def spatial(study: Study, report: Report) -> None:
     for device in METHODS:
         curves = study.cached(f"pointing curves {device}", attitude_curves, device, roots[0], duration)
         pointing_figures(report, device, curves)
+    first = pointed("controller", roots[0], min(duration, 30.0))
+    report.figure("pointing-motion", motion_figure(first), "Figures 5.3 to 5.5: path, profile of a move and readings")
+    return rows
 
 
 def _inclined(study: Study, report: Report, roots: list[int], duration: float) -> None:

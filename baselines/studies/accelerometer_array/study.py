@@ -6,13 +6,20 @@ Laval. A module for each chapter; what runs in other processes returns rows that
 
 from __future__ import annotations
 
+from ..coverage import cover
 from ..kit import Study
 from ..report import Report
 from .calibration import calibration
 from .comparison import comparison
+from .experiment import experiment
+from .items import ITEMS
 from .planar import planar
+from .planar_figures import planar_pictures
 from .rate import angular_rates
+from .rate_figures import rate_pictures
+from .rate_table import rate_table
 from .spatial import spatial
+from .virtual import virtual
 
 
 def reproduce(study: Study, report: Report) -> None:
@@ -21,11 +28,17 @@ def reproduce(study: Study, report: Report) -> None:
         "P. He: *Estimating the orientation of a game controller from inertial and magnetic measurements*, thesis, "
         "Université Laval. Equations are implemented as corrected; where print and correction differ in effect, both "
         "are shown. The thesis does not give all noises, the direction of the magnetic field, the acceleration of the "
-        "simulated hand, or the start: those here are stated in the docstrings. Its experiments (real shaking, Figures "
-        "5.18 to 5.21 and the experimental columns of Table 5.1) are of a real device and have no counterpart here."
+        "simulated hand, or the start: those here are stated in the docstrings. Its experiments are of a real device; "
+        "here "
+        "devices with the errors that a calibration leaves stand for them."
     )
     angular_rates(study, report)
+    rate_pictures(study, report)
     planar(study, report)
+    planar_pictures(study, report)
     calibration(study, report)
-    spatial(study, report)
+    rate_table(study, report)
+    experiment(study, report, spatial(study, report))
+    virtual(study, report)
     comparison(study, report)
+    cover(report, ITEMS)

@@ -112,6 +112,24 @@ def figure_5(seed: int) -> Figure:
     return figure
 
 
+def truth_figure(seed: int) -> Figure:
+    """Tests B and C: size of the external acceleration, true and estimated by modes 1 and 3, and the errors."""
+    figure, axes = new_figure(10.0, 5.5, 3, 2)
+    for column, test in enumerate("BC"):
+        trial = simulate(test, [seed])
+        true, time = trial.acceleration[:, 0], seconds(trial)
+        for row, mode in enumerate((1, 3)):
+            ax = axes[2 * row + column]
+            found = estimate(trial, published(mode))["external_acceleration"][:, 0]
+            label = f"‖a‖, mode {mode}, m/s²"
+            beside(ax, time, np.linalg.norm(found, axis=-1), np.linalg.norm(true, axis=-1), label)
+            color = OURS if mode == 1 else BAND
+            axes[4 + column].plot(time, np.linalg.norm(found - true, axis=-1), color=color, linewidth=0.8)
+        axes[column].set_title(f"test {test}", fontsize=10)
+        axes[4 + column].set(xlabel="time, s", ylabel="‖error‖, m/s²")
+    return figure
+
+
 def figure_6(seed: int) -> Figure:
     """Test C, mode 1: errors of attitude and external acceleration with the references."""
     trial = simulate("C", [seed])
@@ -162,6 +180,11 @@ FIGURES: dict[str, tuple[str, str, Callable[[int], Figure]]] = {
     ),
     "fig-4": ("Figure 4: test B, the three modes", "Solid: estimate, dashed: reference.", figure_4),
     "fig-5": ("Figure 5: test C, errors of the external acceleration", "", figure_5),
+    "truth": (
+        "External acceleration and truth over time",
+        "Solid: estimate, dashed: the true acceleration of the motion; below: errors of mode 1 (blue) and 3.",
+        truth_figure,
+    ),
     "fig-6": ("Figure 6: test C, errors of mode 1", "Solid: error, dashed: reference.", figure_6),
     "fig-7": ("Figure 7: roll of tests A and B against c_a", "Solid: estimate, dashed: reference.", figure_7),
 }

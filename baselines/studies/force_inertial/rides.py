@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Mapping
-from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -25,7 +24,8 @@ from ..report import Report
 from ..ride_study import MEAN, SETTLED, ZERO, Less, RideStudy, Variant
 from ..sensors import without_errors
 from ..signals import DEG
-from .states import from_the_truth, torques, true_states
+from .figures import course_figures
+from .states import from_the_truth, smoothed_torques, true_states
 
 ANGLES = ("φ_h", "θ", "φ", "φ_b")
 OURS, CELLS, SIMPLE = "this filter", "without load cells", "no pedals, no pelvis, sum of the hands"
@@ -99,13 +99,8 @@ def torque_numbers(
     model: ForceInertial, samples: dict[str, np.ndarray], truth: dict[str, np.ndarray], time: np.ndarray
 ) -> dict[str, dict[str, float]]:
     """What is read and what the two models predict, smoothed over 0.2 s: :data:`TORQUES` of each, N·m."""
-    read, dynamic = torques(model, samples, truth)
-    _, static = torques(replace(model, torque_model="static"), samples, truth)
     kept = (time >= 2.0) & (time <= time[-1] - 1.0)
-    named = {
-        name: np.stack([np.convolve(part[:, k], np.ones(10) / 10.0, "same")[kept] for k in (0, 1)], axis=-1)
-        for name, part in (("read", read), ("dynamic", dynamic), ("static", static))
-    }
+    named = {name: part[kept] for name, part in smoothed_torques(model, samples, truth).items()}
     numbers = {}
     for name, part in named.items():
         off = np.sqrt(np.mean((part - named["read"]) ** 2, axis=0)) if name != "read" else [np.nan, np.nan]
@@ -170,7 +165,8 @@ def rides(study: Study, report: Report) -> None:
         paths, every = RIDES.run(study, scenario, "force-inertial")
         mean = {name: mean_of(each["torques"][name] for each in every) for name in ("read", "dynamic", "static")}
         bound = mean_of(each["bound"] for each in every)
-        RIDES.report(report, scenario, every, claims(every, mean, bound))
+        drawn = course_figures(RIDES, report, paths, every, scenario)
+        RIDES.report(report, scenario, every, [*claims(every, mean, bound), *drawn])
         report.table(
             f"Lower bound, {scenario}, deg",
             [rounded(bound)],
@@ -182,7 +178,6 @@ def rides(study: Study, report: Report) -> None:
             [{"N·m": name, **rounded(torque, 1)} for name, torque in mean.items()],
             "Smoothed over 0.2 s. Means of all rides.",
         )
-        RIDES.figure(report, paths[0], f"Figure 6: angles of one ride, {scenario}")
 
 
 def claims(every: list[dict[str, Any]], torque: dict[str, dict[str, float]], bound: dict[str, float]) -> list[Claim]:
@@ -194,7 +189,10 @@ def claims(every: list[dict[str, Any]], torque: dict[str, dict[str, float]], bou
     }
     std, off = ({name: torque[name][f"τ_φh{label}"] for name in torque} for label in (" std", " − read, rms"))
     start = max(time for each in every for time in each["wrong start"])
+    others = max(error for angle, error in ours.items() if angle != "φ")
     return [
+        follows(every),
+        Claim.less("φ has the largest error of the four angles", others, ours["φ"], names=("another", "φ")),
         Claim.best("φ_b has the smallest error of the four angles", "φ_b", ours),
         Claim.less("With exact sensors φ_b is at its bound", exact["φ_b"], bound["φ_b"], factor=1.1),
         Claim.less("The bias model changes no angle by more than a fifth", change["no bias model"], 20.0, "%"),
@@ -204,3 +202,15 @@ def claims(every: list[dict[str, Any]], torque: dict[str, dict[str, float]], bou
         Claim.less("The dynamic torque lacks less than half of what is read", off["dynamic"], 0.5 * std["read"], "N·m"),
         Claim.less("φ_h that starts 35° off is right within 1° after 6 s at most", start, 6.0, "s"),
     ]
+
+
+def follows(every: list[dict[str, Any]]) -> Claim:
+    """Whether the trunk of each rider is estimated better than by the best constant of each ride."""
+    ratios = {}
+    for subject in dict.fromkeys(each["subject"] for each in every):
+        rides = [each for each in every if each["subject"] == subject]
+        ours, best = mean_rms(rides, OURS), mean_rms(rides, MEAN)
+        ratios |= {f"{angle} of rider {subject}": ours[angle] / best[angle] for angle in ANGLES[:3]}
+    return Claim.every(
+        "The filter follows every rider's trunk better than the best constant", ratios, 1.0, "of its error"
+    )

@@ -195,6 +195,13 @@ def claims(means: dict[tuple[str, str], dict[str, float]], slowest: dict[str, fl
         ):
             statement = f"{course}: {name} at least doubles the error of {angle}"
             found.append(Claim.less(statement, ours[angle], means[name, course][angle], factor=0.5))
+    published = means["as published, sign of (12) corrected", "indoor"]
+    raw, ours = means["same, (13) as published", "indoor"], means[exact, "indoor"]
+    statement = "indoor: the published (7), (8) are as good as the corrected form in φ_h"
+    found += [
+        Claim.less(statement, published["φ_h"], ours["φ_h"], factor=1.1),
+        Claim.less("indoor: (13) as published is as good in φ_b", raw["φ_b"], ours["φ_b"], factor=1.1),
+    ]
     found += [
         Claim.less(f"φ_h that starts 35° off is within 3° after 6 s at most: {label}", time, 6.0, "s")
         for label, time in slowest.items()

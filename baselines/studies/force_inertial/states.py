@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 from scipy.signal import lfilter
@@ -58,6 +59,19 @@ def torques(
     delta = states[:, 3] - states[:, 0]
     read = np.stack([N[0], np.cos(delta) * N[1] - np.sin(delta) * N[2]], axis=-1)
     return read, read - residual
+
+
+def smoothed_torques(
+    model: ForceInertial, measurements: Mapping[str, np.ndarray], truth: Mapping[str, np.ndarray]
+) -> dict[str, np.ndarray]:
+    """``read``, ``dynamic`` and ``static`` → torques ``(T, 2)`` of :func:`torques`, averaged over 0.2 s, N·m."""
+    read, dynamic = torques(model, measurements, truth)
+    _, static = torques(replace(model, torque_model="static"), measurements, truth)
+    kernel = np.ones(10) / 10.0
+    return {
+        name: np.stack([np.convolve(part[:, axis], kernel, "same") for axis in (0, 1)], axis=-1)
+        for name, part in (("read", read), ("dynamic", dynamic), ("static", static))
+    }
 
 
 def from_the_truth(

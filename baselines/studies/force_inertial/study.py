@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from ..coverage import cover
 from ..kit import Study
 from ..model_draws import within_bounds
 from ..report import Report
 from .consistency import ideal_consistency
+from .items import ITEMS
+from .observability import observability
+from .offsets import offsets
+from .parameters import table_i
 from .rides import rides
 from .simulation import simulations
 
@@ -17,13 +22,17 @@ def reproduce(study: Study, report: Report) -> None:
         "a six-axis force sensor and load cells under the saddle, and strain gauges on the handlebar. The paper gives "
         "neither the rider's masses nor any noise or tuning; what is used instead is in the filter's defaults."
     )
+    table_i(report)
     rides(study, report)
     simulations(study, report)
+    offsets(study, report)
+    observability(study, report)
     runs = 50 if study.quick else 100
     found = study.cached("consistency", ideal_consistency, runs, 6.0, study.seed)
     note = f"{runs} runs drawn from the model. Ratio to the degrees of freedom, and 95 % bounds of a consistent filter."
     report.claims("Consistency where the model is exact", within_bounds(found), note)
     report.text(LESSONS, "Where this filter differs from the published one, and why")
+    cover(report, ITEMS)
 
 
 LESSONS = """

@@ -12,16 +12,15 @@ from ....filters.bicycle.two_gyro.filter import TwoGyro
 from ....filters.bicycle.two_gyro.truth import true_angles
 from ....filters.core.kalman import KalmanFilter
 from ....filters.core.quantity import Estimate
-from ...plots import TRUTH_COLOR, legend_above, new_figure
 from ..averages import mean_of, rounded, windowed
 from ..claims import Claim
 from ..kit import Study
 from ..report import Report
-from ..ride_study import DRAWN, MEAN, SETTLED, ZERO
+from ..ride_study import MEAN, SETTLED, ZERO
 from ..sensors import without_errors
 from ..signals import DEG
+from .figures import fixture_figure
 from .rides import ALONE, RIDES
-from .simulation import with_band
 
 CHANNELS = ["bicycle_imu/gyr", "disk/gyr", "relative/distances", "relative/orientation"]
 FILTERS: dict[str, dict[str, Any]] = {
@@ -77,9 +76,8 @@ def fixture(study: Study, report: Report) -> None:
         "orientation has an alignment error of its own (1°). The push has no pitch at all.",
     )
     report.claims("Fixture: what the paper says, and what holds here", claims(means["paper"]))
-    report.figure(
-        "fixture", figure(pushes[0]), "Figures 6 to 8: one push", "Distances; thin: three standard deviations."
-    )
+    drawn = fixture_figure(pushes[0], estimates(pushes[0], pushes[0].measurements), RIDES, "distances")
+    report.figure("fixture", drawn, "Figures 6 to 8: one push", "Distances; thin: three standard deviations.")
 
 
 def claims(means: dict[str, dict[str, float]]) -> list[Claim]:
@@ -95,23 +93,3 @@ def claims(means: dict[str, dict[str, float]]) -> list[Claim]:
             Claim.less(f"{sensor}: Σ2 beats a roll of zero", ours, late[ZERO]),
         ]
     return [*found, Claim.best("The platform's gyroscope alone has the smallest error of the roll", ALONE, late)]
-
-
-def figure(push: Trajectory) -> Any:
-    """Error of the roll, and relative angles."""
-    truth, every = true_angles(push.truth, "disk"), estimates(push, push.measurements)
-    errors = {name: RIDES.errors(each.pose, truth) for name, each in every.items()}
-    drawn, axes = new_figure(7.5, 7.5, 4)
-    for name, color in zip((ALONE, "Σ1, distances", "Σ2, distances"), (*DRAWN[:2], DRAWN[-1]), strict=True):
-        with_band(axes[0], push.time, errors[name]["φ"], every[name], color, name)
-    axes[0].set(ylabel="error of φ, deg", ylim=(-15.0, 15.0))
-    for i, ax in enumerate(axes[1:]):
-        true = np.unwrap(truth["two-gyro/relative_angles"][:, i]) / DEG
-        ax.plot(push.time, true, color=TRUTH_COLOR, linewidth=1.2, label="truth")
-        error = errors["Σ2, distances"][f"θ{i + 1}"]
-        ax.plot(push.time, true + error, color=DRAWN[-1], linewidth=0.9, label="Σ2, distances")
-        ax.set_ylabel(f"θ{i + 1}, deg")
-    axes[-1].set_xlabel("time, s")
-    for ax in axes:
-        legend_above(ax)
-    return drawn

@@ -20,7 +20,7 @@ from ..averages import rounded, windowed
 from ..claims import Claim
 from ..kit import Study
 from ..report import Report
-from ..ride_study import DRAWN
+from ..ride_figures import DRAWN, with_band
 from ..signals import DEG
 from .motion import MOTIONS, Errors, filter_of, simulate
 from .rides import RIDES
@@ -299,14 +299,6 @@ def ideal_consistency(study: Study, report: Report) -> None:
         f"{count} runs of 20 s, errors of all states at the end, for each degree of freedom, with the 95 % bounds of "
         "chi-square.",
     )
-
-
-def with_band(ax: Any, time: np.ndarray, error: np.ndarray, estimate: Estimate, color: str, label: str) -> None:
-    """An error of φ, deg, within three of the filter's standard deviations."""
-    assert estimate.covariance is not None
-    band = 3.0 * np.sqrt(estimate.covariance[: len(time), 0, 0]) / DEG
-    ax.plot(time, error[: len(time)], color=color, linewidth=0.9, label=label)
-    ax.plot(time, np.stack([-band, band], axis=-1), color=color, linewidth=0.6, alpha=0.6)
 
 
 def roll_figure() -> Any:

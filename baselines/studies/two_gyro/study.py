@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from ..coverage import cover
 from ..kit import Study
 from ..report import Report
 from .bounds import bounds, observability
 from .fixture import fixture
+from .items import ITEMS
 from .rides import rides
+from .segway import segway
 from .simulation import ideal_consistency, simulations
 
 
@@ -23,3 +26,5 @@ def reproduce(study: Study, report: Report) -> None:
     ideal_consistency(study, report)
     fixture(study, report)
     rides(study, report)
+    segway(study, report)
+    cover(report, ITEMS)

@@ -68,6 +68,7 @@ class ExactRide:
         swivel: rad, standard deviation of how far elbows and knees stand off their plane, and of their slow wander.
         seed: of motion (and, with another stream, of sensors).
         bumps: (start, end) in s of shocks of 40 m/s² on the bicycle, or None.
+        constant_speed: m/s throughout, or None for the speeds of the course.
     """
 
     geometry: RiderGeometry
@@ -75,6 +76,7 @@ class ExactRide:
     swivel: float = math.radians(3.0)
     seed: int = 0
     bumps: tuple[float, float] | None = None
+    constant_speed: float | None = None
     functions: dict[str, Waves] = field(init=False, repr=False, compare=False)
     linkage: RiderLinkage = field(init=False, repr=False, compare=False)
 
@@ -100,6 +102,8 @@ class ExactRide:
             "steer": draw(0.26 if indoor else 0.0, 0.08 * still, 0.1, 0.6),
             "cadence": draw(5.0 * still, 0.6 * still, 0.02, 0.1),
         }
+        if self.constant_speed is not None:
+            functions["speed"] = Waves(self.constant_speed)
         for side in SIDES:
             for limb in ("arm", "leg"):
                 functions[f"{limb}_{side}"] = draw(self.swivel * rng.standard_normal(), self.swivel * still, 0.01, 0.05)

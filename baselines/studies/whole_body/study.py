@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from ..coverage import cover
 from ..kit import Study
 from ..report import Report
+from .items import ITEMS
 from .rides import bumps, rides
+from .sweep import sweep
 from .synthetic import synthetic
 
 
@@ -19,3 +22,5 @@ def reproduce(study: Study, report: Report) -> None:
     rides(study, report)
     bumps(study, report)
     synthetic(study, report)
+    sweep(study, report)
+    cover(report, ITEMS)

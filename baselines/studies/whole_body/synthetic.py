@@ -22,10 +22,11 @@ from ..kit import Study
 from ..model_draws import within_bounds
 from ..report import Report
 from ..ride_study import Variant
-from .angles import ANGLES, STATES, short
+from .angles import STATES, short
 from .consistency import consistencies
 from .motion import IDEAL, ExactRide, SensorErrors
 from .rides import NO_GUARD, PUBLISHED_FORMS, RIDES
+from .states import true_angles_state, true_states
 
 GEOMETRY = RiderGeometry()
 SEAT = {"seat_share": 1.0}
@@ -113,9 +114,9 @@ def start_scores(seed: int, offset: float, kind: str) -> dict[str, float]:
     signs = np.random.default_rng(seed).choice([-1.0, 1.0], ERROR_SIZE)
     signs[[1, 5, 6, 7]] = 0.0
     if kind == "every angle":
-        state.x[:ERROR_SIZE] = true_state(ride)[0] + math.radians(offset) * signs
+        state.x[:ERROR_SIZE] = true_angles_state(ride.truth)[0] + math.radians(offset) * signs
     else:
-        x = true_state(ride)[0] + math.radians(offset) * signs
+        x = true_angles_state(ride.truth)[0] + math.radians(offset) * signs
         state.x[ROLL], state.x[TRUNK] = x[ROLL], x[TRUNK]
         R, model = rotation.euler_matrix("zxy", x[TRUNK]), WholeBody.for_rider(GEOMETRY)
         for side in SIDES:
@@ -141,15 +142,6 @@ def bump_scores(seed: int) -> dict[str, dict[str, float]]:
     return found
 
 
-def true_state(ride: Trajectory) -> np.ndarray:
-    """Angles of the truth ``(T, 20)`` in the filter's order; accelerations are zero."""
-    truth, x = true_angles(ride.truth), np.zeros((len(ride), ERROR_SIZE))
-    for angle, index in STATES.items():
-        name, part = ANGLES[angle]
-        x[:, index] = truth[name][:, part]
-    return x
-
-
 def bound_scores(seed: int, duration: float = 15.0) -> dict[str, Any]:
     """Posterior Cramér–Rao bounds and errors of rides without biases and swivel, deg, for two sets of noises.
 
@@ -162,13 +154,7 @@ def bound_scores(seed: int, duration: float = 15.0) -> dict[str, Any]:
     read, found = {channel.name: ideal.measurements[channel.name] for channel in WholeBody.channels}, {}
     for name, noises in {"filter's noises": {}, "sensors' noises": SENSORS}.items():
         model = WholeBody.for_rider(GEOMETRY, **(TIGHT | noises))
-        x = np.zeros((len(ideal), model.state_size))
-        x[:, :ERROR_SIZE] = true_state(ideal)
-        prior = model.prior({channel: values[0] for channel, values in read.items()})[0]
-        x[0, ERROR_SIZE:] = prior[ERROR_SIZE:]
-        for k in range(1, len(ideal)):
-            z = {channel: values[k] for channel, values in read.items()}
-            x[k, ERROR_SIZE:] = model._remember(x[k - 1], z, model.rates(z)["bicycle_imu/gyr"])
+        x = true_states(model, read, ideal.truth)
         bound = np.degrees(np.sqrt(np.linalg.diagonal(posterior_bound(model, x, read))))
         estimate = RIDES.estimate(noisy, Variant(TIGHT | noises))
         assert estimate.covariance is not None

@@ -7,7 +7,7 @@ import pytest
 
 from poise.baselines.studies.averages import mean_of, mean_rms, windowed
 from poise.baselines.studies.report import Report
-from poise.baselines.studies.ride_study import MEAN, ZERO
+from poise.baselines.studies.ride_study import MEAN, ZERO, interval_of_mean
 from poise.baselines.studies.two_gyro.motion import MOTIONS, Errors, simulate
 from poise.baselines.studies.two_gyro.rides import RIDES, claims
 from poise.filters.bicycle.two_gyro.truth import true_angles
@@ -19,7 +19,8 @@ def fabricated(errors, length=60.0):
         name: {"settled": {"φ": value}, "last 20 s": {"φ": value, "θ1": value}} for name, value in errors.items()
     }
     consistency = {name: {"NEES": 1.0, "NIS": 9.0} for name in RIDES.checked}
-    return [{"name": "r", "length": length, "rms": windows, "peak": {"Σ2": {"φ": 4.0}}, "consistency": consistency}]
+    ride = {"name": "r", "length": length, "rms": windows, "peak": {"Σ2": {"φ": 4.0}}, "consistency": consistency}
+    return [ride | {"nees": {"φ": 2.5}, "bound": {"φ": 0.25}}]
 
 
 def verdicts(found):
@@ -41,6 +42,12 @@ def test_windows_include_their_ends_and_are_unknown_beyond_a_ride():
     assert windowed(errors, time, 0.0, 1.0)["a"] == pytest.approx(np.sqrt(12.5))
     assert np.isnan(windowed(errors, time, 5.0)["a"])
     assert mean_of([{"a": 1.0}, {"a": float("nan")}, {"a": 3.0}]) == {"a": 2.0}
+
+
+def test_the_interval_of_a_mean_is_student_s():
+    # t(0.975, 3) = 3.182, standard deviation 1.291, four values
+    assert interval_of_mean([1.0, 2.0, 3.0, 4.0]) == "2.5 (0.45 … 4.6)"
+    assert interval_of_mean([3.0]) == "3"
 
 
 def test_numbers_decide_claims():
@@ -75,11 +82,17 @@ def test_a_course_is_reported(tmp_path):
     titles = [entry.title for entry in report.entries]
     assert titles == [
         "Table I, indoor_circle",
+        "Skill, indoor_circle, RMS in deg",
         "Variants, indoor_circle, mean RMS in deg",
         "Where errors come from, indoor_circle, mean RMS in deg",
         "Drift, indoor_circle, mean RMS in deg",
         "Consistency, indoor_circle",
         "What holds, indoor_circle",
     ]
-    assert {row["filter"] for row in report.entries[1].rows} >= {"Σ2", ZERO, MEAN}
+    skill = {row["angle"]: row for row in report.entries[1].rows}
+    assert skill["φ"]["posterior bound"] == 0.25
+    assert skill["φ"]["NEES, 95 % interval"] == "2.5"
+    assert skill["φ"]["published"] == "0.72 ± 0.22"
+    assert skill["θ1"]["posterior bound"] is None
+    assert {row["filter"] for row in report.entries[2].rows} >= {"Σ2", ZERO, MEAN}
     assert len(report.results) == len(methods) * 4

@@ -79,7 +79,10 @@ def test_the_study_runs_and_says_what_it_must(tmp_path):
     recorded = tables["Recordings: inclination error, deg"]
     assert [row["trial"] for row in recorded] == [hand.name, "mean"]
     assert recorded[0]["bounded-motion"] < recorded[0]["mode 2"]
-    assert {path.name for path in (tmp_path / "run" / "figures").iterdir()} == {f"fig-{n}.png" for n in range(2, 8)}
+    assert {path.name for path in (tmp_path / "run" / "figures").iterdir()} == {
+        "truth.png",
+        *(f"fig-{n}.png" for n in range(2, 8)),
+    }
     assert len(report.results) == 18
     holds = {row["statement"]: row["holds"] for row in tables["What the paper says, and the inclination errors here"]}
     assert holds["Mode 2 fails in test B (more than three times mode 1)"]

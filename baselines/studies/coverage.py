@@ -1,0 +1,136 @@
+"""Coverage of a work: each of its tables, figures and statements with the verdict of a run.
+
+A work lists its :class:`Item` s as data. An item names the entries of the report that show it and the claims that
+decide it; the verdict is computed from them and is never written down.
+"""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from .claims import Claim
+from .report import Report
+
+TITLE = "Coverage"
+"""Title of the table in every report, and name of its file ``tables/coverage.csv``."""
+REPRODUCED, DIFFERS, IMPOSSIBLE = "reproduced", "differs", "cannot be answered"
+UNDECIDED, ABSENT = "undecided in this run", "not in this run"
+VERDICTS = (REPRODUCED, DIFFERS, IMPOSSIBLE, UNDECIDED, ABSENT)
+COLUMNS = ("item", "content", "verdict", "what decides", "shown in")
+Decided = tuple[str, str]
+"""Beginnings of the title of a table of claims and of a statement in it."""
+
+
+@dataclass(frozen=True)
+class Item:
+    """One table, figure or statement of a work."""
+
+    label: str
+    """such as ``Figure 15``; for a statement, where it is made"""
+    content: str
+    """what it shows or says"""
+    shown: tuple[str, ...] = ()
+    """beginnings of titles of the report's entries that show it"""
+    decided: tuple[Decided, ...] = ()
+    """claims that say what the item says; it is reproduced if all hold"""
+    causes: tuple[Decided, ...] = ()
+    """claims that explain a difference; those that hold are printed where the item differs"""
+    because: str = ""
+    """why no run can answer it, or the cause of a difference that no claim measures"""
+
+    def __post_init__(self) -> None:
+        if not (self.shown or self.decided or self.because):
+            raise ValueError(f"{self.label}: an item that nothing shows or decides needs a reason in 'because'")
+
+
+def verdict(item: Item, report: Report) -> dict[str, str]:
+    """Row of the coverage table: :data:`COLUMNS` → text."""
+    titles = [entry.title for entry in report.entries]
+    shown = [next((title for title in titles if title.startswith(start)), None) for start in item.shown]
+    found = [claim for key in item.decided for claim in claims_of(report, key)]
+    missing = any(title is None for title in shown) or any(not claims_of(report, key) for key in item.decided)
+    failed = [claim for claim in found if claim.holds is False]
+    reasons = [item.because] if item.because else []
+    if not (item.shown or item.decided):
+        result = IMPOSSIBLE
+    elif failed:
+        result = DIFFERS
+        causes = [claim for key in item.causes for claim in claims_of(report, key) if claim.holds]
+        reasons = [*map(said, failed), *(f"because: {said(claim)}" for claim in causes), *reasons]
+    elif missing:
+        result = ABSENT
+    elif any(claim.holds is None for claim in found):
+        result, reasons = UNDECIDED, [said(claim) for claim in found if claim.holds is None]
+    else:
+        result, reasons = REPRODUCED, [said(claim) for claim in found] or ["drawn; it states nothing"]
+    where = dict.fromkeys([*(title for title in shown if title), *(title for title, _ in item.decided)])
+    values = (item.label, item.content, result, "; ".join(reasons), "; ".join(where))
+    return dict(zip(COLUMNS, values, strict=True))
+
+
+def claims_of(report: Report, key: Decided) -> list[Claim]:
+    """Claims of the report whose table and statement begin so."""
+    title, statement = key
+    return [
+        claim
+        for name, claims in report.claimed.items()
+        if name.startswith(title)
+        for claim in claims
+        if claim.statement.startswith(statement)
+    ]
+
+
+def said(claim: Claim) -> str:
+    """A claim in one line: statement and number, with what the run found if it does not hold."""
+    return f"{claim.statement}: {claim.number}" + (" – does not hold" if claim.holds is False else "")
+
+
+def cover(report: Report, items: Sequence[Item]) -> None:
+    """Add the coverage table of a work at the end of its report."""
+    rows = [verdict(item, report) for item in items]
+    note = f"Of {len(rows)} tables, figures and statements: {counted(rows)}."
+    report.table(TITLE, rows, note)
+
+
+def counted(rows: Iterable[Mapping[str, str]]) -> str:
+    """How many rows have each verdict, in words."""
+    verdicts = [row["verdict"] for row in rows]
+    return ", ".join(f"{verdicts.count(name)} {name}" for name in VERDICTS if name in verdicts)
+
+
+def read(folder: Path) -> list[dict[str, str]]:
+    """Rows of the coverage table in the run folder of a work."""
+    with (folder / "tables" / f"{TITLE.lower()}.csv").open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def page(works: Mapping[str, Sequence[Mapping[str, Any]]], provenance: str) -> str:
+    """Markdown page of all works: how many items have each verdict, then a table for each work.
+
+    Args:
+        works: name of the work → rows of its table.
+        provenance: Markdown that says with what the numbers were computed.
+    """
+    every = [row for rows in works.values() for row in rows]
+    parts = [
+        "# Coverage of the five works",
+        "Each table, figure and statement of the five works, with the verdict of a run. *Reproduced*: the run shows it "
+        "and every claim that it makes holds. *Differs*: a claim does not hold; its number and, where the run measures "
+        "one, the cause follow. *Cannot be answered*: a simulator has no counterpart.",
+        f"{len(every)} items: {counted(every)}. The page is written by `poise reproduce all --page FILE`.",
+    ]
+    for work, rows in works.items():
+        parts += [f"## {work}", f"{counted(rows)[:1].upper()}{counted(rows)[1:]}."]
+        parts.append("\n".join(markdown(rows)))
+    return "\n\n".join([*parts, "## Provenance", provenance]) + "\n"
+
+
+def markdown(rows: Sequence[Mapping[str, str]]) -> list[str]:
+    """Lines of a table of four columns."""
+    columns = COLUMNS[:4]
+    lines = [f"| {' | '.join(columns)} |", f"|{' --- |' * len(columns)}"]
+    return [*lines, *(f"| {' | '.join(row[name].replace('|', chr(92) + '|') for name in columns)} |" for row in rows)]

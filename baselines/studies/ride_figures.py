@@ -1,0 +1,113 @@
+"""Figures of rides: angles of one ride, and errors of all riders over time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ...envs.data.trajectory import Trajectory
+from ...filters.core.quantity import Estimate
+from ..plots import TRUTH_COLOR, legend_above, new_figure
+from .claims import Claim
+from .report import Report
+from .ride_study import SETTLED, SPACING, RideStudy
+from .signals import DEG
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+DRAWN = ("#2c8c5a", "#c2571a", "#b08d1a", "#1f5fa8")
+"""Colours of the methods of a figure; the last is that of the study's filter, the one before that of integration."""
+
+
+def ride_figure(
+    study: RideStudy, report: Report, path: Path, title: str, angles: Sequence[str] | None = None
+) -> Trajectory:
+    """Angles of one ride, true and estimated; the scale is that of the truth and of the last method drawn.
+
+    Returns:
+        The ride.
+    """
+    ride, shown = study.load(path), list(angles or study.angles)
+    truth = study.truth(ride.truth)
+    errors = {name: study.errors(study.estimate(ride, study.variants[name]).pose, truth) for name in study.drawn}
+    figure, axes = new_figure(7.5, 0.6 + 1.9 * len(shown), len(shown))
+    for ax, angle in zip(axes, shown, strict=True):
+        curves = {name: error[angle] for name, error in errors.items() if angle in error}
+        draw_angle(ax, ride.time, true_angle(study, truth, angle), curves, angle)
+    axes[-1].set_xlabel("time, s")
+    report.figure(title, figure, title, SCALES)
+    return ride
+
+
+SCALES = "Scales are those of truth and filter; what drifts leaves the picture."
+
+
+def true_angle(study: RideStudy, truth: Mapping[str, np.ndarray], angle: str) -> np.ndarray:
+    """True angle ``(T,)`` of the paper, deg, without jumps."""
+    name, part = study.angles[angle]
+    return np.asarray(np.degrees(np.unwrap(truth[name][:, part])))
+
+
+def draw_angle(ax: Any, time: np.ndarray, true: np.ndarray, errors: Mapping[str, np.ndarray], label: str) -> None:
+    """The true angle and the estimates of some methods; the scale is that of the truth and of the last method."""
+    ax.plot(time, true, color=TRUTH_COLOR, linewidth=1.2, label="truth")
+    for (method, error), color in zip(errors.items(), DRAWN[-len(errors) :], strict=True):
+        ax.plot(time, true + error, color=color, linewidth=0.9, label=method)
+    scale = np.concatenate([true, true + list(errors.values())[-1]])
+    low, high = np.nanmin(scale), np.nanmax(scale)
+    margin = 0.25 * (high - low) + 1.0
+    ax.set(ylabel=f"{label}, deg", ylim=(low - margin, high + margin))
+    legend_above(ax)
+
+
+def with_band(
+    ax: Any, time: np.ndarray, error: np.ndarray, estimate: Estimate, color: str, label: str, state: int = 0
+) -> None:
+    """An error, deg, within three of the filter's standard deviations of that element of its state."""
+    assert estimate.covariance is not None
+    band = 3.0 * np.sqrt(estimate.covariance[: len(time), state, state]) / DEG
+    ax.plot(time, error[: len(time)], color=color, linewidth=0.9, label=label)
+    ax.plot(time, np.stack([-band, band], axis=-1), color=color, linewidth=0.6, alpha=0.6)
+
+
+def errors_over_time(results: Sequence[Mapping[str, Any]], angle: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Time (s), and mean and standard deviation of an error over all rides (deg), as far as the shortest ride goes."""
+    curves = [each["over time"][angle] for each in results]
+    length = min(map(len, curves))
+    values = np.array([curve[:length] for curve in curves])
+    deviation = values.std(axis=0, ddof=1) if len(values) > 1 else np.full(length, np.nan)
+    return SPACING * np.arange(length), values.mean(axis=0), deviation
+
+
+def spread_figure(results: Sequence[Mapping[str, Any]], angles: Sequence[str]) -> Figure:
+    """Mean over riders of the errors over time, and one standard deviation."""
+    figure, axes = new_figure(7.5, 0.6 + 1.5 * len(angles), len(angles))
+    for ax, angle in zip(axes, angles, strict=True):
+        time, mean, deviation = errors_over_time(results, angle)
+        ax.plot(time, mean, color=DRAWN[-1], linewidth=1.0)
+        ax.plot(time, np.stack([mean - deviation, mean + deviation], -1), "--", color=DRAWN[-1], linewidth=0.8)
+        ax.axhline(0.0, color=TRUTH_COLOR, linewidth=0.6)
+        ax.set_ylabel(f"error of {angle}, deg", fontsize=8.5)
+    axes[-1].set_xlabel("time, s (solid: mean over rides, dashed: one standard deviation)")
+    return figure
+
+
+def spread_claims(results: Sequence[Mapping[str, Any]], angles: Sequence[str], figure: str) -> list[Claim]:
+    """Whether errors lie around zero and do not grow, as a figure of mean and deviation over time says."""
+    centred, growth = {}, {}
+    for angle in angles:
+        time, mean, deviation = errors_over_time(results, angle)
+        settled, late = time >= SETTLED, time >= 0.5 * (SETTLED + time[-1])
+        early = settled & ~late
+        if early.any() and np.isfinite(deviation).all():
+            size = np.sqrt(np.mean(deviation[settled] ** 2))
+            centred[angle] = float(abs(mean[settled].mean()) / size)
+            growth[angle] = float(np.sqrt(np.mean(deviation[late] ** 2) / np.mean(deviation[early] ** 2)))
+    return [
+        Claim.every(f"{figure}: errors are around zero (mean below their standard deviation)", centred, 1.0, "of it"),
+        Claim.every(f"{figure}: standard deviations do not grow from the first to the second half", growth, 1.5, "×"),
+    ]

@@ -1,0 +1,141 @@
+"""Figure 7 of the whole-body paper: rider and bicycle in three dimensions, true and estimated, as picture and film."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ....envs.data.trajectory import Trajectory
+from ....filters.bicycle.geometry import RiderGeometry
+from ....filters.bicycle.whole_body.linkage import true_angles
+from ...plots import new_spatial_figure
+from ..claims import Claim
+from ..report import Report
+from ..ride_study import SETTLED, RideStudy
+from .skeleton import skeleton
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+TRUE, FOUND = "#1f5fa8", "#c2571a"
+SNAPSHOTS, APART = 5, 0.5
+"""snapshots of figure 7, and s between them, as in the paper"""
+FILM, FRAME = 4.0, 0.1
+"""s: length of the film, and time from frame to frame"""
+LIMITS = ((-0.45, 1.45), (-0.7, 0.7), (0.0, 1.75))
+"""m: x, y, z of the picture"""
+ELEVATION, AZIMUTH = 14.0, -62.0
+"""deg: seen from behind on the left"""
+JOINTS = {
+    "shoulder": (("arm right", 0), ("arm left", 0)),
+    "elbow": (("arm right", 1), ("arm left", 1)),
+    "knee": (("leg right", 1), ("leg left", 1)),
+    "head": (("trunk", 3),),
+}
+"""Joint → line and number of its points"""
+
+
+class Reconstruction:
+    """Skeletons of one ride, true and estimated."""
+
+    def __init__(self, study: RideStudy, path: Path) -> None:
+        self.ride: Trajectory = study.load(path)
+        self.geometry = RiderGeometry.of(self.ride.metadata)
+        self.truth = true_angles(self.ride.truth)
+        self.found = dict(study.estimate(self.ride, next(iter(study.variants.values()))).pose)
+
+    def at(self, time: float) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
+        """Lines of the true and of the estimated rider at a time, s, in the frame R.
+
+        Both have the bicycle's true steering and crank angle, which no filter estimates.
+        """
+        index = min(int(np.searchsorted(self.ride.time, time - 1e-9)), len(self.ride) - 1)
+        steer, crank = (self.ride.truth[f"bicycle/{name}"][index] for name in ("steer", "crank"))
+
+        def lines(pose: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+            return skeleton(self.geometry, {name: values[index] for name, values in pose.items()}, steer, crank)
+
+        return lines(self.truth), lines(self.found)
+
+    def begin(self, length: float) -> float:
+        """Time, s, from which on a span of this length is shown: settled if the ride is long enough."""
+        return min(2.0 * SETTLED, max(0.0, float(self.ride.time[-1]) - length))
+
+    def distances(self, every: float = 0.1) -> dict[str, float]:
+        """Joint → RMS distance between its estimated and its true place, both sides, cm."""
+        squares: dict[str, list[float]] = {name: [] for name in JOINTS}
+        for time in np.arange(min(SETTLED, 0.5 * self.ride.time[-1]), self.ride.time[-1], every):
+            true, found = self.at(float(time))
+            for name, points in JOINTS.items():
+                squares[name] += [float(np.sum((true[line][k] - found[line][k]) ** 2)) for line, k in points]
+        return {name: 100.0 * float(np.sqrt(np.mean(values))) for name, values in squares.items()}
+
+
+def draw(ax: Any, lines: Mapping[str, np.ndarray], color: str, width: float = 1.6, alpha: float = 1.0) -> None:
+    """Lines with dots at the rider's joints."""
+    for name, points in lines.items():
+        rider = name.split()[0] in ("trunk", "shoulders", "arm", "leg")
+        style = {"marker": "o", "markersize": 2.4} if rider else {}
+        ax.plot(*points.T, color=color, linewidth=width if rider else 0.6 * width, alpha=alpha, **style)
+    if "trunk" in lines:
+        ax.plot(*lines["trunk"][-1:].T, marker="o", markersize=9, color=color, alpha=alpha)
+
+
+def dress(ax: Any, title: str) -> None:
+    """Limits, view and labels of a picture in space."""
+    for axis, (low, high) in zip("xyz", LIMITS, strict=True):
+        getattr(ax, f"set_{axis}lim")(low, high)
+    ax.set_box_aspect([high - low for low, high in LIMITS], zoom=1.25)
+    ax.view_init(ELEVATION, AZIMUTH)
+    ax.set_title(title, fontsize=9, y=0.97)
+    ax.tick_params(labelsize=6, pad=-3)
+    ax.set_yticks((-0.5, 0.0, 0.5))
+    ax.set_xticks((0.0, 0.5, 1.0))
+    ax.set_zticks((0.0, 0.5, 1.0, 1.5))
+
+
+def snapshots(scene: Reconstruction) -> Figure:
+    """Truth above, estimate (with the truth pale behind it) below, at five moments."""
+    figure, axes = new_spatial_figure(11.0, 5.2, 2, SNAPSHOTS)
+    begin = scene.begin(SNAPSHOTS * APART)
+    for k in range(SNAPSHOTS):
+        time = begin + k * APART
+        true, found = scene.at(time)
+        draw(axes[k], true, TRUE)
+        dress(axes[k], f"truth, {time:.1f} s")
+        draw(axes[SNAPSHOTS + k], true, TRUE, 1.0, 0.3)
+        draw(axes[SNAPSHOTS + k], found, FOUND)
+        dress(axes[SNAPSHOTS + k], "estimate")
+    return figure
+
+
+def frames(scene: Reconstruction) -> list[Figure]:
+    """Pictures of the film: truth on the left, estimate on the right."""
+    pictures = []
+    begin = scene.begin(FILM)
+    for time in begin + np.arange(0.0, min(FILM, float(scene.ride.time[-1])), FRAME):
+        figure, axes = new_spatial_figure(6.4, 3.6, 1, 2, dpi=80)
+        true, found = scene.at(float(time))
+        draw(axes[0], true, TRUE)
+        dress(axes[0], f"truth, {time:.1f} s")
+        draw(axes[1], true, TRUE, 1.0, 0.3)
+        draw(axes[1], found, FOUND)
+        dress(axes[1], "estimate")
+        pictures.append(figure)
+    return pictures
+
+
+def reconstruction(study: RideStudy, report: Report, path: Path, course: str) -> list[Claim]:
+    """Picture and film of one ride; how far estimated joints are from the true ones."""
+    scene = Reconstruction(study, path)
+    note = (
+        "Blue: truth. Orange: estimate. Metres, in the frame that turns with the bicycle; steering and crank are true."
+    )
+    report.figure(f"figure-7-{course}", snapshots(scene), f"Figure 7: rider and bicycle in space, {course}", note)
+    title = f"Figure 7: {FILM:g} s of the same ride as a film, {course}"
+    report.animation(f"figure-7-film-{course}", frames(scene), FRAME, title)
+    distances = scene.distances()
+    return [Claim.every("Figure 7: every joint is where it truly is, within 5 cm", distances, 5.0, "cm")]

@@ -1,0 +1,83 @@
+"""Coverage of a work: verdicts follow from entries and claims of a report."""
+
+from __future__ import annotations
+
+import importlib
+
+import pytest
+
+from poise.baselines.studies import PAPERS, coverage
+from poise.baselines.studies.claims import Claim
+from poise.baselines.studies.coverage import Item, cover, page, read, verdict
+from poise.baselines.studies.report import Report
+
+
+@pytest.fixture
+def report(tmp_path):
+    report = Report(tmp_path)
+    report.text("numbers", "Table I, indoors")
+    report.claims(
+        "What holds",
+        [
+            Claim("It does not drift", "0.1 deg", True),
+            Claim("It beats zero", "2 against 1 deg", False),
+            Claim("It is late in a short ride", "–", None),
+            Claim("The camera is off", "by 1 deg", True),
+        ],
+    )
+    return report
+
+
+@pytest.mark.parametrize(
+    ("item", "expected", "text"),
+    [
+        (Item("Figure 1", "a picture", because="it shows no result"), "cannot be answered", "it shows no result"),
+        (Item("Table I", "errors", ("Table I",)), "reproduced", "drawn"),
+        (Item("Table I", "drift", ("Table I",), (("What", "It does not drift"),)), "reproduced", "0.1 deg"),
+        (Item("Table I", "skill", (), (("What", "It beats zero"),)), "differs", "does not hold"),
+        (Item("Table I", "late", (), (("What", "It is late"),)), "undecided in this run", "–"),
+        (Item("Table II", "more", ("Table II",)), "not in this run", ""),
+        (Item("Table II", "more", (), (("What", "Nobody says so"),)), "not in this run", ""),
+    ],
+)
+def test_a_verdict_follows_from_entries_and_claims(report, item, expected, text):
+    row = verdict(item, report)
+    assert row["verdict"] == expected
+    assert text in row["what decides"]
+
+
+def test_a_difference_has_its_number_and_the_causes_that_hold(report):
+    causes = (("What", "The camera"), ("What", "It is late"))
+    item = Item("Table I", "skill", ("Table I",), (("What", "It beats"),), causes, "the course is short")
+    row = verdict(item, report)
+    assert row["what decides"] == (
+        "It beats zero: 2 against 1 deg – does not hold; because: The camera is off: by 1 deg; the course is short"
+    )
+    assert row["shown in"] == "Table I, indoors; What"
+
+
+def test_an_item_that_nothing_answers_needs_a_reason():
+    with pytest.raises(ValueError, match="Figure 3: an item that nothing shows or decides needs a reason"):
+        Item("Figure 3", "curves")
+
+
+def test_the_page_has_every_row(report, tmp_path):
+    items = (Item("Figure 1", "a | b", because="none"), Item("Table I", "errors", ("Table I",)))
+    cover(report, items)
+    rows = read(tmp_path)
+    assert [row["item"] for row in rows] == ["Figure 1", "Table I"]
+    text = page({"small": rows}, "- seed 0")
+    assert "2 items: 1 reproduced, 1 cannot be answered" in text
+    assert "| Figure 1 | a \\| b | cannot be answered | none |" in text
+    assert text.endswith("- seed 0\n")
+
+
+@pytest.mark.parametrize("paper", PAPERS)
+def test_items_of_a_paper_are_told_apart(paper):
+    module = importlib.import_module(PAPERS[paper].replace(".study", ".items"), "poise.baselines.studies")
+    names = [(item.label, item.content) for item in module.ITEMS]
+    assert len(names) == len(set(names)) > 10
+    assert all(
+        isinstance(start, str) for item in module.ITEMS for key in (*item.decided, *item.causes) for start in key
+    )
+    assert coverage.TITLE == "Coverage"
