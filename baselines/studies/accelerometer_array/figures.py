@@ -11,7 +11,7 @@ from ....envs.data.trajectory import Trajectory
 from ....envs.sensors.ideal import STANDARD_GRAVITY
 from ....filters.arrays.spatial.pointing import pointing_angles
 from ....filters.core import rotation
-from ...plots import TRUTH_COLOR, new_figure
+from ...plots import TRUTH_COLOR, legend_above, new_figure
 from ..report import Report
 
 LINES = ("#1f5fa8", "#c2571a", "#2c8c5a", "#b08d1a", "#7a4fa3", "#6d737c", "#b03060")
@@ -19,33 +19,39 @@ NUMBERS = {"controller": ("5.6 and 5.7", "5.8"), "octa": ("5.9 and 5.10", "5.11"
 """Device → numbers of its figures: errors over time, path"""
 
 
-def motion_figure(trajectory: Trajectory, seconds: float = 10.0) -> Any:
-    """Where a controller points (5.3), the profile of one move (5.4), and one reading of each sensor (5.5)."""
-    figure, axes = new_figure(9.0, 5.4, 2, 3)
-    for ax in axes:
-        # every panel has its own scale of time or angle
-        ax.tick_params(labelbottom=True)
+def move_figure(trajectory: Trajectory) -> Any:
+    """Where a controller points (5.3), and the profile of one move (5.4)."""
+    figure, axes = new_figure(7.5, 3.2, 1, 2)
     pitch, azimuth = (np.degrees(angle) for angle in pointing_angles(trajectory.truth["orientation"]))
     axes[0].plot(azimuth, pitch, color=TRUTH_COLOR, linewidth=0.7)
     axes[0].set(xlabel="azimuth, deg", ylabel="pitch, deg", title="path")
     u = np.linspace(0.0, 1.0, 101)
     axes[1].plot(u, 6.0 * u**5 - 15.0 * u**4 + 10.0 * u**3, color=TRUTH_COLOR)
     axes[1].set(xlabel="share of the time", ylabel="share of the angle", title="a move")
+    return figure
+
+
+def readings_figure(trajectory: Trajectory, seconds: float = 10.0) -> Any:
+    """One reading of each sensor, with and without noise (5.5)."""
+    figure, axes = new_figure(7.5, 5.0, 3)
     part = trajectory.time <= seconds
     q, time = trajectory.truth["orientation"][part], trajectory.time[part]
     truth = {name: trajectory.truth[name][part] for name in ("external_acceleration", "angular_rate")}
-    up = rotation.up_in_body(q)
+    # the first accelerometer lies off the reference point; what rotation adds there is small beside gravity
+    force = truth["external_acceleration"][:, 0] + STANDARD_GRAVITY * rotation.up_in_body(q)[:, 0]
+    north = rotation.rotate_back(q, np.array([0.0, 1.0, 0.0]))[:, 1]
+    strength = float(np.linalg.norm(trajectory.measurements["imu/mag"], axis=-1).mean())
     signals = (
-        ("array/acc", 0, truth["external_acceleration"][:, 0] + STANDARD_GRAVITY * up[:, 0], "a_x, m/s²"),
+        ("array/acc", 0, force, "a_x, m/s²"),
         ("imu/gyr", 0, truth["angular_rate"][:, 0], "ω_x, rad/s"),
-        ("imu/mag", 1, None, "m_y, µT"),
+        ("imu/mag", 1, strength * north, "m_y, µT"),
     )
-    for ax, (channel, index, clean, label) in zip(axes[2:5], signals, strict=True):
-        ax.plot(time, trajectory.measurements[channel][part][:, index], color=LINES[0], linewidth=0.6)
-        if clean is not None:
-            ax.plot(time, clean, color=TRUTH_COLOR, linewidth=0.8)
-        ax.set(xlabel="time, s", ylabel=label)
-    axes[5].set_axis_off()
+    for ax, (channel, index, clean, label) in zip(axes, signals, strict=True):
+        ax.plot(time, trajectory.measurements[channel][part][:, index], color=LINES[0], linewidth=0.6, label="reading")
+        ax.plot(time, clean, color=TRUTH_COLOR, linewidth=0.8, label="true")
+        ax.set_ylabel(label)
+    legend_above(axes[0])
+    axes[-1].set_xlabel("time, s")
     return figure
 
 

@@ -145,7 +145,7 @@ ITEMS = (
         "Appendix B", "(B.4) is a rotation", decided=((FOUR, "Appendix B"),), because="its determinant is −1: a mirror"
     ),
     Item("Figures 5.1, 5.2, 5.12 to 5.17, 5.23", "block diagrams, photographs, windows", because="they show no result"),
-    Item("Figures 5.3, 5.4, 5.5", "targets, profile of a move, readings", shown=("Figures 5.3 to 5.5",)),
+    Item("Figures 5.3, 5.4, 5.5", "targets, profile of a move, readings", shown=("Figures 5.3 and 5.4", "Figure 5.5")),
     Item(
         "Figures 5.6, 5.7",
         "controller: errors within ±3°, tilt and Marins large",

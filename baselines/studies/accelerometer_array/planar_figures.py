@@ -41,7 +41,7 @@ def planar_curves(seed: int, motion: str, duration: float) -> dict[str, Any]:
     """
     trajectory = moved(seed, motion, duration)
     truth = trajectory.truth
-    angle = truth[PLANAR_ANGLE.name][:, 0]
+    angle = np.unwrap(truth[PLANAR_ANGLE.name][:, 0])
     curves: dict[str, Any] = {
         "time": trajectory.time.tolist(),
         "path": truth["planar/position"].tolist(),
@@ -73,7 +73,7 @@ def planar_figures(report: Report, motion: str, curves: Mapping[str, Any], clean
     """Path, readings, estimates, errors, and the rate of the complete pose."""
     numbers, time = NUMBERS[motion], np.array(curves["time"])
     report.figure(f"path-{motion}", path_figure(curves["path"]), f"Figure {numbers['path']}: path, {motion}")
-    part = time <= WINDOW
+    part = (time >= 2.0) & (time <= 3.0)
     figure, (ax,) = new_figure(7.5, 2.6)
     ax.plot(time[part], np.array(curves["reading"])[part], color=DRAWN[-1], linewidth=0.8, label="with noise")
     ax.plot(time[part], np.array(clean)[part], color=TRUTH_COLOR, linewidth=0.8, label="true")
@@ -147,7 +147,8 @@ def draw_angles(ax: Any, time: np.ndarray, curves: Mapping[str, Any], methods: S
     for method, color in zip(methods, DRAWN[-len(methods) :], strict=True):
         last = method == methods[-1]
         values = np.array(curves["estimates"][method])[part]
-        ax.plot(time, values, color=color, linewidth=0.9 if last else 0.6, alpha=1.0 if last else 0.7, label=method)
+        style = {"linewidth": 0.4, "alpha": 0.35} if method == "tilt" else {"linewidth": 1.0 if last else 0.8}
+        ax.plot(time, values, color=color, label=method, **style)
     ax.set_ylabel("φ, deg")
 
 
@@ -163,5 +164,7 @@ def error_figure(time: np.ndarray, errors: Mapping[str, Any], methods: Sequence[
 def draw_errors(ax: Any, time: np.ndarray, errors: Mapping[str, Any], methods: Sequence[str], limit: float) -> None:
     """Errors by method, the last on top."""
     for method, color in zip(methods, DRAWN[-len(methods) :], strict=True):
-        ax.plot(time[::EVERY], errors[method][::EVERY], color=color, linewidth=0.8, label=method)
+        # the tilt angle jumps from sample to sample and would cover the others
+        style = {"linewidth": 0.4, "alpha": 0.35} if method == "tilt" else {"linewidth": 0.9}
+        ax.plot(time[::EVERY], errors[method][::EVERY], color=color, label=method, **style)
     ax.set(ylabel="error of φ, deg", ylim=(-limit, limit))

@@ -31,7 +31,7 @@ from ....filters.imu.marins import Marins
 from ..claims import Claim
 from ..kit import Study
 from ..report import OVER_MOTIONS, Report
-from .figures import motion_figure, pointing_figures
+from .figures import move_figure, pointing_figures, readings_figure
 from .tables import Row, grouped, mean_of, values_of
 
 RATE = 100.0
@@ -325,7 +325,8 @@ def spatial(study: Study, report: Report) -> list[Row]:
         curves = study.cached(f"pointing curves {device}", attitude_curves, device, roots[0], duration)
         pointing_figures(report, device, curves)
     first = pointed("controller", roots[0], min(duration, 30.0))
-    report.figure("pointing-motion", motion_figure(first), "Figures 5.3 to 5.5: path, profile of a move and readings")
+    report.figure("pointing-path", move_figure(first), "Figures 5.3 and 5.4: path and profile of a move")
+    report.figure("pointing-readings", readings_figure(first), "Figure 5.5: readings with and without noise")
     return rows
 
 

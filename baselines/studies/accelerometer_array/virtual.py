@@ -28,8 +28,8 @@ DURATION = 40.0
 """s"""
 AZIMUTH, ELEVATION = -37.5, 30.0
 """deg: view of the thesis' window"""
-BOX = np.array([0.04, 0.30, 0.04])
-"""m: the controller"""
+BOX = np.array([0.06, 0.30, 0.06])
+"""m: the controller, a little thicker than it is"""
 SHOWN = (0.0, 0.75, 1.5, 2.25)
 """s after the begin of the picture"""
 UNDAMPED = 1e-6
@@ -82,6 +82,8 @@ def controller_figure(seed: int) -> Any:
         ("true", trajectory.truth["orientation"], place, TRUTH_COLOR),
         ("virtual", estimate.pose["orientation"], estimate.pose["virtual_position"], DRAWN[-1]),
     )
+    part = slice(round(10.0 * RATE), round((10.0 + SHOWN[-1]) * RATE) + 1)
+    limit = 0.2 + max(float(np.abs(each[part]).max()) for _, _, each, _ in rows)
     for row, (name, orientation, position, color) in enumerate(rows):
         for column, after in enumerate(SHOWN):
             ax, k = axes[row * len(SHOWN) + column], round((10.0 + after) * RATE)
@@ -89,10 +91,11 @@ def controller_figure(seed: int) -> Any:
             ax.plot(*points.T, color=color, linewidth=1.2)
             tip = rotation.rotate(orientation[k], np.array([[0.0, 0.0, 0.0], [0.0, 0.25, 0.0]])) + position[k]
             ax.plot(*tip.T, color=DRAWN[1], linewidth=1.0)
-            ax.set(xlim=(-0.35, 0.35), ylim=(-0.35, 0.35), zlim=(-0.35, 0.35))
+            ax.set(xlim=(-limit, limit), ylim=(-limit, limit), zlim=(-limit, limit))
             ax.view_init(ELEVATION, AZIMUTH)
+            ax.set_box_aspect((1.0, 1.0, 1.0), zoom=1.1)
             ax.tick_params(labelsize=6, pad=-3)
-            ax.set_title(f"{name}, {10.0 + after:g} s", fontsize=9)
+            ax.set_title(f"{name}, {10.0 + after:g} s", fontsize=9, y=0.98)
     return figure
 
 

@@ -70,7 +70,8 @@ def torque_figure(study: RideStudy, path: Path, begin: float = 5.0, seconds: flo
     named = smoothed_torques(model, samples, dict(study.truth(ride.truth)))
     figure, axes = new_figure(7.5, 4.6, 2)
     start = min(begin, 0.25 * float(ride.time[-1]))
-    part = (ride.time >= start) & (ride.time <= start + seconds)
+    # averages over 0.2 s do not reach to the end
+    part = (ride.time >= start) & (ride.time <= min(start + seconds, ride.time[-1] - 0.2))
     colors = {"read": TRUTH_COLOR, "static": DRAWN[1], "dynamic": DRAWN[-1]}
     for index, (ax, label) in enumerate(zip(axes, ("τ_φh, N·m", "τ_θ, N·m"), strict=True)):
         for name, color in colors.items():

@@ -95,7 +95,8 @@ def test_the_section_has_its_tables_and_figures(study, monkeypatch, tmp_path):
         "Figure 5.8",
         "Figures 5.9 and 5.10",
         "Figure 5.11",
-        "Figures 5.3 to 5.5",
+        "Figures 5.3 and 5.4",
+        "Figure 5.5",
     ]
     compared = report.entries[0].rows
     assert len(compared) == 12
