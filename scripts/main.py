@@ -22,6 +22,7 @@ from gymnasium.error import UnregisteredEnv
 
 from ..filters.support.names import unknown
 from ..filters.support.optional import MissingExtraError, extra
+from ..filters.support.parallel import BACKENDS, on_backend
 from ..filters.support.version import poise_version
 
 USAGE_ERROR = 2
@@ -73,8 +74,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     words = list(sys.argv[1:] if argv is None else argv)
     debug = "--debug" in words or os.environ.get("POISE_DEBUG", "0") not in ("", "0")
     try:
-        with extra():
-            status = dispatch([word for word in words if word != "--debug"])
+        words, backend = without_backend([word for word in words if word != "--debug"])
+        with extra(), on_backend(backend) if backend else contextlib.nullcontext():
+            status = dispatch(words)
         # Here rather than at exit, where a reader that left could not be handled.
         sys.stdout.flush()
         return status
@@ -90,6 +92,21 @@ def main(argv: Sequence[str] | None = None) -> int:
         if debug:
             raise
         return fail(f"{one_line(error)} (--debug shows where)")
+
+
+def without_backend(words: list[str]) -> tuple[list[str], str]:
+    """``words`` without ``--backend NAME``, and NAME, by default ``POISE_BACKEND``; empty: processes of this machine.
+
+    Raises:
+        ValueError: no name follows ``--backend``.
+    """
+    words = [part for word in words for part in (word.split("=", 1) if word.startswith("--backend=") else (word,))]
+    if "--backend" not in words:
+        return words, os.environ.get("POISE_BACKEND", "")
+    place = words.index("--backend")
+    if place + 1 == len(words):
+        raise ValueError(f"--backend needs one of {', '.join(BACKENDS)}")
+    return words[:place] + words[place + 2 :], words[place + 1]
 
 
 def dispatch(words: Sequence[str]) -> int:
@@ -155,6 +172,7 @@ def usage() -> str:
             "  -h, --help  this text; `poise COMMAND --help` explains a command",
             "  --version   the version",
             "  --debug     show the traceback of an error (also POISE_DEBUG=1)",
+            "  --backend   loky, dask or ray: what runs parallel jobs (also POISE_BACKEND)",
         ]
     )
 
