@@ -52,6 +52,7 @@ COMMANDS: dict[str, Command] = {
         ".realism", "compare simulated motion with recordings and publications: how true simulators are"
     ),
     "train": Command(".train", "train a learned estimator"),
+    "export": Command(".export", "write a trained network as a file of ONNX, for programs without Python"),
     "tune": Command(".tune", "fit the gains of a filter: constant ones, or a policy that sets them"),
     "inspect": Command(".recordings.inspect", "what a recording holds; whether units, signs and clock are plausible"),
     "recommend": Command(".recordings.recommend", "which estimator suits a recording, by errors on similar ones"),
