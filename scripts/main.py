@@ -59,7 +59,9 @@ COMMANDS: dict[str, Command] = {
     "estimate": Command(".recordings.estimate", "angles, quaternions, standard deviations of a recording, as a file"),
     "evaluate": Command(".recordings.evaluate", "measure estimators on recorded trajectories"),
     "stream": Command(".live.stream", "estimate sample by sample while lines of samples arrive: stdin, serial, UDP"),
-    "calibrate": Command(".calibrate", "scale, offset and axes of raw sensors, from rate-table and tumbling runs"),
+    "calibrate": Command(
+        ".recordings.calibrate", "scale, offset and axes of raw sensors, from rate-table and tumbling runs"
+    ),
     "array": Command(".array", "analyse an array of accelerometers: rank and noise gains"),
     "benchmark": Command(".benchmark", "compare all estimators on simulated motion and on recordings"),
     "reproduce": Command(".reproduce", "reproduce the study of a paper: its tables and figures beside ours"),
