@@ -2,7 +2,8 @@
 
 A file holds one graph,
 
-    features ``(batch, updates, F)``, memory ``(batch, M)`` → output ``(batch, updates, O)``, memory_after ``(batch, M)``
+    features ``(batch, updates, F)``, memory ``(batch, M)``
+    → output ``(batch, updates, O)``, memory_after ``(batch, M)``
 
 all float32, the memory zero before the first update. One update at a time, with the memory handed on, gives what all
 at once do. The card of the weights, with what the features are and what the output means, is in the metadata
