@@ -54,7 +54,7 @@ def on_backend(name: str, processes: int = 2) -> Iterator[None]:
 
     with extra("cluster"):
         if name == "dask":
-            from distributed import Client
+            from dask.distributed import Client
 
             # one thread a worker, since compiled filters have their own
             address = os.environ.get("DASK_SCHEDULER_ADDRESS")
