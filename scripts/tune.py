@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from ..baselines.gain_policy.policy import GainPolicy
     from ..envs.data.trajectory import Trajectory
     from ..filters.adaptation.tuned import TunedFilter
+    from ..filters.core.quantity import Quantity
 
 QUICK_STEPS = 100_000
 """Decisions with ``--preset quick``."""
@@ -67,6 +68,7 @@ def run(args: Args) -> int:
     """Tune, compare with the published tuning and the best constant gains, and write what was found."""
     from ..baselines.gain_policy.constant_gains import best_constant_gains
     from ..baselines.gain_policy.policy import GainPolicy
+    from ..envs.gain_reward import scored_quantity
     from ..filters.adaptation.gains import tunable_filter
     from ..filters.adaptation.tuned import TunedFilter
 
@@ -80,7 +82,7 @@ def run(args: Args) -> int:
     with Output("tune", args) as out:
         motions = config.motions.draw_many(config.seed, min(config.trajectories, 48))
         out.say(f"searching constant gains of {args.filter} on {len(motions)} trajectories")
-        samples, refinements = (64, 60) if args.preset == "shipped" else (16, 20)
+        samples, refinements = (config.gain_search,) * 2 if args.preset == "shipped" else (16, 20)
         guesses = () if config.warm_start_centre is None else (config.warm_start_centre,)
         constant = best_constant_gains(
             tuned, motions, guesses=guesses, samples=samples, refinements=refinements, seed=args.seed
@@ -89,12 +91,13 @@ def run(args: Args) -> int:
         if args.method == "ppo":
             candidates["policy"] = train(args, folder, constant.action)
         errors = errors_of(tuned, candidates, sets, constant)
-        folder.write_results(results(errors, sets))
+        folder.write_results(results(errors, sets, scored_quantity(tuned.kalman, None)))
         summary = {
             name: {group: round(float(np.mean(found[name])), 4) for group, found in errors.items()}
             for name in [*candidates, "oracle"]
         }
-        title = f"Inclination error of {args.filter}, mean of RMS over trajectories, deg"
+        name = scored_quantity(tuned.kalman, None).name
+        title = f"Error of {args.filter} ({name}), mean of RMS over trajectories, deg"
         out.table([{"gains": name, **values} for name, values in summary.items()], title)
         final = candidates["policy" if args.method == "ppo" else "constant"]
         card = card_of(args, final, constant, summary)
@@ -169,10 +172,11 @@ def errors_of(
 
 
 def results(
-    errors: Mapping[str, Mapping[str, np.ndarray]], sets: Mapping[str, Sequence[Trajectory]]
+    errors: Mapping[str, Mapping[str, np.ndarray]], sets: Mapping[str, Sequence[Trajectory]], quantity: Quantity
 ) -> list[dict[str, Any]]:
     """The same as rows of results."""
-    common = {"quantity": "up", "metric": "inclination", "unit": "deg"}
+    metric = "inclination" if quantity.kind == "direction" else "rmse"
+    common = {"quantity": quantity.name, "metric": metric, "unit": "deg"}
     return [
         {"estimator": name, "trajectory": trajectory.name, "value": float(value), **common}
         for group, found in errors.items()
@@ -191,10 +195,10 @@ def card_of(
         "estimator": "poise.baselines.gain_policy.adaptive.AdaptiveEstimator",
         "method": args.method,
         "command": command_line("tune", args, ("method", "preset", "seed", "steps", "trajectories", "recipe")),
-        "data": "simulated hand motions" if args.recipe is None else f"recipe {args.recipe}",
+        "data": "simulated" if args.recipe is None else f"recipe {args.recipe}",
         **policy.card,
         "best_constant": [round(float(value), 4) for value in constant.action],
-        "test_inclination_deg": {name: dict(values) for name, values in summary.items()},
+        "test_error_deg": {name: dict(values) for name, values in summary.items()},
         "versions": versions(("numpy", "numba", "torch", "stable-baselines3", "scipy")),
         "date": date.today().isoformat(),
         "licence": "MIT",

@@ -9,8 +9,8 @@ from typing import Any
 
 from ...envs.hand.gestures import Mixed
 from ...envs.hand.trajectories import HandTrajectories
-from ...envs.recipes.hand import HandRecipe
 from ...envs.sensors.presets import sensor_preset
+from .motions import GradedMotions, Motions, RiddenMotions
 
 SUSTAINED = Mixed(lengths=(15.0, 40.0), rest_share=0.1, spread=0.5, single_share=0.25)
 """Sustained motion of one kind, in addition to the quick changes of ``mixed``."""
@@ -31,7 +31,7 @@ TRAINING_MOTIONS = HandTrajectories(
     noise_scale=(0.1, 1.0),
     duration=60.0,
 )
-"""Training data of the shipped policies."""
+"""Smooth gestures: training data of ``bounded-motion+policy``."""
 
 
 @dataclass(frozen=True)
@@ -48,8 +48,8 @@ class TrainingConfig:
     """gains that the policy sets; None for all of the filter"""
     interval: float = 0.1
     """s between decisions"""
-    motions: HandTrajectories | HandRecipe = TRAINING_MOTIONS
-    """what is simulated; a recipe with few rates, since the trajectories of one rate are computed together"""
+    motions: Motions = TRAINING_MOTIONS
+    """what is simulated, such as a recipe; at few rates, since the trajectories of one rate are computed together"""
     trajectories: int = 240
     """number of simulated trajectories to train on"""
     seed: int = 0
@@ -115,5 +115,26 @@ def shipped_config(filter: str) -> TrainingConfig:
     if filter == "bounded-motion":
         # The bias gain is not tuned: motion that resembles a bias drift is more frequent than a real one.
         return TrainingConfig(filter=filter, gains=("process", "velocity"), warm_start_centre=(0.0, 0.0))
+    if filter in ("two-gyro-level", "platform-gyro"):
+        gain = "constraint" if filter == "two-gyro-level" else "measurement"
+        return TrainingConfig(
+            filter=filter,
+            gains=(gain,),
+            motions=RiddenMotions(),
+            trajectories=96,
+            total_timesteps=200_000,
+            n_envs=96,
+            gain_search=16,
+            warm_start=96,
+        )
     # The valley in which the measurement variance does the work, and c_a, which trusts the filter's own error, little.
-    return TrainingConfig(filter=filter, warm_start_centre=(-0.7, 0.7, -0.7))
+    centre = (-0.7, 0.7, -0.7) if filter == "external-acceleration" else None
+    return TrainingConfig(
+        filter=filter,
+        motions=GradedMotions(),
+        trajectories=120,
+        total_timesteps=300_000,
+        gain_search=16,
+        warm_start=120,
+        warm_start_centre=centre,
+    )
