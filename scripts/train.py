@@ -169,7 +169,7 @@ def test_trajectories(preset: Preset, seed: int, episodes: int) -> list[Trajecto
 def test_rides(preset: Preset, seed: int, rides: int) -> dict[str, list[Trajectory]]:
     """Rides of riders that training never saw: as those of the training, in other scenarios, of aggressive riders."""
     from ..baselines.learned.presets import seeds_of
-    from ..baselines.learned.rides import drawn, held_out
+    from ..envs.recipes.rides import drawn, held_out
 
     assert preset.rides is not None
     root, source = seeds_of(seed)[3], replace(preset.rides, rides=max(1, rides // 3), draws=2)

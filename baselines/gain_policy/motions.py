@@ -12,8 +12,8 @@ from ...envs.hand.carried import Carried
 from ...envs.hand.hand_held import HandHeld
 from ...envs.recipes.devices import VariedSensors
 from ...envs.recipes.hand import HandRecipe
+from ...envs.recipes.rides import RideSource, drawn
 from ...filters.support.ranges import Range
-from ..learned.rides import RideSource, drawn
 
 DEG = math.pi / 180.0
 

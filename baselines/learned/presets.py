@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
+from ...envs.recipes.rides import RideSource
 from ...filters.registry import make
 from ...filters.support.names import look_up
 from ...filters.support.seeds import child_seeds
@@ -14,7 +15,6 @@ from .head import AngleHead, Head, TiltHead
 from .inputs.filter_features import FilterFeatures
 from .inputs.front_end import FrontEnd
 from .inputs.level_frame import LevelFrame
-from .rides import RideSource
 
 
 @dataclass(frozen=True)
