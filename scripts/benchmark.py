@@ -44,7 +44,7 @@ def run(args: Args) -> int:
     """Simulate, load, estimate, compare."""
     import pandas
 
-    from ..baselines.benchmark import (
+    from ..baselines.comparison.data_sets import (
         HAND_CHANNELS,
         contenders,
         groups_of,

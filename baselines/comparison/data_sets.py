@@ -7,10 +7,10 @@ import statistics
 from collections.abc import Collection, Sequence
 from typing import Any
 
-from ..envs.data.trajectory import REFERENCE_CLOCK, Trajectory
-from ..filters.core.estimator import Estimator
-from ..filters.support.seeds import child_seeds
-from .registry import list_estimators, make_estimator
+from ...envs.data.trajectory import REFERENCE_CLOCK, Trajectory
+from ...filters.core.estimator import Estimator
+from ...filters.support.seeds import child_seeds
+from ..registry import list_estimators, make_estimator
 
 GESTURES = ("slow", "fast", "severe", "mixed")
 """Gestures of the simulated part: tests A, B, C of the external-acceleration paper, and changing intensity."""
@@ -54,7 +54,7 @@ def simulated(seed: int, episodes: int, gestures: Sequence[str] = GESTURES, **op
     """
     import gymnasium
 
-    from ..envs.record import record
+    from ...envs.record import record
 
     trajectories = []
     seeds = iter(child_seeds(seed, episodes * len(gestures)))
@@ -78,9 +78,9 @@ def simulated_rides(seed: int, scenarios: Sequence[str] = RIDES, duration: float
         scenarios: of ``poise/RiderBicycle-v0``.
         duration: s.
     """
-    from ..envs.bicycle.environment import RiderBicycleEnv
-    from ..envs.bicycle.sensors.single_imu import SITES, imu_of
-    from ..envs.record import record
+    from ...envs.bicycle.environment import RiderBicycleEnv
+    from ...envs.bicycle.sensors.single_imu import SITES, imu_of
+    from ...envs.record import record
 
     trajectories = []
     for number, (scenario, child) in enumerate(zip(scenarios, child_seeds(seed, len(scenarios)), strict=True)):
