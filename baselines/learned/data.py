@@ -92,13 +92,13 @@ class SequenceData:
         wholes: list[np.ndarray] = []
         for index in range(4):
             shape = (len(parts), longest, *parts[0][index].shape[1:])
-            wholes.append(np.zeros(shape, bool if index == 3 else np.float32))
+            # nothing is divided by a spread of zero where a sequence is over
+            wholes.append(np.full(shape, index == 2, bool if index == 3 else np.float32))
             for row, part in enumerate(parts):
                 wholes[index][row, : len(part[index])] = part[index]
                 if index == 1:
                     wholes[index][row, len(part[index]) :] = part[index][-1]
         features, target, spread, mask = wholes
-        spread[spread == 0.0] = 1.0
         return cls(features, target, spread, mask, tuple(names))
 
     @classmethod
