@@ -114,7 +114,7 @@ TRAINED = {"scenarios": ["indoor_circle", "outdoor", "straight", "slalom"], "sty
 """Rides that networks train on; other scenarios and aggressive riders are kept aside."""
 RIDES = RideSource(rides=40, draws=6, duration=40.0, changes=TRAINED)
 RIDDEN = FitConfig(epochs=12, window=125, learning_rate=3e-3)
-HANDS = {"hand-held": 300, "carried": 60}
+HANDS = {"hand-held-prompt": 300, "carried-prompt": 60}
 PRESETS: dict[str, Preset] = {
     "gru": Preset("inclination from six axes by a recurrent network alone", HANDS, fit=FitConfig(epochs=8)),
     "tcn": Preset(
@@ -128,7 +128,7 @@ PRESETS: dict[str, Preset] = {
         bank=True,
         units=48,
         noise=0.05,
-        fit=FitConfig(epochs=4, batch=24, learning_rate=3e-3),
+        fit=FitConfig(epochs=5, batch=24, learning_rate=3e-3),
     ),
     **{
         f"{name}+network": Preset(
