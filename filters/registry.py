@@ -91,8 +91,10 @@ class Entry:
             raise ValueError(f"unknown parameters {unknown} of {name!r}; accepted are {sorted(own | outer)}")
         given = {key: value for key, value in parameters.items() if key not in outer}
         described = FILTERS[self.describes].made_by if self.describes in FILTERS else _load(self.describes)
-        for owner in filter(None, (described, self.made_by, self.runner)):
-            check_parameters(owner, parameters)
+        for owner in filter(None, (described, self.made_by)):
+            check_parameters(owner, given)
+        if self.runner:  # which has a field of its own that is named as a parameter of some equations: model
+            check_parameters(self.runner, {key: value for key, value in parameters.items() if key in outer})
         if metadata and isinstance(self.made_by, type) and issubclass(self.made_by, Equations):
             found = self.made_by.parameters_from(metadata)
             # a name that fixes the device overrides the device of the recording

@@ -208,6 +208,9 @@ def sequence_of(trajectory: Trajectory, front_end: FrontEnd, head: Head) -> tupl
         ValueError: see :meth:`SequenceData.from_trajectories`.
     """
     trajectory = trajectory.on_grid()
+    if hasattr(head, "sequence"):
+        found: tuple[np.ndarray, ...] = head.sequence(trajectory, front_end)
+        return found
     if not trajectory.dt <= front_end.interval * (1.0 + 1e-9):
         raise ValueError(f"{trajectory.name} is sampled every {trajectory.dt:g} s, more than {front_end.interval:g} s")
     front_end = front_end.with_dt(trajectory.dt).configured(trajectory.metadata)

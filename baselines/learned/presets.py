@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from ...envs.recipes.recipe import Recipe
+from ...envs.recipes.registry import recipe
 from ...envs.recipes.rides import RideSource
 from ...filters.registry import make
 from ...filters.support.names import look_up
@@ -68,6 +70,10 @@ class Preset:
             raise ValueError("a bank needs a filter of hand motion: name it, and sources instead of rides")
         if self.units < 1:
             raise ValueError(f"units must be at least 1, got {self.units}")
+
+    def recipe(self, name: str) -> Recipe:
+        """The recipe of a source."""
+        return recipe(name)
 
     def front_end(self) -> FrontEnd:
         """What the network sees."""

@@ -7,8 +7,9 @@ begins at its prior, whose derivative is left out, and the monitor is off.
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
@@ -141,7 +142,9 @@ def back(Z, parameters, stages, xs, Ps, presents, befores, ages, gposes, gcovari
             finish_back(x2, z, p, gx[b], passed, gp)
             for i in range({k}):
                 gparameters[t, b, i] += gp[i]
-            retract_back(x1, dx, p, passed, more, gdx)
+            retract_back(x1, dx, p, passed, more, gdx, gp)
+            for i in range({k}):
+                gparameters[t, b, i] += gp[i]
             correct_back(
                 H, P1, rows, count, A, W, y, gdx, gP[b], gnis[t, b], glogarithms[t, b], gr, gH, gR, work
             )
@@ -211,10 +214,10 @@ def print_back(model: Model, primal: str, shared: str, gains: Sequence[str]) -> 
             {"gx": list(x), "gp": tuned},
             "z",
         ),
-        "retract_back(x, dx, p, gxn, gx, gdx)": (
+        "retract_back(x, dx, p, gxn, gx, gdx, gp)": (
             (traced.retract(x, dx),),
             (seeds("gxn", n),),
-            {"gx": list(x), "gdx": list(dx)},
+            {"gx": list(x), "gdx": list(dx), "gp": tuned},
             "",
         ),
         "finish_back(x, z, p, gxn, gx, gp)": (
@@ -289,6 +292,12 @@ class DifferentiableEquations:
         shared = load(print_shared(), "shared").__name__
         primal = load(print_model(self.model, shared), type(self.model).__name__).__name__
         self.module = load(print_back(self.model, primal, shared, self.gains), f"{type(self.model).__name__}_back")
+
+    def with_model(self, model: Model) -> Self:
+        """The same passes with the constants of another model of the same class and structure."""
+        other = copy.copy(self)
+        other.model, other.base = model, np.array([*parameters_of(model).values()])
+        return other
 
     def parameters(self, factors: np.ndarray) -> np.ndarray:
         """Parameters ``(T, B, count)`` for log factors ``(T, B, gains)``."""
