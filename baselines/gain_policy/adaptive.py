@@ -66,7 +66,7 @@ class AdaptiveEstimator(Enclosing):
     @cached_property
     def tuned(self) -> TunedFilter:
         """The filter with the actions and observations of the policy."""
-        return TunedFilter(self.filter, self.policy.ranges, self.policy.features)
+        return TunedFilter(self.filter, self.policy.ranges, self.policy.features, self.policy.smoothing)
 
     def init(self, measurement: Measurement) -> TunedState:
         """Initial state with the batch shape of ``measurement``."""
