@@ -41,7 +41,7 @@ SMALL_ERROR = math.radians(0.2)
 """rad, e₀: errors below it count little"""
 FREEDOM = 8.0
 """ν, degrees of freedom of the distribution of errors"""
-CONSTANT_STEPS = 30
+CONSTANT_STEPS = 60
 """of gradient descent to the best constants, from which a network starts"""
 LARGEST_ERROR = math.radians(30.0)
 """rad: larger errors of a sample count as that, so that a filter that was lost for a second does not decide"""
@@ -65,7 +65,7 @@ class GainHead:
     kalman: KalmanFilter
     gains: tuple[str, ...]
     limits: tuple[float, ...]
-    likelihood: float = 0.05
+    likelihood: float = 0.01
 
     kind: ClassVar[str] = "gains"
 
@@ -178,7 +178,7 @@ class GainHead:
         generator = np.random.default_rng(seed)
         length = data.features.shape[1]
         for _ in range(CONSTANT_STEPS):
-            chosen = generator.choice(len(data), min(6, len(data)), replace=False)
+            chosen = generator.choice(len(data), min(4, len(data)), replace=False)
             target, mask = torch.from_numpy(data.target[chosen]), torch.from_numpy(data.mask[chosen])
             optimizer.zero_grad()
             self.loss(constant.expand(len(chosen), length, -1), target, None, mask).backward()

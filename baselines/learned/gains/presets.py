@@ -7,20 +7,20 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from ....envs.recipes.devices import VariedSensors
 from ....envs.recipes.recipe import Recipe
 from ....envs.recipes.registry import hand_recipe
 from ....filters.core.kalman import KalmanFilter
 from ....filters.registry import make
 from ..config import FitConfig
 from ..inputs.gain_features import GainFeatures
-from ..presets import PRESETS, Preset
+from ..presets import PRESETS, RIDES, Preset
 from .gain_head import GainHead
 from .gain_shares import with_gain_shares
 
 DEG = math.pi / 180.0
-SENSORS = VariedSensors(gyroscope_bias=(0.03 * DEG, 6.0 * DEG), accelerometer_bias=(0.01, 0.3))
-"""Devices as in the hand recipes, also such that were never calibrated."""
+GYROSCOPE_BIAS = (0.03 * DEG, 6.0 * DEG)
+ACCELEROMETER_BIAS = (0.01, 0.3)
+"""rad/s and m/s²: devices as in the hand recipes, also such that were never calibrated"""
 DURATION = 60.0
 """s of an episode"""
 
@@ -39,7 +39,7 @@ class GainPreset(Preset):
     """filter whose innovations the network sees; None: the same"""
     shares: bool = False
     """whether shares of the Kalman gain are among the gains"""
-    likelihood: float = 0.05
+    likelihood: float = 0.01
     """weight of the likelihood of the errors"""
 
     def __post_init__(self) -> None:
@@ -67,15 +67,24 @@ class GainPreset(Preset):
 
     def recipe(self, name: str) -> Recipe:
         """Episodes of a minute with devices that may be uncalibrated."""
-        return replace(hand_recipe(name), duration=DURATION, sensors=SENSORS)
+        made = hand_recipe(name)
+        sensors = replace(made.sensors, gyroscope_bias=GYROSCOPE_BIAS, accelerometer_bias=ACCELEROMETER_BIAS)
+        return replace(made, duration=DURATION, sensors=sensors)
+
+    def quick(self) -> Preset:
+        """A small version that learns visibly within minutes."""
+        sources = {name: min(count, 8) for name, count in self.sources.items()}
+        rides = None if self.rides is None else replace(self.rides, rides=4, draws=2)
+        fit = replace(self.fit, epochs=3)
+        return replace(self, sources=sources, rides=rides, units=min(self.units, 16), fit=fit)
 
     def describe(self) -> dict[str, Any]:
         """All settings, for a card."""
         return {**super().describe(), "limits": dict(self.limits)}
 
 
-HANDS = {"hand-held": 160, "carried": 60, "carried-running": 20}
-FIT = FitConfig(epochs=10, batch=8, window=10**6, learning_rate=5e-3)
+HANDS = {"hand-held-prompt": 64, "carried-prompt": 24, "carried-running": 8}
+FIT = FitConfig(epochs=8, batch=4, window=10**6, learning_rate=6e-3)
 """A whole sequence is one window: the filter runs over it from its start."""
 NOISE, SHARE = 30.0, 10.0
 """Largest factors on a standard deviation, and on a share of the Kalman gain."""
@@ -87,7 +96,7 @@ GAIN_PRESETS: dict[str, Preset] = {
         observed="mekf",
         units=32,
         limits={"process": NOISE, "measurement": 1000.0, "c_a": NOISE},
-        scale=1.0,
+        scale=2.0,
         noise=0.05,
         fit=FIT,
     ),
@@ -97,7 +106,7 @@ GAIN_PRESETS: dict[str, Preset] = {
         filter="mekf",
         units=32,
         limits={"process": NOISE, "bias": NOISE, "measurement": NOISE},
-        scale=1.0,
+        scale=2.0,
         noise=0.05,
         fit=FIT,
     ),
@@ -108,9 +117,18 @@ GAIN_PRESETS: dict[str, Preset] = {
         shares=True,
         units=32,
         limits={"process": NOISE, "bias": NOISE, "measurement": NOISE, "attitude-gain": SHARE, "bias-gain": SHARE},
-        scale=1.0,
+        scale=2.0,
         noise=0.05,
         fit=FIT,
+    ),
+    "two-gyro-level+noise": GainPreset(
+        "two-gyro-level, its noises and how far level ground is believed set by a recurrent network",
+        rides=RIDES,
+        filter="two-gyro-level",
+        units=32,
+        limits={"process": NOISE, "measurement": NOISE, "constraint": 100.0},
+        noise=0.1,
+        fit=replace(FIT, epochs=6),
     ),
 }
 """Name of the weights → training."""
