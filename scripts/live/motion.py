@@ -89,14 +89,15 @@ def _map(motion: Motion, function: Any) -> Motion:
 
 def joined(before: Motion, after: Motion) -> Motion:
     """One motion after another; both have the same bodies and curves."""
-    flat_after = iter(_arrays(after))
-    return _map(before, lambda values: np.concatenate([values, next(flat_after)]))
+    later: list[np.ndarray] = []
 
+    def keep(values: np.ndarray) -> np.ndarray:
+        later.append(values)
+        return values
 
-def _arrays(motion: Motion) -> list[np.ndarray]:
-    found: list[np.ndarray] = []
-    _map(motion, lambda values: found.append(values) or values)
-    return found
+    _map(after, keep)
+    rest = iter(later)
+    return _map(before, lambda values: np.concatenate([values, next(rest)]))
 
 
 class Subject(Protocol):
@@ -170,7 +171,8 @@ class Device:
         figures: dict[str, Poses] = {}
         if truth is not None:
             figures[TRUTH] = {"device": Placed(place, truth)}
-        virtual, arrows = {}, {}
+        virtual: dict[str, np.ndarray] = {}
+        arrows: dict[str, Arrow] = {}
         for label, estimate in block.estimates.items():
             turn = self._attitudes.setdefault(label, DeviceAttitude()).orientation(estimate, truth)
             if turn is None:

@@ -6,6 +6,7 @@ import threading
 import time
 from collections.abc import Callable
 from contextlib import redirect_stdout
+from functools import partial
 from io import StringIO
 from typing import Any
 
@@ -79,7 +80,7 @@ class Viewer:
         self._play = gui.add_button("Pause" if player.playing else "Play")
         self._play.on_click(lambda event: self._act(player.toggle))
         span = max(player.end - player.begin, 0.01)
-        self._slider = gui.add_slider("time (s)", player.begin, player.begin + span, 0.01, player.time)
+        self._slider: Any = gui.add_slider("time (s)", player.begin, player.begin + span, 0.01, player.time)
         self._slider.on_update(
             lambda event: self._act(lambda: player.seek(self._slider.value)) if event.client is not None else None
         )
@@ -87,12 +88,12 @@ class Viewer:
         speed.on_update(lambda event: self._act(lambda: setattr(player, "speed", float(speed.value.split()[0]))))
         if player.following:
             gui.add_button("Follow the newest sample").on_click(lambda event: self._act(player.follow))
-        self._choice = gui.add_dropdown("plot", list(self.motion.curves) or [NOTHING])
+        self._choice: Any = gui.add_dropdown("plot", list(self.motion.curves) or [NOTHING])
         self._choice.on_update(lambda event: self._act(lambda: None))
         self._plot = gui.add_plotly(self._figure(), aspect=0.66)
         with gui.add_folder("Shown"):
             for label in self.options.visible:
-                self._checkbox(label, True, lambda value, label=label: self.options.visible.update({label: value}))
+                self._checkbox(label, True, partial(self._choose, label))
             if self.motion.arrows:
                 self._checkbox("forces" if ride else "acceleration", True, self._set("forces"))
             self._checkbox("trail", True, self._set("trails"))
@@ -101,6 +102,9 @@ class Viewer:
                 self._checkbox("virtual controller", False, self._set("virtual"))
             if ride:
                 self._checkbox("follow heading", True, self._set("turn"))
+
+    def _choose(self, label: str, value: bool) -> None:
+        self.options.visible[label] = value
 
     def _set(self, name: str) -> Callable[[bool], object]:
         return lambda value: setattr(self.options, name, value)
@@ -140,8 +144,9 @@ class Viewer:
             self.player.seek(at)
             self.player.playing = False
         if plot is not None:
-            found = next((title for title in self.motion.curves if plot in title), None)
-            self._choice.value = look_up("plot", plot, self.motion.curves) if found is None else found
+            titles = {title: title for title in self.motion.curves}
+            found = next((title for title in titles if plot in title), None)
+            self._choice.value = look_up("plot", plot, titles) if found is None else found
         self._beside.value = beside
         self._act(lambda: None)
 
