@@ -63,7 +63,6 @@ COMMANDS: dict[str, Command] = {
         ".recordings.calibrate", "scale, offset and axes of raw sensors, from rate-table and tumbling runs"
     ),
     "view": Command(".live.view", "see motion and estimates in the browser: recordings, environments, live samples"),
-    "calibrate": Command(".calibrate", "scale, offset and axes of raw sensors, from rate-table and tumbling runs"),
     "array": Command(".array", "analyse an array of accelerometers: rank and noise gains"),
     "benchmark": Command(".benchmark", "compare all estimators on simulated motion and on recordings"),
     "reproduce": Command(".reproduce", "reproduce the study of a paper: its tables and figures beside ours"),
