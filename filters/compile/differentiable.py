@@ -213,7 +213,7 @@ def print_back(model: Model, primal: str, gains: Sequence[str]) -> str:
     text = [_HEAD.format(primal=primal, starts=begins)]
     sizes = {"x": n, "dx": e, "p": len(names), "gx": n, "gdx": e, "gp": len(tuned), "gxn": n, "gr": m}
     sizes |= dict.fromkeys(("z", "previous"), width) | {"gout": len(posed)}
-    shapes = {name: (size,) for name, size in sizes.items()}
+    shapes: dict[str, tuple[int, ...]] = {name: (size,) for name, size in sizes.items()}
     shapes |= {"gF": (e, e), "gQ": (e, e), "gH": (m, e), "gR": (m, m)}
     for signature, (outputs, given, wanted, unknown) in functions.items():
         arrays = [np.asarray(array, dtype=object) for array in outputs]

@@ -185,7 +185,7 @@ def _print_entries(tape: Tape, F: np.ndarray, H: np.ndarray, shapes: dict[str, t
     """Functions that keep and restore the elements of F and H that vary, and the number of these."""
     varying = {"F": np.zeros(F.shape, dtype=object), "H": np.zeros(H.shape, dtype=object)}
     constants = {"F": varying["F"].copy(), "H": varying["H"].copy()}
-    kept: list[Expression] = []
+    kept: list[Any] = []
     for name, array in (("F", F), ("H", H)):
         elements = tape.inputs(name, *array.shape)
         for place in np.ndindex(array.shape):
