@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from .envs.data.formats.load import load_recording, load_recordings
     from .envs.data.plausibility import Finding, check_recording
     from .envs.data.trajectory import Trajectory
+    from .envs.exchange.minari_data import from_minari, to_minari
     from .envs.record import record
     from .envs.sensors.kinds import SensorKind, register_sensor_kind
     from .filters.core.estimator import Estimator
@@ -48,6 +49,7 @@ __all__ = [
     "apply_calibration",
     "check_recording",
     "evaluate",
+    "from_minari",
     "list_estimators",
     "load_calibration",
     "load_recording",
@@ -58,6 +60,7 @@ __all__ = [
     "register_sensor_kind",
     "run",
     "smooth",
+    "to_minari",
 ]
 
 _HOMES = {
@@ -70,6 +73,7 @@ _HOMES = {
     "apply_calibration": ".envs.data.calibration.records",
     "check_recording": ".envs.data.plausibility",
     "evaluate": ".baselines.evaluation",
+    "from_minari": ".envs.exchange.minari_data",
     "list_estimators": ".baselines.registry",
     "load_calibration": ".envs.data.calibration.records",
     "load_recording": ".envs.data.formats.load",
@@ -80,6 +84,7 @@ _HOMES = {
     "register_sensor_kind": ".envs.sensors.kinds",
     "run": ".baselines.run",
     "smooth": ".baselines.run",
+    "to_minari": ".envs.exchange.minari_data",
 }
 
 __version__ = poise_version()

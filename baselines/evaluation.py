@@ -17,6 +17,7 @@ from ..filters.core.estimator import Estimator
 from ..filters.core.offline import SUFFIX, Offline
 from ..filters.core.quantity import ORIENTATION
 from ..filters.support.parallel import progress_bar
+from .comparison.measures import measures
 from .registry import list_estimators, make_estimator
 from .run import fitted, run_on
 from .scoring import (
@@ -55,6 +56,7 @@ def evaluate(
     reference_clock: ReferenceClock = "recorded",
     offline: bool = False,
     check: bool = True,
+    detailed: bool = False,
     progress: bool = False,
 ) -> ErrorTable:
     """Run every estimator over every trajectory and tabulate the errors over the evaluation mask.
@@ -73,6 +75,7 @@ def evaluate(
             clock and the gyroscope's, which loaders measure (``metadata["reference_clock_offset"]``).
         offline: also run the smoother of every estimator that has one, as ``<label> (offline)``.
         check: warn of implausible recordings (:func:`poise.check_recording`).
+        detailed: also measure the largest error, settling, drift and NEES (:func:`.measures`).
         progress: show a progress bar.
 
     Returns:
@@ -113,7 +116,7 @@ def evaluate(
     for trajectory in loaded:
         if check:
             report_findings(trajectory)
-        one = Evaluation(trajectory, contenders, reference, reference_clock)
+        one = Evaluation(trajectory, contenders, reference, reference_clock, detailed)
         for label in contenders:
             bar.set_postfix_str(f"{label} on {trajectory.name}")
             one.run(label)
@@ -145,8 +148,9 @@ class Evaluation:
         contenders: Mapping[str, str | Estimator[Any]],
         reference: str | Estimator[Any] | None,
         clock: ReferenceClock,
+        detailed: bool = False,
     ) -> None:
-        self.contenders = contenders
+        self.contenders, self.detailed = contenders, detailed
         self.skipped: dict[str, str] = {}
         self.reference: StandIn | None = None
         self.everyone = reference is None or reference == AUTO
@@ -208,6 +212,8 @@ class Evaluation:
         for label, (estimator, estimate) in self.estimates.items():
             # Agreement of an estimator with itself carries no information.
             found[label] = errors(estimator, estimate, self.trajectory, [one for one in others if one[0] != label])
+            if self.detailed:
+                found[label] += measures(estimator, estimate, self.trajectory)
             nis = next((value for _, metric, value, _ in found[label] if metric == "nis"), 0.0)
             if nis > LARGEST_NIS.get(family(label), float("inf")):
                 warnings.warn(

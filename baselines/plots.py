@@ -22,7 +22,7 @@ COLOURS = {
     "baseline": "#6d737c",
     "learned": "#c2571a",
     "adaptive": "#2c8c5a",
-    "offline": "tab:purple",
+    "offline": "#9467bd",
     "external": "#b08d1a",
 }
 """Kind of estimator → colour."""

@@ -17,7 +17,7 @@ import numpy as np
 
 from ..envs.data.plausibility import vectors
 from ..envs.data.trajectory import Trajectory
-from .benchmark import NORTH, dataset_of
+from .comparison.data_sets import NORTH, dataset_of
 from .registry import list_estimators
 
 if TYPE_CHECKING:

@@ -15,6 +15,20 @@ from ..filters.registry import FILTERS, Entry, Kind
 from ..filters.support.names import look_up
 
 HERE = "this package"
+RULES = {
+    "pitch-rate": "its belief in level ground lowered by a rule on the pitch rate",
+    "innovation": "its measurement variance adapted to the innovations",
+    "guarded-innovation": "its belief in level ground adapted to innovations and pitch rate",
+    "acceleration": "its measurement variance in proportion to the mean square excess of the specific force",
+}
+"""Rule by hand → what it does; :mod:`poise.baselines.gain_policy.rules` has them."""
+RULED = {
+    "two-gyro-level": ("pitch-rate",),
+    "platform-gyro": ("pitch-rate", "innovation", "guarded-innovation"),
+    "external-acceleration": ("innovation", "acceleration"),
+    "mekf": ("innovation", "acceleration"),
+}
+"""Filter → rules that set one of its gains."""
 TRAINED: dict[str, Entry] = {
     **{
         f"{name}+policy": Entry(
@@ -26,6 +40,18 @@ TRAINED: dict[str, Entry] = {
             FILTERS[name].factory,
         )
         for name in ("external-acceleration", "bounded-motion")
+    },
+    **{
+        f"{name}+{rule}": Entry(
+            "..baselines.gain_policy.rules:by_rule",
+            f"{name}, {RULES[rule]}",
+            HERE,
+            "adaptive",
+            {"filter": name, "rule": rule},
+            name,
+        )
+        for name, rules in RULED.items()
+        for rule in rules
     },
     "gru": Entry(
         "..baselines.learned.estimator:shipped",
@@ -68,6 +94,7 @@ class EstimatorInfo:
         channels: channels that it needs.
         outputs: quantities that it estimates.
         source: where it was published.
+        experimental: not better on recordings or rides than the filter that it is built on.
     """
 
     name: str
@@ -76,13 +103,21 @@ class EstimatorInfo:
     channels: tuple[str, ...]
     outputs: tuple[str, ...]
     source: str
+    experimental: bool = False
 
 
-def list_estimators() -> dict[str, EstimatorInfo]:
-    """All estimators by name: kind, description, channels that they need, quantities that they estimate, source."""
+def list_estimators(experimental: bool = False) -> dict[str, EstimatorInfo]:
+    """All estimators by name: kind, description, channels that they need, quantities that they estimate, source.
+
+    Args:
+        experimental: list also those that do not beat the filter that they are built on.
+    """
     listed = {
-        name: EstimatorInfo(name, entry.kind, entry.description, entry.channels, entry.outputs, entry.source)
+        name: EstimatorInfo(
+            name, entry.kind, entry.description, entry.channels, entry.outputs, entry.source, entry.experimental
+        )
         for name, entry in {**FILTERS, **TRAINED}.items()
+        if experimental or not entry.experimental
     }
     return dict(sorted(listed.items(), key=lambda item: list(KINDS).index(item[1].kind)))
 

@@ -92,13 +92,16 @@ def with_up(pose: Mapping[str, Any]) -> dict[str, Any]:
     return dict(pose)
 
 
-def errors(estimator: Estimator[Any], estimate: Estimate, trajectory: Trajectory, others: list[StandIn]) -> list[Row]:
-    """Rows of one run: errors against the truth, distances to others where it is unknown, shares, consistency."""
-    pose = with_up(estimate.pose)
+def with_derived_truth(estimator: Estimator[Any], trajectory: Trajectory) -> Trajectory:
+    """The trajectory with the truth of what the estimator's equations derive from it (segments relative to others)."""
     equations = equations_of(estimator)
     derived = dict(equations.truth(trajectory.truth)) if callable(getattr(equations, "truth", None)) else {}
-    if derived:
-        trajectory = trajectory.replace(truth={**derived, **trajectory.truth})
+    return trajectory.replace(truth={**derived, **trajectory.truth}) if derived else trajectory
+
+
+def errors(estimator: Estimator[Any], estimate: Estimate, trajectory: Trajectory, others: list[StandIn]) -> list[Row]:
+    """Rows of one run: errors against the truth, distances to others where it is unknown, shares, consistency."""
+    pose, trajectory = with_up(estimate.pose), with_derived_truth(estimator, trajectory)
     outputs = {quantity.name: quantity for quantity in (UP, *estimator.outputs)}
     rows: list[Row] = []
     for name, quantity in outputs.items():

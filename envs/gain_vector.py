@@ -119,6 +119,19 @@ class GainTuningVectorEnv(RowsVectorEnv):
         parts = [one.privileged(at, last) for one, at, last in zip(self.episodes, decisions, errors, strict=True)]
         return np.concatenate([seen, np.stack(parts)], axis=-1)
 
+    @property
+    def errors_deg(self) -> np.ndarray:
+        """Mean error of each row over the last interval, deg; NaN where none is known."""
+        return np.degrees(self._mean_error)
+
+    def gain_sizes(self) -> dict[str, np.ndarray]:
+        """The scaled constants of each row: name → ``(rows,)``."""
+        gains = {part.gain: np.zeros(self.num_envs) for part in self.single.tuned.ranges}
+        for group, members in self.filters.groups(np.arange(self.num_envs)):
+            for name, sizes in self.filters.sizes(group, members, self.filters.state.action[members]).items():
+                gains[name][members] = sizes
+        return gains
+
     def infos(self) -> dict[str, Any]:
         """Infos of all rows, as of the single environment; empty where none are wanted."""
         if not self.with_infos:
@@ -132,17 +145,13 @@ class GainTuningVectorEnv(RowsVectorEnv):
         truth = gathered([episode.known[0] for episode in self.episodes], [one[1:] for one in known], self.num_envs)
         ends = np.cumsum([quantity.size for quantity in self.single.quantities])
         parts = np.split(pose, ends[:-1], axis=-1)
-        gains = {part.gain: np.zeros(self.num_envs) for part in self.single.tuned.ranges}
-        for group, members in self.filters.groups(np.arange(self.num_envs)):
-            for name, sizes in self.filters.sizes(group, members, self.filters.state.action[members]).items():
-                gains[name][members] = sizes
         found = {
             "time": np.array([one[0] for one in known]),
             "pose": {one.name: part.copy() for one, part in zip(self.single.quantities, parts, strict=True)},
             "truth": {},
             "estimate": {name: values.copy() for name, values in self._estimates.items()},
-            "error_deg": np.degrees(self._mean_error),
-            "gains": gains,
+            "error_deg": self.errors_deg,
+            "gains": self.gain_sizes(),
         }
         return {**everywhere(found, self.num_envs), "truth": truth}
 

@@ -159,8 +159,8 @@ def join(rows: list[Mapping[str, Any]], infos: list[Mapping[str, Any]], metadata
     return rated(trajectory)
 
 
-def describe(env: Any, seed: int) -> dict[str, Any]:
-    """What is needed to play the same episode again."""
+def describe(env: Any, seed: int | None) -> dict[str, Any]:
+    """What is needed to play the same episode again; a seed of None is an unknown one."""
     spec = env.spec
     identity = type(env.unwrapped).__name__ if spec is None else spec.id
     suite = env.unwrapped.suite

@@ -36,7 +36,9 @@ class Entry:
         kind: ``filter`` (published or this package's), ``adaptive`` (a filter whose gains a policy sets), ``learned``,
             ``baseline`` (a classical reference without tuning), ``external`` (another package's).
         fixed: parameters that the name implies; they cannot be passed.
-        describes: the class whose channels and outputs are those of the estimator, where ``factory`` is a function.
+        describes: the class whose channels and outputs are those of the estimator, where ``factory`` is a function,
+            or the name of a filter.
+        experimental: not better on recordings or rides than the filter that it is built on; listed on request only.
     """
 
     factory: str | Callable[..., Any]
@@ -45,6 +47,7 @@ class Entry:
     kind: Kind = "filter"
     fixed: Mapping[str, Any] = field(default_factory=dict)
     describes: str | Callable[..., Any] = ""
+    experimental: bool = False
 
     @cached_property
     def made_by(self) -> Callable[..., Any]:
@@ -69,6 +72,8 @@ class Entry:
         return self._names("outputs")
 
     def _names(self, attribute: str) -> tuple[str, ...]:
+        if isinstance(self.describes, str) and self.describes in FILTERS:
+            return FILTERS[self.describes]._names(attribute)
         described = _load(self.describes) if self.describes else self.made_by
         found = getattr(described, attribute, None)
         if found is None or isinstance(found, property):  # of a function, or depends on parameters
@@ -85,8 +90,11 @@ class Entry:
         if unknown and not any(each.kind is each.VAR_KEYWORD for each in signature.values()):
             raise ValueError(f"unknown parameters {unknown} of {name!r}; accepted are {sorted(own | outer)}")
         given = {key: value for key, value in parameters.items() if key not in outer}
-        for owner in filter(None, (_load(self.describes), self.made_by, self.runner)):
-            check_parameters(owner, parameters)
+        described = FILTERS[self.describes].made_by if self.describes in FILTERS else _load(self.describes)
+        for owner in filter(None, (described, self.made_by)):
+            check_parameters(owner, given)
+        if self.runner:  # which has a field of its own that is named as a parameter of some equations: model
+            check_parameters(self.runner, {key: value for key, value in parameters.items() if key in outer})
         if metadata and isinstance(self.made_by, type) and issubclass(self.made_by, Equations):
             found = self.made_by.parameters_from(metadata)
             # a name that fixes the device overrides the device of the recording
@@ -171,6 +179,12 @@ FILTERS: dict[str, Entry] = {
         f"{BICYCLE}.two_gyro.filter:TwoGyro",
         "roll of a bicycle, attitude of the trunk; two gyroscopes and a camera; model=sigma1 or sigma2",
         TWO_GYRO,
+    ),
+    "two-gyro-level": Entry(
+        f"{BICYCLE}.two_gyro.filter:TwoGyro",
+        "two-gyro by Σ1, with level ground as pseudo-measurement: the roll no longer drifts",
+        HERE,
+        fixed={"model": "sigma1", "constraint": True},
     ),
     "force-inertial": Entry(
         f"{BICYCLE}.force_inertial.filter:ForceInertial",
@@ -262,7 +276,13 @@ def make(name: str, *, metadata: Mapping[str, Any] | None = None, **parameters: 
 
 
 def name_of(equations: Equations) -> str | None:
-    """The name under which equations are registered; None if they are not registered."""
+    """The name under which equations are registered, the most specific one; None if they are not registered."""
     kind = type(equations)
     place = f"{kind.__module__.removeprefix(__package__)}:{kind.__qualname__}"
-    return next((name for name, entry in FILTERS.items() if entry.factory in (kind, place)), None)
+    found = {
+        name: len(entry.fixed)
+        for name, entry in FILTERS.items()
+        if entry.factory in (kind, place)
+        and all(getattr(equations, field, None) == value for field, value in entry.fixed.items())
+    }
+    return max(found, key=lambda name: found[name]) if found else None

@@ -1,13 +1,26 @@
-"""Compare all estimators on simulated hand motion and, if given, on recordings: tables, figures, a report."""
+"""Compare all estimators on simulated motion and, if given, on recordings: tables with intervals, figures, a report."""
 
 from __future__ import annotations
 
 import json
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from .main import run_command
 from .output import Output
+
+if TYPE_CHECKING:
+    import pandas
+
+    from ..baselines.comparison.tasks import Results, Task
+    from ..envs.data.trajectory import Trajectory
+    from .experiment import Run
+
+REGRESSIONS = "Errors that grew by more than 2 % against the baseline"
+STEPS = 100
+"""Samples of which each is timed as a step."""
 
 
 @dataclass
@@ -32,92 +45,217 @@ class Args:
     """trials of each test of the external-acceleration paper; 0 leaves them out"""
     rides: bool = True
     """whether to simulate rides of a bicycle too, and estimate the inclination of its and the rider's IMU"""
+    baseline: Path | None = None
+    """results.csv of an earlier run: errors that grew by more than 2 % are listed, and the exit status is 1"""
     save: Path | None = None
     """file for the errors of all recordings and simulations, from which `poise recommend` reads"""
+    processes: int = 2
+    """number of parallel processes"""
     runs: Path = Path("runs")
     """parent of the run folder"""
+    resume: Path | None = None
+    """folder of an earlier run to continue: what it has finished is kept, and the results are those of one run"""
     json: bool = False
     """print one JSON document instead of tables"""
 
 
 def run(args: Args) -> int:
     """Simulate, load, estimate, compare."""
-    import pandas
-
-    from ..baselines.benchmark import (
-        HAND_CHANNELS,
-        contenders,
-        groups_of,
-        simulated,
-        simulated_rides,
-        with_other_clocks,
-    )
-    from ..baselines.evaluation import evaluate
-    from ..baselines.recommendation import CORRECTED, ERRORS, dataset_errors, results_of
-    from ..baselines.scoring import has_truth
-    from ..baselines.studies.external_acceleration.simulation import compare_modes
-    from ..filters.support.files import write_json
-    from .experiment import start_run
+    from ..baselines.comparison.tasks import run_tasks
+    from .experiment import open_run
     from .recordings.load import load_all, passed_over_text, plain_warnings
-    from .report import draw_example, print_comparison, provenance
-    from .tables import markdown_table
+    from .report import provenance
 
+    before = None if args.baseline is None else load_baseline(args.baseline)
     with plain_warnings(), Output("benchmark", args) as out:
         recorded, passed_over = load_all(args.recordings) if args.recordings else ([], [])
-        channels = {*HAND_CHANNELS, *(name for each in recorded for name in each.measurements)}
-        chosen = contenders(args.estimators, channels)
-        folder = start_run("benchmark", args, args.seed, args.runs)
-        out.say(f"simulating {4 * args.episodes} episodes of poise/HandMotion-v0")
-        data = {"simulation": simulated(args.seed, args.episodes, sensors=args.sensors)}
-        if args.rides:
-            out.say("simulating rides of poise/RiderBicycle-v0")
-            data["rides"] = simulated_rides(args.seed)
-        if recorded:
-            data["recordings"] = recorded
+        tasks, channels = tasks_of(args, recorded)
+        folder = open_run("benchmark", args, may_differ=("baseline", "save"))
+        out.say(f"{len(tasks)} tasks; an interrupted run continues with --resume {folder.folder}")
+        suites = run_tasks(
+            *(tasks, folder.folder / "tasks", args.estimators, channels),
+            processes=args.processes,
+            offline=args.offline,
+            reference=args.reference,
+        )
+        table = all_rows(suites)
+        folder.write_results(table)
         sections: dict[str, str] = {}
-        tables, scored = [], {}
-        for name, trajectories in data.items():
-            table = evaluate(chosen, trajectories, reference=args.reference, offline=args.offline, progress=True)
-            tables.append(table)
-            scored[name] = [trajectory for trajectory in trajectories if has_truth(trajectory)], table
-            folder.write_results(pandas.concat(tables))
-            sections |= print_comparison(table, folder, out, groups=groups_of(trajectories), name=name)
-            sections |= draw_example(table, trajectories, chosen, folder, name)
-        results = [one for name in data for one in results_of(*scored[name])]
-        corrected = with_other_clocks(recorded)
-        if corrected:
-            out.say(f"{len(corrected)} recordings again, the clock of the reference corrected")
-            table = evaluate(
-                *(chosen, corrected),
-                reference_clock="corrected",
-                offline=args.offline,
-                check=False,
-                progress=True,
-            )
-            results += results_of(corrected, table, CORRECTED)
-        for metric in ERRORS:
-            rows = [{"estimator": name, **errors} for name, errors in dataset_errors(results, metric).items()]
-            if rows:
-                names = list(dict.fromkeys(one["dataset"] for one in results))
-                title = f"All data sets: {metric} error, RMS, mean over recordings, deg"
-                sections[title] = markdown_table(rows, ["estimator", *names])
-                out.table(rows, title, columns=["estimator", *names])
-        if args.save is not None:
-            source = json.loads((folder.folder / "versions.json").read_text(encoding="utf-8"))
-            source = {key: source[key] for key in ("poise", "python", "packages")} | {"seed": args.seed}
-            out.say(f"results: {write_json(args.save, {'source': source, 'recordings': results}, indent=None)}")
+        for suite, results in suites.items():
+            sections |= show_suite(suite, results, [task for task in tasks if task.suite == suite], args, folder, out)
+        sections |= show_data_sets(suites, args, folder, out)
         if args.trials:
-            out.say(f"the three tests of the external-acceleration paper, {args.trials} trials each")
-            modes = compare_modes(range(args.trials))
-            title = "external-acceleration, tests A to C of the paper, RMS in deg (levels in m/s²)"
-            sections[title] = markdown_table(modes)
-            out.table(modes, title)
+            sections |= show_paper(args.trials, out)
+        grown = [] if before is None else show_regressions(table, before, sections, out)
         if passed_over:
             sections["Passed over"] = passed_over_text(passed_over, most=1000)
             out.say(f"passed over:\n{passed_over_text(passed_over)}")
+        costs = show_costs(args, channels, sections, out)
         sections["Provenance"] = provenance(folder)
+        write_page(suites, {"Cost of an update": costs} | ({REGRESSIONS: grown} if grown else {}), folder, out)
         out.report(folder.write_report("poise benchmark", sections))
-    return 0
+    return 1 if grown else 0
+
+
+def tasks_of(args: Args, recorded: list[Trajectory]) -> tuple[list[Task], list[str]]:
+    """What is to be done, and the channels that estimators may read."""
+    from ..baselines.comparison.data_sets import HAND_CHANNELS, contenders, with_other_clocks
+    from ..baselines.comparison.tasks import hand_tasks, imu_ride_tasks, recording_tasks
+    from ..baselines.recommendation import CORRECTED
+
+    channels = list(dict.fromkeys([*HAND_CHANNELS, *(name for each in recorded for name in each.measurements)]))
+    contenders(args.estimators, channels)  # an unknown name is told before anything is simulated
+    tasks = hand_tasks(args.seed, args.episodes, sensors=args.sensors)
+    tasks += imu_ride_tasks(args.seed) if args.rides else []
+    tasks += recording_tasks(recorded)
+    again = {"settings": {"reference_clock": "corrected", "check": False}, "suffix": CORRECTED}
+    tasks += recording_tasks(with_other_clocks(recorded), "recordings, clock corrected", **again)
+    return tasks, channels
+
+
+def all_rows(suites: dict[str, Results]) -> pandas.DataFrame:
+    """All results with their suite, in the order of the suites."""
+    import pandas
+
+    return pandas.concat([results.table.assign(suite=suite) for suite, results in suites.items()], ignore_index=True)
+
+
+def show_suite(suite: str, results: Results, tasks: list[Task], args: Args, folder: Run, out: Output) -> dict[str, str]:
+    """Tables of a suite, its intervals and an example over time; heading → Markdown."""
+    from ..baselines.comparison.data_sets import contenders
+    from ..baselines.comparison.intervals import errors_of, intervals, is_measure
+    from .report import draw_example, print_comparison
+    from .tables import markdown_table
+
+    table = results.table[~is_measure(results.table)]
+    table.attrs |= results.table.attrs
+    sections = print_comparison(table, folder, out, groups=results.groups, name=suite)
+    if (table["metric"] == "inclination").any():
+        errors = errors_of(table, "inclination", "up")
+        rows = intervals(errors) if len(errors) > 1 else []
+        if rows:
+            title = f"{suite}: inclination, mean with its 95 % interval over {len(errors)} trajectories, deg"
+            sections[title] = markdown_table(rows)
+            out.table(rows, title, columns=["estimator", "mean", "low", "high", "difference", "better", "rank"])
+    example = tasks[-1].trajectories()[-1:]
+    chosen = contenders(args.estimators, list(example[0].measurements))
+    return sections | draw_example(table, example, chosen, folder, suite)
+
+
+def show_data_sets(suites: dict[str, Results], args: Args, folder: Run, out: Output) -> dict[str, str]:
+    """Mean errors of all data sets side by side; heading → Markdown. Saves what ``--save`` asks for."""
+    from ..baselines.recommendation import ERRORS, dataset_errors
+    from ..filters.support.files import write_json
+    from .tables import markdown_table
+
+    results = [one for each in suites.values() for one in each.recordings]
+    sections = {}
+    for metric in ERRORS:
+        rows = [{"estimator": name, **errors} for name, errors in dataset_errors(results, metric).items()]
+        if rows:
+            names = list(dict.fromkeys(one["dataset"] for one in results))
+            title = f"All data sets: {metric} error, RMS, mean over recordings, deg"
+            sections[title] = markdown_table(rows, ["estimator", *names])
+            out.table(rows, title, columns=["estimator", *names])
+    if args.save is not None:
+        source = json.loads((folder.folder / "versions.json").read_text(encoding="utf-8"))
+        source = {key: source[key] for key in ("poise", "python", "packages")} | {"seed": args.seed}
+        out.say(f"results: {write_json(args.save, {'source': source, 'recordings': results}, indent=None)}")
+    return sections
+
+
+def show_paper(trials: int, out: Output) -> dict[str, str]:
+    """The tests of the external-acceleration paper; heading → Markdown."""
+    from ..baselines.studies.external_acceleration.simulation import compare_modes
+    from .tables import markdown_table
+
+    out.say(f"the three tests of the external-acceleration paper, {trials} trials each")
+    modes = compare_modes(range(trials))
+    title = "external-acceleration, tests A to C of the paper, RMS in deg (levels in m/s²)"
+    out.table(modes, title)
+    return {title: markdown_table(modes)}
+
+
+def load_baseline(path: Path) -> pandas.DataFrame:
+    """Results of an earlier run.
+
+    Raises:
+        ValueError: the file is none.
+        FileNotFoundError: it is not there.
+    """
+    import pandas
+
+    from .experiment import COLUMNS
+
+    try:
+        table = pandas.read_csv(path)
+    except ValueError as reason:
+        raise ValueError(f"--baseline {path} is no table: {reason}") from None
+    lacking = [name for name in ("suite", *COLUMNS) if name not in table.columns]
+    if lacking:
+        raise ValueError(f"--baseline {path} is no results.csv of poise benchmark: it lacks {', '.join(lacking)}")
+    return table
+
+
+def show_regressions(
+    table: pandas.DataFrame, before: pandas.DataFrame, sections: dict[str, str], out: Output
+) -> list[dict[str, Any]]:
+    """What grew against the baseline."""
+    from ..baselines.comparison.intervals import regressions
+    from .tables import markdown_table
+
+    grown = regressions(table, before)
+    sections[REGRESSIONS] = markdown_table(grown) if grown else "None."
+    if grown:
+        out.table(grown, REGRESSIONS)
+    else:
+        out.say("no error grew by more than 2 % against the baseline")
+    return grown
+
+
+def show_costs(args: Args, channels: list[str], sections: dict[str, str], out: Output) -> list[dict[str, Any]]:
+    """Time of an update, step by step and over a sequence; no result, since results are the same on any machine."""
+    from ..baselines.comparison.data_sets import contenders, hand_episode
+    from ..baselines.run import fitted
+    from ..baselines.speed.measure import measure
+    from ..filters.core.estimator import run, run_by_steps
+    from .report import kinds_of
+    from .tables import markdown_table
+
+    (trajectory,) = hand_episode("mixed", 1, args.seed, sensors=args.sensors, duration=5.0)
+    rows = []
+    for label, contender in contenders(args.estimators, channels).items():
+        estimator = fitted(contender, trajectory)
+        if not {channel.name for channel in estimator.channels} <= set(trajectory.measurements):
+            continue
+        short = {name: values[:STEPS] for name, values in trajectory.measurements.items()}
+        stepping = measure(partial(run_by_steps, estimator, short), STEPS)
+        whole = measure(partial(run, estimator, trajectory.measurements), len(trajectory))
+        rows.append({"estimator": label, "step, µs": 1e6 / stepping, "sequence, samples/s": whole})
+    kinds = kinds_of(row["estimator"] for row in rows)
+    rows = [{"estimator": row["estimator"], "kind": kinds.get(str(row["estimator"]), "–"), **row} for row in rows]
+    sections["Cost of an update"] = markdown_table(rows)
+    out.show(rows, "Cost of an update")
+    return rows
+
+
+def write_page(suites: dict[str, Results], tables: dict[str, list[dict[str, Any]]], folder: Run, out: Output) -> None:
+    """The report for a browser, if Plotly is there."""
+    from ..baselines.comparison.html_report import html_report
+    from ..filters.support.files import write_text
+    from ..filters.support.optional import MissingExtraError
+    from .report import kinds_of
+
+    state = json.loads((folder.folder / "versions.json").read_text(encoding="utf-8"))
+    about = {"command": f"poise {folder.command}", "seed": folder.seed, "poise": state["poise"]["version"]}
+    about |= {"commit": state["poise"].get("commit"), "Python": state["python"], **state["packages"]}
+    labels = {name for results in suites.values() for name in results.table["estimator"]}
+    try:
+        page = html_report("poise benchmark", suites, kinds_of(sorted(labels)), about, tables)
+    except MissingExtraError as reason:
+        out.say(f"no page for a browser: {reason}")
+        return
+    out.say(f"page for a browser: {write_text(folder.folder / 'report.html', page)}")
 
 
 if __name__ == "__main__":

@@ -186,18 +186,21 @@ def write_results(path: Path, rows: Iterable[Any]) -> Path:
 
     Args:
         path: file to (re)place.
-        rows: mappings, named tuples, dataclass instances or a data frame, with exactly the fields :data:`COLUMNS`.
+        rows: mappings, named tuples, dataclass instances or a data frame, with exactly the fields :data:`COLUMNS`, or
+            all with ``suite`` besides, which then comes first.
 
     Raises:
         ValueError: a row has other fields.
     """
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(COLUMNS)
-    for record in records(rows):
-        if set(record) != set(COLUMNS):
-            raise ValueError(f"a result has the fields {', '.join(COLUMNS)}, got {', '.join(map(str, record))}")
-        writer.writerow([repr(float(record[name])) if name == "value" else record[name] for name in COLUMNS])
+    found = records(rows)
+    columns = ("suite", *COLUMNS) if found and "suite" in found[0] else COLUMNS
+    writer.writerow(columns)
+    for record in found:
+        if set(record) != set(columns):
+            raise ValueError(f"a result has the fields {', '.join(columns)}, got {', '.join(map(str, record))}")
+        writer.writerow([repr(float(record[name])) if name == "value" else record[name] for name in columns])
     return write_text(path, text.getvalue())
 
 

@@ -251,9 +251,9 @@ def recipes() -> Rows:
 
 def presets() -> Rows:
     """Every network that `poise train` trains."""
-    from ..baselines.learned.presets import PRESETS
+    from ..baselines.learned.gains.presets import all_presets
 
-    return [{"name": name, "description": each.summary} for name, each in PRESETS.items()]
+    return [{"name": name, "description": each.summary} for name, each in all_presets().items()]
 
 
 def learned() -> Rows:

@@ -22,6 +22,7 @@ from gymnasium.error import UnregisteredEnv
 
 from ..filters.support.names import unknown
 from ..filters.support.optional import MissingExtraError, extra
+from ..filters.support.parallel import BACKENDS, on_backend
 from ..filters.support.version import poise_version
 
 USAGE_ERROR = 2
@@ -51,12 +52,17 @@ COMMANDS: dict[str, Command] = {
         ".realism", "compare simulated motion with recordings and publications: how true simulators are"
     ),
     "train": Command(".train", "train a learned estimator"),
+    "export": Command(".export", "write a trained network as a file of ONNX, for programs without Python"),
     "tune": Command(".tune", "fit the gains of a filter: constant ones, or a policy that sets them"),
     "inspect": Command(".recordings.inspect", "what a recording holds; whether units, signs and clock are plausible"),
     "recommend": Command(".recordings.recommend", "which estimator suits a recording, by errors on similar ones"),
     "estimate": Command(".recordings.estimate", "angles, quaternions, standard deviations of a recording, as a file"),
     "evaluate": Command(".recordings.evaluate", "measure estimators on recorded trajectories"),
-    "calibrate": Command(".calibrate", "scale, offset and axes of raw sensors, from rate-table and tumbling runs"),
+    "stream": Command(".live.stream", "estimate sample by sample while lines of samples arrive: stdin, serial, UDP"),
+    "calibrate": Command(
+        ".recordings.calibrate", "scale, offset and axes of raw sensors, from rate-table and tumbling runs"
+    ),
+    "view": Command(".live.view", "see motion and estimates in the browser: recordings, environments, live samples"),
     "array": Command(".array", "analyse an array of accelerometers: rank and noise gains"),
     "benchmark": Command(".benchmark", "compare all estimators on simulated motion and on recordings"),
     "reproduce": Command(".reproduce", "reproduce the study of a paper: its tables and figures beside ours"),
@@ -73,8 +79,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     words = list(sys.argv[1:] if argv is None else argv)
     debug = "--debug" in words or os.environ.get("POISE_DEBUG", "0") not in ("", "0")
     try:
-        with extra():
-            status = dispatch([word for word in words if word != "--debug"])
+        words, backend = without_backend([word for word in words if word != "--debug"])
+        with extra(), on_backend(backend) if backend else contextlib.nullcontext():
+            status = dispatch(words)
         # Here rather than at exit, where a reader that left could not be handled.
         sys.stdout.flush()
         return status
@@ -90,6 +97,21 @@ def main(argv: Sequence[str] | None = None) -> int:
         if debug:
             raise
         return fail(f"{one_line(error)} (--debug shows where)")
+
+
+def without_backend(words: list[str]) -> tuple[list[str], str]:
+    """``words`` without ``--backend NAME``, and NAME, by default ``POISE_BACKEND``; empty: processes of this machine.
+
+    Raises:
+        ValueError: no name follows ``--backend``.
+    """
+    words = [part for word in words for part in (word.split("=", 1) if word.startswith("--backend=") else (word,))]
+    if "--backend" not in words:
+        return words, os.environ.get("POISE_BACKEND", "")
+    place = words.index("--backend")
+    if place + 1 == len(words):
+        raise ValueError(f"--backend needs one of {', '.join(BACKENDS)}")
+    return words[:place] + words[place + 2 :], words[place + 1]
 
 
 def dispatch(words: Sequence[str]) -> int:
@@ -155,6 +177,7 @@ def usage() -> str:
             "  -h, --help  this text; `poise COMMAND --help` explains a command",
             "  --version   the version",
             "  --debug     show the traceback of an error (also POISE_DEBUG=1)",
+            "  --backend   loky, dask or ray: what runs parallel jobs (also POISE_BACKEND)",
         ]
     )
 

@@ -36,6 +36,8 @@ class Args:
     """arguments of the environment, as name=value (gesture=fast rate=200)"""
     recipe: str | None = None
     """instead of an environment: a recipe of domain randomisation, by name (`poise list recipes`) or as a JSON file"""
+    minari: str | None = None
+    """keep the episodes as a Minari data set of this name (poise/hand-motion-v0) instead of files in a folder"""
     json: bool = False
     """print one JSON document instead of tables"""
 
@@ -74,6 +76,8 @@ def option(text: str) -> tuple[str, Any]:
 
 def run(args: Args) -> int:
     """Record and say where the files are."""
+    if args.minari is not None:
+        return record_minari(args, args.minari)
     record, what = recorder(args)
     with Output("record", args) as out:
         with progress_bar(args.episodes, f"record {what}", "episode") as bar:
@@ -86,6 +90,28 @@ def run(args: Args) -> int:
             )
         out.rows({"episode": index, "file": str(path)} for index, path in enumerate(paths))
         out.say(f"{len(paths)} episodes in {args.folder}")
+    return 0
+
+
+def record_minari(args: Args, dataset_id: str) -> int:
+    """Play the environment's neutral action and keep the episodes in Minari's folder.
+
+    Raises:
+        ValueError: a recipe was given too: its episodes are not those of one environment.
+    """
+    from ..envs.exchange.minari_data import to_minari
+    from ..envs.registration import make_environment
+
+    if args.recipe is not None:
+        raise ValueError("--minari keeps episodes of one environment, and a recipe draws another one for each episode")
+    env = make_environment(environment_id(args.environment), **dict(option(text) for text in args.options))
+    try:
+        dataset = to_minari(env, dataset_id, episodes=args.episodes, seed=args.seed, progress=True)
+    finally:
+        env.close()
+    with Output("record", args) as out:
+        out.rows([{"dataset": dataset_id, "episodes": dataset.total_episodes, "steps": dataset.total_steps}])
+        out.say(f"minari.load_dataset({dataset_id!r}) opens them")
     return 0
 
 

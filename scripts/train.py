@@ -107,10 +107,10 @@ def chosen(args: Args) -> Preset:
     Raises:
         ValueError: an unknown name, or a number out of its range.
     """
-    from ..baselines.learned.presets import PRESETS
+    from ..baselines.learned.gains.presets import all_presets
     from ..filters.support.names import look_up
 
-    preset: Preset = look_up("preset", args.preset, PRESETS)
+    preset: Preset = look_up("preset", args.preset, all_presets())
     preset = preset.quick() if args.quick else preset
     if args.recipe is not None:
         preset = replace(preset, sources={args.recipe: sum(preset.sources.values())})
@@ -151,12 +151,11 @@ def test_trajectories(preset: Preset, seed: int, episodes: int) -> list[Trajecto
     from ..baselines.learned.data import simulate
     from ..baselines.learned.presets import seeds_of
     from ..envs.hand.trajectories import HandTrajectories
-    from ..envs.recipes.registry import recipe
 
     root = seeds_of(seed)[3]
     trajectories = []
     for name in preset.sources:
-        for index, each in enumerate(simulate(recipe(name), root, max(1, episodes // len(preset.sources)))):
+        for index, each in enumerate(simulate(preset.recipe(name), root, max(1, episodes // len(preset.sources)))):
             trajectories.append(each.replace(metadata={**each.metadata, "name": f"{name}:{index}"}))
     for index, gesture in enumerate(GESTURES):
         hand = HandTrajectories((gesture,), rates=(60.0, 100.0, 200.0), sensors=("paper-hand",), duration=60.0)
@@ -169,7 +168,7 @@ def test_trajectories(preset: Preset, seed: int, episodes: int) -> list[Trajecto
 def test_rides(preset: Preset, seed: int, rides: int) -> dict[str, list[Trajectory]]:
     """Rides of riders that training never saw: as those of the training, in other scenarios, of aggressive riders."""
     from ..baselines.learned.presets import seeds_of
-    from ..baselines.learned.rides import drawn, held_out
+    from ..envs.recipes.rides import drawn, held_out
 
     assert preset.rides is not None
     root, source = seeds_of(seed)[3], replace(preset.rides, rides=max(1, rides // 3), draws=2)
@@ -203,7 +202,7 @@ def card_of(args: Args, preset: Preset, result: FitResult, table: pandas.DataFra
     return {
         "name": args.preset,
         "description": preset.summary,
-        "estimator": "poise.baselines.learned.estimator.LearnedEstimator",
+        "estimator": f"poise.{type(result.estimator).__module__.split('poise.')[-1]}.{type(result.estimator).__name__}",
         "command": command_line("train", args, OPTIONS),
         "data": preset.describe()["rides"] or dict(preset.sources)
         if not args.recordings

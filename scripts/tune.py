@@ -2,42 +2,53 @@
 
 from __future__ import annotations
 
+import csv
+import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import date
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, cast
 
 import numpy as np
 import tyro
 
+from ..baselines.gain_policy.comparison import CURVE, SETS
+from ..filters.support.files import write_json, write_text
 from ..filters.support.parallel import progress_bar
 from ..filters.support.seeds import child_seed
-from .experiment import Run, command_line, known_recordings, open_run, versions
+from .experiment import Run, command_line, known_recordings, open_run, start_run, versions
 from .main import run_command
 from .output import Output
+from .tables import markdown_table
 
 if TYPE_CHECKING:
-    from ..baselines.gain_policy.config import TrainingConfig
+    from ..baselines.gain_policy.agents.learners import Trained
+    from ..baselines.gain_policy.config import AgentName, TrainingConfig
     from ..baselines.gain_policy.constant_gains import ConstantGains
-    from ..baselines.gain_policy.policy import GainPolicy
     from ..envs.data.trajectory import Trajectory
     from ..filters.adaptation.tuned import TunedFilter
+    from ..filters.core.quantity import Quantity
 
 QUICK_STEPS = 100_000
 """Decisions with ``--preset quick``."""
 TEST_SEED, VALIDATION_SEED = 1, 2
-"""Children of the root seed for trajectories that training never sees."""
+"""Children of the root seeds for trajectories that training never sees."""
+PACKAGES = ("numpy", "numba", "torch", "stable-baselines3", "sb3-contrib", "optuna", "scipy")
+"""Packages whose versions the card names."""
+SEARCHES = ("constant", "optuna")
+"""Agents that do not act while the filter runs."""
 
 
 @dataclass
 class Args:
     """Arguments of ``poise tune``."""
 
-    filter: tyro.conf.Positional[Literal["external-acceleration", "bounded-motion"]] = "external-acceleration"
-    """filter whose gains are tuned"""
-    method: Literal["ppo", "constant"] = "ppo"
-    """ppo: train a policy that sets the gains while the filter runs; constant: search the best constant gains"""
+    filter: tyro.conf.Positional[str] = "external-acceleration"
+    """filter whose gains are tuned: any Kalman filter of ``poise list estimators`` that reads a gyroscope"""
+    agent: Literal["ppo", "recurrent-ppo", "sac", "td3", "constant", "optuna"] = "ppo"
+    """who sets the gains while the filter runs: ppo, recurrent-ppo, sac or td3; or the best constant gains, by an even
+    search (constant) or by Optuna"""
     preset: Literal["quick", "shipped"] = "quick"
     """quick: a minute or two, as a test; shipped: the training of the weights in the package"""
     seed: int = 0
@@ -46,13 +57,19 @@ class Args:
     """decisions to train on, instead of the preset's"""
     trajectories: int | None = None
     """simulated trajectories of a minute to train on, instead of the preset's"""
+    trials: int = 100
+    """gains that Optuna tries"""
     recipe: str | None = None
     """recipe of hand motions to train and test on, by name or as a JSON file, at 100 Hz (default: the motions of the
     shipped policies)"""
     test_trajectories: int = 32
     """simulated trajectories that training never sees, for the comparison"""
+    test_seed: int = 0
+    """root seed of these; equal for all seeds of training, so that their runs can be compared"""
     recordings: tuple[Path, ...] = ()
     """files or folders of recordings with known orientation to compare on; never trained on"""
+    report: tuple[Path, ...] = ()
+    """no training: tables and figures of these finished run folders, with intervals over their seeds"""
     resume: Path | None = None
     """run folder of an interrupted training; the other arguments must be the same"""
     export: Path | None = None
@@ -65,38 +82,41 @@ class Args:
 
 def run(args: Args) -> int:
     """Tune, compare with the published tuning and the best constant gains, and write what was found."""
-    from ..baselines.gain_policy.constant_gains import best_constant_gains
+    if args.report:
+        return compare(args)
     from ..baselines.gain_policy.policy import GainPolicy
+    from ..envs.gain_reward import scored_quantity
     from ..filters.adaptation.gains import tunable_filter
     from ..filters.adaptation.tuned import TunedFilter
 
     config = training_config(args)
     tuned = TunedFilter.of(tunable_filter(args.filter), config.gains)
-    sets = {"simulated": config.motions.draw_many(child_seed(args.seed, TEST_SEED), args.test_trajectories)}
+    if args.test_trajectories < 1:
+        raise ValueError(f"test_trajectories must be at least 1, got {args.test_trajectories}")
     recorded = known_recordings(args.recordings)
+    folder = open_run("tune", args, may_differ=("steps", "test_trajectories", "test_seed", "recordings", "report"))
+    sets = {"simulated": config.motions.draw_many(child_seed(args.test_seed, TEST_SEED), args.test_trajectories)}
     if recorded:
         sets["recorded"] = recorded
-    folder = open_run("tune", args, may_differ=("steps", "test_trajectories", "recordings"))
     with Output("tune", args) as out:
-        motions = config.motions.draw_many(config.seed, min(config.trajectories, 48))
-        out.say(f"searching constant gains of {args.filter} on {len(motions)} trajectories")
-        samples, refinements = (64, 60) if args.preset == "shipped" else (16, 20)
-        guesses = () if config.warm_start_centre is None else (config.warm_start_centre,)
-        constant = best_constant_gains(
-            tuned, motions, guesses=guesses, samples=samples, refinements=refinements, seed=args.seed
-        )
-        candidates = {"published": GainPolicy.neutral(tuned), "constant": GainPolicy.constant(tuned, constant.action)}
-        if args.method == "ppo":
+        constant = searched(args, config, tuned, out)
+        candidates: dict[str, Trained] = {
+            "published": GainPolicy.neutral(tuned),
+            "constant": GainPolicy.constant(tuned, constant.action),
+        }
+        if args.agent not in SEARCHES:
             candidates["policy"] = train(args, folder, constant.action)
         errors = errors_of(tuned, candidates, sets, constant)
-        folder.write_results(results(errors, sets))
+        write_json(folder.folder / SETS, {group: [each.name for each in some] for group, some in sets.items()})
+        folder.write_results(results(errors, sets, scored_quantity(tuned.kalman, None)))
         summary = {
             name: {group: round(float(np.mean(found[name])), 4) for group, found in errors.items()}
             for name in [*candidates, "oracle"]
         }
-        title = f"Inclination error of {args.filter}, mean of RMS over trajectories, deg"
+        name = scored_quantity(tuned.kalman, None).name
+        title = f"Error of {args.filter} ({name}), mean of RMS over trajectories, deg"
         out.table([{"gains": name, **values} for name, values in summary.items()], title)
-        final = candidates["policy" if args.method == "ppo" else "constant"]
+        final = candidates["constant" if args.agent in SEARCHES else "policy"]
         card = card_of(args, final, constant, summary)
         out.say(f"weights: {final.save(folder.folder / 'policy', card)}")
         if args.export is not None:
@@ -105,9 +125,30 @@ def run(args: Args) -> int:
     return 0
 
 
+def compare(args: Args) -> int:
+    """Tables and figures of finished runs."""
+    from ..baselines.gain_policy.comparison import TuneRun, comparison, curves_figure, profiles_figure
+    from ..baselines.plots import save
+
+    runs = [TuneRun.read(folder) for folder in args.report]
+    rows = comparison(runs, args.seed)
+    folder = start_run("tune-report", args, args.seed, args.runs)
+    with Output("tune", args) as out:
+        out.table(rows, "Agents over their seeds of training; intervals of 95 %")
+        figures = {f"profiles-{group}": profiles_figure(runs, group) for group in runs[0].sets}
+        if (curves := curves_figure(runs)) is not None:
+            figures["curves"] = curves
+        for name, figure in figures.items():
+            save(figure, folder.figures / f"{name}.png")
+        pictures = "\n\n".join(f"![{name}](figures/{name}.png)" for name in figures)
+        sections = {"Errors and scores": markdown_table(rows), "Figures": pictures}
+        out.report(folder.write_report("Agents that tune filters", sections))
+    return 0
+
+
 def training_config(args: Args) -> TrainingConfig:
     """The configuration that the arguments ask for."""
-    from ..baselines.gain_policy.config import shipped_config
+    from ..baselines.gain_policy.config import config_of, shipped_config
 
     if args.preset == "shipped":
         config = shipped_config(args.filter)
@@ -118,36 +159,87 @@ def training_config(args: Args) -> TrainingConfig:
         from ..envs.recipes.registry import hand_recipe
 
         given["motions"] = replace(hand_recipe(args.recipe), rates=(100.0, 100.0))
-    return replace(config, seed=args.seed, **{name: value for name, value in given.items() if value is not None})
+    config = replace(config, seed=args.seed, **{name: value for name, value in given.items() if value is not None})
+    return config if args.agent in SEARCHES else config_of(cast("AgentName", args.agent), config)
 
 
-def train(args: Args, folder: Run, start: np.ndarray) -> GainPolicy:
-    """Train a policy from a constant action, with a bar; the best look at validation trajectories is kept."""
-    from ..baselines.gain_policy.constant_gains import policy_errors
+def searched(args: Args, config: TrainingConfig, tuned: TunedFilter, out: Output) -> ConstantGains:
+    """The best constant gains on training trajectories."""
+    from ..baselines.gain_policy.constant_gains import best_constant_gains
+
+    motions = config.motions.draw_many(config.seed, min(config.trajectories, 48))
+    out.say(f"searching constant gains of {args.filter} on {len(motions)} trajectories")
+    if args.agent == "optuna":
+        from ..baselines.gain_policy.agents.optuna_search import optuna_constant_gains
+
+        return optuna_constant_gains(tuned, motions, trials=args.trials, seed=args.seed)
+    samples, refinements = (config.gain_search,) * 2 if args.preset == "shipped" else (16, 20)
+    guesses = () if config.warm_start_centre is None else (config.warm_start_centre,)
+    return best_constant_gains(
+        tuned, motions, guesses=guesses, samples=samples, refinements=refinements, seed=args.seed
+    )
+
+
+def train(args: Args, folder: Run, start: np.ndarray) -> Trained:
+    """Train a policy from a constant action; the best look at validation trajectories is kept."""
+    from ..baselines.gain_policy.agents.learners import policy_errors_of
     from ..baselines.gain_policy.training import train_policy
     from ..filters.adaptation.gains import tunable_filter
 
     config, kalman = training_config(args), tunable_filter(args.filter)
     unseen = config.motions.draw_many(child_seed(args.seed, VALIDATION_SEED), min(24, config.trajectories))
+    curve = Curve(folder.folder / CURVE, resumed=args.resume is not None)
     with progress_bar(config.total_timesteps, f"tune {args.filter}", "step") as bar:
 
         def report(progress: Mapping[str, float]) -> None:
             bar.update(int(progress["steps"]) - bar.n)
             bar.set_postfix(gain=f"{progress['gain']:.3f}")
+            curve.add(progress["steps"], progress["gain"])
 
-        return train_policy(
+        policy = train_policy(
             config,
             start=start,
             folder=folder.folder,
             resume=args.resume is not None,
             report=report,
-            validate=lambda policy: float(np.mean(policy_errors(kalman, policy, unseen))),
+            validate=lambda policy: float(np.mean(policy_errors_of(kalman, policy, unseen))),
         )
+    curve.write()
+    return policy
+
+
+class Curve:
+    """The reward per decision over a training, in a file that a resumed training continues.
+
+    Args:
+        path: of the file.
+        resumed: whether to begin with what the file holds.
+    """
+
+    def __init__(self, path: Path, resumed: bool) -> None:
+        self.path, self.rows, self.written = path, [], time.monotonic()
+        if resumed and path.is_file():
+            with path.open(encoding="utf-8", newline="") as file:
+                self.rows = [(float(row["steps"]), float(row["gain"])) for row in csv.DictReader(file)]
+
+    def add(self, steps: float, gain: float) -> None:
+        """Note a point; later ones, of what was lost in an interruption, go."""
+        self.rows = (
+            [row for row in self.rows if row[0] < steps] if self.rows and self.rows[-1][0] >= steps else self.rows
+        )
+        self.rows.append((steps, gain))
+        if time.monotonic() - self.written > 10.0:
+            self.write()
+
+    def write(self) -> None:
+        """Write the file."""
+        self.written = time.monotonic()
+        write_text(self.path, "steps,gain\n" + "".join(f"{steps:.0f},{gain!r}\n" for steps, gain in self.rows))
 
 
 def errors_of(
     tuned: TunedFilter,
-    candidates: Mapping[str, GainPolicy],
+    candidates: Mapping[str, Trained],
     sets: Mapping[str, Sequence[Trajectory]],
     constant: ConstantGains,
     points: int = 32,
@@ -157,22 +249,24 @@ def errors_of(
     The ``oracle`` takes the best of ``points`` constant gains on each trajectory, chosen with the truth known: a bound,
     not a method.
     """
-    from ..baselines.gain_policy.constant_gains import constant_errors, policy_errors
+    from ..baselines.gain_policy.agents.learners import policy_errors_of
+    from ..baselines.gain_policy.constant_gains import constant_errors
 
     # The first that were tried lie evenly in the box; those at the end crowd around the best.
     actions, table = [constant.action, *constant.tried[:points]], {}
     for group, trajectories in sets.items():
-        found = {name: policy_errors(tuned.kalman, policy, trajectories) for name, policy in candidates.items()}
+        found = {name: policy_errors_of(tuned.kalman, policy, trajectories) for name, policy in candidates.items()}
         found["oracle"] = np.min([constant_errors(tuned, trajectories, action) for action in actions], axis=0)
         table[group] = {name: np.degrees(values) for name, values in found.items()}
     return table
 
 
 def results(
-    errors: Mapping[str, Mapping[str, np.ndarray]], sets: Mapping[str, Sequence[Trajectory]]
+    errors: Mapping[str, Mapping[str, np.ndarray]], sets: Mapping[str, Sequence[Trajectory]], quantity: Quantity
 ) -> list[dict[str, Any]]:
     """The same as rows of results."""
-    common = {"quantity": "up", "metric": "inclination", "unit": "deg"}
+    metric = "inclination" if quantity.kind == "direction" else "rmse"
+    common = {"quantity": quantity.name, "metric": metric, "unit": "deg"}
     return [
         {"estimator": name, "trajectory": trajectory.name, "value": float(value), **common}
         for group, found in errors.items()
@@ -182,20 +276,19 @@ def results(
 
 
 def card_of(
-    args: Args, policy: GainPolicy, constant: ConstantGains, summary: Mapping[str, Mapping[str, float]]
+    args: Args, policy: Trained, constant: ConstantGains, summary: Mapping[str, Mapping[str, float]]
 ) -> dict[str, Any]:
     """What the policy is and how it came about."""
     return {
         "name": f"{args.filter.replace('-', '_')}_policy",
         "description": f"sets the gains of the {args.filter} filter while it runs",
-        "estimator": "poise.baselines.gain_policy.adaptive.AdaptiveEstimator",
-        "method": args.method,
-        "command": command_line("tune", args, ("method", "preset", "seed", "steps", "trajectories", "recipe")),
-        "data": "simulated hand motions" if args.recipe is None else f"recipe {args.recipe}",
+        "agent": args.agent,
+        "command": command_line("tune", args, ("agent", "preset", "seed", "steps", "trajectories", "recipe")),
+        "data": "simulated" if args.recipe is None else f"recipe {args.recipe}",
         **policy.card,
         "best_constant": [round(float(value), 4) for value in constant.action],
-        "test_inclination_deg": {name: dict(values) for name, values in summary.items()},
-        "versions": versions(("numpy", "numba", "torch", "stable-baselines3", "scipy")),
+        "test_error_deg": {name: dict(values) for name, values in summary.items()},
+        "versions": versions(PACKAGES),
         "date": date.today().isoformat(),
         "licence": "MIT",
     }

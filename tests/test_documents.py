@@ -25,6 +25,7 @@ EXAMPLES = [
 @pytest.mark.parametrize(("path", "code"), EXAMPLES)
 def test_examples_run(path, code, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path))
     if path.name == "recordings.md":
         write_examples(tmp_path)
     kinds = dict(KINDS)

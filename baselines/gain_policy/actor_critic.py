@@ -15,11 +15,9 @@ import numpy as np
 from gymnasium import spaces
 
 from ...envs.gain_episode import PRIVILEGED, GainEpisode
-from ...filters.adaptation.tuned import TunedFilter
 from ...filters.support.optional import extra
 from .config import TrainingConfig
 from .oracle_warm_start import OracleNetwork
-from .policy import GainPolicy
 
 with extra("rl"):
     import torch
@@ -73,8 +71,8 @@ class AsymmetricActorCriticPolicy(ActorCriticPolicy):
         )
 
 
-class GainPPO(PPO):
-    """PPO that calls ``after_update`` after every update, between two rollouts.
+class AfterUpdate:
+    """Added to a model of stable-baselines3: calls ``after_update`` after every update, between two rollouts.
 
     A callback of stable-baselines3 is called after the exploration noise of the next rollout was drawn, which is too
     late for a checkpoint.
@@ -82,11 +80,20 @@ class GainPPO(PPO):
 
     after_update: Callable[[], None] | None = None
 
-    def train(self) -> None:
-        """Update the networks from the rollout."""
-        super().train()
+    def train(self, *args: Any, **kwargs: Any) -> None:
+        """Update the networks."""
+        super().train(*args, **kwargs)  # type: ignore[misc]
         if self.after_update is not None:
             self.after_update()
+
+
+class GainPPO(AfterUpdate, PPO):
+    """PPO with a checkpoint after every update."""
+
+
+def lowered(rate: float) -> Callable[[float], float]:
+    """A learning rate that falls linearly to a tenth."""
+    return lambda remaining: rate * (0.1 + 0.9 * remaining)
 
 
 def make_model(config: TrainingConfig, env: VecNormalize, start: np.ndarray, logs: Path | None = None) -> GainPPO:
@@ -98,14 +105,10 @@ def make_model(config: TrainingConfig, env: VecNormalize, start: np.ndarray, log
         start: action ``(k,)``.
         logs: folder of the TensorBoard log; None for none.
     """
-
-    def learning_rate(remaining: float) -> float:
-        return config.learning_rate * (0.1 + 0.9 * remaining)
-
     model = GainPPO(
         AsymmetricActorCriticPolicy,
         env,
-        learning_rate=learning_rate,
+        learning_rate=lowered(config.learning_rate),
         n_steps=config.n_steps,
         batch_size=min(config.batch_size, config.n_envs * config.n_steps),
         n_epochs=config.n_epochs,
@@ -154,11 +157,3 @@ def warm_start(model: PPO, env: VecNormalize, oracle: OracleNetwork, episodes: S
     statistics.var = np.concatenate([oracle.std**2, (table.std(axis=0) + 1e-3) ** 2])
     # From here on the normalisation is part of the actor and must not drift.
     statistics.count = 1e12
-
-
-def export_policy(model: PPO, env: VecNormalize, tuned: TunedFilter) -> GainPolicy:
-    """The deterministic part of the actor as plain arrays, with the normalisation of ``env`` in the first layer."""
-    seen, statistics = tuned.observation_size, env.obs_rms
-    assert not isinstance(statistics, dict)
-    std = np.sqrt(statistics.var[:seen] + env.epsilon)
-    return GainPolicy.of_network(tuned, actor_layers(model), statistics.mean[:seen], std)

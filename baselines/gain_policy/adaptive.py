@@ -59,10 +59,14 @@ class AdaptiveEstimator(Enclosing):
         policy = GainPolicy.load(path_or_name)
         return cls(replace(tunable_filter(policy.filter), keep_covariance=True).with_dt(dt), policy)
 
+    def configured(self, metadata: Mapping[str, Any]) -> AdaptiveEstimator:
+        """The same for the person, vehicle or device that a recording's metadata describe."""
+        return replace(self, filter=replace(self.filter, model=self.filter.model.configured(metadata)))
+
     @cached_property
     def tuned(self) -> TunedFilter:
         """The filter with the actions and observations of the policy."""
-        return TunedFilter(self.filter, self.policy.ranges, self.policy.features)
+        return TunedFilter(self.filter, self.policy.ranges, self.policy.features, self.policy.smoothing)
 
     def init(self, measurement: Measurement) -> TunedState:
         """Initial state with the batch shape of ``measurement``."""

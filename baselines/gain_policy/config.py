@@ -1,16 +1,16 @@
-"""Training configuration of gain policies; settings of PPO have the names and meanings of stable-baselines3."""
+"""Training configuration of gain policies; settings of agents have the names and meanings of stable-baselines3."""
 
 from __future__ import annotations
 
 import json
 import math
-from dataclasses import dataclass, fields, replace
-from typing import Any
+from dataclasses import asdict, dataclass, field, fields, replace
+from typing import Any, Literal, get_args
 
 from ...envs.hand.gestures import Mixed
 from ...envs.hand.trajectories import HandTrajectories
-from ...envs.recipes.hand import HandRecipe
 from ...envs.sensors.presets import sensor_preset
+from .motions import GradedMotions, Motions, RiddenMotions
 
 SUSTAINED = Mixed(lengths=(15.0, 40.0), rest_share=0.1, spread=0.5, single_share=0.25)
 """Sustained motion of one kind, in addition to the quick changes of ``mixed``."""
@@ -31,7 +31,43 @@ TRAINING_MOTIONS = HandTrajectories(
     noise_scale=(0.1, 1.0),
     duration=60.0,
 )
-"""Training data of the shipped policies."""
+"""Smooth gestures: training data of ``bounded-motion+policy``."""
+
+
+AgentName = Literal["ppo", "recurrent-ppo", "sac", "td3"]
+"""Agents that train a policy."""
+
+
+@dataclass(frozen=True)
+class OffPolicySettings:
+    """What SAC and TD3 need besides.
+
+    With 64 episodes at a time a gradient step follows on 16 decisions: fewer than by default (one on one), since the
+    decisions of one motion resemble each other, and a step costs as much as a hundred decisions.
+    """
+
+    buffer_size: int = 100_000
+    """decisions that are remembered"""
+    learning_starts: int = 5_000
+    """decisions before the first gradient step"""
+    gradient_steps: int = 4
+    """gradient steps after each decision of all episodes"""
+    batch_size: int = 256
+    """decisions in a gradient step"""
+    learning_rate: float = 3e-4
+    """constant"""
+    noise: float = 0.1
+    """standard deviation of TD3's exploration"""
+
+    def __post_init__(self) -> None:
+        for name in ("buffer_size", "gradient_steps", "batch_size"):
+            if getattr(self, name) < 1:
+                raise ValueError(f"{name} must be at least 1, got {getattr(self, name)}")
+        if self.learning_starts < 0:
+            raise ValueError(f"learning_starts must be 0 or more, got {self.learning_starts}")
+        for name in ("learning_rate", "noise"):
+            if not 0.0 < getattr(self, name) < math.inf:
+                raise ValueError(f"{name} must be positive, got {getattr(self, name)}")
 
 
 @dataclass(frozen=True)
@@ -44,12 +80,14 @@ class TrainingConfig:
 
     filter: str = "external-acceleration"
     """name of the filter"""
+    agent: AgentName = "ppo"
+    """who learns; PPO has a critic that sees the truth, and alone starts from the oracle"""
     gains: tuple[str, ...] | None = None
     """gains that the policy sets; None for all of the filter"""
     interval: float = 0.1
     """s between decisions"""
-    motions: HandTrajectories | HandRecipe = TRAINING_MOTIONS
-    """what is simulated; a recipe with few rates, since the trajectories of one rate are computed together"""
+    motions: Motions = TRAINING_MOTIONS
+    """what is simulated, such as a recipe; at few rates, since the trajectories of one rate are computed together"""
     trajectories: int = 240
     """number of simulated trajectories to train on"""
     seed: int = 0
@@ -77,6 +115,12 @@ class TrainingConfig:
     """units of the hidden layers"""
     initial_std: float = 0.1
     """standard deviation of the actions at the start, about"""
+    smoothing: float = 0.0
+    """s; the gains follow the actions with this time constant, 0: at once"""
+    off_policy: OffPolicySettings = field(default_factory=OffPolicySettings)
+    """of SAC and TD3"""
+    lstm_units: int = 64
+    """units of the memory of recurrent PPO"""
     error_scale: float = 5.0
     """deg: errors far above it count by their logarithm in the reward"""
     warm_start: int = 150
@@ -87,13 +131,15 @@ class TrainingConfig:
     """points of the search for constant gains, the reference of the reward; 0 takes the published tuning"""
 
     def __post_init__(self) -> None:
-        for name in ("trajectories", "total_timesteps", "n_envs", "n_steps", "batch_size", "n_epochs"):
+        if self.agent not in get_args(AgentName):
+            raise ValueError(f"agent must be one of {list(get_args(AgentName))}, got {self.agent!r}")
+        for name in ("trajectories", "total_timesteps", "n_envs", "n_steps", "batch_size", "n_epochs", "lstm_units"):
             if getattr(self, name) < 1:
                 raise ValueError(f"{name} must be at least 1, got {getattr(self, name)}")
         if not 0.0 <= self.gamma < 1.0:
             raise ValueError(f"gamma must lie in [0, 1), got {self.gamma}")
-        for name in ("warm_start", "gain_search"):
-            if getattr(self, name) < 0:
+        for name in ("warm_start", "gain_search", "smoothing"):
+            if not 0 <= getattr(self, name) < math.inf:
                 raise ValueError(f"{name} must be 0 or more, got {getattr(self, name)}")
         for name in ("initial_std", "learning_rate", "error_scale"):
             if not 0.0 < getattr(self, name) < math.inf:
@@ -102,11 +148,12 @@ class TrainingConfig:
     def describe(self) -> dict[str, Any]:
         """Everything, in JSON's types."""
         values = {part.name: getattr(self, part.name) for part in fields(self)} | {"motions": self.motions.describe()}
+        values["off_policy"] = asdict(self.off_policy)
         return json.loads(json.dumps(values))
 
 
 def shipped_config(filter: str) -> TrainingConfig:
-    """The configuration that the shipped weights of a filter were trained with.
+    """The configuration that the shipped weights of a filter were trained with, or that of any other filter.
 
     They begin from the oracle warm start. From the best constant gains, the same number of steps gains little in
     simulation and loses on recordings. With an oracle over the whole box of actions the filter diverges in single
@@ -115,5 +162,40 @@ def shipped_config(filter: str) -> TrainingConfig:
     if filter == "bounded-motion":
         # The bias gain is not tuned: motion that resembles a bias drift is more frequent than a real one.
         return TrainingConfig(filter=filter, gains=("process", "velocity"), warm_start_centre=(0.0, 0.0))
+    if filter in ("two-gyro-level", "platform-gyro"):
+        gain = "constraint" if filter == "two-gyro-level" else "measurement"
+        return TrainingConfig(
+            filter=filter,
+            gains=(gain,),
+            motions=RiddenMotions(),
+            trajectories=96,
+            total_timesteps=200_000,
+            n_envs=96,
+            gain_search=16,
+            warm_start=96,
+        )
     # The valley in which the measurement variance does the work, and c_a, which trusts the filter's own error, little.
-    return TrainingConfig(filter=filter, warm_start_centre=(-0.7, 0.7, -0.7))
+    centre = (-0.7, 0.7, -0.7) if filter == "external-acceleration" else None
+    return TrainingConfig(
+        filter=filter,
+        motions=GradedMotions(),
+        trajectories=120,
+        total_timesteps=300_000,
+        gain_search=16,
+        warm_start=120,
+        warm_start_centre=centre,
+    )
+
+
+def config_of(agent: AgentName, config: TrainingConfig) -> TrainingConfig:
+    """The configuration of PPO, changed to what suits another agent.
+
+    Recurrent PPO walks through its memory decision by decision, so it takes few long rollouts; SAC and TD3 take few
+    episodes at a time, since each of them waits for the gradient steps.
+    """
+    if agent == "ppo":
+        return replace(config, agent=agent)
+    common = {"agent": agent, "warm_start": 0, "n_envs": 64, "smoothing": config.smoothing or 0.5}
+    if agent == "recurrent-ppo":
+        return replace(config, **common, batch_size=1024, n_epochs=4, learning_rate=3e-4)  # type: ignore[arg-type]
+    return replace(config, **common, gamma=0.98)  # type: ignore[arg-type]

@@ -33,6 +33,7 @@ class GainPolicy:
         features: its observation, and the interval of its decisions.
         layers: weights and biases; the normalisation of observations is part of the first.
         card: description of the training.
+        smoothing: s; the gains follow the actions with this time constant, 0: at once.
 
     Raises:
         ValueError: layers do not fit each other, the observation or the actions.
@@ -43,6 +44,7 @@ class GainPolicy:
     features: Features
     layers: tuple[Layer, ...]
     card: dict[str, Any] = field(default_factory=dict)
+    smoothing: float = 0.0
 
     def __post_init__(self) -> None:
         layers = tuple((np.asarray(weight, float), np.asarray(bias, float)) for weight, bias in self.layers)
@@ -80,7 +82,7 @@ class GainPolicy:
         ]
         weight, bias = layers[0]
         layers[0] = (weight / std, bias - (weight / std) @ mean)
-        return cls(tuned.name, tuned.ranges, tuned.features, tuple(layers))
+        return cls(tuned.name, tuned.ranges, tuned.features, tuple(layers), smoothing=tuned.smoothing)
 
     @classmethod
     def neutral(cls, tuned: TunedFilter) -> GainPolicy:
@@ -107,6 +109,7 @@ class GainPolicy:
             "scales": list(self.features.scales),
             "gains": [{"gain": part.gain, "lower": part.lower, "upper": part.upper} for part in self.ranges],
             "layers": len(self.layers),
+            "smoothing": self.smoothing,
         }
         if isinstance(self.features, NamedFeatures):
             own["rows"], own["channels"] = self.features.rows, [list(entry) for entry in self.features.channels]
@@ -136,6 +139,6 @@ class GainPolicy:
                 channels = tuple((str(name), int(size), str(unit)) for name, size, unit in card["channels"])
                 features = NamedFeatures(features.interval, features.scales, int(card["rows"]), channels)
             layers = tuple((arrays[f"{index}.weight"], arrays[f"{index}.bias"]) for index in range(card["layers"]))
-            return cls(card["filter"], ranges, features, layers, card)
+            return cls(card["filter"], ranges, features, layers, card, float(card.get("smoothing", 0.0)))
         except KeyError as missing:
             raise ValueError(f"{path_or_name}: the {KIND} lacks {missing}") from None

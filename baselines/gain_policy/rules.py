@@ -3,14 +3,50 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from ...filters.adaptation.gains import filter_name, gain_ranges
-from ...filters.adaptation.rules import InnovationRule, PitchRateRule, Rule
+from ...filters.adaptation.rules import (
+    AccelerationRule,
+    GuardedInnovationRule,
+    InnovationRule,
+    PitchRateRule,
+    Rule,
+)
 from ...filters.core.kalman import KalmanFilter
+from ...filters.registry import make
+from ...filters.support.names import look_up
 from .adaptive import AdaptiveEstimator
 from .policy import GainPolicy
+
+RULES: dict[str, Rule] = {
+    "pitch-rate": PitchRateRule(),
+    "innovation": InnovationRule(),
+    "guarded-innovation": GuardedInnovationRule(),
+    "acceleration": AccelerationRule(),
+}
+"""Name → rule, with constants chosen on simulated motion and rides."""
+
+
+def by_rule(filter: str, rule: str, dt: float = 0.01, **parameters: Any) -> AdaptiveEstimator:
+    """A registered filter with its measurement variance, or its belief in level ground, set by a rule.
+
+    Args:
+        filter: name of a Kalman filter.
+        rule: one of :data:`RULES`.
+        dt: sampling interval, s.
+        parameters: constants of the filter that differ from the published tuning, by the model's field names.
+
+    Raises:
+        ValueError: an unknown filter, rule or parameter.
+    """
+    kalman = make(filter, dt=dt, **parameters)
+    if not isinstance(kalman, KalmanFilter):
+        raise ValueError(f"filter must be a Kalman filter, got {filter!r}")
+    gain = "constraint" if "constraint" in kalman.gains else "measurement"
+    return ruled(kalman, gain, look_up("rule", rule, RULES))
 
 
 def ruled(filter: KalmanFilter, gain: str, rule: Rule) -> AdaptiveEstimator:
@@ -26,7 +62,7 @@ def ruled(filter: KalmanFilter, gain: str, rule: Rule) -> AdaptiveEstimator:
     """
     (part,) = gain_ranges(filter, (gain,))
     features = replace(rule, largest=part.upper)
-    if isinstance(features, InnovationRule) and part.lower == -part.upper:
+    if isinstance(features, InnovationRule | AccelerationRule) and part.lower == -part.upper:
         features = replace(features, smallest=part.lower)
     layers = ((np.array([[1.0, 0.0]]), np.zeros(1)),)
     return AdaptiveEstimator(filter, GainPolicy(filter_name(filter), (part,), features, layers))

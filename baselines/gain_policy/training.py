@@ -1,4 +1,4 @@
-"""Train a gain policy by proximal policy optimisation (stable-baselines3); a stopped training resumes bit by bit.
+"""Train a gain policy by an agent of stable-baselines3; a stopped training resumes bit by bit.
 
 The motions are simulated (:class:`poise.envs.hand.trajectories.HandTrajectories`), a fixed set drawn from a seed. First
 the best constant gains are searched. The network starts from them, and its reward is relative to their error. This does
@@ -10,7 +10,6 @@ from __future__ import annotations
 import hashlib
 import json
 import time
-from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -31,19 +30,20 @@ from ..checkpoint import load_checkpoint, save_checkpoint
 from .config import TrainingConfig
 from .constant_gains import best_constant_gains
 from .oracle_warm_start import fit_oracle
-from .policy import GainPolicy
 
 if TYPE_CHECKING:
-    from .actor_critic import GainPPO
+    from .agents.learners import Trained
     from .vec_env import SB3VecEnv
 
 CHECKPOINT = "checkpoint.pt"
 """File of the run folder that a stopped training resumes from."""
 LOOKS = 6
 """Approximate number of validations during a training."""
+CHECKPOINTS = 20
+"""Approximate number of checkpoints of SAC and TD3, whose memory is large; other agents write one after each update."""
 
 Report = Callable[[dict[str, float]], None]
-Validate = Callable[[GainPolicy], float]
+Validate = Callable[[Any], float]
 
 
 def train_policy(
@@ -56,7 +56,7 @@ def train_policy(
     resume: bool = False,
     report: Report | None = None,
     validate: Validate | None = None,
-) -> GainPolicy:
+) -> Trained:
     """Train a policy; the same arguments on the same machine give the same policy, interrupted and resumed or not.
 
     Args:
@@ -70,7 +70,8 @@ def train_policy(
         validate: gives a score of a policy, the less the better; the best of about six validated policies is returned.
 
     Returns:
-        The policy; its card holds the configuration, the training time and the constant gains that it started from.
+        The policy, a :class:`.RecurrentGainPolicy` of recurrent PPO; its card holds the configuration, the training
+        time and the constant gains that it started from.
 
     Raises:
         ValueError: see :class:`TrainingConfig`; ``resume`` without a folder or a readable checkpoint; the checkpoint
@@ -83,7 +84,7 @@ def train_policy(
         import torch
 
     filter = tunable_filter(config.filter) if kalman is None else kalman
-    tuned = TunedFilter.of(filter, config.gains, features_of(filter, config.interval))
+    tuned = TunedFilter.of(filter, config.gains, features_of(filter, config.interval), config.smoothing)
     motions = config.motions.draw_many(config.seed, config.trajectories) if trajectories is None else list(trajectories)
     home = None if folder is None else Path(folder)
     key = training_key(config, tuned, motions)
@@ -156,7 +157,7 @@ class PolicyTraining:
     ) -> None:
         from stable_baselines3.common.vec_env import VecNormalize
 
-        from .actor_critic import make_model
+        from .agents.learners import make_learner
         from .vec_env import SB3VecEnv
 
         self.config, self.tuned, self.motions, self.start = config, tuned, motions, start
@@ -171,7 +172,8 @@ class PolicyTraining:
             reward="relative",
             reference=tuple(start.tolist()),
             error_scale=config.error_scale,
-            privileged=True,
+            smoothing=config.smoothing,
+            privileged=config.agent == "ppo",
             autoreset_mode="SameStep",
             staggered=True,
             infos=False,
@@ -179,10 +181,10 @@ class PolicyTraining:
         self.batch: SB3VecEnv = SB3VecEnv(self.rows)
         # Any, because its statistics are typed as those of observations in dictionaries too.
         self.env: Any = VecNormalize(self.batch, gamma=config.gamma, clip_obs=1e6)
-        self.model: GainPPO = make_model(config, self.env, start, home)
+        self.model: Any = make_learner(config, self.env, start, home)
         self.batch.seed(child_seeds(root_seed(config.seed), config.n_envs))
-        self.best: GainPolicy | None = None
-        self.best_score, self.best_steps, self.looked = np.inf, 0, 0
+        self.best: Trained | None = None
+        self.best_score, self.best_steps, self.looked, self.saved = np.inf, 0, 0, 0
 
     @property
     def steps(self) -> int:
@@ -196,10 +198,10 @@ class PolicyTraining:
 
     def begin(self) -> None:
         """The oracle warm start, a first validation of its policy, and the first observation."""
-        from .actor_critic import warm_start
-
         config = self.config
-        if config.warm_start:
+        if config.warm_start and config.agent == "ppo":
+            from .actor_critic import warm_start
+
             centre = self.start if config.warm_start_centre is None else np.asarray(config.warm_start_centre)
             motions = self.motions[: config.warm_start]
             oracle = fit_oracle(self.tuned, motions, centre, net_arch=config.net_arch, seed=config.seed)
@@ -208,14 +210,19 @@ class PolicyTraining:
         # As the model itself would at the start of `learn`, but a checkpoint can be written before it.
         self.model._last_obs = self.env.reset()
         self.model._last_episode_starts = np.ones(config.n_envs, dtype=bool)
+        if config.agent in ("sac", "td3"):
+            self.model._last_original_obs = self.env.get_original_obs()
         self.save()
 
-    def finish(self) -> GainPolicy:
+    def finish(self) -> Trained:
         """Train to the end and give the policy."""
+        from .agents.progress import GainProgress
+
         remaining = self.config.total_timesteps - self.steps
         if remaining > 0:
             self.model.after_update = self.after_update
-            self.model.learn(remaining, reset_num_timesteps=False, tb_log_name="tensorboard")
+            progress = GainProgress()
+            self.model.learn(remaining, progress, reset_num_timesteps=False, tb_log_name="tensorboard")
             self.model.after_update = None
         self.look()
         policy = self.exported() if self.best is None else self.best
@@ -228,11 +235,11 @@ class PolicyTraining:
         }
         return replace(policy, card=json.loads(json.dumps(card)))
 
-    def exported(self) -> GainPolicy:
+    def exported(self) -> Trained:
         """The current policy."""
-        from .actor_critic import export_policy
+        from .agents.learners import exported_policy
 
-        return export_policy(self.model, self.env, self.tuned)
+        return exported_policy(self.model, self.env, self.tuned, self.config.agent)
 
     def after_update(self) -> None:
         """Validate the policy if due, report, and write a checkpoint."""
@@ -243,7 +250,9 @@ class PolicyTraining:
             finished: list[Any] = list(self.model.ep_info_buffer or ())
             gain = float(np.mean([episode["r"] / episode["l"] for episode in finished])) if finished else float("nan")
             self.report({"steps": float(self.steps), "gain": gain, "seconds": self.seconds})
-        self.save()
+        large = self.config.agent in ("sac", "td3")
+        if not large or self.steps - self.saved >= self.config.total_timesteps / CHECKPOINTS:
+            self.save()
 
     def look(self) -> None:
         """Score the current policy, and keep it if it is the best so far."""
@@ -259,11 +268,15 @@ class PolicyTraining:
 
     def save(self) -> None:
         """Write a checkpoint, if there is a folder: everything that the rest of the training depends on."""
+        self.saved = self.steps
         if self.home is None:
             return
         import torch
 
-        model, env = self.model, self.env
+        from .agents.learners import arrays_of_policy
+        from .agents.snapshot import learner_state
+
+        env = self.env
         self.home.mkdir(parents=True, exist_ok=True)
         # The global generator, because stable-baselines3 shuffles its batches with it.
         generator: Any = np.random.get_state()  # noqa: NPY002
@@ -271,17 +284,14 @@ class PolicyTraining:
         normalisation = [env.obs_rms.mean, env.obs_rms.var, env.ret_rms.mean, env.ret_rms.var, env.returns]
         state = {
             "start": self.start,
-            "policy": model.policy.state_dict(),
-            "optimizer": model.policy.optimizer.state_dict(),
-            "counters": [self.steps, int(model._n_updates), self.looked, self.best_steps],
-            "episodes": [dict(episode) for episode in model.ep_info_buffer or []],
-            "observation": [model._last_obs, model._last_episode_starts],
+            "learner": learner_state(self.model),
+            "looks": [self.looked, self.best_steps],
             "normalisation": normalisation,
             "counts": [float(env.obs_rms.count), float(env.ret_rms.count)],
             "rows": self.rows.snapshot(),
             "unfinished": [self.batch.returns, self.batch.lengths],
             "best_score": float(self.best_score),
-            "best": None if self.best is None else [array for layer in self.best.layers for array in layer],
+            "best": None if self.best is None else arrays_of_policy(self.best),
             "generators": {
                 "torch": torch.get_rng_state(),
                 "numpy": [str(name), keys.astype(np.int64), json.dumps(rest)],
@@ -294,21 +304,20 @@ class PolicyTraining:
         """Continue from the state of a checkpoint as if there had been no interruption."""
         import torch
 
-        model, env = self.model, self.env
-        model.policy.load_state_dict(state["policy"])
-        model.policy.optimizer.load_state_dict(state["optimizer"])
-        model.num_timesteps, model._n_updates, self.looked, self.best_steps = state["counters"]
-        model.ep_info_buffer = deque(state["episodes"], maxlen=model._stats_window_size)
-        model.ep_success_buffer = deque(maxlen=model._stats_window_size)
-        model._last_obs, model._last_episode_starts = state["observation"]
+        from .agents.learners import policy_of_arrays
+        from .agents.snapshot import restore_learner
+
+        env = self.env
+        restore_learner(self.model, state["learner"])
+        self.looked, self.best_steps = state["looks"]
+        self.saved = self.steps
         obs_rms, ret_rms = env.obs_rms, env.ret_rms
         obs_rms.mean, obs_rms.var, ret_rms.mean, ret_rms.var, env.returns = state["normalisation"]
         obs_rms.count, ret_rms.count = state["counts"]
         self.rows.restore(state["rows"])
         self.batch.returns, self.batch.lengths = state["unfinished"]
         if state["best"] is not None:
-            layers = tuple(zip(state["best"][::2], state["best"][1::2], strict=True))
-            self.best = GainPolicy(self.tuned.name, self.tuned.ranges, self.tuned.features, layers)
+            self.best = policy_of_arrays(state["best"], self.exported())
         self.best_score, self.earlier = state["best_score"], state["seconds"]
         generators = state["generators"]
         torch.set_rng_state(generators["torch"])

@@ -87,18 +87,24 @@ class SequenceData:
 
     @classmethod
     def joined(cls, parts: Sequence[tuple[np.ndarray, ...]], names: Sequence[str]) -> Self:
-        """Sequences of :func:`sequence_of`, padded to one length."""
+        """Sequences of :func:`sequence_of`, padded to one length.
+
+        Raises:
+            ValueError: there are none.
+        """
+        if not parts:
+            raise ValueError("a data set must hold at least one sequence, got none")
         longest = max(len(part[0]) for part in parts)
         wholes: list[np.ndarray] = []
         for index in range(4):
             shape = (len(parts), longest, *parts[0][index].shape[1:])
-            wholes.append(np.zeros(shape, bool if index == 3 else np.float32))
+            # nothing is divided by a spread of zero where a sequence is over
+            wholes.append(np.full(shape, index == 2, bool if index == 3 else np.float32))
             for row, part in enumerate(parts):
                 wholes[index][row, : len(part[index])] = part[index]
                 if index == 1:
                     wholes[index][row, len(part[index]) :] = part[index][-1]
         features, target, spread, mask = wholes
-        spread[spread == 0.0] = 1.0
         return cls(features, target, spread, mask, tuple(names))
 
     @classmethod
@@ -208,10 +214,16 @@ def sequence_of(trajectory: Trajectory, front_end: FrontEnd, head: Head) -> tupl
         ValueError: see :meth:`SequenceData.from_trajectories`.
     """
     trajectory = trajectory.on_grid()
+    if hasattr(head, "sequence"):
+        found: tuple[np.ndarray, ...] = head.sequence(trajectory, front_end)
+        return found
     if not trajectory.dt <= front_end.interval * (1.0 + 1e-9):
         raise ValueError(f"{trajectory.name} is sampled every {trajectory.dt:g} s, more than {front_end.interval:g} s")
     front_end = front_end.with_dt(trajectory.dt).configured(trajectory.metadata)
-    arrays = check_measurements(front_end.channels, trajectory.measurements, time_axis=True)
+    try:
+        arrays = check_measurements(front_end.channels, trajectory.measurements, time_axis=True)
+    except ValueError as reason:
+        raise ValueError(f"{trajectory.name}: {reason}") from None
     seen = front_end.run(arrays)
     kalman = getattr(front_end, "kalman", None)
     if kalman is not None:
@@ -219,7 +231,10 @@ def sequence_of(trajectory: Trajectory, front_end: FrontEnd, head: Head) -> tupl
         trajectory = trajectory.replace(truth={**trajectory.truth, **kalman.model.truth(trajectory.truth)})
     due = seen.due == 1.0
     if not due.any():
-        raise ValueError(f"{trajectory.name} is too short: {len(trajectory)} samples hold no interval of the network")
+        raise ValueError(
+            f"{trajectory.name} is too short, or one of its channels holds nothing: "
+            f"its {len(trajectory)} samples hold no interval of the network"
+        )
     target = head.target(seen, trajectory)[due]
     known = np.isfinite(target).all(axis=-1) & np.isfinite(seen.features[due]).all(axis=-1)
     features, spread = np.nan_to_num(seen.features[due]), seen.spread[due]

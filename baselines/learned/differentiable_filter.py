@@ -7,14 +7,16 @@ array form, to which they are equal to rounding.
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
 from ...filters.compile.differentiable import DifferentiableEquations
 from ...filters.core.kalman import KalmanFilter
+from ...filters.core.model import Model
 from ...filters.core.sampling import FilterState
 from ...filters.support.optional import extra
 
@@ -66,6 +68,13 @@ class DifferentiableFilter:
         self.kalman = replace(kalman, restart=False)
         self.gains = tuple(kalman.gains if gains is None else gains)
         self._equations = DifferentiableEquations(self.kalman, self.gains)
+
+    def with_model(self, model: Model) -> Self:
+        """The same equations with other constants: another sampling interval, rider or device; nothing is compiled."""
+        other = copy.copy(self)
+        other.kalman = replace(self.kalman, model=model)
+        other._equations = self._equations.with_model(model)
+        return other
 
     def init(self, measurement: Mapping[str, Any]) -> FilterState:
         """The state before samples of the batch shape ``(B,)`` of ``measurement`` (channel → ``(B, size)``)."""

@@ -89,13 +89,15 @@ def fit(
 
     Raises:
         ValueError: the module gives other shapes than the head takes; there is nothing to resume, or it was started
-            with another configuration, other data or another version of the package; a data set scores nothing.
+            with another configuration, other data or another version of the package; a data set scores nothing, or
+            scores numbers that are not finite.
         RuntimeError: loss or gradients were not finite several times in a row.
     """
     config = FitConfig() if config is None else config
     for name, part in (("data", data), ("validation", validation)):
         if not part.mask.any():
             raise ValueError(f"{name} scores nothing: the truth of its {len(part)} sequences is unknown everywhere")
+        check_finite(name, part)
     if resume and folder is None:
         raise ValueError("resume needs the folder of the interrupted training")
     home = None if folder is None else Path(folder)
@@ -128,6 +130,19 @@ def fit(
     network = module.export() if hasattr(module, "export") else trainer.network  # type: ignore[operator]
     estimator = LearnedEstimator(network, front_end, head)
     return FitResult(estimator, trainer.history, trainer.best_epoch, tuple(residuals.tolist()))
+
+
+def check_finite(name: str, data: SequenceData) -> None:
+    """Refuse data that score what is not a number.
+
+    Raises:
+        ValueError: names the array and the sequence.
+    """
+    for field in ("features", "target"):
+        bad = (data.mask & ~np.isfinite(getattr(data, field)).all(axis=-1)).any(axis=1)
+        if bad.any():
+            where = data.names[int(np.argmax(bad))]
+            raise ValueError(f"{name} holds numbers that are not finite where it is scored: {field} of {where}")
 
 
 class Trainer:

@@ -238,12 +238,15 @@ class AngleHead:
 
 def mean_of_sequences(error: Array, mask: Array) -> Array:
     """Mean over sequences ``(B, N)`` of the root mean square in time of what is in the mask; 0 where nothing is."""
-    xp = namespace(error)
-    counted = xp.any(scored(error, mask), axis=1)
-    each = rms(error, mask, axis=1)
-    each = xp.where(counted, each, xp.zeros_like(each))
-    count = xp.sum(xp.astype(counted, each.dtype))
+    xp, each = namespace(error), of_sequences(error, mask)
+    count = xp.sum(xp.astype(xp.any(scored(error, mask), axis=1), each.dtype))
     return xp.sum(each) / xp.where(count > 0.0, count, xp.ones_like(count))
+
+
+def of_sequences(error: Array, mask: Array) -> Array:
+    """Root mean square in time ``(B,)`` of what is in the mask of each sequence ``(B, N)``; 0 where nothing is."""
+    xp, each = namespace(error), rms(error, mask, axis=1)
+    return xp.where(xp.any(scored(error, mask), axis=1), each, xp.zeros_like(each))
 
 
 def turned(features: np.ndarray, up: np.ndarray, angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

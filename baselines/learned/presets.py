@@ -6,15 +6,21 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
+import numpy as np
+
+from ...envs.recipes.recipe import Recipe
+from ...envs.recipes.registry import recipe
+from ...envs.recipes.rides import RideSource
 from ...filters.registry import make
 from ...filters.support.names import look_up
 from ...filters.support.seeds import child_seeds
 from .config import FitConfig
 from .head import AngleHead, Head, TiltHead
+from .inputs.filter_bank import TUNINGS, FilterBank
 from .inputs.filter_features import FilterFeatures
 from .inputs.front_end import FrontEnd
 from .inputs.level_frame import LevelFrame
-from .rides import RideSource
+from .mixture_head import MixtureHead
 
 
 @dataclass(frozen=True)
@@ -41,12 +47,14 @@ class Preset:
     """units of a GRU, channels of a convolution network"""
     filter: str | None = None
     """that the network corrects; None: it stands alone"""
+    bank: bool = False
+    """whether the network chooses among tunings of the filter (:mod:`.inputs.filter_bank`)"""
     limit: float | None = None
     """of corrections, in standard deviations of the filter"""
     scale: float = 0.1
     """rad: unit of the output"""
     noise: float = 0.0
-    """on standardised features while training"""
+    """on features while training: standardised ones, or those of a bank, which are of the order of one"""
     fit: FitConfig = field(default_factory=FitConfig)
     refined: FitConfig = field(default_factory=lambda: FitConfig(epochs=8, batch=16, learning_rate=4e-4))
     """settings of a training that starts from weights"""
@@ -58,16 +66,26 @@ class Preset:
             )
         if self.rides is not None and self.filter is None:
             raise ValueError("a network for rides corrects a filter: name it")
+        if self.bank and (self.rides is not None or self.filter is None):
+            raise ValueError("a bank needs a filter of hand motion: name it, and sources instead of rides")
         if self.units < 1:
             raise ValueError(f"units must be at least 1, got {self.units}")
+
+    def recipe(self, name: str) -> Recipe:
+        """The recipe of a source."""
+        return recipe(name)
 
     def front_end(self) -> FrontEnd:
         """What the network sees."""
         kalman: Any = None if self.filter is None else make(self.filter, **self.parameters)
-        return LevelFrame(kalman) if self.rides is None else FilterFeatures(kalman)
+        if self.rides is not None:
+            return FilterFeatures(kalman)
+        return FilterBank(LevelFrame(kalman)) if self.bank else LevelFrame(kalman)
 
     def head(self) -> Head:
         """What it says: an inclination, or corrections of all angles of a rider's filter."""
+        if self.bank:
+            return MixtureHead(len(TUNINGS))
         if self.rides is None:
             return TiltHead(self.limit)
         outputs = tuple(quantity for quantity in make(str(self.filter)).outputs if quantity.kind == "angle")
@@ -79,9 +97,12 @@ class Preset:
 
         kinds: dict[str, Any] = {"gru": GruModule, "tcn": TcnModule}
         kind = look_up("network", self.network, kinds)
-        # the head of angles has a scale of its own
-        scale = self.scale if self.rides is None else 1.0
-        return kind(features, outputs, self.units, seed=seed, scale=scale, noise=self.noise)
+        # other heads have a scale of their own
+        scale = self.scale if self.rides is None and not self.bank else 1.0
+        made = kind(features, outputs, self.units, seed=seed, scale=scale, noise=self.noise)
+        if self.bank:
+            made.standardised.fit(np.zeros(features), np.ones(features))
+        return made
 
     def quick(self) -> Preset:
         """A small version that learns visibly within minutes."""
@@ -99,7 +120,7 @@ TRAINED = {"scenarios": ["indoor_circle", "outdoor", "straight", "slalom"], "sty
 """Rides that networks train on; other scenarios and aggressive riders are kept aside."""
 RIDES = RideSource(rides=40, draws=6, duration=40.0, changes=TRAINED)
 RIDDEN = FitConfig(epochs=12, window=125, learning_rate=3e-3)
-HANDS = {"hand-held": 300, "carried": 60}
+HANDS = {"hand-held-prompt": 300, "carried-prompt": 60}
 PRESETS: dict[str, Preset] = {
     "gru": Preset("inclination from six axes by a recurrent network alone", HANDS, fit=FitConfig(epochs=8)),
     "tcn": Preset(
@@ -107,11 +128,13 @@ PRESETS: dict[str, Preset] = {
         fit=FitConfig(epochs=8),
     ),
     "bounded-motion+network": Preset(
-        "bounded-motion, its inclination corrected by a recurrent network within what its covariance allows",
-        HANDS,
+        "bounded-motion in eight tunings, weighed by a recurrent network",
+        {"hand-held-prompt": 200, "carried-prompt": 70},
         filter="bounded-motion",
-        limit=3.0,
-        scale=0.02,
+        bank=True,
+        units=48,
+        noise=0.05,
+        fit=FitConfig(epochs=5, batch=24, learning_rate=3e-3),
     ),
     **{
         f"{name}+network": Preset(

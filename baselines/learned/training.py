@@ -5,14 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from ...envs.data.trajectory import Trajectory
-from ...envs.recipes.registry import recipe
 from .data import SequenceData, taught, with_errors
 from .estimator import LearnedEstimator
 from .fit import FitResult, fit
+from .gains.gain_filter import GainFilter
+from .gains.gain_head import GainHead
 from .head import AngleHead
 from .networks.gru import GruNetwork
 from .networks.modules import GruModule
@@ -52,7 +54,8 @@ def train_preset(
     Raises:
         ValueError: see :func:`.fit.fit`; a recording lacks a channel or the truth.
     """
-    front_end, head = preset.front_end(), preset.head()
+    front_end: Any = preset.front_end()
+    head: Any = preset.head()
     train_seed, validation_seed, weights_seed, _ = seeds_of(seed)
 
     def simulated(root: int, share: float, words: str) -> SequenceData:
@@ -62,7 +65,7 @@ def train_preset(
             return ride_data(some, root, front_end, head, processes=processes, label=label)
         parts = [
             SequenceData.from_recipe(
-                *(recipe(name), root, max(1, round(share * count)), front_end, head),
+                *(preset.recipe(name), root, max(1, round(share * count)), front_end, head),
                 cache=folder,
                 progress="" if say is None else f"{words} {name}",
                 processes=processes,
@@ -96,9 +99,14 @@ def train_preset(
             raise ValueError(f"start must be weights of a recurrent network, got a {network.kind} in {start}")
         module, config = GruModule.of(network, preset.scale), preset.refined
     config = replace(config, seed=number)
+    if isinstance(head, GainHead) and start is None and not resume:
+        head.begin(module, data, number)
     result = fit(module, front_end, head, data, validation, config, folder=folder, resume=resume, say=say)
     if isinstance(head, AngleHead):
         # the covariance that what is held out asks for
         calibrated = replace(head, deviations=result.residuals)
         result = result._replace(estimator=replace(result.estimator, head=calibrated))
+    if isinstance(head, GainHead):
+        made: Any = GainFilter(result.estimator.network, front_end, head)
+        result = result._replace(estimator=made)
     return result

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import json
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -27,6 +28,12 @@ class ShippedRecipe(NamedTuple):
     fields: Mapping[str, Any]
 
 
+PROMPT = {
+    "gyroscope_bias": (math.radians(0.03), math.radians(4.0)),
+    "bandwidth": (400.0, 4000.0),
+    "timing": {"late_share": 0.0},
+}
+"""Sensors that report at once; a gyroscope may be one whose bias nobody has removed."""
 RECIPES: dict[str, ShippedRecipe] = {
     "hand-held": ShippedRecipe(
         "hand",
@@ -42,6 +49,16 @@ RECIPES: dict[str, ShippedRecipe] = {
         "hand",
         "the same of somebody who runs",
         {"carried_share": 1.0, "carried": {"first_rest": (0.3, 20.0), "running_share": 1.0, "standing_share": 0.0}},
+    ),
+    "hand-held-prompt": ShippedRecipe(
+        "hand",
+        "hand-held by sensors without delay or low-pass, so that a network does not learn to predict; larger biases",
+        {"carried_share": 0.0, "sensors": PROMPT},
+    ),
+    "carried-prompt": ShippedRecipe(
+        "hand",
+        "carried, by the same sensors",
+        {"carried_share": 1.0, "carried": {"first_rest": (0.3, 20.0), "running_share": 0.0}, "sensors": PROMPT},
     ),
     "rider": ShippedRecipe("rider", "rides of anybody anywhere with sensors of several grades", {}),
 }

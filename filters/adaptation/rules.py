@@ -1,8 +1,10 @@
 r"""Rules by hand that set one gain of a filter while it runs: what a trained policy has to beat.
 
-A rule is written as the features of a policy that hands its only feature on. Both rules here raise the variance of the
-pseudo-measurement "the bicycle does not pitch" (:mod:`poise.filters.bicycle.platform_gyro`; the constraint of
-:class:`poise.filters.bicycle.two_gyro.filter.TwoGyro`), which is right on level ground and wrong on ramps and bumps.
+A rule is written as the features of a policy that hands its only feature on. The pitch rate and the innovations raise
+the variance of the pseudo-measurement "the bicycle does not pitch" (:mod:`poise.filters.bicycle.platform_gyro`; the
+constraint of :class:`poise.filters.bicycle.two_gyro.filter.TwoGyro`), which is right on level ground and wrong on ramps
+and bumps. The innovations alone make any filter innovation-adaptive, and the excess of the specific force that of one
+inertial sensor adaptive to shaking.
 """
 
 from __future__ import annotations
@@ -14,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..core.kalman import KalmanFilter
-from ..core.quantity import Estimate
+from ..core.quantity import ACCELEROMETER, GRAVITY, Estimate
 from .time_scales import FeatureMemory, Features
 
 
@@ -117,3 +119,80 @@ class InnovationRule(Rule):
     def factor(self, averages: np.ndarray) -> np.ndarray:
         """λ."""
         return averages[..., 1]
+
+
+@dataclass(frozen=True)
+class GuardedInnovationRule(InnovationRule):
+    """The larger of :class:`InnovationRule`'s λ and :class:`PitchRateRule`'s.
+
+    Innovations of the pseudo-measurement grow where the roll is wrong as well as where the road is not level; on bumps
+    they are small again before the pitching ends. The pitch rate tells the two apart.
+
+    Attributes:
+        pitching: the rule for the pitch rate; its λ is added to the published constant, not to the λ of the
+            innovations.
+    """
+
+    pitching: PitchRateRule = PitchRateRule()
+
+    def init(self, kalman: KalmanFilter, batch: tuple[int, ...] = ()) -> FeatureMemory:
+        """Empty memory of both."""
+        averages, sums = np.zeros((*batch, 1, 4)), np.zeros((*batch, 4))
+        return FeatureMemory(averages, sums, np.zeros((*batch, 0, 0)), np.array(0), np.zeros(batch, int))
+
+    def moments(
+        self, memory: FeatureMemory, kalman: KalmanFilter, measurements: Mapping[str, np.ndarray], estimate: Estimate
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Those of both rules ``(T, *batch, 4)``."""
+        mine, previous = super().moments(memory, kalman, measurements, estimate)
+        return np.concatenate(
+            [mine, self.pitching.moments(memory, kalman, measurements, estimate)[0]], axis=-1
+        ), previous
+
+    def averaged(self, averages: np.ndarray, means: np.ndarray, duration: float) -> np.ndarray:
+        """Those of both rules ``(*batch, 1, 4)``."""
+        mine = super().averaged(averages[..., :2], means[..., :2], duration)
+        return np.concatenate([mine, self.pitching.averaged(averages[..., 2:], means[..., 2:], duration)], axis=-1)
+
+    def factor(self, averages: np.ndarray) -> np.ndarray:
+        """The larger λ."""
+        return np.maximum(super().factor(averages[..., :2]), self.pitching.factor(averages[..., 2:]))
+
+
+@dataclass(frozen=True)
+class AccelerationRule(Rule):
+    """λ = 2 ln(rms / reference) of the excess ‖f‖ − g of the specific force: what shakes is not gravity.
+
+    Attributes:
+        channel: accelerometer.
+        reference: m/s²; excess at which the published variance holds.
+        decay: s, time constant of the mean square.
+        gravity: m/s².
+        smallest: log factor below which λ does not fall.
+    """
+
+    channel: str = ACCELEROMETER.name
+    reference: float = 1.0
+    decay: float = 4.0
+    gravity: float = GRAVITY
+    smallest: float = -math.inf
+
+    def moments(
+        self, memory: FeatureMemory, kalman: KalmanFilter, measurements: Mapping[str, np.ndarray], estimate: Estimate
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Known or not, and squared excess ``(T, *batch, 2)``."""
+        force = np.asarray(measurements[self.channel], dtype=float)
+        excess = np.sqrt(np.sum(force * force, axis=-1)) - self.gravity
+        known = np.isfinite(excess)
+        return np.stack([known, np.where(known, excess, 0.0) ** 2], axis=-1), memory.previous
+
+    def averaged(self, averages: np.ndarray, means: np.ndarray, duration: float) -> np.ndarray:
+        """Known share and squared excess, averaged."""
+        return averages - math.expm1(-duration / self.decay) * (means[..., None, :] - averages)
+
+    def factor(self, averages: np.ndarray) -> np.ndarray:
+        """2 ln(rms / reference); 0 before the first sample."""
+        known, square = averages[..., 0], averages[..., 1]
+        there = known > 0.0
+        ratio = square / np.where(there, known, 1.0) / self.reference**2
+        return np.where(there, np.maximum(np.log(np.maximum(ratio, 1e-8)), self.smallest), 0.0)

@@ -1,4 +1,4 @@
-r"""Reverse-mode derivatives of recorded equations, printed as straight-line code.
+r"""Reverse-mode derivatives of recorded equations, as straight-line code.
 
 The gradient of a number with respect to everything that it was computed from costs a small multiple of the computation
 itself (A. Griewank, A. Walther, "Evaluating Derivatives", SIAM 2008, chapter 3). Each recorded operation passes the
@@ -17,9 +17,10 @@ from typing import Any
 
 import numpy as np
 
+from .emit import TRUTHS
 from .trace import Expression, Tape
 
-SILENT = {"input", "constant", "floor", "isfinite", ">", ">=", "<", "<=", "and", "or", "not"}
+SILENT = {"input", "constant", "floor", *TRUTHS}
 """Operations without a derivative."""
 
 
@@ -50,7 +51,7 @@ def gradient(
             if isinstance(operand, Expression) and operand.index not in live:
                 live[operand.index] = operand
                 pending.append(operand)
-    risky = _depending_on(live, f"{unknown}[") if unknown else set()
+    risky = _depending_on(live, unknown) if unknown else set()
     for index in sorted(live, reverse=True):
         node, own = live[index], adjoint.get(index, 0.0)
         if node.operation in SILENT or not isinstance(own, Expression) or own.value == 0.0:
@@ -64,12 +65,12 @@ def gradient(
     return found
 
 
-def _depending_on(live: dict[int, Expression], prefix: str) -> set[int]:
-    """Indices of the nodes that are computed from inputs whose text begins with a prefix."""
+def _depending_on(live: dict[int, Expression], name: str) -> set[int]:
+    """Indices of the nodes that are computed from an input array."""
     found: set[int] = set()
     for index in sorted(live):
         node = live[index]
-        own = node.operation == "input" and str(node.operands[0]).startswith(prefix)
+        own = node.operation == "input" and node.operands[0] == name
         if own or any(isinstance(part, Expression) and part.index in found for part in node.operands):
             found.add(index)
     return found

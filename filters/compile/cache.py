@@ -116,7 +116,9 @@ def load(text: str, label: str) -> ModuleType:
 
     versions = f"{numba.__version__} {np.__version__} {sys.version}"
     here = Path(__file__)
-    foundation = "".join(here.with_name(f"{name}.py").read_text(encoding="utf-8") for name in ("kernel", "smoothing"))
+    foundation = "".join(
+        here.with_name(f"{name}.py").read_text(encoding="utf-8") for name in ("kernel", "smoothing", "emit")
+    )
     name = f"{label}_{hashlib.sha256(f'{versions}{foundation}{text}'.encode()).hexdigest()[:20]}"
     folder = cache_folder()
     path = f"<{name}>" if folder is None else str(_written(folder / f"{name}.py", text))

@@ -7,8 +7,9 @@ begins at its prior, whose derivative is left out, and the monitor is off.
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
@@ -18,36 +19,25 @@ from ..core.quantity import Measurement
 from ..core.sampling import FilterState, join, split
 from .adjoint import gradient
 from .cache import compile_now, load
-from .printer import print_model, print_shared
+from .emit import print_function
+from .printer import print_model
 from .run import CompiledEquations, compiled_equations
-from .trace import Tape, print_code
+from .trace import Tape
 
 _HEAD = """
-from math import *
-
 import numpy as np
-from numba import njit
+from numba.extending import intrinsic
 
 from poise.filters.compile.adjoint_kernel import correct_back, gain_times, innovation, propagate_back, symmetric
 from poise.filters.compile.cache import jit
-from poise.filters.compile.kernel import (
-    begin, copy, copy_matrix, correct, fill, propagate, scratch, squared, take, zeros
-)
-from {primal} import F_column, F_first, H_column, H_first, finish, pose, predict, prior, residual, retract{grow}
+from poise.filters.compile.emit import native
+from poise.filters.compile.kernel import begin, copy, copy_matrix, correct, fill, propagate, scratch, take, zeros
+from {primal} import F_column, F_first, H_column, H_first, finish, grow, pose, predict, prior, residual, retract
 
-inf, nan = np.inf, np.nan
 starts = np.array({starts})
 """
 
-_INNER = '@njit(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)'
-
 _LOOPS = """
-{inner}
-def noise_of(present, age, p, noise):
-    copy(p, noise){grown}
-    return
-
-
 @jit
 def follow(x, P, held, age, started, Z, parameters, poses, covariances, whites, nis, logarithms,
            stages, xs, Ps, presents, befores, ages):
@@ -69,7 +59,7 @@ def follow(x, P, held, age, started, Z, parameters, poses, covariances, whites, 
             copy(age[b], ages[t, b])
             logarithms[t, b] = 0.0
             if started[b]:
-                noise_of(present, age[b], p, noise)
+                grow(p, age[b], present, noise)
                 predict(state, present, before, noise, x1, F, Q)
                 propagate(F, P1, Q, work, F_first, F_column)
                 residual(x1, z, p, r, H, R)
@@ -121,7 +111,7 @@ def back(Z, parameters, stages, xs, Ps, presents, befores, ages, gposes, gcovari
             p = parameters[t if parameters.shape[0] > 1 else 0, b if parameters.shape[1] > 1 else 0]
             z, present, before = Z[t, b], presents[t, b], befores[t, b]
             # the sample again
-            noise_of(present, ages[t, b], p, noise)
+            grow(p, ages[t, b], present, noise)
             predict(xs[t, b], present, before, noise, x1, F, Q)
             copy_matrix(Ps[t, b], P1)
             propagate(F, P1, Q, square, F_first, F_column)
@@ -141,7 +131,9 @@ def back(Z, parameters, stages, xs, Ps, presents, befores, ages, gposes, gcovari
             finish_back(x2, z, p, gx[b], passed, gp)
             for i in range({k}):
                 gparameters[t, b, i] += gp[i]
-            retract_back(x1, dx, p, passed, more, gdx)
+            retract_back(x1, dx, p, passed, more, gdx, gp)
+            for i in range({k}):
+                gparameters[t, b, i] += gp[i]
             correct_back(
                 H, P1, rows, count, A, W, y, gdx, gP[b], gnis[t, b], glogarithms[t, b], gr, gH, gR, work
             )
@@ -165,19 +157,13 @@ _SHARE = """
             if noise[{i}] > 0.0:
                 gp[{g}] *= p[{i}] / noise[{i}]"""
 
-_GROWN = """
-    noise[{i}] = max(noise[{i}], grow(
-        p[{i}], age[{c}], squared(present, {start}, {stop}), p[{dt}], p[{dt}]**{power}, {constants}
-    ))"""
 
-
-def print_back(model: Model, primal: str, shared: str, gains: Sequence[str]) -> str:
+def print_back(model: Model, primal: str, gains: Sequence[str]) -> str:
     """Print the module that runs a model forward and backward.
 
     Args:
         model: the equations.
         primal: name of the module of :func:`.printer.print_model`.
-        shared: name of that of :func:`.printer.print_shared`.
         gains: with respect to which the derivatives are taken.
     """
     tape = Tape()
@@ -189,56 +175,46 @@ def print_back(model: Model, primal: str, shared: str, gains: Sequence[str]) -> 
     x, dx, raw = tape.inputs("x", n), tape.inputs("dx", e), tape.inputs("z", width)
     z, previous = split(raw, model.channels), split(tape.inputs("previous", width), model.channels)
 
-    def seeds(name: str, *shape: int) -> np.ndarray:
-        array = np.empty(shape, dtype=object)
-        for place in np.ndindex(shape):
-            array[place] = tape.node("input", f"{name}[{', '.join(map(str, place))}]")
-        return array
-
     pose = traced.pose(x)
     posed = np.concatenate([np.asarray(pose[quantity.name], dtype=object) for quantity in model.outputs])
     tuned = [p[place] for place in places]
     functions: dict[str, tuple[Any, Sequence[np.ndarray], dict[str, Sequence[Any]], str]] = {
         "predict_back(x, z, previous, p, gxn, gF, gQ, gx, gp)": (
             traced.predict(x, z, previous),
-            (seeds("gxn", n), seeds("gF", e, e), seeds("gQ", e, e)),
+            (tape.inputs("gxn", n), tape.inputs("gF", e, e), tape.inputs("gQ", e, e)),
             {"gx": list(x), "gp": tuned},
             "",
         ),
         "residual_back(x, z, p, gr, gH, gR, gx, gp)": (
             traced.residual(x, z),
-            (seeds("gr", m), seeds("gH", m, e), seeds("gR", m, m)),
+            (tape.inputs("gr", m), tape.inputs("gH", m, e), tape.inputs("gR", m, m)),
             {"gx": list(x), "gp": tuned},
             "z",
         ),
-        "retract_back(x, dx, p, gxn, gx, gdx)": (
+        "retract_back(x, dx, p, gxn, gx, gdx, gp)": (
             (traced.retract(x, dx),),
-            (seeds("gxn", n),),
-            {"gx": list(x), "gdx": list(dx)},
+            (tape.inputs("gxn", n),),
+            {"gx": list(x), "gdx": list(dx), "gp": tuned},
             "",
         ),
         "finish_back(x, z, p, gxn, gx, gp)": (
             (traced.finish(x, z),),
-            (seeds("gxn", n),),
+            (tape.inputs("gxn", n),),
             {"gx": list(x), "gp": tuned},
             "z",
         ),
-        "pose_back(x, p, gout, gx)": ((posed,), (seeds("gout", len(posed)),), {"gx": list(x)}, ""),
+        "pose_back(x, p, gout, gx)": ((posed,), (tape.inputs("gout", len(posed)),), {"gx": list(x)}, ""),
     }
-    channels = [channel.name for channel in model.channels]
     begins = [0, *np.cumsum([channel.size for channel in model.channels]).tolist()]
     dt = names.index("dt")
-    grown, share = "", ""
-    for item in model.held_inputs:
-        i, c = names.index(item.parameter), channels.index(item.channel)
-        constants = ", ".join(repr(float(v)) for v in (item.spread, item.share, item.time, item.bound))
-        grown += _GROWN.format(
-            i=i, c=c, start=begins[c], stop=begins[c + 1], dt=dt, power=item.power, constants=constants
-        )
+    share = ""
     for i in {names.index(item.parameter): None for item in model.held_inputs}:
         share += "".join(_SHARE.format(i=i, g=g) for g, place in enumerate(places) if place == i)
-    grow = f"\nfrom {shared} import grow" if model.held_inputs else ""
-    text = [_HEAD.format(primal=primal, grow=grow, starts=begins)]
+    text = [_HEAD.format(primal=primal, starts=begins)]
+    sizes = {"x": n, "dx": e, "p": len(names), "gx": n, "gdx": e, "gp": len(tuned), "gxn": n, "gr": m}
+    sizes |= dict.fromkeys(("z", "previous"), width) | {"gout": len(posed)}
+    shapes: dict[str, tuple[int, ...]] = {name: (size,) for name, size in sizes.items()}
+    shapes |= {"gF": (e, e), "gQ": (e, e), "gH": (m, e), "gR": (m, m)}
     for signature, (outputs, given, wanted, unknown) in functions.items():
         arrays = [np.asarray(array, dtype=object) for array in outputs]
         inputs = [item for part in wanted.values() for item in part]
@@ -247,9 +223,9 @@ def print_back(model: Model, primal: str, shared: str, gains: Sequence[str]) -> 
         for name, part in wanted.items():
             parts[name] = found[start : start + len(part)]
             start += len(part)
-        clear = [f"    fill({name}, 0.0)" for name in parts]
-        text += [_INNER, f"def {signature}:", *clear, *print_code(parts), "    return", "", ""]
-    text.append(_LOOPS.format(inner=_INNER, grown=grown, share=share, dt=dt, m=m, k=len(places)))
+        name, _, arguments = signature.rstrip(")").partition("(")
+        text.append(print_function(name, {argument: shapes[argument] for argument in arguments.split(", ")}, parts))
+    text.append(_LOOPS.format(share=share, dt=dt, m=m, k=len(places)))
     return "\n".join(text)
 
 
@@ -286,9 +262,14 @@ class DifferentiableEquations:
         self.base = np.array([*parameters_of(self.model).values()])
         self.scaled = [self.model.gains[name] for name in self.gains]
         self.columns = [form.names.index(gain.parameter) for gain in self.scaled]
-        shared = load(print_shared(), "shared").__name__
-        primal = load(print_model(self.model, shared), type(self.model).__name__).__name__
-        self.module = load(print_back(self.model, primal, shared, self.gains), f"{type(self.model).__name__}_back")
+        primal = load(print_model(self.model), type(self.model).__name__).__name__
+        self.module = load(print_back(self.model, primal, self.gains), f"{type(self.model).__name__}_back")
+
+    def with_model(self, model: Model) -> Self:
+        """The same passes with the constants of another model of the same class and structure."""
+        other = copy.copy(self)
+        other.model, other.base = model, np.array([*parameters_of(model).values()])
+        return other
 
     def parameters(self, factors: np.ndarray) -> np.ndarray:
         """Parameters ``(T, B, count)`` for log factors ``(T, B, gains)``."""

@@ -83,50 +83,6 @@ def take(z, held, age, starts, dt, current, present, before):  # type: ignore[no
 
 
 @jit
-def squared(vector, start, stop):  # type: ignore[no-untyped-def]
-    """Sum of the squares of some elements."""
-    total = 0.0
-    for i in range(start, stop):
-        total += vector[i] * vector[i]
-    return total
-
-
-@jit
-def gather(present, z, pose, age, dt, declination, always, places, inputs):  # type: ignore[no-untyped-def]
-    """The inputs of :func:`poise.filters.core.monitor.watch`; ``places`` as in :class:`.monitor.Places`."""
-    for i in range(3):
-        inputs[i] = present[places[0] + i]
-        inputs[3 + i] = z[places[1] + i]
-        inputs[6 + i] = z[places[2] + i] if places[2] >= 0 else np.nan
-        inputs[9 + i] = pose[places[3] + i] if places[3] >= 0 else np.nan
-    for i in range(4):
-        inputs[12 + i] = pose[places[4] + i] if places[4] >= 0 else (1.0 if i == 0 else 0.0)
-    inputs[16] = age
-    inputs[17] = dt
-    inputs[18] = declination
-    inputs[19] = always
-
-
-@jit
-def reject(z, places, memory, age, least, share, longest):  # type: ignore[no-untyped-def]
-    """Put NaN into a sample as :func:`poise.filters.core.monitor.without_impacts` does."""
-    square = squared(z, places[1], places[1] + 3)
-    if memory[4] > 0.0 and age < longest and square > least * least and square > share * share * memory[3]:
-        fill(z[places[1] : places[1] + 3], np.nan)
-
-
-@jit
-def realign(memory, places, present, dt, current):  # type: ignore[no-untyped-def]
-    """Put the averages of force and field into a sample, as :func:`poise.filters.core.monitor.realigned` does."""
-    for i in range(3):
-        j, k = (i + 1) % 3, (i + 2) % 3
-        a, b = dt * present[places[0] + j], dt * present[places[0] + k]
-        current[places[1] + i] = memory[i] - (a * memory[k] - b * memory[j])
-        if places[2] >= 0 and memory[10] > 0.0:
-            current[places[2] + i] = memory[6 + i] - (a * memory[6 + k] - b * memory[6 + j])
-
-
-@jit
 def begin(x0, P0, factor, x, P):  # type: ignore[no-untyped-def]
     """Start from a prior if it is finite, with a factor on its covariance; returns whether it is."""
     if not finite(x0):

@@ -1,54 +1,38 @@
 """Equations → text of a module whose function ``run`` runs them over time, and ``record`` and ``smooth`` back again.
 
-A model runs once on recorded scalars (:mod:`.trace`); its floats stay parameters, so one printed module serves every
-tuning, sampling interval and gain. What is the same for every model is imported from :mod:`.kernel`. A method without
-covariance is a Kalman filter whose error state and measurement are empty.
+A model runs once on recorded scalars (:mod:`.trace`), which become machine code without numba's analysis
+(:mod:`.emit`); its floats stay parameters, so one printed module serves every tuning, sampling interval and gain. What
+is the same for every model is imported from :mod:`.kernel`. A method without covariance is a Kalman filter whose error
+state and measurement are empty.
 """
 
 from __future__ import annotations
 
-import inspect
 from collections.abc import Callable
-from dataclasses import astuple
 from typing import Any
 
 import numpy as np
 
-from ..core.held_inputs import grown
+from ..core.held_inputs import grown_parameters
 from ..core.model import Equations, Model, Recurrence, parameters_of, with_parameters
-from ..core.monitor import (
-    IMPACT,
-    IMPACT_SHARE,
-    INPUTS,
-    LONGEST_IMPACT,
-    LOST,
-    MEMORY,
-    places_of,
-    starts_of,
-    watch,
-)
+from ..core.monitor import LOST, MEMORY, inputs_of, places_of, realigned, starts_of, watch, without_impacts
 from ..core.quantity import ACCELEROMETER, GYROSCOPE
 from ..core.sampling import split
-from .trace import Expression, Tape, print_code
+from .emit import print_function
+from .trace import Expression, Tape
 
 _HEAD = """
-from math import *
-
 import numpy as np
-from numba import njit
+from numba.extending import intrinsic
 
 from poise.filters.compile.cache import jit
-from poise.filters.compile.kernel import (
-    begin, copy, copy_matrix, correct, fill, gather, keep, propagate, realign, reject, scratch, squared, take, zeros
-)
+from poise.filters.compile.emit import native
+from poise.filters.compile.kernel import begin, copy, correct, fill, keep, propagate, scratch, take, zeros
 from poise.filters.compile.smoothing import remember, update_back
-
-inf, nan = np.inf, np.nan
 """
 
 WIDTH = 10
 """Columns of a product that are summed at a time."""
-_INNER = '@njit(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)'
 
 _RUN = """
 starts = np.array({starts})
@@ -61,7 +45,7 @@ def run(x, P, held, age, monitor, started, Z, parameters, restart, poses, covari
     vectors, square, measured, rows = scratch(*sizes)
     current, present, before, x1, x0, r, dx, grown = vectors
     P0, F, Q, work = square
-    H, R, S, HP, K = measured{memory}
+    H, R, S, HP, K = measured
     for t in range(Z.shape[0]):
         for b in range(Z.shape[1]):
             p = parameters[t if parameters.shape[0] > 1 else 0, b if parameters.shape[1] > 1 else 0]
@@ -69,7 +53,10 @@ def run(x, P, held, age, monitor, started, Z, parameters, restart, poses, covari
             missing = take(z, held[b], age[b], starts, p[{dt}], current, present, before)
             lost = {lost}
             if started[b] and not lost:
-                noise = p{grown}
+                noise = p
+                if missing:
+                    grow(p, age[b], present, grown)
+                    noise = grown
                 predict(state, present, before, noise, x1, F, Q)
                 if P1.shape[0] > 0:
                     propagate(F, P1, Q, work, F_first, F_column)
@@ -91,30 +78,18 @@ def run(x, P, held, age, monitor, started, Z, parameters, restart, poses, covari
                 keep(started[b], P1, pose_now, covariances, t, b)
 """
 
-_GROWN = """
-                if missing:
-                    for i in range(p.shape[0]):
-                        grown[i] = p[i]
-                    noise = grown"""
-
-_GROWN_ONE = """
-                    ω, dt = squared(present, {start}, {stop}), p[{dt}]
-                    grown[{i}] = max(grown[{i}], grow(p[{i}], age[b, {c}], ω, dt, dt**{power}, {constants}))"""
-
-_REJECTED = f"""
+_REJECTED = """
             if restart and started[b]:
-                reject(z, places, monitor[b], age[b, {{a}}], {IMPACT}, {IMPACT_SHARE}, {LONGEST_IMPACT})"""
+                reject(z, monitor[b], age[b])"""
 
-_REALIGNED = """
+_REALIGNED = f"""
                 if lost:
-                    realign(monitor[b], places, present, p[{dt}], current)
-                    factor = monitor[b, {lost}]"""
+                    realign(current, monitor[b], p)
+                    factor = monitor[b, {LOST}]"""
 
 _WATCHED = """
             if restart and started[b]:
-                gather(present, z, pose_now, age[b, {c}], p[{dt}], {declination}, {always}, places, inputs)
-                watch(monitor[b], inputs, watched)
-                copy(watched, monitor[b])"""
+                watch(monitor[b], present, z, pose_now, age[b], p)"""
 
 # ``record`` is ``run`` with further lines in place of the comments: it keeps what the way back needs.
 _RECORDED = {
@@ -206,27 +181,27 @@ def _number_of(item: Any) -> float | None:
     return item.value if isinstance(item, Expression) else float(item)
 
 
-def _print_entries(F: np.ndarray, H: np.ndarray) -> tuple[list[str], int]:
+def _print_entries(tape: Tape, F: np.ndarray, H: np.ndarray, shapes: dict[str, tuple[int, ...]]) -> list[str]:
     """Functions that keep and restore the elements of F and H that vary, and the number of these."""
-    stored: list[str] = []
-    fetched: list[str] = []
-    constants: list[str] = []
+    varying = {"F": np.zeros(F.shape, dtype=object), "H": np.zeros(H.shape, dtype=object)}
+    constants = {"F": varying["F"].copy(), "H": varying["H"].copy()}
+    kept: list[Any] = []
     for name, array in (("F", F), ("H", H)):
-        for i, j in np.ndindex(array.shape):
-            item, number = f"{name}[{i}, {j}]", _number_of(array[i, j])
-            if number is None:
-                fetched.append(f"    {item} = kept[{len(stored)}]")
-                stored.append(f"    kept[{len(stored)}] = {item}")
-            elif number != 0.0:
-                constants.append(f"    {item} = {number!r}")
-    text = []
-    for signature, lines in (
-        ("store(F, H, kept)", stored),
-        ("fetch(kept, F, H)", fetched),
-        ("constants(F, H)", constants),
-    ):
-        text += ["", "", _INNER, f"def {signature}:", *lines, "    return"]
-    return text, len(stored)
+        elements = tape.inputs(name, *array.shape)
+        for place in np.ndindex(array.shape):
+            value = _number_of(array[place])
+            if value is None:
+                varying[name][place] = tape.node("input", "kept", len(kept))
+                kept.append(elements[place])
+            else:
+                constants[name][place] = value
+    shapes = {"kept": (len(kept),)} | shapes
+    functions = [
+        print_function("store", {name: shapes[name] for name in ("F", "H", "kept")}, {"kept": np.array(kept)}),
+        print_function("fetch", {name: shapes[name] for name in ("kept", "F", "H")}, varying),
+        print_function("constants", {name: shapes[name] for name in ("F", "H")}, constants),
+    ]
+    return [*functions, f"ENTRIES = {len(kept)}"]
 
 
 def _print_products(e: int) -> list[str]:
@@ -254,60 +229,44 @@ class UntraceableError(TypeError):
     """A method of a model that computes something that cannot be recorded."""
 
 
-def print_shared() -> str:
-    """Print the equations that belong to no model: the growth of a held input's noise and the monitor."""
-    names = list(inspect.signature(grown).parameters)
-    tape = Tape()
-    growth = print_code({"value": np.array([grown(*(tape.node("input", name) for name in names))], dtype=object)})
-    memory, inputs = tape.inputs("memory", MEMORY), tape.inputs("inputs", INPUTS)
-    text = [_HEAD, "", "@jit", f"def grow({', '.join(names)}):", *growth[:-1]]
-    text += [growth[-1].replace("value[0] =", "return"), "", "", "@jit", "def watch(memory, inputs, after):"]
-    text += ["    fill(after, 0.0)", *print_code({"after": watch(memory, inputs)})]
-    return "\n".join([*text, ""])
+def _recursion(traced: Equations, tape: Tape, names: list[str]) -> tuple[dict[str, Any], str]:
+    """What the recursion needs beside a model's equations, and the loop over time.
 
+    Returns the functions as in :func:`print_model`.
+    """
+    channels, places = [channel.name for channel in traced.channels], places_of(traced)
+    begins = [*starts_of(traced.channels).values(), sum(channel.size for channel in traced.channels)]
+    parts = {"starts": begins, "dt": names.index("dt"), "lost": "False", "rejected": "", "realigned": "", "watched": ""}
+    p, age = tape.inputs("p", len(names)), tape.inputs("age", len(channels))
+    present, current, z = (tape.inputs(name, begins[-1]) for name in ("present", "current", "z"))
 
-def _print_run(model: Equations, names: list[str], shared: str) -> str:
-    """The loop over time, with what the model's held inputs and the monitor need."""
-    channels = [channel.name for channel in model.channels]
-    begins, dt, places = [*starts_of(model.channels).values()], names.index("dt"), places_of(model)
-    begins.append(sum(channel.size for channel in model.channels))
-    parts: dict[str, Any] = {
-        "starts": begins,
-        "dt": dt,
-        "grown": "",
-        "watched": "",
-        "memory": "",
-        "lost": "False",
-        "realigned": "",
-        "rejected": "",
-    }
-    head = []
-    if model.held_inputs:
-        head = [f"from {shared} import grow"]
-        parts["grown"] = _GROWN
-        for item in model.held_inputs:
-            c = channels.index(item.channel)
-            constants = ", ".join(repr(float(v)) for v in (item.spread, item.share, item.time, item.bound))
-            place = {"i": names.index(item.parameter), "c": c, "start": begins[c], "stop": begins[c + 1]}
-            parts["grown"] += _GROWN_ONE.format(**place, dt=dt, power=item.power, constants=constants)
+    def grow() -> Any:
+        grown = grown_parameters(traced, age, split(present, traced.channels))
+        return np.array([grown.get(name, value) for name, value in zip(names, p, strict=True)])
+
+    functions: dict[str, Any] = {"grow(p, age, present, grown)": (("grown",), grow)}
     if places is not None:
-        head += [f"from {shared} import watch", f"places = np.array({list(astuple(places))})"]
-        declination = f"p[{names.index('declination')}]" if "declination" in names and places.field >= 0 else "0.0"
-        parts["memory"] = f"\n    inputs, watched = np.empty({INPUTS}), np.empty({MEMORY})"
-        parts["lost"] = f"restart and monitor[b, {LOST}] > 0.5"
-        parts["realigned"] = _REALIGNED.format(dt=dt, lost=LOST)
-        c, a = (channels.index(channel.name) for channel in (GYROSCOPE, ACCELEROMETER))
-        parts["rejected"] = _REJECTED.format(a=a)
-        parts["watched"] = _WATCHED.format(c=c, dt=dt, declination=declination, always=float(model.error_size > 0))
-    return "\n".join([*head, _RUN.format(**parts)])
+        memory, posed = tape.inputs("memory", MEMORY), tape.inputs("posed", sum(part.size for part in traced.outputs))
+        of_rate, of_force = (age[i : i + 1] for i in map(channels.index, (GYROSCOPE.name, ACCELEROMETER.name)))
+        functions["reject(z, memory, age)"] = ("z",), lambda: without_impacts(places, z, memory, of_force)
+        functions["realign(current, memory, p)"] = (
+            ("current",),
+            lambda: realigned(places, current, memory, traced.dt),
+        )
+        functions["watch(memory, present, z, posed, age, p)"] = (
+            ("memory",),
+            lambda: watch(memory, inputs_of(traced, places, present, z, posed, of_rate)),
+        )
+        lost = f"restart and monitor[b, {LOST}] > 0.5"
+        parts |= {"lost": lost, "rejected": _REJECTED, "realigned": _REALIGNED, "watched": _WATCHED}
+    return functions, _RUN.format(**parts)
 
 
-def print_model(model: Equations, shared: str = "shared") -> str:
+def print_model(model: Equations) -> str:
     """Trace equations and print the module that runs them.
 
     Args:
         model: the equations.
-        shared: name of the module that :func:`print_shared` has printed.
 
     Raises:
         ValueError: an equation returns another shape than the model's sizes say.
@@ -319,8 +278,10 @@ def print_model(model: Equations, shared: str = "shared") -> str:
     width, n, e, m = (sum(c.size for c in model.channels), model.state_size, model.error_size, model.residual_size)
     x, dx = tape.inputs("x", n), tape.inputs("dx", e)
     z, previous = (split(tape.inputs(name, width), model.channels) for name in ("z", "previous"))
-    shapes = {"xn": (n,), "P": (e, e), "F": (e, e), "Q": (e, e), "r": (m,), "H": (m, e), "R": (m, m)}
-    shapes["out"] = (sum(quantity.size for quantity in model.outputs),)
+    shapes: dict[str, tuple[int, ...]] = {"x": (n,), "dx": (e,), "p": (len(names),), "grown": (len(names),)}
+    shapes |= dict.fromkeys(("z", "previous", "present", "current"), (width,))
+    shapes |= {"xn": (n,), "P": (e, e), "F": (e, e), "Q": (e, e), "r": (m,), "H": (m, e), "R": (m, m)}
+    shapes |= {"memory": (MEMORY,), "age": (len(model.channels),), "posed": (sum(part.size for part in model.outputs),)}
 
     def posed() -> Any:
         pose = traced.pose(x)
@@ -345,29 +306,29 @@ def print_model(model: Equations, shared: str = "shared") -> str:
     else:
         raise TypeError(f"{kind} is neither a Model nor a Recurrence")
     equations["finish(x, z, p, xn)"] = (("xn",), lambda: traced.finish(x, z))
-    equations["pose(x, p, out)"] = (("out",), posed)
+    equations["pose(x, p, posed)"] = (("posed",), posed)
+    more, run = _recursion(traced, tape, names)
     text, jacobians = [_HEAD, ""], {"F": np.zeros((e, e)), "H": np.zeros((m, e))}
-    for signature, (outputs, compute) in equations.items():
-        where = f"{kind}.{signature.split('(')[0]}"
+    for signature, (outputs, compute) in (equations | more).items():
+        name, _, arguments = signature.rstrip(")").partition("(")
+        where = f"{kind}.{name}"
         try:
-            found = compute()
+            with np.errstate(all="ignore"):  # constants that are not numbers stand for what is missing
+                found = compute()
         except Exception as reason:  # functions that do not know traced numbers raise whatever they like
             raise UntraceableError(f"{where}: {reason}") from reason
         found = found if isinstance(found, tuple) else (found,)
-        arrays = {name: np.asarray(part, dtype=object) for name, part in zip(outputs, found, strict=True)}
-        for name, array in arrays.items():
-            if array.shape != shapes[name]:
-                raise ValueError(f"{where}: {name} must have shape {shapes[name]}, got {array.shape}")
-        jacobians |= {name: arrays[name] for name in ("F", "H") if name in arrays}
-        # Zeros are not printed; matrices keep theirs between calls, vectors share their memory and are cleared.
-        clear = [f"    fill({name}, 0.0)" for name in outputs if name in ("xn", "out", "r")]
-        text += [_INNER, f"def {signature}:", *clear, *print_code(arrays), "    return", "", ""]
-    run = _print_run(model, names, shared)
+        arrays = {output: np.asarray(part, dtype=object) for output, part in zip(outputs, found, strict=True)}
+        for output, array in arrays.items():
+            if array.shape != shapes[output]:
+                raise ValueError(f"{where}: {output} must have shape {shapes[output]}, got {array.shape}")
+        jacobians |= {output: arrays[output] for output in ("F", "H") if output in arrays}
+        # Matrices keep their zeros between calls.
+        text.append(print_function(name, {argument: shapes[argument] for argument in arguments.split(", ")}, arrays))
     text += [*_lists("F", jacobians["F"]), *_lists("H", jacobians["H"]), run]
     if isinstance(traced, Model):
         recorded = run
         for mark, line in _RECORDED.items():
             recorded = recorded.replace(mark, line)
-        entries, count = _print_entries(jacobians["F"], jacobians["H"])
-        text += [*entries, f"ENTRIES = {count}", *_print_products(e), recorded, _SMOOTH]
+        text += [*_print_entries(tape, jacobians["F"], jacobians["H"], shapes), *_print_products(e), recorded, _SMOOTH]
     return "\n".join(text)

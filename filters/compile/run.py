@@ -14,7 +14,7 @@ from ..core.quantity import Estimate, Measurement
 from ..core.sampling import FilterState, Gains, empty_state, join, per_tick_gains
 from ..support.parallel import processors
 from .cache import compile_now, load
-from .printer import UntraceableError, print_model, print_shared
+from .printer import UntraceableError, print_model
 
 _COMPILED: dict[tuple[Any, ...], CompiledEquations | None] = {}
 PARALLEL_WORK = 200_000
@@ -48,8 +48,7 @@ class CompiledEquations:
     """The compiled recursion of one class of equations; parameters are passed at every call."""
 
     def __init__(self, model: Equations) -> None:
-        shared = load(print_shared(), "shared").__name__
-        self.module = load(print_model(model, shared), type(model).__name__)
+        self.module = load(print_model(model), type(model).__name__)
         self.kernel = self.module.run
         self.names = tuple(parameters_of(model))
         self.columns: dict[str, slice] = {}

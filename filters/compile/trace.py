@@ -1,4 +1,4 @@
-"""Record what model code computes, to print it as straight-line code.
+"""Record what model code computes, to compile it as straight-line code.
 
 Model code runs once on object arrays of :class:`Expression`. Every operation makes a node; equal operations on equal
 operands make the same node (common subexpressions are found while recording), and zeros and ones are folded away, so
@@ -33,11 +33,11 @@ class Tape:
         """The node of a number."""
         return self.node("constant", repr(float(value)))
 
-    def inputs(self, name: str, size: int) -> np.ndarray:
-        """Object array ``(size,)`` of inputs that print as ``name[0]``, ``name[1]`` and so on."""
-        array = np.empty(size, dtype=object)
-        for index in range(size):
-            array[index] = self.node("input", f"{name}[{index}]")
+    def inputs(self, name: str, *shape: int) -> np.ndarray:
+        """Object array ``(*shape)`` of the elements of an input array."""
+        array = np.empty(shape, dtype=object)
+        for index in range(array.size):
+            array.flat[index] = self.node("input", name, index)
         return array
 
 
@@ -318,73 +318,3 @@ class TracedNamespace:
     def eye(size: int) -> np.ndarray:
         """Identity matrix of plain numbers."""
         return np.eye(size).astype(object)
-
-
-LARGEST_DEPTH = 8
-"""Nested operations in one printed line."""
-INFIX = {"+", "-", "*", "/", ">", ">=", "<", "<=", "==", "and", "or"}
-
-
-def print_code(outputs: dict[str, np.ndarray], *, indent: str = "    ") -> list[str]:
-    """Print straight-line Python that computes recorded outputs.
-
-    Args:
-        outputs: name of an array that exists in the printed scope → object array of what to write into it. Elements
-            that are exactly zero are not written: the caller clears the arrays once.
-        indent: put before every line.
-
-    Returns:
-        Lines of code that use ``sin``, ``sqrt`` … of ``math`` and ``isfinite`` by these names.
-    """
-    uses: dict[int, int] = {}
-    live: dict[int, Expression] = {}
-    pending = [item for array in outputs.values() for item in array.ravel() if isinstance(item, Expression)]
-    while pending:
-        node = pending.pop()
-        uses[node.index] = uses.get(node.index, 0) + 1
-        if node.index not in live:
-            live[node.index] = node
-            pending.extend(operand for operand in node.operands if isinstance(operand, Expression))
-    # What is used once is written where it is used, up to a depth that parsers like: fewer variables compile faster.
-    texts: dict[int, tuple[str, int]] = {}
-    lines = []
-    for index in sorted(live):
-        node = live[index]
-        operands = [texts[part.index] if isinstance(part, Expression) else (part, 0) for part in node.operands]
-        formula = _formula(node.operation, [text for text, _ in operands])
-        depth = 1 + max((level for _, level in operands), default=0)
-        if node.operation == "constant" or (uses[index] == 1 and depth < LARGEST_DEPTH):
-            texts[index] = formula, depth
-        else:
-            lines.append(f"{indent}v{index} = {formula}")
-            texts[index] = f"v{index}", 0
-    for name, array in outputs.items():
-        for position in np.ndindex(array.shape):
-            item = array[position]
-            number = item.value if isinstance(item, Expression) else float(item)
-            if number != 0.0:
-                text = texts[item.index][0] if isinstance(item, Expression) else _number(float(item))
-                lines.append(f"{indent}{name}[{', '.join(map(str, position))}] = {text}")
-    return lines
-
-
-def _number(value: float) -> str:
-    return repr(value) if math.isfinite(value) else ("nan" if math.isnan(value) else "inf" if value > 0 else "-inf")
-
-
-def _formula(operation: str, operands: list[str]) -> str:
-    if operation == "input":
-        return operands[0]
-    if operation == "constant":
-        return _number(float(operands[0]))
-    if operation in INFIX:
-        return f"({operands[0]} {operation} {operands[1]})"
-    if operation == "neg":
-        return f"(-{operands[0]})"
-    if operation == "not":
-        return f"(not {operands[0]})"
-    if operation == "**":
-        return f"({operands[0]}**{operands[1]})"
-    if operation == "where":
-        return f"({operands[1]} if {operands[0]} else {operands[2]})"
-    return f"{operation}({', '.join(operands)})"

@@ -7,10 +7,13 @@ from contextlib import contextmanager
 
 EXTRAS: dict[str, frozenset[str]] = {
     "sim": frozenset({"pybullet", "pybullet_data"}),
-    "learn": frozenset({"torch", "tensorboard"}),
-    "rl": frozenset({"stable_baselines3", "torch", "tensorboard"}),
+    "learn": frozenset({"torch", "tensorboard", "onnx", "onnxruntime"}),
+    "rl": frozenset({"stable_baselines3", "sb3_contrib", "optuna", "torch", "tensorboard", "onnx", "onnxruntime"}),
     "compare": frozenset({"ahrs", "imufusion", "vqf"}),
     "parquet": frozenset({"pyarrow"}),
+    "view": frozenset({"viser", "plotly"}),
+    "exchange": frozenset({"minari"}),
+    "cluster": frozenset({"dask", "ray"}),
 }
 """Extra → the modules that it brings."""
 

@@ -4,7 +4,14 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any
+
+from .names import look_up
+from .optional import extra
+
+BACKENDS = ("loky", "dask", "ray")
+"""Where jobs run: processes of this machine, the workers of a Dask scheduler, those of a Ray cluster."""
 
 
 def processors() -> int:
@@ -24,6 +31,51 @@ def progress_bar(total: int | None, label: str, unit: str, *, show: bool = True)
     return tqdm(total=total, desc=label, unit=unit, disable=None if show else True)
 
 
+@contextmanager
+def on_backend(name: str, processes: int = 2) -> Iterator[None]:
+    """Jobs of :func:`in_parallel` run on joblib's backend of that name inside this context.
+
+    ``dask`` and ``ray`` join the cluster of ``DASK_SCHEDULER_ADDRESS`` or ``RAY_ADDRESS``, and without one start
+    workers on this machine. Results are those of a serial run: a job's seed belongs to the job, not to the worker.
+
+    Args:
+        name: one of :data:`BACKENDS`.
+        processes: workers to start where no cluster is named.
+
+    Raises:
+        ValueError: the name is unknown.
+        MissingExtraError: the packages of the extra ``cluster`` are not installed.
+    """
+    look_up("backend", name, dict.fromkeys(BACKENDS))
+    if name == "loky":
+        yield
+        return
+    import joblib
+
+    with extra("cluster"):
+        if name == "dask":
+            from dask.distributed import Client
+
+            # one thread a worker, since compiled filters have their own
+            address = os.environ.get("DASK_SCHEDULER_ADDRESS")
+            cluster = {"n_workers": processes, "threads_per_worker": 1, "dashboard_address": None}
+            with Client(address) if address else Client(**cluster), joblib.parallel_config("dask"):
+                yield
+        else:
+            import ray
+            from ray.util.joblib import register_ray
+
+            register_ray()
+            address = os.environ.get("RAY_ADDRESS")
+            cluster = {"num_cpus": processes, "include_dashboard": False, "log_to_driver": False}
+            ray.init(address=address) if address else ray.init(**cluster)
+            try:
+                with joblib.parallel_config("ray"):
+                    yield
+            finally:
+                ray.shutdown()
+
+
 def in_parallel(
     function: Callable[..., Any],
     jobs: Sequence[tuple[Any, ...]],
@@ -32,7 +84,7 @@ def in_parallel(
     label: str = "",
     unit: str = "job",
 ) -> Iterator[Any]:
-    """Yield ``function(*job)`` of every job as soon as it is done, in any order.
+    """Yield ``function(*job)`` of every job as soon as it is done, in any order; see :func:`on_backend` for where.
 
     Args:
         function: of a module, so that other processes find it.
@@ -51,8 +103,11 @@ def in_parallel(
         results = (function(*job) for job in jobs)
     else:
         from joblib import Parallel, delayed
+        from joblib.parallel import get_active_backend
 
-        pool = Parallel(n_jobs=min(processes, len(jobs)), return_as="generator_unordered")
+        # joblib's backend for Ray hands over all results at the end
+        at_once = not get_active_backend()[0].supports_return_generator
+        pool = Parallel(n_jobs=min(processes, len(jobs)), return_as="list" if at_once else "generator_unordered")
         results = pool(delayed(function)(*job) for job in jobs)
     with progress_bar(len(jobs), label, unit, show=bool(label and jobs)) as bar:
         for result in results:

@@ -41,7 +41,7 @@ class Args:
 
 def run(args: Args) -> int:
     """Evaluate, print the table, and leave a run folder with a report."""
-    from ...baselines.benchmark import groups_of
+    from ...baselines.comparison.data_sets import groups_of
     from ...baselines.evaluation import evaluate
     from ...baselines.registry import list_estimators
     from ..experiment import start_run

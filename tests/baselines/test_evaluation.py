@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import poise
-from poise.baselines.benchmark import HAND_CHANNELS, contenders
+from poise.baselines.comparison.data_sets import HAND_CHANNELS, contenders
 from poise.baselines.error_table import agreement, summary
 from poise.baselines.evaluation import evaluate
 from poise.baselines.scoring import COLUMNS

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from poise.baselines.benchmark import dataset_of, with_other_clocks
+from poise.baselines.comparison.data_sets import dataset_of, with_other_clocks
 from poise.baselines.evaluation import evaluate
 from poise.baselines.recommendation import (
     CORRECTED,

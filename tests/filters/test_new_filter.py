@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import poise
-from poise.baselines.benchmark import contenders
+from poise.baselines.comparison.data_sets import contenders
 from poise.baselines.evaluation import evaluate
 from poise.baselines.speed.fixtures import plausible_measurements
 from poise.envs.hand.sensing import simulate_hand

@@ -6,6 +6,7 @@ import re
 import pandas
 import pytest
 
+from poise.baselines.comparison.intervals import is_measure
 from poise.baselines.scoring import COLUMNS
 from poise.envs.data.trajectory import load_trajectory
 from poise.filters.support.seeds import child_seed
@@ -102,7 +103,8 @@ def test_benchmark_compares_and_reports(episodes, tmp_path, capsys):
     }
     parts = {row["table"] for row in document["rows"]}
     assert {"simulation", "recordings"} < parts
-    assert sum(name.startswith("All data sets: ") for name in parts) == len(parts) - 3 == 3
+    assert sum(name.startswith("All data sets: ") for name in parts) == 3
+    assert "simulation: inclination, mean with its 95 % interval over 4 trajectories, deg" in parts
     rows = [row for row in document["rows"] if row["table"] in ("simulation", "recordings")]
     assert all(tuple(row) == ("table", *COLUMNS) for row in rows)
     assert {row["trajectory"] for row in rows} == {"slow-1", "fast-1", "severe-1", "mixed-1", "hand_motion_0000"}
@@ -112,4 +114,15 @@ def test_benchmark_compares_and_reports(episodes, tmp_path, capsys):
     assert all((folder / picture).stat().st_size > 5_000 for picture in pictures)
     assert "| C |" in report
     assert "root seed 0" in report
-    assert len(pandas.read_csv(folder / "results.csv")) == len(rows)
+    results = pandas.read_csv(folder / "results.csv")
+    assert {"inclination", "inclination largest", "nees", "nis"} <= set(results["metric"])
+    assert len(results[~is_measure(results)]) == len(rows)
+    assert (folder / "report.html").stat().st_size > 1_000_000
+    again = [*words, "--recordings", str(episodes / "hand_motion_0000.h5"), "--resume", str(folder)]
+    before = (folder / "results.csv").read_bytes()
+    assert main([*again, "--baseline", str(folder / "results.csv")]) == 0
+    assert (folder / "results.csv").read_bytes() == before
+    better = results.assign(value=results["value"] * 0.9)
+    better.to_csv(tmp_path / "better.csv", index=False)
+    assert main([*again, "--baseline", str(tmp_path / "better.csv")]) == 1
+    assert "grew by more than 2 %" in capsys.readouterr().out

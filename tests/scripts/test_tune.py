@@ -1,7 +1,9 @@
-"""Arguments of ``poise tune`` that choose what is simulated."""
+"""``poise tune``: what is simulated, agents and searches, reports, wrong input."""
 
 from __future__ import annotations
 
+import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -9,7 +11,8 @@ import pytest
 from poise.baselines.gain_policy.config import TRAINING_MOTIONS
 from poise.envs.recipes.hand import HandRecipe
 from poise.envs.recipes.registry import recipe, save_recipe
-from poise.scripts.tune import Args, training_config
+from poise.scripts.main import main
+from poise.scripts.tune import Args, Curve, training_config
 
 
 def test_a_recipe_replaces_the_motions_of_the_shipped_policies(tmp_path: Path) -> None:
@@ -23,3 +26,58 @@ def test_a_recipe_replaces_the_motions_of_the_shipped_policies(tmp_path: Path) -
     assert described["motions"]["name"] == "hand-held"
     with pytest.raises(ValueError, match="recipe must be one of hand motions"):
         training_config(Args(recipe="rider"))
+
+
+def test_agents_and_searches_leave_runs_that_a_report_compares(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    runs = ["--runs", str(tmp_path)]
+    short = save_recipe(replace(recipe("hand-held"), duration=3.0), tmp_path / "short.json")
+    small = ["--steps", "700", "--trajectories", "3", "--test-trajectories", "2", "--recipe", str(short), *runs]
+    assert main(["tune", "mekf", "--agent", "td3", *small]) == 0
+    assert main(["tune", "mekf", "--agent", "optuna", "--trials", "4", *small]) == 0
+    folders = sorted((tmp_path / "tune").iterdir())
+    assert {"checkpoint.pt", "curve.csv", "policy.safetensors", "sets.json"} <= {
+        each.name for each in folders[0].iterdir()
+    }
+    card = json.loads((folders[1] / "policy.json").read_text())
+    assert card["agent"] == "optuna"
+    capsys.readouterr()
+    assert main(["tune", "--report", *map(str, folders), "--json", *runs]) == 0
+    rows = json.loads(capsys.readouterr().out)["rows"]
+    assert {row["agent"] for row in rows} == {"td3", "optuna"}
+    (report,) = (tmp_path / "tune-report").iterdir()
+    assert "| td3 |" in (report / "report.md").read_text()
+    assert (report / "figures" / "profiles-simulated.png").is_file()
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["mekff"], "did you mean 'mekf'"),
+        (["vqf"], "filter must be a Kalman filter with gains"),
+        (["mekf", "--test-trajectories", "0"], "test_trajectories must be at least 1"),
+        (["mekf", "--steps", "0"], "total_timesteps must be at least 1"),
+        (["mekf", "--recipe", "nothing"], "recipe"),
+        (["mekf", "--recordings", "missing"], "missing"),
+        (["mekf", "--resume", "missing"], "there is no run in missing"),
+        (["--report", "missing"], "is not a finished run of poise tune"),
+    ],
+)
+def test_wrong_input_is_one_line(
+    words: list[str], said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["tune", *words]) == 2
+    assert said in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_curve_continues_where_a_checkpoint_was(tmp_path: Path) -> None:
+    curve = Curve(tmp_path / "curve.csv", resumed=False)
+    for steps in (10, 20, 30):
+        curve.add(steps, 0.1 * steps)
+    curve.write()
+    resumed = Curve(tmp_path / "curve.csv", resumed=True)
+    resumed.add(20, 7.0)
+    assert resumed.rows == [(10.0, 1.0), (20, 7.0)]

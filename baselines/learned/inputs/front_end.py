@@ -24,7 +24,8 @@ class Seen(NamedTuple):
         features: ``(..., F)`` of the interval so far.
         due: ``(...)``, 1 at the samples that end an interval, else 0.
         base: quantity → ``(..., size)``: what the head corrects, such as the estimate of a filter.
-        spread: ``(..., S)`` standard deviations of the base, or S = 0 where nothing is known of them.
+        spread: ``(..., S)`` standard deviations of the base, or S = 0 where nothing is known of them; and after them
+            what else the head needs at every sample.
     """
 
     features: Array

@@ -209,6 +209,11 @@ class TwoGyro(RiderEquations, Model):
         return (ROLL if self.platform == "bicycle" else PITCH, RELATIVE_ANGLES, UP, bias, platform)
 
     @property
+    def error_parts(self) -> Mapping[str, tuple[int, int]]:  # type: ignore[override]
+        """Roll (or pitch) and relative angles."""
+        return {(ROLL if self.platform == "bicycle" else PITCH).name: (0, 1), RELATIVE_ANGLES.name: (1, 4)}
+
+    @property
     def gains(self) -> Mapping[str, Gain]:  # type: ignore[override]
         """Factors on process and measurement noise, and on that of the constraint."""
         noise = f"{self.sensor.removesuffix('s')}_noise"

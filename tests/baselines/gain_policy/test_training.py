@@ -68,7 +68,8 @@ def test_equal_arguments_give_equal_policies_and_other_seeds_do_not(wrong, traje
 def test_the_exported_policy_is_the_trained_one(trajectories):
     from stable_baselines3.common.vec_env import VecNormalize
 
-    from poise.baselines.gain_policy.actor_critic import export_policy, make_model
+    from poise.baselines.gain_policy.actor_critic import make_model
+    from poise.baselines.gain_policy.agents.learners import exported_policy
     from poise.baselines.gain_policy.vec_env import SB3VecEnv
 
     tuned = TunedFilter.of(tunable_filter("external-acceleration"))
@@ -78,7 +79,7 @@ def test_the_exported_policy_is_the_trained_one(trajectories):
     model.learn(2048)
     env.training = False
     observation = env.reset()
-    policy = export_policy(model, env, tuned)
+    policy = exported_policy(model, env, tuned, "ppo")
     for _ in range(30):
         action, _ = model.predict(observation, deterministic=True)
         np.testing.assert_allclose(policy(env.get_original_obs()[:, : tuned.observation_size]), action, atol=1e-5)
@@ -139,8 +140,8 @@ def test_the_command_tunes_compares_and_exports(tmp_path, capsys):
     assert {row["estimator"] for row in rows} == {"published", "constant", "policy", "oracle"}
     assert {row["trajectory"] for row in rows} >= {"hand-77-0"}
     card = json.loads((tmp_path / "mine.json").read_text())
-    assert card["command"].startswith("poise tune external-acceleration --method ppo")
-    assert set(card["test_inclination_deg"]["policy"]) == {"simulated", "recorded"}
+    assert card["command"].startswith("poise tune external-acceleration --agent ppo")
+    assert set(card["test_error_deg"]["policy"]) == {"simulated", "recorded"}
     assert GainPolicy.load(tmp_path / "mine").filter == "external-acceleration"
     assert "published" in capsys.readouterr().out
 

@@ -156,6 +156,14 @@ def test_wrong_input_is_refused(episodes: list[Trajectory]) -> None:
         SequenceData.from_trajectories([episode.replace(truth={})], END, HEAD)
     with pytest.raises(ValueError, match="too short"):
         SequenceData.from_trajectories([episode[:2]], END, HEAD)
+    lacking = episode.replace(measurements={"imu/gyr": episode.measurements["imu/gyr"]})
+    with pytest.raises(ValueError, match=rf"{episode.name}: measurements lack the channels \['imu/acc'\]"):
+        SequenceData.from_trajectories([episode, lacking], END, HEAD)
+    silent = {**episode.measurements, "imu/acc": np.full_like(episode.measurements["imu/acc"], np.nan)}
+    with pytest.raises(ValueError, match="one of its channels holds nothing"):
+        SequenceData.from_trajectories([episode.replace(measurements=silent)], END, HEAD)
+    with pytest.raises(ValueError, match="at least one sequence"):
+        SequenceData.together([])
     with pytest.raises(ValueError, match="more than"):
         SequenceData.from_trajectories([episode.replace(time=episode.time * 30.0)], END, HEAD)
 

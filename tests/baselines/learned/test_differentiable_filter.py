@@ -10,6 +10,7 @@ import pytest
 torch = pytest.importorskip("torch")
 
 from poise.baselines.learned.differentiable_filter import DifferentiableFilter  # noqa: E402
+from poise.baselines.learned.gains.gain_shares import with_gain_shares  # noqa: E402
 from poise.envs.hand.sensing import simulate_hand  # noqa: E402
 from poise.filters.registry import make  # noqa: E402
 
@@ -34,11 +35,17 @@ def weights(shape, seed):
 
 
 @pytest.mark.parametrize(
-    "name",
-    ["external-acceleration", *(pytest.param(name, marks=pytest.mark.slow) for name in ("mekf", "bounded-motion-9"))],
+    "kalman",
+    [
+        make("external-acceleration"),
+        with_gain_shares("external-acceleration"),
+        *(pytest.param(make(name), marks=pytest.mark.slow) for name in ("mekf", "bounded-motion-9")),
+        pytest.param(with_gain_shares("mekf"), marks=pytest.mark.slow),
+    ],
+    ids=lambda kalman: type(kalman.model).__name__,
 )
-def test_derivatives_equal_those_of_the_array_form(name):
-    kalman = replace(make(name), restart=False)
+def test_derivatives_equal_those_of_the_array_form(kalman):
+    kalman = replace(kalman, restart=False)
     data, through = samples(kalman), DifferentiableFilter(kalman)
     factors = 0.3 * np.random.default_rng(5).standard_normal((T, B, len(through.gains)))
     mine, theirs = (torch.tensor(factors, requires_grad=True) for _ in range(2))

@@ -114,6 +114,17 @@ def test_data_that_score_nothing_are_refused(data: tuple[SequenceData, SequenceD
         trained((data[0], unknown), SMALL)
 
 
+def test_numbers_that_are_none_are_refused_by_name(data: tuple[SequenceData, SequenceData]) -> None:
+    for part, name in ((0, "data"), (1, "validation")):
+        for field in ("target", "features"):
+            array = getattr(data[part], field).copy()
+            array[5, 3] = np.nan
+            spoiled = [data[0], data[1]]
+            spoiled[part] = replace(data[part], **{field: array})
+            with pytest.raises(ValueError, match=rf"{name} holds numbers that are not finite .* {field} of leaning-5"):
+                trained((spoiled[0], spoiled[1]), SMALL)
+
+
 def test_angles_are_corrected_in_their_scale() -> None:
     """The head of angles learns an offset that depends on a feature, and keeps to its limit."""
     rng = np.random.default_rng(0)
@@ -233,7 +244,7 @@ def test_the_command_leaves_weights_that_load(tmp_path: Path, capsys: pytest.Cap
         assert (folder / name).is_file(), name
     arrays, card = load_weights(tmp_path / "mine")
     assert card["command"].startswith("poise train bounded-motion+network --quick --seed 0 --episodes 4 --epochs 1")
-    assert card["test"]["hand-held"]["bounded-motion+network"]["mean_deg"] > 0.0
+    assert card["test"]["hand-held-prompt"]["bounded-motion+network"]["mean_deg"] > 0.0
     assert LearnedEstimator.load(tmp_path / "mine").network.memory_size == 8
     assert main([*words, "--resume", str(folder)]) == 0
     again, _ = load_weights(folder / "bounded-motion_network.safetensors")

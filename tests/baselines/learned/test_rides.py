@@ -9,8 +9,9 @@ import pytest
 
 from poise.baselines.learned.head import AngleHead
 from poise.baselines.learned.inputs.filter_features import FilterFeatures
-from poise.baselines.learned.rides import RideSource, drawn, held_out, ride, ride_data
+from poise.baselines.learned.rides import ride_data
 from poise.envs import episodes
+from poise.envs.recipes.rides import RideSource, drawn, held_out, ride
 from poise.filters.registry import make
 
 SHORT = RideSource(

@@ -7,8 +7,10 @@ import pytest
 import torch
 
 from poise.filters.arrays.symmetric_matrix import largest_eigenpair
-from poise.filters.compile.trace import Tape, print_code
+from poise.filters.compile.trace import Tape
 from poise.filters.core.matrices import diagonal_matrix
+
+from ..compile.emitted import emitted
 
 COUNT = 20_000
 
@@ -84,11 +86,11 @@ def test_tensors_traces_and_gradients() -> None:
     assert bool(torch.isfinite(zero.grad).all())
 
     traced = largest_eigenpair(Tape().inputs("a", 9).reshape(3, 3))
-    code = print_code({"out": np.array([traced[0], *traced[1]], dtype=object)}, indent="")
+    outputs = {"out": np.array([traced[0], *traced[1]], dtype=object)}
+    call = emitted({"a": (9,), "out": (4,)}, outputs)
     for index in range(5):
         out = np.zeros(4)
-        scope = {"a": matrix[index].ravel(), "out": out, "sqrt": np.sqrt, "fabs": abs}
-        exec("\n".join(code), scope)
+        call(matrix[index].ravel(), out)
         np.testing.assert_allclose(out, [value[index], *vector[index]], atol=1e-13)
 
 

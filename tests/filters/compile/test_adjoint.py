@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 import pytest
 
 from poise.filters.compile.adjoint import gradient
 from poise.filters.compile.adjoint_kernel import correct_back, innovation, invert, propagate_back
-from poise.filters.compile.trace import Tape, TracedNamespace, print_code
+from poise.filters.compile.trace import Tape, TracedNamespace
+
+from .emitted import emitted
 
 xp = TracedNamespace
 
@@ -19,16 +19,14 @@ def compiled(function, count: int, unknown: str = ""):
     tape = Tape()
     z = tape.inputs("z", count)
     value = function(z)
-    seed = np.array([tape.node("input", "g")], dtype=object)
+    seed = tape.inputs("g", 1)
     found = gradient([np.array([value], dtype=object)], [seed], list(z), unknown)
-    code = print_code({"value": np.array([value], dtype=object), "slope": found})
-    text = "\n".join(["def run(z, g, value, slope):", *code])
-    scope = {name: getattr(math, name) for name in dir(math) if not name.startswith("_")}
-    exec(text, scope)
+    shapes = {"z": (count,), "g": (1,), "value": (1,), "slope": (count,)}
+    call = emitted(shapes, {"value": np.array([value], dtype=object), "slope": found})
 
     def run(numbers, g=1.0):
         result, slope = np.zeros(1), np.zeros(count)
-        scope["run"](numbers, g, result, slope)
+        call(np.asarray(numbers, dtype=float), np.array([g]), result, slope)
         return result[0], slope
 
     return run
@@ -60,7 +58,7 @@ def test_the_branch_that_was_not_taken_passes_nothing_on():
     run = compiled(lambda z: xp.where(xp.greater(z[0], 0.0), xp.sqrt(z[0]), 2.0 * z[1]), 2)
     np.testing.assert_array_equal(run(np.array([0.0, 1.0]))[1], [0.0, 2.0])
     run = compiled(lambda z: xp.where(xp.isfinite(z[0]), z[0] * z[1], 3.0 * z[1]), 2, unknown="z")
-    np.testing.assert_array_equal(run(np.array([math.nan, 2.0]))[1], [0.0, 3.0])
+    np.testing.assert_array_equal(run(np.array([np.nan, 2.0]))[1], [0.0, 3.0])
 
 
 def test_constants_pass_nothing_on():

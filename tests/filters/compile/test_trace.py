@@ -1,24 +1,28 @@
 """The recorder of model code, checked against SymPy and plain NumPy."""
 
-import math
-
 import numpy as np
 import pytest
 import sympy
 
-from poise.filters.compile.trace import Tape, TracedNamespace, print_code
+from poise.filters.compile.trace import Tape, TracedNamespace
 from poise.filters.core import rotation
 from poise.filters.core.backend import constant, expand, namespace, rows
 
+from .emitted import emitted
 
-def evaluate(function, inputs):
-    """Record ``function`` of one vector, print it, run the printed code and return its output."""
+
+def recorded(function, count):
+    """A function of one vector, recorded, printed and compiled."""
     tape = Tape()
-    traced = np.asarray(function(tape.inputs("x", len(inputs))), dtype=object)
-    lines = print_code({"out": traced}, indent="")
-    scope = {name: getattr(math, name) for name in dir(math)} | {"x": inputs, "out": np.zeros(traced.shape)}
-    exec("\n".join(lines), scope)
-    return scope["out"], lines
+    traced = np.asarray(function(tape.inputs("x", count)), dtype=object)
+    call = emitted({"x": (count,), "out": traced.shape}, {"out": traced})
+
+    def run(inputs):
+        out = np.zeros(traced.shape)
+        call(inputs, out)
+        return out
+
+    return run
 
 
 FUNCTIONS = {
@@ -29,6 +33,13 @@ FUNCTIONS = {
     "from matrix": lambda x: rotation.from_matrix(rotation.to_matrix(rotation.normalize(x[..., :4]))),
     "angles": lambda x: namespace(x).stack(rotation.to_euler_zyx(rotation.normalize(x[..., :4])), axis=-1),
     "skew": lambda x: rotation.skew(x[..., :3]) @ rotation.exp_matrix(x[..., 3:6]),
+    "functions": lambda x: namespace(x).stack(
+        [
+            namespace(x).sin(x[0]) + namespace(x).tan(x[1]) + namespace(x).exp(x[2]) - namespace(x).cos(-x[3]),
+            namespace(x).atan2(x[4], x[5]) + namespace(x).floor(3.0 * x[6]) * namespace(x).abs(x[7]) ** 0.5,
+            namespace(x).log(1.0 + x[0] * x[0]) + x[1] ** 7 - x[2] ** -3 + (1.0 + x[3] ** 2) ** -0.5,
+        ]
+    ),
     "choice": lambda x: namespace(x).where(namespace(x).greater(x, 0.2), x, -2.0 * x) ** 3,
     "constants": lambda x: constant([[1.0, 2.0], [3.0, 4.0]], x) @ x[..., :2, None] / (1.0 + x[..., 7:, None] ** 2),
 }
@@ -37,10 +48,10 @@ FUNCTIONS = {
 @pytest.mark.parametrize("name", FUNCTIONS)
 def test_printed_code_computes_what_numpy_computes(name):
     generator = np.random.default_rng(0)
+    run = recorded(FUNCTIONS[name], 8)
     for _ in range(20):
         x = generator.standard_normal(8)
-        printed, _ = evaluate(FUNCTIONS[name], x)
-        np.testing.assert_allclose(printed, FUNCTIONS[name](x), rtol=1e-14, atol=1e-15)
+        np.testing.assert_allclose(run(x), FUNCTIONS[name](x), rtol=1e-14, atol=1e-15)
 
 
 def test_a_traced_product_of_matrices_is_that_of_sympy():
@@ -50,11 +61,10 @@ def test_a_traced_product_of_matrices_is_that_of_sympy():
     symbols = sympy.symbols("x0:3")
     cross = sympy.Matrix([[0, -symbols[2], symbols[1]], [symbols[2], 0, -symbols[0]], [-symbols[1], symbols[0], 0]])
     values = np.array([0.3, -1.2, 0.7])
-    lines = print_code({"out": traced}, indent="")
-    scope = {"x": values, "out": np.zeros((3, 3))}
-    exec("\n".join(lines), scope)
+    out = np.zeros((3, 3))
+    emitted({"x": (3,), "out": (3, 3)}, {"out": traced})(values, out)
     expected = np.array((cross * cross).subs(dict(zip(symbols, values, strict=True))), dtype=float)
-    np.testing.assert_allclose(scope["out"], expected, rtol=1e-14)
+    np.testing.assert_allclose(out, expected, rtol=1e-14)
 
 
 def test_zeros_and_ones_are_folded_and_equal_operations_are_recorded_once():

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import json
+from typing import Any
 
 import numpy as np
 import pytest
 
+from poise.baselines.learned.inputs.filter_bank import FilterBank
 from poise.baselines.learned.inputs.filter_features import FilterFeatures, standardisation
 from poise.baselines.learned.inputs.front_end import FrontEnd, RawChannels, interval_ends, seen_by_steps
 from poise.baselines.learned.inputs.level_frame import LevelFrame
 from poise.envs.hand.sensing import simulate_hand
+from poise.filters.core import rotation
+from poise.filters.core.model import equations_of
 from poise.filters.core.quantity import ACCELEROMETER, GYROSCOPE
 from poise.filters.registry import make
 
@@ -19,6 +23,7 @@ ENDS: dict[str, FrontEnd] = {
     "raw": RawChannels((GYROSCOPE, ACCELEROMETER), (3.0, 10.0)),
     "level": LevelFrame(),
     "level of a filter": LevelFrame(make("bounded-motion")),
+    "bank": FilterBank(LevelFrame(make("bounded-motion")), ((0.3, 1.0), (1.0, 4.0))),
     "filter": FilterFeatures(make("mekf")),
 }
 
@@ -66,6 +71,39 @@ def test_a_card_describes_it(name: str, samples: dict[str, np.ndarray]) -> None:
     np.testing.assert_array_equal(again.run(samples).features, end.with_dt(1.0 / RATE).run(samples).features)
 
 
+def test_candidates_are_the_filter_with_other_constants(samples: dict[str, np.ndarray]) -> None:
+    """Each candidate is what a filter made with these constants finds, in the level frame of the published one."""
+    dt = 1.0 / RATE
+    usual = make("bounded-motion", dt=dt)
+    seen = FilterBank(LevelFrame(usual), ((0.3, 1.0), (1.0, 4.0))).run(samples)
+    model: Any = equations_of(usual)
+    for index, changed in enumerate(
+        ({"gyroscope_noise": 0.3 * model.gyroscope_noise}, {"velocity_bound": 4.0 * model.velocity_bound})
+    ):
+        up = make("bounded-motion", dt=dt, **changed).run(samples).pose["up"]
+        tilt = rotation.rotate(seen.base["relative_orientation"], up)[10:, :2]
+        found = seen.spread[10:, 1 + 2 * index : 3 + 2 * index]
+        np.testing.assert_allclose(found, tilt, atol=1e-12)
+        assert np.abs(found).max() > 5e-5
+
+
+def test_a_bank_does_not_see_the_heading(samples: dict[str, np.ndarray]) -> None:
+    """The start of the level frame's heading is arbitrary: turned vectors give the same features."""
+    bank = ENDS["bank"].with_dt(1.0 / RATE)
+    assert isinstance(bank, FilterBank)
+    seen = bank.level.run(samples)
+    up = bank._others.run(
+        bank._repeated(samples), {k: np.broadcast_to(f, (300, 2)) for k, f in bank._factors().items()}
+    )
+    turn = np.array([np.cos(0.4), 0.0, 0.0, np.sin(0.4)])
+    vectors = rotation.rotate(turn, seen.features[:, :18].reshape(-1, 6, 3)).reshape(-1, 18)
+    base = {"relative_orientation": rotation.multiply(turn, seen.base["relative_orientation"])}
+    turned = seen._replace(features=np.concatenate([vectors, seen.features[:, 18:]], axis=1), base=base)
+    one, other = (bank._seen(each, up.pose["up"]) for each in (seen, turned))
+    np.testing.assert_allclose(one.features, other.features, atol=1e-9)
+    assert np.abs(one.spread[10:, 1:] - other.spread[10:, 1:]).max() > 1e-6
+
+
 def test_filters_are_described_by_what_differs() -> None:
     end = LevelFrame(make("bounded-motion", velocity_bound=0.4))
     assert end.describe()["filter"] == {"name": "bounded-motion", "parameters": {"velocity_bound": 0.4}}
@@ -85,6 +123,10 @@ def test_what_cannot_be_is_refused() -> None:
         RawChannels((GYROSCOPE,), (1.0, 2.0))
     with pytest.raises(ValueError, match="must estimate a relative orientation"):
         LevelFrame(make("external-acceleration"))
+    with pytest.raises(ValueError, match="must have a filter with the gains"):
+        FilterBank(LevelFrame())
+    with pytest.raises(ValueError, match="pairs of positive factors"):
+        FilterBank(LevelFrame(make("bounded-motion")), ((1.0, 0.0),))
     with pytest.raises(ValueError, match=r"channels_seen must be channels of the filter"):
         FilterFeatures(make("mekf"), channels_seen=("imu/mag",))
 

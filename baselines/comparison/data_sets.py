@@ -7,10 +7,9 @@ import statistics
 from collections.abc import Collection, Sequence
 from typing import Any
 
-from ..envs.data.trajectory import REFERENCE_CLOCK, Trajectory
-from ..filters.core.estimator import Estimator
-from ..filters.support.seeds import child_seeds
-from .registry import list_estimators, make_estimator
+from ...envs.data.trajectory import REFERENCE_CLOCK, Trajectory
+from ...filters.core.estimator import Estimator
+from ..registry import list_estimators, make_estimator
 
 GESTURES = ("slow", "fast", "severe", "mixed")
 """Gestures of the simulated part: tests A, B, C of the external-acceleration paper, and changing intensity."""
@@ -40,58 +39,47 @@ PLAIN_PYTHON = ("ahrs-mahony", "ahrs-mahony-9", "ahrs-ekf", "ahrs-ekf-9")
 """Slow wrapped loops in plain Python, which take minutes on recordings: left out by default."""
 
 
-def simulated(seed: int, episodes: int, gestures: Sequence[str] = GESTURES, **options: Any) -> list[Trajectory]:
-    """Record episodes of ``poise/HandMotion-v0``.
+def hand_episode(gesture: str, number: int, seed: int, **options: Any) -> list[Trajectory]:
+    """One episode of ``poise/HandMotion-v0``, named ``slow-1``; the gesture is ``metadata["group"]``.
 
     Args:
-        seed: root seed; each episode has a child.
-        episodes: of each gesture.
-        gestures: names.
+        gesture: its name.
+        number: of the episode among those of the gesture.
+        seed: of the episode.
         options: further arguments of the environment.
-
-    Returns:
-        Trajectories named ``slow-1``, ``slow-2`` …; the gesture is ``metadata["group"]``.
     """
     import gymnasium
 
-    from ..envs.record import record
+    from ...envs.record import record
 
-    trajectories = []
-    seeds = iter(child_seeds(seed, episodes * len(gestures)))
-    for gesture in gestures:
-        env = gymnasium.make("poise/HandMotion-v0", gesture=gesture, **options)
-        try:
-            for number in range(1, episodes + 1):
-                trajectory = record(env, seed=next(seeds))
-                metadata = {**trajectory.metadata, "name": f"{gesture}-{number}", "group": gesture}
-                trajectories.append(trajectory.replace(metadata=metadata))
-        finally:
-            env.close()
-    return trajectories
+    env = gymnasium.make("poise/HandMotion-v0", gesture=gesture, **options)
+    try:
+        trajectory = record(env, seed=seed)
+    finally:
+        env.close()
+    return [trajectory.replace(metadata={**trajectory.metadata, "name": f"{gesture}-{number}", "group": gesture})]
 
 
-def simulated_rides(seed: int, scenarios: Sequence[str] = RIDES, duration: float = 40.0) -> list[Trajectory]:
-    """Record rides of a bicycle; the IMUs of bicycle and trunk become separate trajectories.
+def ride_imus(scenario: str, subject: int, seed: int, duration: float = 40.0) -> list[Trajectory]:
+    """One ride of a bicycle; the IMUs of bicycle and trunk become separate trajectories.
 
     Args:
-        seed: root seed; each ride has a child, and a subject of its own.
-        scenarios: of ``poise/RiderBicycle-v0``.
+        scenario: of ``poise/RiderBicycle-v0``.
+        subject: who rides.
+        seed: of the ride.
         duration: s.
     """
-    from ..envs.bicycle.environment import RiderBicycleEnv
-    from ..envs.bicycle.sensors.single_imu import SITES, imu_of
-    from ..envs.record import record
+    from ...envs.bicycle.environment import RiderBicycleEnv
+    from ...envs.bicycle.sensors.single_imu import SITES, imu_of
+    from ...envs.record import record
 
-    trajectories = []
-    for number, (scenario, child) in enumerate(zip(scenarios, child_seeds(seed, len(scenarios)), strict=True)):
-        env = RiderBicycleEnv(scenario, subject=number, suite="whole-body", fidelity="lumped", duration=duration)
-        try:
-            ride = record(env, seed=child)
-        finally:
-            env.close()
-        ride = ride.replace(metadata={**ride.metadata, "name": scenario})
-        trajectories += [imu_of(ride, site) for site in SITES]
-    return trajectories
+    env = RiderBicycleEnv(scenario, subject=subject, suite="whole-body", fidelity="lumped", duration=duration)
+    try:
+        ride = record(env, seed=seed)
+    finally:
+        env.close()
+    ride = ride.replace(metadata={**ride.metadata, "name": scenario})
+    return [imu_of(ride, site) for site in SITES]
 
 
 def dataset_of(trajectory: Trajectory) -> str:

@@ -18,11 +18,11 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 import tyro
 
-from .main import run_command
-from .output import Output
+from ..main import run_command
+from ..output import Output
 
 if TYPE_CHECKING:
-    from ..envs.data.calibration.records import CalibrationRecord
+    from ...envs.data.calibration.records import CalibrationRecord
 
 
 @dataclass
@@ -61,7 +61,7 @@ class Args:
 
 def run(args: Args) -> int:
     """Calibrate, print, and write the record."""
-    from ..envs.data.calibration.records import CalibrationRecord, load_calibration
+    from ...envs.data.calibration.records import CalibrationRecord, load_calibration
 
     if args.simulate == bool(args.files):
         raise ValueError("name CSV files, or --simulate runs instead of them")
@@ -83,10 +83,10 @@ def run(args: Args) -> int:
 
 def calibrate(args: Args, out: Output) -> tuple[CalibrationRecord, CalibrationRecord | None]:
     """The record found, and the true one of simulated runs."""
-    from ..envs.data.calibration import channels as channels
-    from ..envs.data.calibration.data import MagnetometerData, RateTableData, read_magnetometer, read_rate_table
-    from ..envs.hand import calibration_runs as runs
-    from ..filters.arrays.files import load_array
+    from ...envs.data.calibration import channels as channels
+    from ...envs.data.calibration.data import MagnetometerData, RateTableData, read_magnetometer, read_rate_table
+    from ...envs.hand import calibration_runs as runs
+    from ...filters.arrays.files import load_array
 
     array, files = load_array(args.array), list(args.files)
     truth = runs.random_calibration(array, args.seed) if args.simulate else None
@@ -160,10 +160,10 @@ def row(number: int, axis: dict[str, Any]) -> dict[str, Any]:
 
 def frame(args: Args) -> CalibrationRecord:
     """Rotation from the tracker's frame to the device."""
-    from ..envs.data.calibration.data import read_axes
-    from ..envs.data.calibration.records import CalibrationRecord
-    from ..filters.arrays.calibration.frame import align_axes
-    from ..filters.core import rotation
+    from ...envs.data.calibration.data import read_axes
+    from ...envs.data.calibration.records import CalibrationRecord
+    from ...filters.arrays.calibration.frame import align_axes
+    from ...filters.core import rotation
 
     if len(args.files) != 1:
         raise ValueError(f"frame needs one CSV file (and has no simulated run), got {len(args.files)}")

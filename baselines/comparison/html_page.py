@@ -1,0 +1,136 @@
+"""Text of the page of a report: layout and the script that sorts, filters and draws."""
+
+PAGE = """<!DOCTYPE html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<title>%%title%%</title>
+<style>
+body { font: 15px/1.45 system-ui, sans-serif; margin: 0 auto; max-width: 1180px; padding: 1rem 1.5rem; color: #1c1c1c; }
+h1 { font-size: 1.6rem; margin-bottom: .2rem; }
+h2 { font-size: 1.15rem; margin-top: 2.4rem; border-top: 1px solid #ddd; padding-top: 1rem; }
+nav { columns: 3; margin: 1rem 0; }
+nav a { display: block; color: #1f5f99; text-decoration: none; }
+.tools { position: sticky; top: 0; background: #fffffff2; padding: .5rem 0; z-index: 5; border-bottom: 1px solid #ddd; }
+.tools label { margin-right: .8rem; white-space: nowrap; }
+.dot { display: inline-block; width: .7em; height: .7em; border-radius: 50%; margin-right: .35em; }
+.scroll { overflow-x: auto; }
+table { border-collapse: collapse; font-variant-numeric: tabular-nums; font-size: .87rem; }
+th { cursor: pointer; text-align: right; padding: .3rem .55rem; border-bottom: 2px solid #999; white-space: nowrap; }
+th[data-order]::after { content: " ▲"; } th[data-order="down"]::after { content: " ▼"; }
+td { text-align: right; padding: .2rem .55rem; border-bottom: 1px solid #eee; white-space: nowrap; }
+th:first-child, td:first-child, td.text, th.text { text-align: left; }
+tbody tr:hover { background: #f2f6fa; }
+dl { display: grid; grid-template-columns: max-content 1fr; gap: .15rem 1rem; font-size: .87rem; }
+dt { color: #666; } dd { margin: 0; }
+summary { cursor: pointer; margin: .6rem 0; color: #1f5f99; }
+</style>
+</head>
+<body>
+<h1>%%title%%</h1>
+<nav></nav>
+<div class="tools"><label>Filter <input id="filter" type="search" placeholder="name of an estimator"></label>
+<span id="kinds"></span></div>
+<main></main>
+<h2 id="provenance">Provenance</h2>
+<dl>%%about%%</dl>
+<script id="data" type="application/json">%%data%%</script>
+<script>%%plotly%%</script>
+<script>
+const data = JSON.parse(document.getElementById("data").textContent);
+const make = (tag, parent, text, attributes = {}) => {
+  const element = document.createElement(tag);
+  if (text !== undefined && text !== null) element.textContent = text;
+  Object.assign(element, attributes);
+  if (parent) parent.appendChild(element);
+  return element;
+};
+const shown = value => value === null || value === undefined ? "–" : typeof value !== "number" ? value :
+  Number.isInteger(value) ? String(value) : Math.abs(value) >= 1000 ? value.toFixed(0) : value.toPrecision(3);
+const hidden = new Set();
+const rows = [];
+
+function drawTable(parent, table) {
+  const scroll = make("div", parent, null, {className: "scroll"});
+  const element = make("table", scroll);
+  const head = make("tr", make("thead", element));
+  const body = make("tbody", element);
+  const kind = table.columns.indexOf("kind"), name = table.columns.indexOf("estimator");
+  const numeric = table.columns.map((_, column) => table.rows.some(row => typeof row[column] === "number"));
+  for (const cells of table.rows) {
+    const row = make("tr", body);
+    row.cells_ = cells;
+    cells.forEach((cell, column) => {
+      const td = make("td", row, null, {className: numeric[column] ? "" : "text"});
+      if (column === name && kind >= 0) {
+        const dot = make("span", td, null, {className: "dot"});
+        dot.style.background = data.colours[cells[kind]] || data.colours["–"];
+      }
+      td.append(shown(cell));
+    });
+    rows.push({element: row, name: name >= 0 ? String(cells[name]) : null, kind: kind >= 0 ? cells[kind] : null});
+  }
+  table.columns.forEach((column, index) => {
+    const th = make("th", head, column, {className: numeric[index] ? "" : "text", title: data.foot[column] || ""});
+    th.onclick = () => {
+      const down = th.dataset.order === "up";
+      head.querySelectorAll("th").forEach(other => delete other.dataset.order);
+      th.dataset.order = down ? "down" : "up";
+      const missing = down ? -Infinity : Infinity;
+      const key = row => row.cells_[index] === null ? missing : row.cells_[index];
+      const sorted = [...body.rows].sort((a, b) =>
+        typeof key(a) === "string" ? String(key(a)).localeCompare(String(key(b))) : key(a) - key(b));
+      if (down) sorted.reverse();
+      body.append(...sorted);
+    };
+  });
+}
+
+function filterRows() {
+  const words = document.getElementById("filter").value.toLowerCase().split(/\\s+/).filter(Boolean);
+  for (const row of rows) {
+    if (row.name === null) continue;
+    const found = !words.length || words.some(word => row.name.toLowerCase().includes(word));
+    row.element.hidden = !found || hidden.has(row.kind);
+  }
+}
+
+const main = document.querySelector("main"), nav = document.querySelector("nav");
+const pending = [];
+data.sections.forEach((section, number) => {
+  make("h2", main, section.title, {id: "section-" + number});
+  make("a", nav, section.title, {href: "#section-" + number});
+  section.tables.forEach(table => drawTable(main, table));
+  section.plots.forEach((plot, index) => {
+    const details = make("details", main, null, {open: index === 0});
+    make("summary", details, plot.layout.title);
+    const place = make("div", details);
+    const draw = () => {
+      if (!details.open || place.drawn) return;
+      place.drawn = true;
+      Plotly.newPlot(place, plot.data, {...plot.layout, title: undefined, margin: {l: 10, r: 10, t: 10, b: 40},
+        xaxis: {automargin: true, ...plot.layout.xaxis}, yaxis: {automargin: true, ...plot.layout.yaxis},
+        showlegend: plot.data.length > 1, font: {family: "system-ui, sans-serif"}}, {responsive: true});
+    };
+    details.addEventListener("toggle", draw);
+    pending.push(draw);
+  });
+});
+make("a", nav, "Provenance", {href: "#provenance"});
+const kinds = document.getElementById("kinds");
+[...new Set(rows.map(row => row.kind))].filter(Boolean).forEach(kind => {
+  const label = make("label", kinds);
+  const box = make("input", label, null, {type: "checkbox", checked: true});
+  const dot = make("span", label, null, {className: "dot"});
+  dot.style.background = data.colours[kind] || data.colours["–"];
+  label.append(kind);
+  box.onchange = () => { box.checked ? hidden.delete(kind) : hidden.add(kind); filterRows(); };
+});
+document.getElementById("filter").oninput = filterRows;
+pending.forEach(draw => draw());
+</script>
+</body>
+</html>
+"""
+"""``%%name%%`` marks where a part goes."""

@@ -1,0 +1,137 @@
+"""How sure a comparison is: bootstrap intervals over trajectories, paired differences, ranks, regressions."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..error_table import COMPLETE, coverage
+from ..statistics import bootstrap_interval, mean_score, probability_of_improvement
+from .measures import MEASURES
+
+if TYPE_CHECKING:
+    import pandas
+
+DRAWS = 1000
+"""Bootstrap draws of an interval."""
+WORSE = 0.02
+"""Relative growth of a mean error from which it counts as a regression."""
+NEGLIGIBLE = 1e-3
+"""deg (or the quantity's unit): growth that is none."""
+
+
+def is_measure(table: pandas.DataFrame) -> Any:
+    """Rows of :mod:`.measures`, which are no RMS errors."""
+    return table["metric"].str.fullmatch(rf"(.+ )?({'|'.join(MEASURES)})")
+
+
+def errors_of(table: pandas.DataFrame, metric: str, quantity: str | None = None) -> pandas.DataFrame:
+    """Errors as a wide table: one row a trajectory, one column an estimator that ran on all of them.
+
+    Args:
+        table: rows of :func:`poise.evaluate`.
+        metric: which.
+        quantity: None where one quantity alone has the metric.
+    """
+    chosen = table[table["metric"] == metric]
+    if quantity is not None:
+        chosen = chosen[chosen["quantity"] == quantity]
+    shares = coverage(table, metric)
+    complete = shares.index[shares >= COMPLETE * shares.max()]
+    wide = chosen.pivot_table(index="trajectory", columns="estimator", values="value", sort=False)
+    return wide[[name for name in wide.columns if name in complete]].dropna(axis=1)
+
+
+def intervals(errors: pandas.DataFrame, *, against: str | None = None, seed: int = 0) -> list[dict[str, Any]]:
+    """Mean error of every estimator with its 95 % interval over trajectories, best first.
+
+    ``difference`` is the mean of the paired differences to another estimator on the same trajectories, and ``better``
+    the share of trajectories on which the estimator has the smaller error (ties count half).
+
+    Args:
+        errors: from :func:`errors_of`.
+        against: with which to compare; None for the best.
+        seed: of the draws.
+    """
+    order = list(errors.mean().sort_values().index)
+    if not order:
+        return []
+    other = errors[against if against in errors else order[0]].to_numpy()
+    rows = []
+    for name in order:
+        own = errors[name].to_numpy()
+        mean = bootstrap_interval(mean_score, own[None], seed=seed, draws=DRAWS, tasks_too=True)
+        paired = bootstrap_interval(mean_score, (own - other)[None], seed=seed, draws=DRAWS, tasks_too=True)
+        rows.append(
+            {
+                "estimator": name,
+                "mean": mean.value,
+                "low": mean.low,
+                "high": mean.high,
+                "difference": paired.value,
+                "difference low": paired.low,
+                "difference high": paired.high,
+                "better": probability_of_improvement(-own[None], -other[None]),
+                "rank": float(errors.rank(axis=1)[name].mean()),
+            }
+        )
+    return rows
+
+
+def win_matrix(errors: pandas.DataFrame) -> tuple[list[str], np.ndarray]:
+    """Names, best first, and the share of trajectories on which each (row) has a smaller error than each (column)."""
+    names = list(errors.mean().sort_values().index)
+    values = errors[names].to_numpy()
+    return names, (0.5 + 0.5 * np.sign(values[:, None, :] - values[:, :, None])).mean(axis=0)
+
+
+def details(table: pandas.DataFrame, metric: str, quantity: str) -> list[dict[str, Any]]:
+    """Means over trajectories of the measures beyond RMS (the largest of the largest), one row an estimator."""
+    rows = []
+    for name in table["estimator"].unique():
+        own = table[table["estimator"] == name]
+        own = own[own["quantity"].isin([quantity, "relative_orientation", "innovation"])]
+        row: dict[str, Any] = {"estimator": name}
+        for label, wanted in (("RMS", metric), *((each, f"{metric} {each}") for each in MEASURES[:-1])):
+            values = own[own["metric"] == wanted]["value"].dropna()
+            row[label] = float(values.max() if label == "largest" else values.mean()) if len(values) else float("nan")
+        for label in ("nees", "nis"):
+            values = own[own["metric"] == label]["value"].dropna()
+            row[label.upper()] = float(values.mean()) if len(values) else float("nan")
+        if row["RMS"] == row["RMS"]:
+            rows.append(row)
+    return sorted(rows, key=lambda row: row["RMS"])
+
+
+def regressions(table: pandas.DataFrame, before: pandas.DataFrame) -> list[dict[str, Any]]:
+    """Mean errors that grew against an earlier table, over the trajectories that both have.
+
+    Args:
+        table: rows of :func:`poise.evaluate`, with a column ``suite``.
+        before: the same of an earlier run.
+
+    Returns:
+        One row for each suite, estimator, quantity and metric that grew by more than 2 %; the largest growth first.
+
+    Raises:
+        ValueError: the tables have no result in common.
+    """
+    keys = ["suite", "estimator", "trajectory", "quantity", "metric"]
+    errors = [one[~is_measure(one) & ~one["metric"].isin(["valid", "nis"])] for one in (before, table)]
+    both = (
+        errors[0].merge(errors[1], on=keys, suffixes=(" before", " now")).dropna(subset=["value before", "value now"])
+    )
+    if both.empty:
+        raise ValueError(
+            "the baseline has no result in common with this run: suites, estimators or trajectories differ"
+        )
+    means = both.groupby(["suite", "estimator", "quantity", "metric"], sort=False)[["value before", "value now"]].mean()
+    growth = means["value now"] / means["value before"] - 1.0
+    grown = means[(growth > WORSE) & (means["value now"] - means["value before"] > NEGLIGIBLE)]
+    rows = [
+        {**dict(zip(means.index.names, key, strict=True)), "before": row.iloc[0], "now": row.iloc[1]}
+        | {"growth, %": 100.0 * float(growth[key])}
+        for key, row in grown.iterrows()
+    ]
+    return sorted(rows, key=lambda row: -row["growth, %"])

@@ -1,0 +1,196 @@
+"""Tasks of a comparison: each makes its trajectories and runs all estimators; in parallel, resumable at any moment."""
+
+from __future__ import annotations
+
+import json
+import re
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ...envs.data.trajectory import Trajectory
+from ...filters.support.files import write_json
+from ...filters.support.parallel import in_parallel
+from ...filters.support.seeds import child_seeds
+from ...filters.support.version import code_version
+from ..evaluation import evaluate
+from ..recommendation import results_of
+from ..scoring import COLUMNS, has_truth
+from .data_sets import GESTURES, RIDES, contenders, hand_episode, ride_imus
+
+if TYPE_CHECKING:
+    import pandas
+
+
+@dataclass(frozen=True)
+class Task:
+    """One piece of work of a comparison.
+
+    Attributes:
+        suite: to which table its results belong.
+        name: distinct within the suite.
+        make: function of a module that returns the trajectories.
+        arguments: of ``make``.
+        options: further ones, by name.
+        settings: of :func:`poise.evaluate`.
+        suffix: put behind the names of the data sets.
+    """
+
+    suite: str
+    name: str
+    make: Callable[..., list[Trajectory]]
+    arguments: tuple[Any, ...] = ()
+    options: Mapping[str, Any] = field(default_factory=dict)
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    suffix: str = ""
+
+    @property
+    def file(self) -> str:
+        """Name of the file with its results."""
+        return f"{re.sub(r'[^A-Za-z0-9.+-]+', '_', f'{self.suite} {self.name}')}.json"
+
+    def trajectories(self) -> list[Trajectory]:
+        """Simulated or loaded, the same at every call."""
+        return self.make(*self.arguments, **self.options)
+
+
+@dataclass(frozen=True)
+class Results:
+    """What the tasks of one suite found.
+
+    Attributes:
+        table: rows as of :func:`poise.evaluate`, with its ``attrs``; measures beyond RMS included.
+        groups: trajectory → group.
+        recordings: errors by recording with the statistics of its motion (:func:`.results_of`).
+    """
+
+    table: pandas.DataFrame
+    groups: dict[str, str]
+    recordings: list[dict[str, Any]]
+
+
+def hand_tasks(seed: int, episodes: int, **options: Any) -> list[Task]:
+    """Simulated motion of a hand-held device; every episode has a child of the seed."""
+    seeds = iter(child_seeds(seed, episodes * len(GESTURES)))
+    return [
+        Task("simulation", f"{gesture}-{number}", hand_episode, (gesture, number, next(seeds)), options)
+        for gesture in GESTURES
+        for number in range(1, episodes + 1)
+    ]
+
+
+def imu_ride_tasks(seed: int, scenarios: Sequence[str] = RIDES) -> list[Task]:
+    """Single IMUs on simulated rides; every ride has a subject of its own and a child of the seed."""
+    seeds = child_seeds(seed, len(scenarios))
+    return [
+        Task("rides", scenario, ride_imus, (scenario, subject, child))
+        for subject, (scenario, child) in enumerate(zip(scenarios, seeds, strict=True))
+    ]
+
+
+def given(trajectory: Trajectory) -> list[Trajectory]:
+    """A trajectory that is there already."""
+    return [trajectory]
+
+
+def recording_tasks(trajectories: Sequence[Trajectory], suite: str = "recordings", **more: Any) -> list[Task]:
+    """Recordings that are loaded already."""
+    return [Task(suite, one.name, given, (one,), **more) for one in trajectories]
+
+
+def run_tasks(
+    tasks: Sequence[Task],
+    folder: Path,
+    names: Sequence[str],
+    channels: Sequence[str],
+    *,
+    processes: int = 1,
+    offline: bool = False,
+    reference: str | None = None,
+) -> dict[str, Results]:
+    """Run what has no results in the folder yet, and put all together in the order of the tasks.
+
+    Args:
+        tasks: with distinct files.
+        folder: of their results; one file a task, which appears whole or not at all.
+        names: of estimators; empty for all that read no other channels than these.
+        channels: see ``names``.
+        processes: how many tasks run at a time.
+        offline: also run the smoothers.
+        reference: see :func:`poise.evaluate`.
+
+    Returns:
+        Suite → results. They do not depend on ``processes`` or on an interruption.
+
+    Raises:
+        ValueError: two tasks of one suite have one name; or in none of a suite anything could be run.
+    """
+    files = [task.file for task in tasks]
+    twice = sorted({file for file in files if files.count(file) > 1})
+    if twice:
+        raise ValueError(f"two tasks share the file {twice[0]}: give their trajectories different names")
+    folder.mkdir(parents=True, exist_ok=True)
+    jobs = [
+        (task, folder / task.file, tuple(names), tuple(channels), offline, reference)
+        for task in tasks
+        if not is_done(folder / task.file)
+    ]
+    for _ in in_parallel(run_task, jobs, processes, label="compare", unit="task"):
+        pass
+    suites = dict.fromkeys(task.suite for task in tasks)
+    return {suite: collected([folder / task.file for task in tasks if task.suite == suite]) for suite in suites}
+
+
+def is_done(path: Path) -> bool:
+    """Whether a task has results of this version of the code."""
+    return path.exists() and json.loads(path.read_text(encoding="utf-8"))["code"] == code_version()
+
+
+def run_task(
+    task: Task, path: Path, names: Sequence[str], channels: Sequence[str], offline: bool, reference: str | None
+) -> Path:
+    """Run all estimators on one task's trajectories and keep the results."""
+    started = time.perf_counter()
+    trajectories = task.trajectories()
+    made = time.perf_counter()
+    found: dict[str, Any] = {"groups": {one.name: str(one.metadata.get("group") or one.name) for one in trajectories}}
+    settings = {"offline": offline, "reference": reference, "detailed": True, **task.settings}
+    try:
+        table = evaluate(contenders(names, channels), trajectories, **settings)
+    except ValueError as reason:  # nothing could be run here; other tasks go on
+        found |= {"rows": [], "attrs": {"refused": str(reason)}, "recordings": []}
+    else:
+        known = [one for one in trajectories if has_truth(one)]
+        found |= {
+            "rows": [[None if cell != cell else cell for cell in row] for row in table.itertuples(index=False)],
+            "attrs": table.attrs,
+            "recordings": results_of(known, table, task.suffix),
+        }
+    found["seconds"] = {"trajectories": made - started, "estimators": time.perf_counter() - made}
+    found["code"] = code_version()
+    return write_json(path, found, indent=None)
+
+
+def collected(files: Sequence[Path]) -> Results:
+    """Results of the tasks of one suite.
+
+    Raises:
+        ValueError: nothing could be run in any of them.
+    """
+    from ..error_table import ErrorTable
+
+    parts = [json.loads(file.read_text(encoding="utf-8")) for file in files]
+    rows = [[float("nan") if cell is None else cell for cell in row] for part in parts for row in part["rows"]]
+    if not rows:
+        raise ValueError("; ".join(dict.fromkeys(part["attrs"]["refused"] for part in parts)))
+    table = ErrorTable(rows, columns=list(COLUMNS))
+    attrs = [part["attrs"] for part in parts]
+    table.attrs |= {
+        "skipped": [tuple(item) for each in attrs for item in each.get("skipped", [])],
+        "references": {name: value for each in attrs for name, value in each.get("references", {}).items()},
+        "reference_clock": next((each["reference_clock"] for each in attrs if "reference_clock" in each), "recorded"),
+    }
+    groups = {name: group for part in parts for name, group in part["groups"].items()}
+    return Results(table, groups, [one for part in parts for one in part["recordings"]])

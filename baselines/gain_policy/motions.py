@@ -1,0 +1,109 @@
+"""Motions that shipped policies are trained on: hand-held and carried devices of all grades, and rides."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+from ...envs.data.trajectory import Trajectory
+from ...envs.hand.carried import Carried
+from ...envs.hand.hand_held import HandHeld
+from ...envs.recipes.devices import VariedSensors
+from ...envs.recipes.hand import HandRecipe
+from ...envs.recipes.rides import RideSource, drawn
+from ...filters.support.ranges import Range
+
+DEG = math.pi / 180.0
+
+
+class Motions(Protocol):
+    """A distribution of trajectories."""
+
+    def draw_many(self, seed: int, count: int) -> list[Trajectory]:
+        """The first trajectories of the root seed; a larger ``count`` keeps the first ones."""
+        ...
+
+    def describe(self) -> dict[str, Any]:
+        """All settings, for JSON."""
+        ...
+
+
+@dataclass(frozen=True)
+class GradedMotions:
+    """Devices in the hand and carried, of several grades, at a few rates; one of each combination after the other.
+
+    Few rates, because the trajectories of one rate are computed together.
+    """
+
+    rates: tuple[float, ...] = (100.0, 286.0)
+    """Hz"""
+    gyroscope_biases: tuple[Range, ...] = ((0.03 * DEG, 0.8 * DEG), (0.03 * DEG, 0.8 * DEG), (0.5 * DEG, 6.0 * DEG))
+    """rad/s of each grade: two thirds of the devices are calibrated, the others as phones without calibration"""
+    accelerometer_biases: tuple[Range, ...] = ((0.01, 0.1), (0.01, 0.1), (0.02, 0.2))
+    """m/s² of each grade"""
+    carried_share: float = 0.25
+    """of the episodes"""
+    running_share: float = 0.15
+    """of the carried devices"""
+    first_rest: Range = (0.3, 10.0)
+    """s"""
+    duration: float = 60.0
+    """s"""
+
+    def __post_init__(self) -> None:
+        if not self.rates or not self.gyroscope_biases:
+            raise ValueError("rates and gyroscope_biases must hold one entry at least")
+        if len(self.gyroscope_biases) != len(self.accelerometer_biases):
+            raise ValueError(
+                f"accelerometer_biases must have the {len(self.gyroscope_biases)} grades of gyroscope_biases, "
+                f"got {len(self.accelerometer_biases)}"
+            )
+
+    def recipes(self) -> list[HandRecipe]:
+        """One for each grade and rate."""
+        grades = zip(self.gyroscope_biases, self.accelerometer_biases, strict=True)
+        return [
+            HandRecipe(
+                name="graded",
+                duration=self.duration,
+                rates=(rate, rate),
+                held=HandHeld(first_rest=self.first_rest, moving_start_share=0.15),
+                carried=Carried(first_rest=self.first_rest, running_share=self.running_share),
+                carried_share=self.carried_share,
+                sensors=VariedSensors(gyroscope_bias=gyroscope, accelerometer_bias=accelerometer),
+            )
+            for gyroscope, accelerometer in grades
+            for rate in self.rates
+        ]
+
+    def draw_many(self, seed: int, count: int) -> list[Trajectory]:
+        """The first trajectories of the root seed."""
+        recipes = self.recipes()
+        return [recipes[index % len(recipes)].episode(seed, index) for index in range(count)]
+
+    def describe(self) -> dict[str, Any]:
+        """All fields, for JSON."""
+        return {"kind": "graded", **dataclasses.asdict(self)}
+
+
+UNEVEN = ("indoor_circle", "outdoor", "straight", "slalom", "slow", "gusts", "bumps", "bumps", "pitch", "pitch")
+"""Scenarios of rides, drawn evenly: two fifths with bumps or a ramp, where level ground must not be believed."""
+
+
+@dataclass(frozen=True)
+class RiddenMotions:
+    """Rides with several draws of devices on each; the rides are kept in the user's cache folder."""
+
+    source: RideSource = field(default_factory=lambda: RideSource(24, 4, 40.0, {"scenarios": list(UNEVEN)}))
+    """which rides"""
+
+    def draw_many(self, seed: int, count: int) -> list[Trajectory]:
+        """The first draws of the first rides of the root seed."""
+        rides = range(math.ceil(count / self.source.draws))
+        return [each for index in rides for each in drawn(self.source, seed, index)][:count]
+
+    def describe(self) -> dict[str, Any]:
+        """All fields, for JSON."""
+        return {"kind": "ridden", **dataclasses.asdict(self.source)}

@@ -1,0 +1,1 @@
+"""Networks that set the gains of a filter while it runs."""

@@ -1,0 +1,185 @@
+"""A Kalman filter whose gains a network sets while it runs: learned noise, and learned gains.
+
+The network sees statistics of innovations and sensors (:mod:`..inputs.gain_features`) at fixed intervals. What it says
+holds over the next interval, as bounded log factors on the filter's constants (:mod:`.gain_head`): the noises that Q
+and R are made of, or shares of the Kalman gain (:mod:`.gain_shares`). The covariance is the filter's own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, NamedTuple, Self
+
+import numpy as np
+
+from ....filters.core.estimator import check_measurements
+from ....filters.core.kalman import KalmanFilter
+from ....filters.core.quantity import Channel, Estimate, Measurement, Quantity
+from ....filters.core.sampling import FilterState
+from ....filters.support.names import look_up
+from ...weights_io import load_weights, save_weights
+from ..estimator import NETWORKS, Network
+from ..inputs.gain_features import GainFeatures, ObservedState
+from .gain_head import GainHead
+
+
+class GainFilterState(NamedTuple):
+    """Complete state of a :class:`GainFilter`.
+
+    Attributes:
+        filter: of the filter whose gains are set.
+        front: of the front end.
+        memory: ``(*batch, M)`` of the network.
+        output: ``(*batch, gains)`` last output of the network.
+    """
+
+    filter: FilterState
+    front: ObservedState
+    memory: np.ndarray
+    output: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class GainFilter:
+    """A filter with gains of a network: an :class:`~poise.filters.core.estimator.Estimator` on NumPy arrays.
+
+    A network that says zeros leaves the filter as it is, bit by bit.
+
+    Attributes:
+        network: the weights.
+        front_end: what the network sees, and the filter in its published tuning.
+        head: what its outputs mean.
+
+    Raises:
+        ValueError: front end, network and head do not fit together.
+    """
+
+    network: Network
+    front_end: GainFeatures
+    head: GainHead
+
+    def __post_init__(self) -> None:
+        if self.network.features != self.front_end.size or self.network.outputs != self.head.size:
+            raise ValueError(
+                f"the network must take {self.front_end.size} features and give {self.head.size} outputs, "
+                f"got {self.network.features} and {self.network.outputs}"
+            )
+
+    @classmethod
+    def load(cls, path_or_name: str | Path, dt: float = 0.01) -> Self:
+        """The estimator of a weights file or of shipped weights.
+
+        Args:
+            path_or_name: file, or name of shipped weights.
+            dt: sampling interval, s.
+
+        Raises:
+            FileNotFoundError: there are no such weights.
+            ValueError: they are damaged, or are those of something else.
+        """
+        arrays, card = load_weights(path_or_name)
+        try:
+            network = look_up("kind of network", card["network"], NETWORKS).from_arrays(arrays)
+            front_end = GainFeatures.read(card["front_end"], dt)
+            return cls(network, front_end, GainHead.read(card["head"], front_end.kalman))
+        except (KeyError, TypeError) as reason:
+            raise ValueError(f"{path_or_name}: the card does not describe gains of a filter ({reason})") from None
+
+    def save(self, path: str | Path, card: Mapping[str, Any] | None = None) -> Path:
+        """Write weights and card, for :meth:`load`.
+
+        Args:
+            path: of the weights; see :func:`poise.baselines.weights_io.save_weights`.
+            card: further entries of the card.
+        """
+        parts = {"network": self.network.kind, "front_end": self.front_end.describe(), "head": self.head.describe()}
+        return save_weights(path, self.network.arrays(), {**(card or {}), **parts})
+
+    @property
+    def filter(self) -> KalmanFilter:
+        """The filter whose gains are set, in its published tuning."""
+        return replace(self.front_end.kalman, keep_covariance=True)
+
+    @property
+    def dt(self) -> float:
+        """Sampling interval, s."""
+        return self.front_end.dt
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        """Required channels."""
+        return self.front_end.channels
+
+    @property
+    def outputs(self) -> tuple[Quantity, ...]:
+        """Estimated quantities: those of the filter."""
+        return self.front_end.kalman.outputs
+
+    def with_dt(self, dt: float) -> Self:
+        """The same estimator for another sampling interval."""
+        return replace(self, front_end=self.front_end.with_dt(dt))
+
+    def configured(self, metadata: Mapping[str, Any]) -> Self:
+        """The same for the person, vehicle or device that a recording's metadata describe."""
+        return replace(self, front_end=self.front_end.configured(metadata))
+
+    def init(self, measurement: Measurement) -> GainFilterState:
+        """Initial state with the batch shape of ``measurement``, which is not processed."""
+        arrays = check_measurements(self.channels, measurement, time_axis=False)
+        front = self.front_end.init(arrays)
+        batch = front.memory.decisions.shape
+        memory, output = (np.zeros((*batch, size)) for size in (self.network.memory_size, self.network.outputs))
+        return GainFilterState(self.filter.init(arrays), front, memory, output)
+
+    def step(self, state: GainFilterState, measurement: Measurement) -> tuple[GainFilterState, Estimate]:
+        """Process one sample of every channel, ``(*batch, size)``; NaN where there is none."""
+        inner, estimate = self.filter.step(state.filter, measurement, self.gains(state.output))
+        front, seen = self.front_end.step(state.front, measurement)
+        memory, output = state.memory, state.output
+        if (np.asarray(seen.due) == 1.0).any():
+            memory, output, _ = self._advance(seen.features[None], seen.due[None], memory, output)
+        return GainFilterState(inner, front, memory, output), estimate
+
+    def run(self, measurements: Mapping[str, Any]) -> Estimate:
+        """Estimates of a whole sequence, ``(T, *batch, size)`` in and out; equal to stepping."""
+        return self.run_with_gains(measurements)[0]
+
+    def run_with_gains(self, measurements: Mapping[str, Any]) -> tuple[Estimate, dict[str, np.ndarray]]:
+        """As :meth:`run`, with the log factors ``(T, *batch)`` at every sample."""
+        arrays = check_measurements(self.channels, measurements, time_axis=True)
+        arrays = {name: np.asarray(array) for name, array in arrays.items()}
+        seen = self.front_end.run(arrays)
+        batch = seen.due.shape[1:]
+        memory, output = (np.zeros((*batch, size)) for size in (self.network.memory_size, self.network.outputs))
+        _, _, outputs = self._advance(seen.features, seen.due, memory, output)
+        # what is said at the end of an interval holds from the next sample on
+        gains = self.gains(np.concatenate([output[None], outputs[:-1]]))
+        return self.filter.run(arrays, gains), gains
+
+    def gains(self, output: np.ndarray) -> dict[str, np.ndarray]:
+        """Log factors by gain of outputs ``(..., gains)``."""
+        factors = self.head.factors(output)
+        named = {name: factors[..., index] for index, name in enumerate(self.head.gains)}
+        return self.front_end.kalman.model.limited(named)
+
+    def _advance(
+        self, features: np.ndarray, due: np.ndarray, memory: np.ndarray, output: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Memory and output after ``(T, *batch, …)`` samples, and the output of every sample; inputs stay."""
+        length, batch = features.shape[0], features.shape[1:-1]
+        memory, output = np.array(memory, dtype=float), np.array(output, dtype=float)
+        count = int(np.prod(batch, dtype=int))
+        outputs = self.network.advance(
+            np.ascontiguousarray(features).reshape(length, count, -1),
+            np.ascontiguousarray(due, dtype=float).reshape(length, count),
+            memory.reshape(count, -1),
+            output.reshape(count, -1),
+        )
+        return memory, output, outputs.reshape(length, *batch, -1)
+
+
+def shipped(weights: str, dt: float = 0.01) -> GainFilter:
+    """The estimator with weights of the package, for samples ``dt`` seconds apart."""
+    return GainFilter.load(weights, dt)

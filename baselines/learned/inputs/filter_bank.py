@@ -1,0 +1,183 @@
+"""Front end of a network that chooses among several tunings of one filter of inertial sensors.
+
+How far a gyroscope and how far a bound on the velocity can be trusted depends on the device and on the motion: a
+running phone has a velocity, a fast rotation shows the scale errors of the gyroscope. No constants serve all. Here the
+filter runs with its published constants and, beside them, with other gains on the same samples. The inclinations that
+the others find are **candidates**: tilts of the published filter's level frame. What the network sees of them, and of
+the motion in that frame, does not change with the heading, which is arbitrary.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, NamedTuple, Self
+
+import numpy as np
+
+from ....filters.core.backend import Array, namespace
+from ....filters.core.estimator import check_measurements
+from ....filters.core.kalman import KalmanFilter
+from ....filters.core.quantity import UP, Channel, Measurement
+from ....filters.core.rotation import rotate
+from ....filters.core.sampling import FilterState
+from .front_end import Seen
+from .gravity_aligned_frame import SCALARS, VECTORS
+from .level_frame import LevelFrame, LevelState
+
+TUNINGS = (
+    *((0.1, 1.0), (0.3, 1.0), (0.3, 5.0), (1.0, 0.5)),
+    *((1.0, 4.0), (3.0, 1.0), (3.0, 4.0)),
+)
+"""Factors on the deviations σ_g of the gyroscope and σ_V of the velocity of bounded-motion, one pair a candidate; they
+surround the published pair, which is the best one of these for hand-held devices (simulated and recorded)."""
+VELOCITY = 1
+"""Which of the vectors the directions of the others are told from: the filter's velocity in its level frame."""
+
+
+class BankState(NamedTuple):
+    """Memory of :class:`FilterBank`: of the level frame, and of the other filters."""
+
+    level: LevelState
+    others: FilterState
+
+
+@dataclass(frozen=True)
+class FilterBank:
+    """The level frame of a filter, and the inclinations that the same filter finds with other gains.
+
+    Features: of the vectors of :class:`.gravity_aligned_frame.GravityAlignedFrame` and the candidates (in deviations of
+    tilt) the lengths of their horizontal parts and the directions of these against that of the velocity; the vertical
+    parts of the vectors; the scalars of the frame and the filter's deviation. All are of the order of one.
+
+    ``spread`` holds the deviation of tilt (1) and the candidates (2 K, rad).
+
+    Attributes:
+        level: with the filter.
+        tunings: factors on its deviations ``process`` and ``velocity``, a pair for each of K candidates.
+
+    Raises:
+        ValueError: no filter, one without these gains, or factors that are not positive.
+    """
+
+    level: LevelFrame
+    tunings: tuple[tuple[float, float], ...] = TUNINGS
+
+    kind: ClassVar[str] = "filter-bank"
+    gains: ClassVar[tuple[str, str]] = ("process", "velocity")
+
+    def __post_init__(self) -> None:
+        if self.level.kalman is None or not set(self.gains) <= set(self.level.kalman.gains):
+            raise ValueError(f"level must have a filter with the gains {self.gains}, got {self.level.kalman}")
+        tunings = tuple((float(process), float(velocity)) for process, velocity in self.tunings)
+        if not tunings or not all(0.0 < factor < math.inf for pair in tunings for factor in pair):
+            raise ValueError(f"tunings must be pairs of positive factors, one pair at least, got {self.tunings}")
+        object.__setattr__(self, "tunings", tunings)
+
+    @property
+    def kalman(self) -> KalmanFilter:
+        """The filter with its published constants."""
+        assert self.level.kalman is not None
+        return self.level.kalman
+
+    @property
+    def dt(self) -> float:
+        """Sampling interval, s."""
+        return self.level.dt
+
+    @property
+    def interval(self) -> float:
+        """Time between updates of the network, s."""
+        return self.level.interval
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        """Those of the filter."""
+        return self.level.channels
+
+    @property
+    def size(self) -> int:
+        """Number of features."""
+        horizontals = VECTORS + len(self.tunings)
+        return VECTORS + horizontals + 2 * (horizontals - 1) + SCALARS + 1
+
+    def with_dt(self, dt: float) -> Self:
+        """See :class:`.front_end.FrontEnd`."""
+        return replace(self, level=self.level.with_dt(dt))
+
+    def configured(self, metadata: Mapping[str, Any]) -> Self:
+        """Nothing to configure."""
+        return self
+
+    def describe(self) -> dict[str, Any]:
+        """See :class:`.front_end.FrontEnd`."""
+        return {**self.level.describe(), "kind": self.kind, "tunings": [list(pair) for pair in self.tunings]}
+
+    @classmethod
+    def read(cls, described: Mapping[str, Any], dt: float) -> Self:
+        """The inverse of :meth:`describe`."""
+        tunings = tuple((float(process), float(velocity)) for process, velocity in described["tunings"])
+        return cls(LevelFrame.read(described, dt), tunings)
+
+    def init(self, measurement: Measurement) -> BankState:
+        """See :class:`.front_end.FrontEnd`."""
+        arrays = check_measurements(self.channels, measurement, time_axis=False)
+        return BankState(self.level.init(arrays), self._others.init(self._repeated(arrays)))
+
+    def step(self, state: BankState, measurement: Measurement) -> tuple[BankState, Seen]:
+        """See :class:`.front_end.FrontEnd`."""
+        arrays = check_measurements(self.channels, measurement, time_axis=False)
+        level, seen = self.level.step(state.level, arrays)
+        others, estimate = self._others.step(state.others, self._repeated(arrays), self._factors())
+        return BankState(level, others), self._seen(seen, estimate.pose[UP.name])
+
+    def run(self, measurements: Mapping[str, Any]) -> Seen:
+        """See :class:`.front_end.FrontEnd`."""
+        arrays = check_measurements(self.channels, measurements, time_axis=True)
+        repeated = self._repeated(arrays)
+        shape = next(iter(repeated.values())).shape[:-1]
+        factors = {name: np.broadcast_to(values, shape) for name, values in self._factors().items()}
+        return self._seen(self.level.run(arrays), self._others.run(repeated, factors).pose[UP.name])
+
+    @property
+    def _others(self) -> KalmanFilter:
+        return replace(self.kalman, keep_covariance=False)
+
+    def _factors(self) -> dict[str, np.ndarray]:
+        """Gain → logarithm of its factor ``(K,)``, of the variance."""
+        return {name: 2.0 * np.log([pair[i] for pair in self.tunings]) for i, name in enumerate(self.gains)}
+
+    def _repeated(self, arrays: Measurement) -> dict[str, Array]:
+        """The samples of every channel once for each candidate ``(..., K, size)``."""
+        xp, count = namespace(*arrays.values()), len(self.tunings)
+        return {name: xp.stack([array] * count, axis=-2) for name, array in arrays.items()}
+
+    def _seen(self, seen: Seen, up: Array) -> Seen:
+        xp, due = namespace(up), (seen.due == 1.0)[..., None]
+        turned = rotate(seen.base["relative_orientation"][..., None, :], up)[..., :2]
+        # before the start there are none
+        tilts = xp.where(xp.isfinite(turned), turned, xp.zeros_like(turned))
+        sigma = xp.where(xp.isfinite(seen.spread), seen.spread, xp.ones_like(seen.spread))
+        batch = tuple(due.shape[:-1])
+        vectors = xp.reshape(seen.features[..., : 3 * VECTORS], (*batch, VECTORS, 3))
+        horizontal = xp.concat([vectors[..., :2], tilts / (sigma[..., None] + 0.002)], axis=-2)
+        length = xp.sqrt(xp.sum(horizontal * horizontal, axis=-1) + 1e-6)
+        unit = horizontal / (length[..., None] + 0.02)
+        x, y = unit[..., VELOCITY, :1], unit[..., VELOCITY, 1:]
+        told = [
+            xp.clip(vectors[..., 2], -3.0, 3.0),
+            xp.log(length) / 3.0 + 0.3,
+            *(unit[..., part, 0] * x + unit[..., part, 1] * y for part in self._told),
+            *(unit[..., part, 0] * y - unit[..., part, 1] * x for part in self._told),
+            seen.features[..., 3 * VECTORS :],
+        ]
+        features = xp.concat(told, axis=-1)
+        features = xp.where(due, features, xp.zeros_like(features))
+        spread = xp.concat([sigma, xp.reshape(tilts, (*batch, -1))], axis=-1)
+        return seen._replace(features=features, spread=spread)
+
+    @property
+    def _told(self) -> tuple[slice, slice]:
+        """All horizontals but the velocity."""
+        return slice(0, VELOCITY), slice(VELOCITY + 1, VECTORS + len(self.tunings))

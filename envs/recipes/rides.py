@@ -1,0 +1,78 @@
+"""Rides for training: recorded once, with several draws of devices and measured geometry on each.
+
+Riding costs time; drawing sensors anew on a ride does not. What a learner corrects is mostly constant in a ride and
+differs from ride to ride: alignment, zeros, lengths of limbs. So every ride is used several times, each with another
+draw of errors and half of them with left and right exchanged.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from ..data.trajectory import Trajectory
+from ..episodes import EpisodeStore
+from .recipe import Recipe
+from .registry import described_recipe, recipe
+
+ON_DISK = 4 * 10**9
+"""bytes of rides that are kept"""
+SETTLED = 5.0
+"""s of a ride that are not scored: filters settle"""
+
+
+@dataclass(frozen=True)
+class RideSource:
+    """Rides of the ``rider`` recipe.
+
+    Raises:
+        ValueError: no rides or no draws.
+    """
+
+    rides: int = 80
+    """how many are ridden"""
+    draws: int = 6
+    """of devices and geometry on each ride"""
+    duration: float = 40.0
+    """s"""
+    changes: dict[str, Any] = field(default_factory=dict)
+    """fields of the recipe that differ"""
+
+    def __post_init__(self) -> None:
+        for name in ("rides", "draws"):
+            if getattr(self, name) < 1:
+                raise ValueError(f"{name} must be at least 1, got {getattr(self, name)}")
+
+    def recipe(self) -> Recipe:
+        """The distribution of the rides."""
+        described = recipe("rider").describe() | {"duration": self.duration} | self.changes
+        return described_recipe(described)
+
+
+def ride(source: RideSource, seed: int, index: int) -> Trajectory:
+    """A ride with ideal sensors; kept in the user's cache folder for all networks that train on it.
+
+    Args:
+        source: which rides.
+        seed: root seed; rides of different seeds share neither riders nor courses.
+        index: of the ride.
+    """
+    made: Any = source.recipe()
+    store = EpisodeStore("training-rides", made.describe(), in_memory=1, on_disk=ON_DISK)
+    sequence = np.random.SeedSequence(seed, spawn_key=(index,))
+    return store.episode((seed, index), lambda: made.ride(sequence, f"ride-{seed}-{index}"))
+
+
+def drawn(source: RideSource, seed: int, index: int) -> list[Trajectory]:
+    """The draws of devices and geometry on one ride; what is not settled is left out of the mask."""
+    made: Any = source.recipe()
+    ridden = ride(source, seed, index)
+    children = np.random.SeedSequence(seed, spawn_key=(index, 1)).spawn(source.draws)
+    return [made.sensed(ridden, child).replace(mask=ridden.time > SETTLED) for child in children]
+
+
+def held_out(source: RideSource, **changes: Any) -> RideSource:
+    """The same distribution but for some fields of the recipe, such as ``styles=("aggressive",)``."""
+    return replace(source, changes={**source.changes, **{name: list(value) for name, value in changes.items()}})

@@ -1,0 +1,38 @@
+"""Export a trained network for programs without Python."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import tyro
+
+from .main import run_command
+from .output import Output
+
+
+@dataclass
+class Args:
+    """Arguments of ``poise export``."""
+
+    weights: tyro.conf.Positional[str]
+    """name of shipped weights (`poise list weights`), or a file of weights"""
+    onnx: Path
+    """file to write: one graph with its memory as input and output, the card of the weights in its metadata"""
+    json: bool = False
+    """print one JSON document instead of tables"""
+
+
+def run(args: Args) -> int:
+    """Write the file."""
+    from ..baselines.learned.onnx_export import export_onnx
+
+    with Output("export", args) as out:
+        path = export_onnx(args.weights, args.onnx)
+        out.say(f"{path}: {path.stat().st_size / 1000.0:.0f} kB")
+        out.add(file=str(path))
+    return 0
+
+
+if __name__ == "__main__":
+    run_command("export")

@@ -1,0 +1,207 @@
+"""Motion that is shown: of a finished recording, of an environment that is played, of a stream of samples."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ...baselines.registry import list_estimators, make_estimator
+from ...baselines.run import fitted, run_on
+from ...envs.data.trajectory import Trajectory
+from ...filters.bicycle.geometry import RiderGeometry
+from ...filters.core.estimator import Estimator
+from ...filters.core.model import equations_of
+from .device import SIZE
+from .motion import Block, Device, Motion, Rider, Subject, joined
+from .online import OnlineEstimator, Timed
+
+if TYPE_CHECKING:
+    from ...envs.base import PoseEnv
+
+DRAWN = 50.0
+"""Hz at which motion is drawn; estimators run at the rate of the samples."""
+KEPT = 120.0
+"""s of a live motion that are kept."""
+USUAL = {"imu/gyr": ("bounded-motion", "vqf", "tilt"), "bicycle_imu/gyr": ("whole-body", "two-gyro")}
+"""Channel → estimators that are shown where none are named, as far as their channels and packages are there."""
+EMPTY = np.empty(0)
+
+
+def usual_estimators(channels: Sequence[str]) -> tuple[str, ...]:
+    """Names of the estimators that are shown of a recording with these channels."""
+    from ...filters.support.optional import MissingExtraError
+
+    known, found = list_estimators(), []
+    for channel, names in USUAL.items():
+        for name in names if channel in channels else ():
+            if set(known[name].channels) <= set(channels):
+                try:
+                    make_estimator(name)
+                except MissingExtraError:
+                    continue
+                found.append(name)
+    return tuple(found)
+
+
+def made_estimators(names: Sequence[str], trajectory: Trajectory) -> dict[str, Estimator[Any]]:
+    """Estimators by name, configured for a trajectory.
+
+    Raises:
+        ValueError: an unknown name, or the trajectory lacks a channel.
+    """
+    made = {name: fitted(name, trajectory) for name in dict.fromkeys(names)}
+    for name, estimator in made.items():
+        lacking = [each.name for each in estimator.channels if each.name not in trajectory.measurements]
+        if lacking:
+            raise ValueError(f"{name} needs {', '.join(lacking)}, which {trajectory.name!r} lacks")
+    return made
+
+
+def subject_of(
+    channels: Sequence[str],
+    truth: Sequence[str],
+    metadata: Mapping[str, Any],
+    made: Mapping[str, Estimator[Any]],
+    dt: float,
+) -> Subject:
+    """What a recording is one of: a rider on a bicycle, or a device.
+
+    Args:
+        channels: of the recording.
+        truth: quantities whose truth it has.
+        metadata: of the recording.
+        made: label → estimator.
+        dt: sampling interval, s.
+    """
+    outputs = {label: tuple(estimator.outputs) for label, estimator in made.items()}
+    ride = "bicycle/orientation" in truth or "bicycle_imu/gyr" in channels
+    if ride:
+        return Rider(RiderGeometry.of(metadata), outputs)
+    return Device(outputs, dt, metadata.get("size", SIZE))
+
+
+def with_derived(truth: Mapping[str, np.ndarray], made: Mapping[str, Estimator[Any]]) -> dict[str, np.ndarray]:
+    """The truth with what the equations of the estimators derive from it."""
+    found: dict[str, np.ndarray] = {}
+    for estimator in made.values():
+        derive = getattr(equations_of(estimator), "truth", None)
+        if callable(derive) and truth:
+            found |= derive(truth)
+    return {**found, **truth}
+
+
+def finished(trajectory: Trajectory, names: Sequence[str]) -> tuple[Subject, Motion]:
+    """A recording with estimates, drawn at 50 Hz or its own rate.
+
+    Raises:
+        ValueError: an unknown estimator, or the recording lacks a channel of it.
+    """
+    grid = trajectory.on_grid()
+    made = made_estimators(names, grid)
+    stride = max(1, round(1.0 / (DRAWN * grid.dt))) if len(grid) > 1 else 1
+    subject = subject_of(tuple(grid.measurements), tuple(grid.truth), grid.metadata, made, grid.dt)
+    poses = {label: run_on(estimator, grid).pose for label, estimator in made.items()}
+    truth = dict(grid.truth)
+    if "orientation" not in truth and "up" in grid.quantities:
+        truth["up"] = grid.truth_of("up")
+    block = Block(grid.time, with_derived(truth, made), grid.measurements, poses)
+    return subject, subject.motion(block).rows(slice(None, None, stride))
+
+
+@dataclass
+class LiveMotion:
+    """Motion that grows by samples, with estimators that run sample by sample.
+
+    Attributes:
+        subject: what moves.
+        online: label → estimator at the rate of the samples.
+        dt: sampling interval, s.
+        kept: s of motion that are kept.
+        motion: so far; None before the first sample.
+    """
+
+    subject: Subject
+    online: Mapping[str, OnlineEstimator]
+    dt: float
+    kept: float = KEPT
+    motion: Motion | None = field(default=None, init=False)
+
+    def add(self, samples: Sequence[Timed], truth: Mapping[str, np.ndarray] | None = None) -> None:
+        """Estimate and append samples.
+
+        Args:
+            samples: in the order of time.
+            truth: quantity → ``(n, size)``.
+
+        Raises:
+            ValueError: a sample lacks a channel of an estimator.
+        """
+        if not samples:
+            return
+        steps = {label: [online.step(sample).pose for sample in samples] for label, online in self.online.items()}
+        poses = {
+            label: {name: np.array([pose[name] for pose in rows]) for name in rows[0]} for label, rows in steps.items()
+        }
+        made = {label: online.estimator for label, online in self.online.items()}
+        channels = samples[0].measurement
+        block = Block(
+            np.array([sample.time for sample in samples]),
+            with_derived(truth or {}, made),
+            {name: np.array([sample.measurement[name] for sample in samples]) for name in channels},
+            poses,
+        )
+        added = self.subject.motion(block)
+        whole = added if self.motion is None else joined(self.motion, added)
+        first = int(np.searchsorted(whole.time, whole.time[-1] - self.kept))
+        self.motion = whole.rows(slice(first, None))
+
+
+def live_motion(names: Sequence[str], trajectory: Trajectory, dt: float) -> LiveMotion:
+    """A live motion like a trajectory, whose samples are not yet part of it.
+
+    Args:
+        names: of the estimators.
+        trajectory: of one or more samples, with the channels, truth and metadata to come.
+        dt: sampling interval, s.
+
+    Raises:
+        ValueError: an unknown estimator, one that needs the whole recording, or a channel is lacking.
+    """
+    made = {name: make_estimator(name, dt=dt, metadata=trajectory.metadata) for name in dict.fromkeys(names)}
+    for name, estimator in made.items():
+        if not hasattr(estimator, "step"):
+            raise ValueError(f"{name} needs the whole recording; a live motion needs estimators with steps")
+        lacking = [each.name for each in estimator.channels if each.name not in trajectory.measurements]
+        if lacking:
+            raise ValueError(f"{name} needs {', '.join(lacking)}; there are {', '.join(trajectory.measurements)}")
+    subject = subject_of(tuple(trajectory.measurements), tuple(trajectory.truth), trajectory.metadata, made, dt)
+    return LiveMotion(subject, {name: OnlineEstimator(each).warm_up() for name, each in made.items()}, dt)
+
+
+class PlayedEnvironment:
+    """An environment that is stepped without an agent; its samples and truth, a block at a time.
+
+    Args:
+        env: of this package.
+        seed: of the first episode.
+    """
+
+    def __init__(self, env: Any, seed: int) -> None:
+        self.env: PoseEnv = env.unwrapped
+        if not hasattr(self.env, "measurement"):
+            raise ValueError(f"{env} is not an environment whose agent estimates a pose")
+        _, self._info = self.env.reset(seed=seed)
+        self.over = False
+
+    def block(self, until: float) -> tuple[list[Timed], dict[str, np.ndarray]]:
+        """Samples up to a time of the episode, s, and their truth."""
+        samples, rows = [], []
+        while not self.over and self._info["time"] <= until:
+            samples.append(Timed(self._info["time"], self.env.measurement(), False, False))
+            rows.append({**self._info["pose"], **self._info["truth"]})
+            _, _, terminated, truncated, self._info = self.env.step(self.env.neutral_action)
+            self.over = terminated or truncated
+        return samples, {name: np.array([row[name] for row in rows]) for name in rows[0]} if rows else {}

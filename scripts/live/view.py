@@ -1,0 +1,320 @@
+"""Show motion and estimates in the browser: a recording, an environment, or samples while they arrive.
+
+The truth is solid, estimates are translucent. The page has play, pause, time and speed, errors and angles as curves,
+the choice of estimators, forces, trails, and the virtual controller of the thesis on game controllers.
+"""
+
+from __future__ import annotations
+
+import signal
+import threading
+import time
+import webbrowser
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import tyro
+
+from ...filters.support.optional import extra
+from ..main import run_command
+from ..output import Output
+from .lines import LineFormat
+from .sources import lines_of
+from .stream import Counts, clock_of, reader_of, timed_samples
+
+if TYPE_CHECKING:
+    from ...envs.data.trajectory import Trajectory
+    from .motion import Motion, Subject
+    from .online import Timed
+    from .shown import LiveMotion
+
+AHEAD = 0.25
+"""s of an environment that are simulated at a time."""
+
+
+@dataclass
+class Args:
+    """Arguments of ``poise view``."""
+
+    source: tyro.conf.Positional[str] = "hand-motion"
+    """a recording, an environment (hand-motion, rider-bicycle or an id), or - for lines of samples"""
+    estimators: tuple[str, ...] = ()
+    """names of estimators, see `poise list estimators`; by default some that the channels allow"""
+    options: tuple[str, ...] = ()
+    """arguments of the environment, as name=value (gesture=fast scenario=slalom)"""
+    seed: int = 0
+    """of the episode"""
+    live: bool = False
+    """show an environment while it is simulated, and a text file while lines are added to it"""
+    udp: int | None = None
+    """show samples that arrive as lines in UDP datagrams on this port"""
+    rate: float | None = None
+    """of lines of samples, Hz; found from the first 50 stamps by default"""
+    columns: tuple[str, ...] = ()
+    """of lines of samples, see `poise stream`"""
+    units: tuple[str, ...] = ()
+    """of lines of samples where they are not SI, as kind=unit"""
+    format: LineFormat = "auto"
+    """of lines of samples"""
+    baud: int = 115200
+    """rate of a serial device"""
+    site: str | None = None
+    """in a recording of several sensors, the one to show"""
+    calibration: Path | None = None
+    """record of `poise calibrate` for a recording of raw readings"""
+    port: int = 8080
+    """of the page; the next free one if it is taken"""
+    host: str = "127.0.0.1"
+    """address that the page is served on; 0.0.0.0 for all of this machine"""
+    browser: bool = True
+    """open the page in the browser"""
+    at: float | None = None
+    """begin at this time of the motion, s, paused"""
+    plot: str | None = None
+    """which curves are shown, such as roll or inclination"""
+    beside: bool = False
+    """figures stand side by side"""
+    screenshot: Path | None = None
+    """write a picture of the page, drawn by a Chromium without a window, and leave"""
+
+
+def run(args: Args) -> int:
+    """Show motion until interrupted."""
+    with extra("view"):
+        from .viewer import Viewer
+
+    with Output("view", args) as out, interrupted_by_signals(), opened(args, out) as (subject, motion, newer, title):
+        viewer = Viewer(subject, motion, title, host=args.host, port=args.port, live=newer is not None)
+        try:
+            viewer.begin(args.at, args.plot, beside=args.beside)
+            if args.screenshot is not None:
+                return picture(viewer, args, out)
+            out.say(f"{title} at {viewer.url} (Ctrl-C ends)")
+            if args.browser:
+                webbrowser.open(viewer.url)
+            viewer.run(newer or (lambda: None))
+        except KeyboardInterrupt:
+            out.say("")
+        finally:
+            viewer.close()
+    return 0
+
+
+def picture(viewer: Any, args: Args, out: Output) -> int:
+    """Write a picture of the page."""
+    from .picture import take_picture
+
+    assert args.screenshot is not None
+    viewer.player.playing = False
+    thread = threading.Thread(target=viewer.run, daemon=True)
+    thread.start()
+    out.say(f"picture: {take_picture(viewer.url, args.screenshot)}")
+    viewer.stopped.set()
+    thread.join()
+    return 0
+
+
+@contextmanager
+def interrupted_by_signals() -> Iterator[None]:
+    """Let a termination end like Ctrl-C."""
+
+    def interrupt(number: int, frame: Any) -> None:
+        raise KeyboardInterrupt
+
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGTERM, interrupt)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+Opened = tuple["Subject", "Motion", "Callable[[], Motion | None] | None", str]
+"""What moves, its motion so far, what gives the motion that has grown (None: it does not), title."""
+
+
+@contextmanager
+def opened(args: Args, out: Output) -> Iterator[Opened]:
+    """What the arguments ask for, ready to be shown.
+
+    Raises:
+        ValueError: an unknown environment, estimator or option, or a recording that cannot be read.
+        FileNotFoundError: the source is neither a file nor an environment.
+    """
+    lines = args.udp is not None or args.source == "-"
+    path = Path(args.source)
+    if lines or (args.live and path.exists()):
+        with fed(line_blocks(args), args) as found:
+            yield (*found, "samples")
+    elif path.exists():
+        yield (*recording(args, out), None, path.name)
+    elif args.live:
+        env_id, env = environment(args)
+        try:
+            with fed(environment_blocks(env, args.seed), args) as found:
+                yield (*found, env_id)
+        finally:
+            env.close()
+    else:
+        from ...envs.record import record
+        from .shown import finished
+
+        env_id, env = environment(args)
+        try:
+            out.say(f"recording {env_id}, seed {args.seed} (--live shows it at once)")
+            trajectory = record(env, seed=args.seed, progress=True)
+        finally:
+            env.close()
+        yield (*finished(trajectory, chosen(args, trajectory)), None, env_id)
+
+
+def environment(args: Args) -> tuple[str, Any]:
+    """Id of an environment, and the environment.
+
+    Raises:
+        FileNotFoundError: there is neither a file nor an environment of this name.
+        ValueError: an unknown option.
+    """
+    from ...envs.registration import make_environment, register_environments
+    from ..record import environment_id, option
+
+    register_environments()
+    try:
+        env_id = environment_id(args.source)
+    except ValueError as reason:
+        raise FileNotFoundError(2, f"no such file, and {reason}", args.source) from None
+    return env_id, make_environment(env_id, **dict(option(text) for text in args.options))
+
+
+def chosen(args: Args, trajectory: Trajectory) -> tuple[str, ...]:
+    """The estimators that are named, or the usual ones."""
+    from .shown import usual_estimators
+
+    return args.estimators or usual_estimators(tuple(trajectory.measurements))
+
+
+def recording(args: Args, out: Output) -> tuple[Subject, Motion]:
+    """A finished recording, one of its sensors.
+
+    Raises:
+        ValueError: it cannot be read, or holds several sensors and none is named.
+    """
+    from ..recordings.load import load_all, plain_warnings, sensors_of
+    from .shown import finished, made_estimators
+
+    with plain_warnings():
+        loaded, _ = load_all([Path(args.source)], args.calibration, args.site)
+        trajectory = loaded[0]
+        ride = (
+            any(name.startswith("bicycle/") for name in trajectory.truth)
+            or "bicycle_imu/gyr" in trajectory.measurements
+        )
+        sensors = [trajectory] if ride else [sensor for one in loaded for sensor in sensors_of(one)]
+        if len(sensors) > 1:
+            out.say(
+                f"showing {sensors[0].name}; --site shows another one of {', '.join(each.name for each in sensors)}"
+            )
+        made_estimators(chosen(args, sensors[0]), sensors[0].on_grid())
+        return finished(sensors[0].reference_clock_corrected(), chosen(args, sensors[0]))
+
+
+Blocks = Iterator["tuple[list[Timed], dict[str, Any], Trajectory | None]"]
+"""Samples, their truth, and (with the first block) a trajectory that says channels, truth, metadata and rate."""
+
+
+def environment_blocks(env: Any, seed: int) -> Blocks:
+    """An environment in real time, as fast as it is simulated."""
+    from ...envs.data.trajectory import Trajectory
+    from ...envs.record import describe
+    from .shown import PlayedEnvironment
+
+    played = PlayedEnvironment(env, seed)
+    begin, shown = time.monotonic(), 0.0
+    while not played.over:
+        shown = min(time.monotonic() - begin, shown + AHEAD)
+        samples, truth = played.block(shown)
+        if samples:
+            measurements = {name: values[None] for name, values in samples[0].measurement.items()}
+            first = {name: values[:1] for name, values in truth.items()}
+            details = {**describe(env, seed), "rate": env.unwrapped.rate}
+            yield samples, truth, Trajectory([samples[0].time], measurements, first, metadata=details)  # type: ignore[arg-type]
+        else:
+            yield [], {}, None
+            time.sleep(0.01)
+
+
+def line_blocks(args: Args) -> Blocks:
+    """Lines of samples as they arrive."""
+    from ...baselines.registry import make_estimator
+    from ...envs.data.trajectory import Trajectory
+
+    channels = [channel for name in args.estimators for channel in make_estimator(name).channels]
+    reader, clock = reader_of(args, channels), clock_of(args.rate)
+    lines = lines_of(args.source, udp=args.udp, follow=args.live, baud=args.baud)
+    waiting: list[Timed] = []
+    for sample in timed_samples(lines, reader, clock, Counts()):
+        if sample is not None:
+            waiting.append(sample)
+            if len(waiting) < 200 and sample.time - waiting[0].time < 1.0 / 30.0:
+                continue
+        if not waiting:
+            yield [], {}, None
+            continue
+        assert clock.dt is not None
+        measurements = {name: values[None] for name, values in waiting[0].measurement.items()}
+        yield waiting, {}, Trajectory([waiting[0].time], measurements, metadata={"rate": 1.0 / clock.dt})  # type: ignore[arg-type]
+        waiting = []
+    if waiting:
+        yield waiting, {}, None
+
+
+@contextmanager
+def fed(blocks: Blocks, args: Args) -> Iterator[tuple[Subject, Motion, Callable[[], Motion | None]]]:
+    """A motion that grows by blocks in a thread of its own; it begins with the first samples.
+
+    Raises:
+        ValueError: no sample came, an unknown estimator, or a channel is lacking.
+    """
+    from .shown import live_motion
+
+    live: LiveMotion | None = None
+    for samples, truth, trajectory in blocks:
+        if samples and trajectory is not None:
+            live = live_motion(chosen(args, trajectory), trajectory, trajectory.dt)
+            live.add(samples, truth)
+            break
+    if live is None or live.motion is None:
+        raise ValueError("no sample came")
+    stop = threading.Event()
+    failures: list[Exception] = []
+
+    def feed(live: LiveMotion) -> None:
+        try:
+            for samples, truth, _ in blocks:
+                live.add(samples, truth)
+                if stop.is_set():
+                    return
+        except Exception as reason:
+            failures.append(reason)
+
+    def newer() -> Motion | None:
+        if failures:
+            raise failures.pop()
+        return live.motion
+
+    thread = threading.Thread(target=feed, args=(live,), daemon=True)
+    thread.start()
+    try:
+        yield live.subject, live.motion, newer
+    finally:
+        stop.set()
+        thread.join(timeout=2.0)
+
+
+if __name__ == "__main__":
+    run_command("view")

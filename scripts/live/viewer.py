@@ -1,0 +1,198 @@
+"""The viewer in the browser: picture, plot and controls, kept at the time of the player."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from contextlib import redirect_stdout
+from functools import partial
+from io import StringIO
+from typing import Any
+
+import numpy as np
+
+from ...filters.support.names import look_up
+from ...filters.support.optional import extra
+from .motion import Motion, Rider, Subject
+from .player import SPEEDS, Player
+from .plots import colours_of, curve_figure
+from .scene import DEVICE, RIDE, MotionScene, Options
+
+with extra("view"):
+    import viser
+
+FRAMES = 30.0
+"""Pictures a second."""
+PLOT_INTERVAL = 0.5
+"""s between updates of the plot."""
+NOTHING = "–"
+
+
+class Viewer:
+    """Motion of a subject in the browser.
+
+    Args:
+        subject: what moves.
+        motion: what is shown at first.
+        title: of the page.
+        host: address that the server listens on.
+        port: of the server; 0 takes a free one.
+        live: whether the motion grows.
+    """
+
+    def __init__(
+        self,
+        subject: Subject,
+        motion: Motion,
+        title: str,
+        *,
+        host: str = "127.0.0.1",
+        port: int = 8080,
+        live: bool = False,
+    ) -> None:
+        self.motion = motion
+        self.player = Player(float(motion.time[0]), float(motion.time[-1]), following=live, time=float(motion.time[0]))
+        ride = isinstance(subject, Rider)
+        self.options = Options(dict.fromkeys(motion.figures, True), turn=ride)
+        with redirect_stdout(StringIO()):  # what viser prints, whether it is verbose or not
+            self.server = viser.ViserServer(host, port, title, verbose=False)
+        self.stopped = threading.Event()
+        self._changed = threading.Event()
+        self._changed.set()
+        self._colours = colours_of(list(motion.figures))
+        self._row, self._plotted = -1, -np.inf
+        self._scene = MotionScene(self.server, subject.meshes(), motion, self._colours, RIDE if ride else DEVICE)
+        self._controls(title, ride)
+        self.tick(0.0)
+
+    @property
+    def url(self) -> str:
+        """Address of the page."""
+        host = self.server.get_host()
+        return f"http://{'localhost' if host == '0.0.0.0' else host}:{self.server.get_port()}"
+
+    def _controls(self, title: str, ride: bool) -> None:
+        gui, player = self.server.gui, self.player
+        gui.configure_theme(control_width="large", show_logo=False, show_share_button=False)
+        gui.main_panel.dock_right()
+        gui.set_panel_label(title)
+        self._play = gui.add_button("Pause" if player.playing else "Play")
+        self._play.on_click(lambda event: self._act(player.toggle))
+        span = max(player.end - player.begin, 0.01)
+        self._slider: Any = gui.add_slider("time (s)", player.begin, player.begin + span, 0.01, player.time)
+        self._slider.on_update(
+            lambda event: self._act(lambda: player.seek(self._slider.value)) if event.client is not None else None
+        )
+        speed = gui.add_dropdown("speed", [f"{each:g} ×" for each in SPEEDS], initial_value="1 ×")
+        speed.on_update(lambda event: self._act(lambda: setattr(player, "speed", float(speed.value.split()[0]))))
+        if player.following:
+            gui.add_button("Follow the newest sample").on_click(lambda event: self._act(player.follow))
+        self._choice: Any = gui.add_dropdown("plot", list(self.motion.curves) or [NOTHING])
+        self._choice.on_update(lambda event: self._act(lambda: None))
+        self._plot = gui.add_plotly(self._figure(), aspect=0.66)
+        with gui.add_folder("Shown"):
+            for label in self.options.visible:
+                self._checkbox(label, True, partial(self._choose, label))
+            if self.motion.arrows:
+                self._checkbox("forces" if ride else "acceleration", True, self._set("forces"))
+            self._checkbox("trail", True, self._set("trails"))
+            self._beside = self._checkbox("side by side", False, self._set("beside"))
+            if self.motion.virtual:
+                self._checkbox("virtual controller", False, self._set("virtual"))
+            if ride:
+                self._checkbox("follow heading", True, self._set("turn"))
+
+    def _choose(self, label: str, value: bool) -> None:
+        self.options.visible[label] = value
+
+    def _set(self, name: str) -> Callable[[bool], object]:
+        return lambda value: setattr(self.options, name, value)
+
+    def _checkbox(self, label: str, value: bool, act: Callable[[bool], object]) -> Any:
+        box = self.server.gui.add_checkbox(label, value)
+        box.on_update(lambda event: self._act(lambda: act(box.value)))
+        return box
+
+    def _act(self, act: Callable[[], object]) -> None:
+        act()
+        self._plotted = -np.inf
+        self._changed.set()
+
+    def _figure(self) -> object:
+        shown = {
+            label: values
+            for label, values in self.motion.curves.get(self._choice.value, {}).items()
+            if self.options.visible.get(label, True)
+        }
+        return curve_figure(self.motion.time, shown, self._choice.value, self._colours, self.player.time)
+
+    def begin(self, at: float | None = None, plot: str | None = None, *, beside: bool = False) -> None:
+        """Choose what is shown at first.
+
+        Args:
+            at: time, s, paused; None plays from the beginning.
+            plot: which curves: their name or a part of it.
+            beside: figures stand side by side.
+
+        Raises:
+            ValueError: the time is not one of the motion, or there are no such curves.
+        """
+        if at is not None:
+            if not self.player.begin <= at <= self.player.end:
+                raise ValueError(f"at must lie from {self.player.begin:g} to {self.player.end:g} s, got {at:g}")
+            self.player.seek(at)
+            self.player.playing = False
+        if plot is not None:
+            titles = {title: title for title in self.motion.curves}
+            found = next((title for title in titles if plot in title), None)
+            self._choice.value = look_up("plot", plot, titles) if found is None else found
+        self._beside.value = beside
+        self._act(lambda: None)
+
+    def replace(self, motion: Motion) -> None:
+        """Show a motion that has grown."""
+        self.motion = motion
+        self.player.grow(float(motion.time[0]), float(motion.time[-1]))
+        self._slider.min = self.player.begin
+        self._slider.max = max(self.player.end, self.player.begin + 0.01)
+        self._row = -1
+
+    def tick(self, clock: float) -> None:
+        """Advance the player and update what has changed.
+
+        Args:
+            clock: s of a monotonic clock.
+        """
+        before = self.player.playing
+        shown = self.player.advance(clock)
+        changed = self._changed.is_set()
+        self._changed.clear()
+        row = int(np.clip(np.searchsorted(self.motion.time, shown + 1e-9) - 1, 0, len(self.motion) - 1))
+        if row != self._row or changed:
+            self._row = row
+            self._scene.show(self.motion, row, self.options)
+            self._slider.value = round(shown, 2)
+        if changed or before != self.player.playing:
+            self._play.label = "Pause" if self.player.playing else "Play"
+        if changed or (self.player.playing and clock - self._plotted >= PLOT_INTERVAL):
+            self._plotted = clock
+            self._plot.figure = self._figure()
+
+    def run(self, newer: Callable[[], Motion | None] = lambda: None) -> None:
+        """Keep the page up to date until :attr:`stopped` is set.
+
+        Args:
+            newer: the motion that has grown since, or None.
+        """
+        while not self.stopped.wait(1.0 / FRAMES):
+            grown = newer()
+            if grown is not None and grown is not self.motion:
+                self.replace(grown)
+            self.tick(time.monotonic())
+
+    def close(self) -> None:
+        """Stop the server."""
+        self.stopped.set()
+        with redirect_stdout(StringIO()):
+            self.server.stop()

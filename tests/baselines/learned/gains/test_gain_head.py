@@ -1,0 +1,110 @@
+"""The loss of networks that set gains: the filter that runs in it, and what training with it learns."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+torch = pytest.importorskip("torch")
+
+from poise.baselines.learned.config import FitConfig  # noqa: E402
+from poise.baselines.learned.data import SequenceData  # noqa: E402
+from poise.baselines.learned.fit import fit  # noqa: E402
+from poise.baselines.learned.gains.gain_filter import GainFilter  # noqa: E402
+from poise.baselines.learned.gains.gain_head import GainHead, tilt_variance  # noqa: E402
+from poise.baselines.learned.inputs.gain_features import GainFeatures  # noqa: E402
+from poise.baselines.learned.networks.modules import GruModule  # noqa: E402
+from poise.envs.recipes.registry import hand_recipe  # noqa: E402
+from poise.filters.core.metrics import direction_error, rms  # noqa: E402
+from poise.filters.registry import make  # noqa: E402
+
+RECIPE = replace(hand_recipe("hand-held"), duration=12.0)
+
+
+def parts(gains=("process", "measurement"), limit=8.0):
+    kalman = replace(make("external-acceleration"), restart=False)
+    return GainFeatures(kalman), GainHead(kalman, gains, (limit,) * len(gains))
+
+
+def test_the_loss_runs_the_filter_that_the_estimator_runs():
+    """At any sampling rate, with constants of the sequence, outputs one interval late."""
+    front_end, head = parts()
+    motions = [RECIPE.episode(5, index) for index in range(2)]
+    assert len({motion.dt for motion in motions}) == 2
+    data = SequenceData.from_trajectories(motions, front_end, head)
+    module = GruModule(front_end.size, head.size, 6, scale=3.0)
+    torch.nn.init.normal_(module.output.weight)
+    with torch.no_grad():
+        told, _ = module(torch.from_numpy(data.features))
+        errors = head.errors(told, torch.from_numpy(data.target), None).numpy()[..., 0]
+    for row, motion in enumerate(motions):
+        made = GainFilter(module.export(), front_end.with_dt(motion.dt), head)
+        pose = made.run(motion.measurements).pose["up"]
+        whole = made.front_end.features.interval_samples(motion.dt)
+        count = len(motion) // whole
+        each = direction_error(pose, motion.truth_of("up"))[: count * whole].reshape(count, whole)
+        np.testing.assert_allclose(errors[row, :count], rms(each, None, axis=1), rtol=2e-2, atol=2e-5)
+
+
+def test_derivatives_are_those_of_the_loss():
+    front_end, head = parts()
+    data = SequenceData.from_trajectories([RECIPE.episode(5, 0)], front_end, head)
+    target, mask = torch.from_numpy(data.target), torch.from_numpy(data.mask)
+    told = 0.1 * torch.randn((*data.features.shape[:2], 2), generator=torch.Generator().manual_seed(0))
+    told = told.double().requires_grad_()
+    head.loss(told, target, None, mask).backward()
+    direction = torch.zeros_like(told)
+    direction[0, 20:60, 0] = 1.0
+    step = 1e-4
+    with torch.no_grad():
+        above, below = (head.loss(told + sign * step * direction, target, None, mask) for sign in (1.0, -1.0))
+    slope = float((above - below) / (2.0 * step))
+    assert abs(slope) > 1e-6
+    assert float((told.grad * direction).sum()) == pytest.approx(slope, rel=1e-3)
+
+
+@pytest.mark.parametrize("name", ["mekf", "external-acceleration"])
+def test_the_variance_of_the_inclination_does_not_depend_on_the_heading(name):
+    motion = RECIPE.episode(5, 1)
+    kalman = make(name, dt=motion.dt)
+    estimate = kalman.run(motion.measurements)
+    variance = tilt_variance(kalman, estimate.covariance, estimate.pose["up"])
+    assert (variance > 0.0).all()
+    turned = tilt_variance(kalman, estimate.covariance, -estimate.pose["up"])
+    np.testing.assert_allclose(turned, variance)
+
+
+def test_training_finds_better_gains_and_ends_as_an_estimator():
+    front_end, head = parts()
+    train, held_out = (
+        SequenceData.from_recipe(RECIPE, seed, count, front_end, head) for seed, count in ((1, 6), (2, 3))
+    )
+    module = GruModule(front_end.size, head.size, 8)
+    constant = head.begin(module, train, 0)
+    assert constant[1] > 1.0  # a hand accelerates by more than the paper's 0.01 m/s²
+    config = FitConfig(epochs=3, batch=2, window=10**6, learning_rate=5e-3)
+    before = GainFilter(module.export(), front_end, head)
+    result = fit(module, front_end, head, train, held_out, config)
+    after = GainFilter(result.estimator.network, front_end, head)
+    motion = RECIPE.episode(2, 0)
+
+    def error(estimator):
+        pose = estimator.with_dt(motion.dt).run(motion.measurements).pose["up"]
+        return math.degrees(float(rms(direction_error(pose, motion.truth_of("up")), motion.mask)))
+
+    assert error(before) < error(make("external-acceleration"))
+    assert result.best_epoch > 0
+    assert result.history[-1]["training"] < result.history[0]["training"]
+    assert error(after) < error(make("external-acceleration"))
+
+
+def test_what_cannot_be_used_is_named():
+    front_end, head = parts()
+    short = replace(RECIPE, duration=0.06).episode(0, 0)
+    with pytest.raises(ValueError, match="too short"):
+        SequenceData.from_trajectories([short], front_end, head)
+    with pytest.raises(ValueError, match="neither an inclination nor an angle"):
+        GainHead(make("array-rate", method="weighted"), (), ())
