@@ -128,8 +128,20 @@ class Preset:
 
 TRAINED = {"scenarios": ["indoor_circle", "outdoor", "straight", "slalom"], "styles": ["mild", "normal"]}
 """Rides that networks train on; other scenarios and aggressive riders are kept aside."""
-RIDES = RideSource(rides=40, draws=6, duration=40.0, changes=TRAINED)
-RIDDEN = FitConfig(epochs=12, window=125, learning_rate=3e-3)
+RIDES = RideSource(rides=80, draws=4, duration=40.0, changes=TRAINED)
+RIDDEN = FitConfig(epochs=14, window=125, learning_rate=3e-3)
+CORRECTED = {
+    "two-gyro": "two-gyro-consistent",
+    "force-inertial": "force-inertial-consistent",
+    "whole-body": "whole-body",
+}
+"""Paper → filter that the network corrects: a consistent form, where there is one"""
+BICYCLE_SITES = {
+    "two-gyro": ("bicycle_imu",),
+    "force-inertial": ("bicycle_imu", "wheel"),
+    "whole-body": ("bicycle_imu", "wheel", "steer", "crank"),
+}
+"""Paper → sites of its sensors of which none is worn or held by the rider"""
 HANDS = {"hand-held-prompt": 300, "carried-prompt": 60}
 PRESETS: dict[str, Preset] = {
     "gru": Preset("inclination from six axes by a recurrent network alone", HANDS, fit=FitConfig(epochs=8)),
@@ -147,11 +159,22 @@ PRESETS: dict[str, Preset] = {
         fit=FitConfig(epochs=5, batch=24, learning_rate=3e-3),
     ),
     **{
-        f"{name}+network": Preset(
-            f"{name}, all its angles corrected by a recurrent network", rides=RIDES, filter=name,
+        f"{paper}+network": Preset(
+            f"{filter}, all its angles corrected by a recurrent network", rides=RIDES, filter=filter,
             scale=0.03, noise=0.1, fit=RIDDEN,
         )
-        for name in ("two-gyro", "force-inertial", "whole-body")
+        for paper, filter in CORRECTED.items()
+    },
+    **{
+        f"gru-{paper}{end}": Preset(
+            f"angles of {paper} by a recurrent network alone, {words}", rides=RIDES, paper=paper, sites=sites,
+            scale=0.1, noise=0.1, fit=RIDDEN,
+        )
+        for paper, bicycle in BICYCLE_SITES.items()
+        for end, words, sites in (
+            ("", "from the paper's sensors", ()),
+            ("-bicycle", "from sensors of the bicycle: a rider's habits", bicycle),
+        )
     },
 }  # fmt: skip
 """Name of the weights → training."""

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ..output import Output
 
 if TYPE_CHECKING:
     from ...baselines.studies.riders.suite import RiderSuite
-    from ..benchmark import Args
     from ..experiment import Run
 
 
-def riders(args: Args) -> int:
+def riders(args: Any) -> int:
     """Tables or sweeps of the rider suite."""
     from ...baselines.studies.riders.suite import PAPERS, RiderSuite
     from ..experiment import start_run
@@ -30,7 +29,7 @@ def riders(args: Args) -> int:
     return 0
 
 
-def rider_tables(settings: RiderSuite, args: Args, folder: Run, out: Output) -> dict[str, str]:
+def rider_tables(settings: RiderSuite, args: Any, folder: Run, out: Output) -> dict[str, str]:
     """Errors, each angle, consistency: printed, written, and as sections of the report."""
     from ...baselines.studies.riders import suite, tables
     from ..tables import markdown_table
@@ -53,7 +52,7 @@ def rider_tables(settings: RiderSuite, args: Args, folder: Run, out: Output) -> 
     return sections
 
 
-def rider_sweeps(settings: RiderSuite, args: Args, folder: Run, out: Output) -> dict[str, str]:
+def rider_sweeps(settings: RiderSuite, args: Any, folder: Run, out: Output) -> dict[str, str]:
     """Errors while one condition is varied, and a figure."""
     from ...baselines.studies.riders import sweeps
     from ..tables import markdown_table
