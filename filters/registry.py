@@ -180,6 +180,11 @@ FILTERS: dict[str, Entry] = {
         "roll of a bicycle, attitude of the trunk; two gyroscopes and a camera; model=sigma1 or sigma2",
         TWO_GYRO,
     ),
+    "two-gyro-consistent": Entry(
+        f"{BICYCLE}.two_gyro.consistent:ConsistentTwoGyro",
+        "two-gyro with noises that hold on rides: its covariance is that of its errors",
+        HERE,
+    ),
     "two-gyro-level": Entry(
         f"{BICYCLE}.two_gyro.filter:TwoGyro",
         "two-gyro by Σ1, with level ground as pseudo-measurement: the roll no longer drifts",
@@ -190,6 +195,11 @@ FILTERS: dict[str, Entry] = {
         f"{BICYCLE}.force_inertial.filter:ForceInertial",
         "roll of a bicycle, angles of the trunk; two IMUs, forces at seat and handlebar",
         FORCE_INERTIAL,
+    ),
+    "force-inertial-consistent": Entry(
+        f"{BICYCLE}.force_inertial.consistent:ConsistentForceInertial",
+        "force-inertial from the usual posture, with noises that hold on rides: its covariance is that of its errors",
+        HERE,
     ),
     "whole-body": Entry(
         f"{BICYCLE}.whole_body.filter:WholeBody",

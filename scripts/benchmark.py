@@ -6,7 +6,7 @@ import json
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from .main import run_command
 from .output import Output
@@ -27,6 +27,9 @@ STEPS = 100
 class Args:
     """Arguments of ``poise benchmark``."""
 
+    suite: Literal["all", "rider"] = "all"
+    """all: estimators on simulated motion and recordings; rider: the papers' filters of rider and bicycle beside
+    networks that correct them and what a network should beat, on riders, scenarios and styles kept from training"""
     seed: int = 0
     """root seed of motions and sensor errors"""
     episodes: int = 3
@@ -49,6 +52,10 @@ class Args:
     """results.csv of an earlier run: errors that grew by more than 2 % are listed, and the exit status is 1"""
     save: Path | None = None
     """file for the errors of all recordings and simulations, from which `poise recommend` reads"""
+    quick: bool = False
+    """of the rider suite: two rides of each group, few training rides of the references"""
+    sweep: bool = False
+    """of the rider suite: instead of the tables, vary sensor grade, gaps, mounting, measured geometry and rate"""
     processes: int = 2
     """number of parallel processes"""
     runs: Path = Path("runs")
@@ -61,6 +68,10 @@ class Args:
 
 def run(args: Args) -> int:
     """Simulate, load, estimate, compare."""
+    if args.suite == "rider":
+        from .comparison.riders import riders
+
+        return riders(args)
     from ..baselines.comparison.tasks import run_tasks
     from .experiment import open_run
     from .recordings.load import load_all, passed_over_text, plain_warnings

@@ -54,6 +54,9 @@ COMMANDS: dict[str, Command] = {
     "train": Command(".train", "train a learned estimator"),
     "export": Command(".export", "write a trained network as a file of ONNX, for programs without Python"),
     "tune": Command(".tune", "fit the gains of a filter: constant ones, or a policy that sets them"),
+    "adapt": Command(
+        ".recordings.adapt", "compare whatever may set the gains of a filter: constants, rules, policies, bounds"
+    ),
     "inspect": Command(".recordings.inspect", "what a recording holds; whether units, signs and clock are plausible"),
     "recommend": Command(".recordings.recommend", "which estimator suits a recording, by errors on similar ones"),
     "estimate": Command(".recordings.estimate", "angles, quaternions, standard deviations of a recording, as a file"),

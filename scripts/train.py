@@ -24,7 +24,10 @@ CONTENDERS = ("bounded-motion", "vqf", "mahony", "tilt", "gyroscope-integration"
 """What a network for one inertial sensor is compared with on the test episodes."""
 GESTURES = ("slow", "fast", "severe", "mixed")
 """Gestures of the hand-motion environment on which it is tested besides episodes of its recipes."""
-OPTIONS = ("quick", "seed", "episodes", "epochs", "units", "recipe", "recordings", "teacher", "start", "test_episodes")
+OPTIONS = (
+    *("quick", "seed", "replicate", "episodes", "epochs", "units", "recipe", "recordings", "teacher", "start"),
+    "test_episodes",
+)
 """Arguments that the weights and their card depend on."""
 
 
@@ -38,6 +41,8 @@ class Args:
     """a small version: some minutes"""
     seed: int = 0
     """root seed of episodes, weights and order"""
+    replicate: int = 0
+    """number of a repetition on the same data, with other initial weights and another order"""
     episodes: int | None = None
     """simulated training episodes in all, instead of the preset's"""
     epochs: int | None = None
@@ -79,6 +84,7 @@ def run(args: Args) -> int:
             *(preset, args.seed, folder.folder),
             recordings=own,
             teacher=args.teacher == "smoother",
+            replicate=args.replicate,
             start=args.start,
             resume=args.resume is not None,
             processes=args.processes,
@@ -131,7 +137,7 @@ def test(result: FitResult, preset: Preset, args: Args, out: Output) -> pandas.D
 
     contenders: dict[str, Any] = {args.preset: result.estimator}
     others = CONTENDERS if preset.rides is None else ()
-    contenders |= {name: name for name in dict.fromkeys([preset.filter or CONTENDERS[0], *others])}
+    contenders |= {name: name for name in dict.fromkeys([preset.filter or preset.paper or CONTENDERS[0], *others])}
     if preset.rides is not None:
         groups, tables = test_rides(preset, args.seed, args.test_episodes), []
         for group, rides in groups.items():
@@ -168,22 +174,16 @@ def test_trajectories(preset: Preset, seed: int, episodes: int) -> list[Trajecto
 def test_rides(preset: Preset, seed: int, rides: int) -> dict[str, list[Trajectory]]:
     """Rides of riders that training never saw: as those of the training, in other scenarios, of aggressive riders."""
     from ..baselines.learned.presets import seeds_of
-    from ..envs.recipes.rides import drawn, held_out
+    from ..baselines.learned.rides import UNSEEN, unseen_rides
 
     assert preset.rides is not None
     root, source = seeds_of(seed)[3], replace(preset.rides, rides=max(1, rides // 3), draws=2)
-    groups = {
-        "unseen riders": source,
-        "other scenarios": held_out(source, scenarios=("bumps", "pitch", "slow")),
-        "aggressive riders": held_out(source, styles=("aggressive",)),
-    }
     return {
-        name: [
+        group: [
             each.replace(metadata={**each.metadata, "name": f"{index}-{number}"})
-            for index in range(own.rides)
-            for number, each in enumerate(drawn(own, root + place, index))
+            for index, number, each in unseen_rides(source, root, group)
         ]
-        for place, (name, own) in enumerate(groups.items())
+        for group in UNSEEN
     }
 
 

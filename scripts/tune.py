@@ -46,9 +46,9 @@ class Args:
 
     filter: tyro.conf.Positional[str] = "external-acceleration"
     """filter whose gains are tuned: any Kalman filter of ``poise list estimators`` that reads a gyroscope"""
-    agent: Literal["ppo", "recurrent-ppo", "sac", "td3", "constant", "optuna"] = "ppo"
-    """who sets the gains while the filter runs: ppo, recurrent-ppo, sac or td3; or the best constant gains, by an even
-    search (constant) or by Optuna"""
+    agent: Literal["ppo", "recurrent-ppo", "sac", "td3", "analytic", "constant", "optuna"] = "ppo"
+    """who sets the gains while the filter runs: ppo, recurrent-ppo, sac, td3, or a network trained by the exact
+    gradient (analytic); or the best constant gains, by an even search (constant) or by Optuna"""
     preset: Literal["quick", "shipped"] = "quick"
     """quick: a minute or two, as a test; shipped: the training of the weights in the package"""
     seed: int = 0

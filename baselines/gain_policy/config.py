@@ -34,7 +34,7 @@ TRAINING_MOTIONS = HandTrajectories(
 """Smooth gestures: training data of ``bounded-motion+policy``."""
 
 
-AgentName = Literal["ppo", "recurrent-ppo", "sac", "td3"]
+AgentName = Literal["ppo", "recurrent-ppo", "sac", "td3", "analytic"]
 """Agents that train a policy."""
 
 
@@ -191,10 +191,13 @@ def config_of(agent: AgentName, config: TrainingConfig) -> TrainingConfig:
     """The configuration of PPO, changed to what suits another agent.
 
     Recurrent PPO walks through its memory decision by decision, so it takes few long rollouts; SAC and TD3 take few
-    episodes at a time, since each of them waits for the gradient steps.
+    episodes at a time, since each of them waits for the gradient steps. The exact gradient needs no warm start, and
+    learns the motions by heart with larger networks.
     """
     if agent == "ppo":
         return replace(config, agent=agent)
+    if agent == "analytic":
+        return replace(config, agent=agent, warm_start=0, learning_rate=2e-3, net_arch=(32, 32))
     common = {"agent": agent, "warm_start": 0, "n_envs": 64, "smoothing": config.smoothing or 0.5}
     if agent == "recurrent-ppo":
         return replace(config, **common, batch_size=1024, n_epochs=4, learning_rate=3e-4)  # type: ignore[arg-type]

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...envs.data.trajectory import Trajectory
 from ...envs.gain_episode import filter_for
-from ...envs.gain_reward import scored_quantity, true_values
+from ...envs.gain_reward import scored_quantities, scored_quantity, true_values
 from ...filters.adaptation.tuned import TunedFilter
 from ...filters.core.kalman import KalmanFilter
 from ...filters.core.metrics import error, rms
@@ -50,7 +50,7 @@ def best_constant_gains(
     filter: TunedFilter | KalmanFilter,
     trajectories: Sequence[Trajectory],
     *,
-    quantity: str | None = None,
+    quantity: str | Sequence[str] | None = None,
     guesses: Sequence[Sequence[float]] = (),
     samples: int = 64,
     refinements: int = 60,
@@ -61,7 +61,7 @@ def best_constant_gains(
     Args:
         filter: the filter, with all its gains or with chosen ones.
         trajectories: with a truth for ``quantity``.
-        quantity: output that is scored; None for ``up``.
+        quantity: output that is scored, or several whose mean is; None for ``up``.
         guesses: further actions to try in the first stage.
         samples: points of the first stage, besides the neutral one; best a power of two.
         refinements: evaluations of the second stage.
@@ -101,19 +101,22 @@ def best_constant_gains(
 
 
 def constant_errors(
-    tuned: TunedFilter, trajectories: Sequence[Trajectory], action: np.ndarray, quantity: str | None = None
+    tuned: TunedFilter,
+    trajectories: Sequence[Trajectory],
+    action: np.ndarray,
+    quantity: str | Sequence[str] | None = None,
 ) -> np.ndarray:
-    """Root mean square error of one action on each trajectory ``(trajectories,)``, rad.
+    """Root mean square error of one action on each trajectory ``(trajectories,)``, rad; of several outputs their mean.
 
     The filter is that of the rider, vehicle or device of each trajectory.
     """
-    output = scored_quantity(tuned.kalman, quantity)
+    outputs = scored_quantities(tuned.kalman, quantity)
     errors = []
     for trajectory in trajectories:
         own = replace(tuned, kalman=filter_for(tuned.kalman, trajectory))
         estimate = own.kalman.run(trajectory.measurements, own.gains(action))
-        per_tick = error(output, estimate.pose[output.name], true_values(trajectory, output, own.kalman))
-        errors.append(float(rms(per_tick, trajectory.mask)))
+        per_tick = [error(q, estimate.pose[q.name], true_values(trajectory, q, own.kalman)) for q in outputs]
+        errors.append(float(np.mean([rms(each, trajectory.mask) for each in per_tick])))
     return np.array(errors)
 
 

@@ -33,10 +33,13 @@ from .oracle_warm_start import fit_oracle
 
 if TYPE_CHECKING:
     from .agents.learners import Trained
+    from .policy import GainPolicy
     from .vec_env import SB3VecEnv
 
 CHECKPOINT = "checkpoint.pt"
 """File of the run folder that a stopped training resumes from."""
+HELD_BACK = 1 / 7
+"""Share of the motions on which a training by the exact gradient chooses its policy."""
 LOOKS = 6
 """Approximate number of validations during a training."""
 CHECKPOINTS = 20
@@ -86,6 +89,11 @@ def train_policy(
     filter = tunable_filter(config.filter) if kalman is None else kalman
     tuned = TunedFilter.of(filter, config.gains, features_of(filter, config.interval), config.smoothing)
     motions = config.motions.draw_many(config.seed, config.trajectories) if trajectories is None else list(trajectories)
+    if config.agent == "analytic":
+        if resume:
+            raise ValueError("a training by the exact gradient takes minutes and keeps no checkpoint: start it anew")
+        start = starting_action(config, tuned, motions) if start is None else np.asarray(start, float)
+        return analytic_policy(config, tuned, motions, start, report)
     home = None if folder is None else Path(folder)
     key = training_key(config, tuned, motions)
     threads = torch.get_num_threads()
@@ -103,6 +111,50 @@ def train_policy(
         return training.finish()
     finally:
         torch.set_num_threads(threads)
+
+
+def analytic_policy(
+    config: TrainingConfig, tuned: TunedFilter, motions: list[Trajectory], start: np.ndarray, report: Report | None
+) -> GainPolicy:
+    """A policy trained by the exact gradient; the last :data:`HELD_BACK` of the motions choose among its passes.
+
+    ``report`` is given the decisions so far and the share of the cost that is saved on the motions held back.
+    """
+    from .analytic import train_analytically
+
+    kept = max(1, round(HELD_BACK * len(motions)))
+    train, unseen = (motions[:-kept], motions[-kept:]) if len(motions) > kept else (motions, [])
+    decisions = sum(len(one) // tuned.features.interval_samples(one.dt) for one in train)
+    epochs, started = max(1, round(config.total_timesteps / decisions)), time.perf_counter()
+    costs: list[float] = []
+
+    def told(epoch: int, cost: float, unseen_cost: float) -> None:
+        costs.append(unseen_cost if unseen else cost)
+        if report is not None:
+            seconds = time.perf_counter() - started
+            report({"steps": float(decisions * (epoch + 1)), "gain": 1.0 - costs[-1], "seconds": seconds})
+
+    policy = train_analytically(
+        tuned,
+        train,
+        start,
+        epochs=epochs,
+        learning_rate=config.learning_rate,
+        net_arch=config.net_arch,
+        error_scale=config.error_scale,
+        seed=config.seed,
+        validation=unseen,
+        report=told,
+    )
+    card = {
+        "training": config.describe(),
+        "constant_action": [float(value) for value in start],
+        "steps": decisions * epochs,
+        "chosen_steps": decisions * (1 + int(np.argmin(costs))),
+        "costs": [round(cost, 4) for cost in costs],
+        "seconds": round(time.perf_counter() - started, 1),
+    }
+    return replace(policy, card=json.loads(json.dumps(card)))
 
 
 def starting_action(config: TrainingConfig, tuned: TunedFilter, motions: list[Trajectory]) -> np.ndarray:

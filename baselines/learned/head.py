@@ -129,7 +129,7 @@ class TiltHead:
 
 @dataclass(frozen=True)
 class AngleHead:
-    """Corrections of angles (or vectors) that the front end gives, added to them.
+    """Corrections of angles (or vectors) that the front end gives, added to them; of zero, where it gives none.
 
     Attributes:
         outputs: what is corrected, in this order.
@@ -186,7 +186,7 @@ class AngleHead:
         pose, start = {}, 0
         for quantity in self.outputs:
             part = correction[..., start : start + quantity.size]
-            value = seen.base[quantity.name] + part
+            value = seen.base.get(quantity.name, 0.0) + part
             pose[quantity.name] = rotation.wrap(value) if quantity.kind == "angle" else value
             start += quantity.size
         if not self.deviations:
@@ -209,7 +209,7 @@ class AngleHead:
         parts = []
         for quantity in self.outputs:
             truth = trajectory.truth_of(quantity.name)
-            difference = np.asarray(truth - seen.base[quantity.name])
+            difference = np.asarray(truth - seen.base.get(quantity.name, 0.0))
             parts.append(rotation.wrap(difference) if quantity.kind == "angle" else difference)
         return np.concatenate(parts, axis=-1)
 

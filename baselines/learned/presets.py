@@ -18,7 +18,7 @@ from .config import FitConfig
 from .head import AngleHead, Head, TiltHead
 from .inputs.filter_bank import TUNINGS, FilterBank
 from .inputs.filter_features import FilterFeatures
-from .inputs.front_end import FrontEnd
+from .inputs.front_end import FrontEnd, RawChannels
 from .inputs.level_frame import LevelFrame
 from .mixture_head import MixtureHead
 
@@ -49,6 +49,10 @@ class Preset:
     """that the network corrects; None: it stands alone"""
     bank: bool = False
     """whether the network chooses among tunings of the filter (:mod:`.inputs.filter_bank`)"""
+    paper: str | None = None
+    """filter whose sensors and angles a network has that stands alone on rides"""
+    sites: tuple[str, ...] = ()
+    """whose channels such a network sees; empty for all of the paper"""
     limit: float | None = None
     """of corrections, in standard deviations of the filter"""
     scale: float = 0.1
@@ -64,8 +68,11 @@ class Preset:
             raise ValueError(
                 f"either rides, or sources that map recipes to 1 or more episodes, got {dict(self.sources)}"
             )
-        if self.rides is not None and self.filter is None:
-            raise ValueError("a network for rides corrects a filter: name it")
+        if self.rides is not None and (self.filter is None) == (self.paper is None):
+            raise ValueError(
+                "a network for rides either corrects a filter or has the sensors of a paper's, "
+                f"got filter={self.filter!r}, paper={self.paper!r}"
+            )
         if self.bank and (self.rides is not None or self.filter is None):
             raise ValueError("a bank needs a filter of hand motion: name it, and sources instead of rides")
         if self.units < 1:
@@ -78,9 +85,12 @@ class Preset:
     def front_end(self) -> FrontEnd:
         """What the network sees."""
         kalman: Any = None if self.filter is None else make(self.filter, **self.parameters)
-        if self.rides is not None:
+        if self.rides is None:
+            return FilterBank(LevelFrame(kalman)) if self.bank else LevelFrame(kalman)
+        if self.paper is None:
             return FilterFeatures(kalman)
-        return FilterBank(LevelFrame(kalman)) if self.bank else LevelFrame(kalman)
+        channels = [c for c in make(self.paper).channels if not self.sites or c.name.split("/")[0] in self.sites]
+        return RawChannels(tuple(channels), paper=self.paper)
 
     def head(self) -> Head:
         """What it says: an inclination, or corrections of all angles of a rider's filter."""
@@ -88,7 +98,7 @@ class Preset:
             return MixtureHead(len(TUNINGS))
         if self.rides is None:
             return TiltHead(self.limit)
-        outputs = tuple(quantity for quantity in make(str(self.filter)).outputs if quantity.kind == "angle")
+        outputs = tuple(q for q in make(str(self.filter or self.paper)).outputs if q.kind == "angle")
         return AngleHead(outputs, (self.scale,) * sum(quantity.size for quantity in outputs), self.limit)
 
     def module(self, features: int, outputs: int, seed: int) -> Any:
@@ -118,8 +128,20 @@ class Preset:
 
 TRAINED = {"scenarios": ["indoor_circle", "outdoor", "straight", "slalom"], "styles": ["mild", "normal"]}
 """Rides that networks train on; other scenarios and aggressive riders are kept aside."""
-RIDES = RideSource(rides=40, draws=6, duration=40.0, changes=TRAINED)
-RIDDEN = FitConfig(epochs=12, window=125, learning_rate=3e-3)
+RIDES = RideSource(rides=80, draws=4, duration=40.0, changes=TRAINED)
+RIDDEN = FitConfig(epochs=14, window=125, learning_rate=3e-3)
+CORRECTED = {
+    "two-gyro": "two-gyro-consistent",
+    "force-inertial": "force-inertial-consistent",
+    "whole-body": "whole-body",
+}
+"""Paper → filter that the network corrects: a consistent form, where there is one"""
+BICYCLE_SITES = {
+    "two-gyro": ("bicycle_imu",),
+    "force-inertial": ("bicycle_imu", "wheel"),
+    "whole-body": ("bicycle_imu", "wheel", "steer", "crank"),
+}
+"""Paper → sites of its sensors of which none is worn or held by the rider"""
 HANDS = {"hand-held-prompt": 300, "carried-prompt": 60}
 PRESETS: dict[str, Preset] = {
     "gru": Preset("inclination from six axes by a recurrent network alone", HANDS, fit=FitConfig(epochs=8)),
@@ -137,11 +159,22 @@ PRESETS: dict[str, Preset] = {
         fit=FitConfig(epochs=5, batch=24, learning_rate=3e-3),
     ),
     **{
-        f"{name}+network": Preset(
-            f"{name}, all its angles corrected by a recurrent network", rides=RIDES, filter=name,
+        f"{paper}+network": Preset(
+            f"{filter}, all its angles corrected by a recurrent network", rides=RIDES, filter=filter,
             scale=0.03, noise=0.1, fit=RIDDEN,
         )
-        for name in ("two-gyro", "force-inertial", "whole-body")
+        for paper, filter in CORRECTED.items()
+    },
+    **{
+        f"gru-{paper}{end}": Preset(
+            f"angles of {paper} by a recurrent network alone, {words}", rides=RIDES, paper=paper, sites=sites,
+            scale=0.1, noise=0.1, fit=RIDDEN,
+        )
+        for paper, bicycle in BICYCLE_SITES.items()
+        for end, words, sites in (
+            ("", "from the paper's sensors", ()),
+            ("-bicycle", "from sensors of the bicycle: a rider's habits", bicycle),
+        )
     },
 }  # fmt: skip
 """Name of the weights → training."""

@@ -7,13 +7,40 @@ exchanged; without that, networks learn the few draws by heart.
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
+from typing import Any
+
 import numpy as np
 
-from ...envs.recipes.rides import SETTLED, RideSource, drawn
+from ...envs.data.trajectory import Trajectory
+from ...envs.recipes.rides import SETTLED, RideSource, drawn, held_out
 from ...filters.support.parallel import in_parallel
 from .data import SequenceData, sequence_of
 from .head import Head
 from .inputs.front_end import FrontEnd
+
+UNSEEN: Mapping[str, Mapping[str, Any]] = {
+    "unseen riders": {},
+    "other scenarios": {"scenarios": ("bumps", "pitch", "slow")},
+    "aggressive riders": {"styles": ("aggressive",)},
+}
+"""Groups of test rides, none of whose riders is trained on: how their recipe differs from that of the training."""
+
+
+def unseen_rides(source: RideSource, seed: int, group: str, first: int = 0) -> Iterator[tuple[int, int, Trajectory]]:
+    """Test rides of a group that are long enough: number of the ride, number of the draw, and the drawn ride.
+
+    Args:
+        source: as in training; how many rides and draws.
+        seed: root seed of test data.
+        group: of :data:`UNSEEN`.
+        first: number of the first ride.
+    """
+    own, root = held_out(source, **UNSEEN[group]), seed + list(UNSEEN).index(group)
+    for index in range(first, own.rides):
+        draws = drawn(own, root, index)
+        if float(draws[0].time[-1]) >= 2.0 * SETTLED:
+            yield from ((index, number, each) for number, each in enumerate(draws))
 
 
 def ride_data(

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ...envs.data.trajectory import Trajectory
+from ...filters.support.optional import extra
 from .data import SequenceData, taught, with_errors
 from .estimator import LearnedEstimator
 from .fit import FitResult, fit
@@ -20,6 +21,9 @@ from .networks.gru import GruNetwork
 from .networks.modules import GruModule
 from .presets import Preset, seeds_of
 from .rides import ride_data
+
+with extra("learn"):
+    import torch
 
 COPIES = 4
 """of each recording that a teacher explains"""
@@ -32,6 +36,7 @@ def train_preset(
     *,
     recordings: list[Trajectory] | None = None,
     teacher: bool = False,
+    replicate: int = 0,
     start: str | Path | None = None,
     resume: bool = False,
     processes: int = 1,
@@ -46,6 +51,7 @@ def train_preset(
         recordings: to train on instead of simulated episodes; of five or more the last fifth chooses the best epoch.
         teacher: learn from the smoother of the corrected filter instead of the recordings' truth, each recording
             :data:`COPIES` times with further errors of its sensors.
+        replicate: number of a repetition on the same data with other initial weights and another order.
         start: weights to start from; None: from scratch.
         resume: continue from the checkpoint in ``folder``.
         processes: how many episodes are simulated at a time; the weights do not depend on it.
@@ -56,7 +62,7 @@ def train_preset(
     """
     front_end: Any = preset.front_end()
     head: Any = preset.head()
-    train_seed, validation_seed, weights_seed, _ = seeds_of(seed)
+    train_seed, validation_seed, _, _ = seeds_of(seed)
 
     def simulated(root: int, share: float, words: str) -> SequenceData:
         if preset.rides is not None:
@@ -90,7 +96,26 @@ def train_preset(
             validation = SequenceData.from_trajectories(recordings[kept:], front_end, head)
     data = simulated(train_seed, 1.0, "simulate") if data is None else data
     validation = simulated(validation_seed, preset.validation, "held out") if validation is None else validation
-    number = weights_seed % 2**31
+    return fit_preset(
+        *(preset, seed, folder, data, validation), replicate=replicate, start=start, resume=resume, say=say
+    )
+
+
+def fit_preset(
+    preset: Preset,
+    seed: int,
+    folder: str | Path | None,
+    data: SequenceData,
+    validation: SequenceData,
+    *,
+    replicate: int = 0,
+    start: str | Path | None = None,
+    resume: bool = False,
+    say: Callable[[str], object] | None = None,
+) -> FitResult:
+    """Train the network of a preset on data that were made with its front end and head; see :func:`train_preset`."""
+    front_end, head = preset.front_end(), preset.head()
+    number = (seeds_of(seed)[2] + replicate) % 2**31
     if start is None:
         module, config = preset.module(front_end.size, head.size, number), preset.fit
     else:
@@ -101,6 +126,10 @@ def train_preset(
     config = replace(config, seed=number)
     if isinstance(head, GainHead) and start is None and not resume:
         head.begin(module, data, number)
+    if isinstance(head, AngleHead) and preset.filter is None and start is None:
+        # a network that stands alone starts as the mean
+        usual = data.target[data.mask].mean(axis=0) / np.array(head.scale)
+        module.output.bias.data.copy_(torch.from_numpy(usual.astype(np.float32)))
     result = fit(module, front_end, head, data, validation, config, folder=folder, resume=resume, say=say)
     if isinstance(head, AngleHead):
         # the covariance that what is held out asks for

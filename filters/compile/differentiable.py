@@ -273,10 +273,17 @@ class DifferentiableEquations:
 
     def parameters(self, factors: np.ndarray) -> np.ndarray:
         """Parameters ``(T, B, count)`` for log factors ``(T, B, gains)``."""
-        table = np.broadcast_to(self.base, (*factors.shape[:2], self.base.size)).copy()
+        table = np.broadcast_to(self.base, (*factors.shape[:2], self.base.shape[-1])).copy()
         for index, (gain, column) in enumerate(zip(self.scaled, self.columns, strict=True)):
-            table[:, :, column] = np.minimum(self.base[column] * np.exp(gain.power * factors[..., index]), gain.maximum)
+            scaled = self.base[..., column] * np.exp(gain.power * factors[..., index])
+            table[:, :, column] = np.minimum(scaled, gain.maximum)
         return table
+
+    def of_rows(self, models: Sequence[Model]) -> DifferentiableEquations:
+        """The same for sequences side by side that differ in the numbers of their equations: one model a sequence."""
+        changed = copy.copy(self)
+        changed.base = np.array([[*parameters_of(model).values()] for model in models])
+        return changed
 
     def follow(
         self, state: FilterState, measurements: Measurement, factors: np.ndarray

@@ -8,13 +8,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, NamedTuple, Protocol, Self
 
 import numpy as np
 
 from ....filters.core.backend import Array
 from ....filters.core.estimator import check_measurements, run_by_steps
+from ....filters.core.kalman import KalmanFilter
 from ....filters.core.quantity import Channel, Estimate, Measurement
+from ....filters.registry import make
 
 
 class Seen(NamedTuple):
@@ -161,6 +164,7 @@ class RawChannels:
         scales: unit of each channel in which its numbers are of the order of one; None: 1.
         interval: s between updates of the network.
         dt: sampling interval, s.
+        paper: name of the filter whose paper defines the angles that are estimated; None: they are in the truth.
 
     Raises:
         ValueError: no channels, another number of scales, or sampling slower than the network.
@@ -170,6 +174,7 @@ class RawChannels:
     scales: tuple[float, ...] | None = None
     interval: float = 0.04
     dt: float = 0.01
+    paper: str | None = None
 
     kind = "raw-channels"
 
@@ -179,6 +184,12 @@ class RawChannels:
         if self.scales is not None and len(self.scales) != len(self.channels):
             raise ValueError(f"scales must be {len(self.channels)}, one a channel, got {len(self.scales)}")
         check_interval(self.dt, self.interval)
+
+    @cached_property
+    def kalman(self) -> KalmanFilter | None:
+        """The filter of the paper, which tells the true angles; it is never run."""
+        found: Any = None if self.paper is None else make(self.paper)
+        return found
 
     @property
     def size(self) -> int:
@@ -197,14 +208,16 @@ class RawChannels:
         """See :class:`FrontEnd`."""
         channels = [[channel.name, channel.size, channel.unit] for channel in self.channels]
         scales = None if self.scales is None else list(self.scales)
-        return {"kind": self.kind, "channels": channels, "scales": scales, "interval": self.interval}
+        usual = {"kind": self.kind, "channels": channels, "scales": scales, "interval": self.interval}
+        return usual | ({} if self.paper is None else {"paper": self.paper})
 
     @classmethod
     def read(cls, described: Mapping[str, Any], dt: float) -> Self:
         """The inverse of :meth:`describe`."""
         channels = tuple(Channel(str(name), int(size), str(unit)) for name, size, unit in described["channels"])
         scales = described.get("scales")
-        return cls(channels, None if scales is None else tuple(scales), float(described["interval"]), dt)
+        scales = None if scales is None else tuple(scales)
+        return cls(channels, scales, float(described["interval"]), dt, described.get("paper"))
 
     def init(self, measurement: Measurement) -> IntervalSums:
         """See :class:`FrontEnd`."""

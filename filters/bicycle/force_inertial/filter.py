@@ -105,6 +105,7 @@ class ForceInertial(ForceInertialParameters, Model):
     outputs: ClassVar[tuple[Quantity, ...]] = (ROLL, TRUNK_ANGLES, TRUNK_BIAS)
     state_size: ClassVar[int] = 27
     error_size: ClassVar[int] = 7
+    error_parts: ClassVar = {"force-inertial/trunk_angles": (0, 3), "bicycle/roll": (3, 4)}
     residual_size: ClassVar[int] = 4
     held_inputs: ClassVar = tuple(
         ridden(f"{site}/gyr", "gyroscope_noise", power=2) for site in ("trunk_imu", "bicycle_imu")

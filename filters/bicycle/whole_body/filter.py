@@ -43,6 +43,7 @@ from . import constraints as limb_constraints
 from .blocks import BLOCKS, assemble, row_of
 from .linkage import (
     CRANK,
+    ERROR_PARTS,
     ERROR_SIZE,
     HIP,
     RELATIVE_ACCELERATION,
@@ -154,6 +155,7 @@ class WholeBody(RiderLinkage, Model):
 
     state_size: ClassVar[int] = 33
     error_size: ClassVar[int] = ERROR_SIZE
+    error_parts: ClassVar = ERROR_PARTS
     held_inputs: ClassVar = (
         ridden("bicycle_imu/gyr", "bicycle_gyroscope_noise"),
         ridden("trunk_imu/gyr", "trunk_gyroscope_noise"),

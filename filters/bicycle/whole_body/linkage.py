@@ -32,6 +32,16 @@ ROLL, YAW_ACCELERATION, TRUNK, RELATIVE_ACCELERATION = slice(0, 1), slice(1, 2),
 SHOULDER = {"right": slice(8, 11), "left": slice(14, 17)}
 HIP = {"right": slice(11, 14), "left": slice(17, 20)}
 ERROR_SIZE = 20
+ERROR_PARTS = {
+    name: (part.start, part.stop)
+    for name, part in (
+        ("bicycle/roll", ROLL),
+        ("trunk/angles", TRUNK),
+        *((f"shoulder_{side}/angles", SHOULDER[side]) for side in SIDES),
+        *((f"hip_{side}/angles", HIP[side]) for side in SIDES),
+    )
+}
+"""Quantity → its part of the error state; elbows and knees follow from the others."""
 STEER, CRANK = slice(20, 21), slice(21, 22)
 """Last valid samples of the encoders, for the angles of elbows and knees."""
 

@@ -1,0 +1,1 @@
+"""Learned estimators of riders beside the papers' filters and beside what a network should beat."""

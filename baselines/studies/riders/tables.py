@@ -1,0 +1,80 @@
+"""Tables of the comparison: means with intervals over riders, each angle, consistency."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+
+from ...learned.rides import UNSEEN
+from ...statistics import bootstrap_interval
+from .suite import ROLL_ONLY, Row, names_of
+
+
+def by_method(rows: Iterable[Row], paper: str) -> dict[str, dict[str, list[Row]]]:
+    """Method → group → rows of one paper, methods in the order of the rows, groups in that of :data:`.UNSEEN`."""
+    found: dict[str, dict[str, list[Row]]] = {}
+    for row in rows:
+        if row.paper == paper:
+            found.setdefault(row.method, {group: [] for group in UNSEEN})[row.group].append(row)
+    return found
+
+
+def results(rows: Iterable[Row]) -> list[dict[str, Any]]:
+    """One number a row, as run folders keep them."""
+    found = []
+    for row in rows:
+        named = {"estimator": row.method, "trajectory": f"{row.group}:{row.ride}-{row.draw}"}
+        for name, angle in zip(names_of(row.paper), row.angles, strict=True):
+            found.append({**named, "quantity": f"{row.paper}/{name}", "metric": "angle", "value": angle, "unit": "deg"})
+        for metric, value in (("nees", row.nees), ("coverage of 90 %", row.coverage)):
+            found.append({**named, "quantity": row.paper, "metric": metric, "value": value, "unit": "1"})
+    return found
+
+
+def riders(rows: Sequence[Row]) -> np.ndarray:
+    """Mean error ``(1, rides)`` of each ride over its draws, deg; every ride has a rider of its own."""
+    rides = sorted({row.ride for row in rows})
+    return np.array([[np.mean([row.mean for row in rows if row.ride == ride]) for ride in rides]])
+
+
+def error_table(rows: Sequence[Row], paper: str) -> list[dict[str, str]]:
+    """Method × group: mean of the RMS errors over angles, draws and riders, deg, with 95 % interval over riders."""
+    table = []
+    for method, groups in by_method(rows, paper).items():
+        cells = {"method": f"{method} (roll alone)" if method == ROLL_ONLY else method}
+        for group, own in groups.items():
+            found = bootstrap_interval(lambda scores: float(scores.mean()), riders(own), tasks_too=True)
+            cells[group] = f"{found.value:.2f} [{found.low:.2f}, {found.high:.2f}]"
+        table.append(cells)
+    return table
+
+
+def angle_table(rows: Sequence[Row], paper: str) -> list[dict[str, str]]:
+    """Method × angle: means over draws and riders in the three groups, deg, ``1.2 / 1.5 / 1.9``."""
+    names = names_of(paper)
+    table = []
+    for method, groups in by_method(rows, paper).items():
+        errors = [np.array([row.angles for row in own]).mean(axis=0) for own in groups.values()]
+        cells = {
+            name: " / ".join(f"{each[index]:.2f}" for each in errors)
+            for index, name in enumerate(names)
+            if np.isfinite([each[index] for each in errors]).all()
+        }
+        table.append({"method": method, **{name: cells.get(name, "–") for name in names}})
+    return table
+
+
+def consistency_table(rows: Sequence[Row], paper: str) -> list[dict[str, str]]:
+    """Methods with a covariance × group: mean NEES of an angle, and share of errors inside the stated 90 %."""
+    table = []
+    for method, groups in by_method(rows, paper).items():
+        if not all(np.isfinite([row.nees for row in own]).all() for own in groups.values()):
+            continue
+        cells: dict[str, Any] = {"method": method}
+        for group, own in groups.items():
+            nees, covered = np.mean([row.nees for row in own]), np.mean([row.coverage for row in own])
+            cells[group] = f"{nees:.2f}, {100.0 * covered:.0f} %"
+        table.append(cells)
+    return table

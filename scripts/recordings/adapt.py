@@ -1,0 +1,114 @@
+"""Compare whatever may set the gains of one filter: constants, rules by hand, a bank of tunings, policies, bounds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import tyro
+
+from ...filters.support.seeds import child_seed
+from ..main import run_command
+from ..output import Output
+from ..tune import TEST_SEED
+
+if TYPE_CHECKING:
+    from ...envs.data.trajectory import Trajectory
+
+
+@dataclass
+class Args:
+    """Arguments of ``poise adapt``."""
+
+    filter: tyro.conf.Positional[str] = "external-acceleration"
+    """name of a Kalman filter; of rides: two-gyro-level or platform-gyro"""
+    recordings: tuple[Path, ...] = ()
+    """files or folders of recordings with known truth, each folder a table (default: simulated trajectories that no
+    policy was trained on)"""
+    policies: tuple[str, ...] = ()
+    """shipped names or files of policies (default: the filter's shipped one)"""
+    trajectories: int = 24
+    """simulated ones, without recordings"""
+    training: int = 24
+    """simulated trajectories on which the best constants are searched"""
+    points: int = 32
+    """constant gains that the bounds choose from"""
+    seed: int = 0
+    """root seed of simulated trajectories, searches and intervals"""
+    runs: Path = Path("runs")
+    """parent of the run folder"""
+    json: bool = False
+    """print one JSON document instead of tables"""
+
+
+def run(args: Args) -> int:
+    """Print one table a set of trajectories, and leave the errors of all in a run folder."""
+    from ...baselines.gain_policy.config import shipped_config
+    from ...baselines.gain_policy.constant_gains import best_constant_gains
+    from ...baselines.gain_policy.contenders import contenders, rows_of
+    from ...baselines.gain_policy.policy import GainPolicy
+    from ...baselines.weights_io import list_weights
+    from ...envs.gain_reward import scored_quantity
+    from ...filters.adaptation.gains import tunable_filter
+    from ...filters.adaptation.tuned import TunedFilter
+    from ..experiment import known_recordings, start_run
+    from ..tune import results
+
+    for name in ("trajectories", "training", "points"):
+        if getattr(args, name) < 1:
+            raise ValueError(f"{name} must be at least 1, got {getattr(args, name)}")
+    config = shipped_config(args.filter)
+    shipped = f"{args.filter.replace('-', '_')}_policy"
+    names = args.policies or tuple(name for name in (shipped,) if name in list_weights())
+    policies = {f"policy {Path(name).stem}": GainPolicy.load(name) for name in names}
+    tuned = TunedFilter.of(tunable_filter(args.filter), config.gains)
+    quantity = scored_quantity(tuned.kalman, None)
+    sets: dict[str, list[Trajectory]] = {
+        path.name: [trajectory.on_grid() for trajectory in known_recordings((path,))] for path in args.recordings
+    }
+    folder = start_run("adapt", args, args.seed, args.runs)
+    with Output("adapt", args) as out:
+        motions = config.motions.draw_many(config.seed, args.training)
+        out.say(f"searching constant gains of {args.filter} on {len(motions)} trajectories")
+        guesses = () if config.warm_start_centre is None else (config.warm_start_centre,)
+        constant = best_constant_gains(tuned, motions, guesses=guesses, samples=32, refinements=24, seed=args.seed)
+        twins: list[Trajectory] = []
+        if not sets:
+            sets, twins = simulated(args, config.motions)
+        errors = {}
+        for group, trajectories in sets.items():
+            errors[group] = contenders(
+                tuned,
+                trajectories,
+                constant.action,
+                policies=policies,
+                twins=twins,
+                leave_out=bool(args.recordings),
+                points=args.points,
+                seed=args.seed,
+            )
+            title = f"Error of {args.filter} ({quantity.name}) on {len(trajectories)} {group} trajectories, deg"
+            out.table(rows_of(errors[group]), title)
+        folder.write_results(results(errors, sets, quantity))
+        out.say(f"errors of every trajectory: {folder.folder / 'results.csv'}")
+    return 0
+
+
+def simulated(args: Args, motions: object) -> tuple[dict[str, list[Trajectory]], list[Trajectory]]:
+    """Trajectories that no policy was trained on; of rides also another draw of devices on each."""
+    from ...baselines.gain_policy.motions import RiddenMotions
+    from ...envs.recipes.rides import drawn
+
+    seed = child_seed(args.seed, TEST_SEED)
+    if not isinstance(motions, RiddenMotions):
+        return {"simulated": motions.draw_many(seed, args.trajectories)}, []  # type: ignore[attr-defined]
+    source = replace(motions.source, draws=2)
+    pairs = [drawn(source, seed, index) for index in range(args.trajectories)]
+    lasting = [pair for pair in pairs if pair[0].mask.any()]
+    # Left and right may be exchanged between the two draws; the schedule of gains does not depend on the side.
+    return {"simulated": [pair[0] for pair in lasting]}, [pair[1] for pair in lasting]
+
+
+if __name__ == "__main__":
+    run_command("adapt")
