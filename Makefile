@@ -4,7 +4,7 @@ SHELL := /bin/bash
 .SHELLFLAGS := -eu -o pipefail -c
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help install benchmark speed test test-slow core check lint types format clean
+.PHONY: help install benchmark speed test test-slow docs links core check lint types format clean
 
 VENV := .venv
 BIN := $(abspath $(VENV))/bin
@@ -43,6 +43,12 @@ test: check ## lint, types and the tests of every day; ARGS="-k name" picks some
 
 test-slow: $(STAMP) ## the long tests: training, long rollouts
 	$(BIN)/python -m pytest -m slow $(ARGS)
+
+docs: $(STAMP) ## the documentation site, tutorials executed, in build/docs; a warning is an error
+	$(BIN)/python -m sphinx -W --keep-going -b html docs build/docs $(ARGS)
+
+links: $(STAMP) ## check the external links of the documentation (needs a network)
+	$(BIN)/python -m sphinx -b linkcheck -D plot_gallery=0 docs build/links
 
 core: $(STAMP) ## the core without extras, from the wheel, on every newer Python found here
 	.ci/core

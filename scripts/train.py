@@ -141,8 +141,14 @@ def test(result: FitResult, preset: Preset, args: Args, out: Output) -> pandas.D
     if preset.rides is not None:
         groups, tables = test_rides(preset, args.seed, args.test_episodes), []
         for group, rides in groups.items():
-            tables.append(evaluate(contenders, rides, progress=True))
-            tables[-1]["trajectory"] = f"{group}:" + tables[-1]["trajectory"].astype(str)
+            for ride in rides:
+                # only what is named is configured for the rider by itself
+                own = {
+                    label: each if isinstance(each, str) else each.configured(ride.metadata)
+                    for label, each in contenders.items()
+                }
+                tables.append(evaluate(own, ride))
+                tables[-1]["trajectory"] = f"{group}:" + tables[-1]["trajectory"].astype(str)
         table = pandas.concat(tables)
         angles = {quantity.name for quantity in result.estimator.outputs}
         return table[table["quantity"].isin(angles) & (table["metric"] == "angle")]

@@ -59,3 +59,13 @@ def test_the_table_of_environments_is_that_of_the_package():
 
     text = (ROOT / "README.md").read_text(encoding="utf-8")
     assert set(re.findall(r"^\| `(poise/[^`]+)` \|", text, re.MULTILINE)) == set(list_environments())
+
+
+@pytest.mark.slow
+def test_the_site_builds_without_a_warning(tmp_path):
+    """All pages, references and tutorials."""
+    pytest.importorskip("sphinx_gallery")
+    command = [sys.executable, "-m", "sphinx", "-q", "-W", "-b", "html", str(ROOT / "docs"), str(tmp_path)]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr[-2000:]
+    assert (tmp_path / "tutorials" / "06_leaderboard.html").exists()

@@ -125,7 +125,9 @@ def fit_preset(
         module, config = GruModule.of(network, preset.scale), preset.refined
     config = replace(config, seed=number)
     if isinstance(head, GainHead) and start is None and not resume:
-        head.begin(module, data, number)
+        constants = head.begin(module, data, number)
+        if say is not None:
+            say(f"best constant log factors: {dict(zip(head.gains, constants.round(2).tolist(), strict=True))}")
     if isinstance(head, AngleHead) and preset.filter is None and start is None:
         # a network that stands alone starts as the mean
         usual = data.target[data.mask].mean(axis=0) / np.array(head.scale)

@@ -168,7 +168,7 @@ class GainHead:
             seed: of the choice of sequences.
 
         Returns:
-            The constant outputs ``(gains,)``.
+            Their log factors ``(gains,)``.
         """
         import torch
 
@@ -186,7 +186,7 @@ class GainHead:
             schedule.step()
         with torch.no_grad():
             module.output.bias.copy_(constant / module.scale)
-        return constant.detach().numpy()
+        return np.asarray(self.factors(constant.detach().numpy()))
 
     def errors(self, output: Any, target: Any, spread: Any) -> Any:
         """Error ``(B, N, parts)`` in rad: the root mean square of each interval; 0 where nothing is known."""

@@ -123,7 +123,7 @@ GAIN_PRESETS: dict[str, Preset] = {
     ),
     "two-gyro-level+noise": GainPreset(
         "two-gyro-level, its noises and how far level ground is believed set by a recurrent network",
-        rides=RIDES,
+        rides=replace(RIDES, rides=24, draws=3),
         filter="two-gyro-level",
         units=32,
         limits={"process": NOISE, "measurement": NOISE, "constraint": 100.0},

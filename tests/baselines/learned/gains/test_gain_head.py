@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -15,8 +16,10 @@ from poise.baselines.learned.data import SequenceData  # noqa: E402
 from poise.baselines.learned.fit import fit  # noqa: E402
 from poise.baselines.learned.gains.gain_filter import GainFilter  # noqa: E402
 from poise.baselines.learned.gains.gain_head import GainHead, tilt_variance  # noqa: E402
+from poise.baselines.learned.gains.presets import all_presets  # noqa: E402
 from poise.baselines.learned.inputs.gain_features import GainFeatures  # noqa: E402
 from poise.baselines.learned.networks.modules import GruModule  # noqa: E402
+from poise.baselines.learned.training import train_preset  # noqa: E402
 from poise.envs.recipes.registry import hand_recipe  # noqa: E402
 from poise.filters.core.metrics import direction_error, rms  # noqa: E402
 from poise.filters.registry import make  # noqa: E402
@@ -108,3 +111,22 @@ def test_what_cannot_be_used_is_named():
         SequenceData.from_trajectories([short], front_end, head)
     with pytest.raises(ValueError, match="neither an inclination nor an angle"):
         GainHead(make("array-rate", method="weighted"), (), ())
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["external-acceleration+noise", "mekf+gain"])
+def test_the_quick_form_of_a_preset_learns_visibly(name, tmp_path):
+    preset = all_presets()[name].quick()
+    began = time.process_time()
+    result = train_preset(preset, 0, tmp_path)
+    assert time.process_time() - began < 180.0
+    made, errors = result.estimator, {"trained": [], "plain": []}
+    assert isinstance(made, GainFilter)
+    for index in range(6):
+        motion = preset.recipe("hand-held-prompt").episode(3, index)
+        for label, each in (("trained", made), ("plain", preset.kalman())):
+            pose = each.with_dt(motion.dt).run(motion.measurements).pose["up"]
+            errors[label].append(float(rms(direction_error(pose, motion.truth_of("up")), motion.mask)))
+    assert np.mean(np.log(errors["trained"])) < np.mean(np.log(errors["plain"]))
+    again = GainFilter.load(made.save(tmp_path / "weights"))
+    assert again.front_end.describe() == made.front_end.describe()
