@@ -11,6 +11,7 @@ import pytest
 
 from poise.baselines import studies as package
 from poise.baselines.plots import new_figure
+from poise.baselines.studies.coverage import Item, cover
 from poise.scripts.main import main
 
 STUDIES = []
@@ -30,6 +31,10 @@ def reproduce(study, report):
     report.figure("empty", new_figure(2.0, 1.0)[0], "An empty figure")
     row = {"estimator": "none", "trajectory": "push", "quantity": "ticks", "metric": "mean", "value": 101.0}
     report.numbers([{**row, "unit": "1"}])
+    cover(
+        report,
+        (Item("Table I", "squares of numbers", ("Squares",)), Item("Figure 1", "a picture", because="it is old")),
+    )
 
 
 @pytest.fixture(autouse=True)
@@ -91,6 +96,37 @@ def test_a_file_in_the_place_of_the_run_folder_is_explained(tmp_path, capsys):
     (tmp_path / "file").touch()
     assert start(tmp_path / "file") == 2
     assert "file" in capsys.readouterr().err
+
+
+def test_all_papers_make_one_page_and_what_is_done_is_not_done_again(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(package, "PAPERS", {"small": ".small"})
+    words = [
+        "reproduce",
+        "all",
+        "--quick",
+        "--runs",
+        str(tmp_path),
+        "--processes",
+        "1",
+        "--page",
+        str(tmp_path / "page.md"),
+    ]
+    assert main(words) == 0
+    assert "small: 1 reproduced, 1 cannot be answered" in capsys.readouterr().out
+    (folder,) = (tmp_path / "reproduce").iterdir()
+    assert (folder / "small" / "report.md").exists()
+    assert pandas.read_csv(folder / "small" / "results.csv")["value"].tolist() == [101.0]
+    text = (tmp_path / "page.md").read_text(encoding="utf-8")
+    assert text == (folder / "report.md").read_text(encoding="utf-8")
+    assert "| Table I | squares of numbers | reproduced |" in text
+    assert "poise reproduce all --quick --seed 0" in text
+    assert main([*words, "--resume", str(folder)]) == 0
+    assert len(STUDIES) == 1
+
+
+def test_the_page_is_that_of_all_papers(tmp_path, capsys):
+    assert start(tmp_path, "--page", str(tmp_path / "page.md")) == 2
+    assert "--page is the page of all papers: use it with 'all', not with 'small'" in capsys.readouterr().err
 
 
 def test_rows_are_machine_readable(tmp_path, capsys):

@@ -91,7 +91,10 @@ def accelerometer_accelerations(
     squared, cotangent = rate.psi * rate.psi, c_t / s_t
     if published:
         a_y, a_z = a_h[1], a_h[2]
-        seat_y, seat_z = seat_y - travel.speed * rate.psi, seat_z + gravity
+        # (5) as published: no v_b ψ̇, + g, and ω̇ without its y component ψ̇ φ̇_b, which changes x and z of the seat
+        turned = rate.phi_b * rate.psi
+        seat_x, seat_y = seat_x + h_s * cos(angles.phi_b) * turned, seat_y - travel.speed * rate.psi
+        seat_z = seat_z + gravity + l_s * turned
         lean = c_h * rate.psi * rate.theta - s_h * cotangent * rate.phi_h * rate.psi
         lean = lean - cotangent * rate.phi_h * rate.theta
         pitch = (2.0 * c_t * c_t - 1.0) * c_h * rate.phi_h * rate.psi
