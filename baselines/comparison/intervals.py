@@ -22,7 +22,7 @@ NEGLIGIBLE = 1e-3
 
 
 def is_measure(table: pandas.DataFrame) -> Any:
-    """Rows of :mod:`.measures`, which are no RMS errors."""
+    """Which rows hold measures beyond the RMS error (:mod:`.measures`)."""
     return table["metric"].str.fullmatch(rf"(.+ )?({'|'.join(MEASURES)})")
 
 
