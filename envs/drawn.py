@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import math
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, NamedTuple, Protocol, Self
 
 import gymnasium
@@ -14,6 +14,30 @@ import numpy as np
 from ..filters.support.parameters import arguments_of, check_parameters
 
 RENDER_MODES = ("human", "rgb_array")
+BODY_COLOUR = (0.25, 0.28, 0.33)
+STICK_COLOUR = (0.95, 0.75, 0.1)
+AXIS_COLOURS = ((0.85, 0.15, 0.15), (0.15, 0.65, 0.2), (0.2, 0.35, 0.95))
+"""x red, y green, z blue."""
+DEVICE_SIZE = (0.16, 0.10, 0.05)
+"""m: extent of a device whose size is not known; that of the controller of ``poise/HandMotion-v0``."""
+
+Box = tuple[Sequence[float], Sequence[float], Sequence[float]]
+"""Half extents (m), centre in the body frame (m), colour (red, green, blue from 0 to 1)."""
+
+
+def device_boxes(size: Sequence[float] = DEVICE_SIZE) -> list[Box]:
+    """A device with two grips and a stick, whose orientation is visible from any side.
+
+    Args:
+        size: extent along the body axes, m.
+    """
+    x, y, z = (0.5 * side for side in size)
+    return [
+        ((x, 0.6 * y, z), (0.0, 0.2 * y, 0.0), BODY_COLOUR),
+        ((0.25 * x, 0.5 * y, 0.8 * z), (-0.75 * x, -0.8 * y, 0.0), BODY_COLOUR),
+        ((0.25 * x, 0.5 * y, 0.8 * z), (0.75 * x, -0.8 * y, 0.0), BODY_COLOUR),
+        ((0.12 * x, 0.12 * x, 0.4 * z), (-0.5 * x, 0.3 * y, 1.3 * z), STICK_COLOUR),
+    ]
 
 
 class Scene(Protocol):

@@ -12,6 +12,7 @@ import numpy as np
 
 from ..filters.core import rotation
 from ..filters.support.optional import extra
+from .drawn import AXIS_COLOURS, DEVICE_SIZE, Box, device_boxes
 from .physics.world import Physics
 from .sensors.ideal import BodyState
 
@@ -20,22 +21,16 @@ with extra("sim"):
 
 IMAGE_SIZE = (480, 360)
 """Width and height of an image, pixels."""
-BODY_COLOUR = (0.25, 0.28, 0.33, 1.0)
-AXIS_COLOURS = ((0.85, 0.15, 0.15), (0.15, 0.65, 0.2), (0.2, 0.35, 0.95))
-"""x red, y green, z blue."""
 TILE_COLOURS = ((0.80, 0.82, 0.84, 1.0), (0.62, 0.66, 0.70, 1.0))
 
-Box = tuple[Sequence[float], Sequence[float], Sequence[float]]
-"""Half extents (m), centre in the body frame (m), colour (red, green, blue, alpha)."""
 
-
-def axes_boxes(length: float, thickness: float, alpha: float, pale: float = 0.0) -> list[Box]:
+def axes_boxes(length: float, thickness: float, pale: float = 0.0) -> list[Box]:
     """Three bars along the axes of a frame; ``pale`` mixes white into their colours."""
     boxes: list[Box] = []
     for axis, colour in enumerate(AXIS_COLOURS):
         half, centre = [thickness] * 3, [0.0] * 3
         half[axis], centre[axis] = 0.5 * length, 0.5 * length
-        boxes.append((half, centre, (*(c + pale * (1.0 - c) for c in colour), alpha)))
+        boxes.append((half, centre, tuple(c + pale * (1.0 - c) for c in colour)))
     return boxes
 
 
@@ -47,21 +42,14 @@ class DeviceScene:
         gui: open a window.
     """
 
-    def __init__(self, size: Sequence[float] = (0.16, 0.10, 0.05), *, gui: bool = False) -> None:
+    def __init__(self, size: Sequence[float] = DEVICE_SIZE, *, gui: bool = False) -> None:
         self._physics = Physics(gui=gui)
         if gui:
             pybullet.configureDebugVisualizer(pybullet.COV_ENABLE_GUI, 0, physicsClientId=self._physics.client)
-        x, y, z = (0.5 * side for side in size)
-        # a body with two grips and a stick: its orientation is visible from any side
-        device: list[Box] = [
-            ((x, 0.6 * y, z), (0.0, 0.2 * y, 0.0), BODY_COLOUR),
-            ((0.25 * x, 0.5 * y, 0.8 * z), (-0.75 * x, -0.8 * y, 0.0), BODY_COLOUR),
-            ((0.25 * x, 0.5 * y, 0.8 * z), (0.75 * x, -0.8 * y, 0.0), BODY_COLOUR),
-            ((0.12 * x, 0.12 * x, 0.4 * z), (-0.5 * x, 0.3 * y, 1.3 * z), (0.95, 0.75, 0.1, 1.0)),
-        ]
+        x = 0.5 * size[0]
         self._draw_ground()
-        self._device = self._body([*device, *axes_boxes(2.2 * x, 0.004, 1.0)])
-        self._ghost = self._body(axes_boxes(2.8 * x, 0.0025, 1.0, pale=0.55))
+        self._device = self._body([*device_boxes(size), *axes_boxes(2.2 * x, 0.004)])
+        self._ghost = self._body(axes_boxes(2.8 * x, 0.0025, pale=0.55))
         self._target = np.zeros(3)
 
     def _body(self, boxes: Sequence[Box]) -> int:
@@ -70,7 +58,7 @@ class DeviceScene:
             shapeTypes=[pybullet.GEOM_BOX] * len(boxes),
             halfExtents=[list(extent) for extent in half],
             visualFramePositions=[list(centre) for centre in centres],
-            rgbaColors=[list(colour) for colour in colours],
+            rgbaColors=[[*colour[:3], 1.0] for colour in colours],
             physicsClientId=self._physics.client,
         )
         return self._physics.create_body(0.0, (0.0, 0.0, 0.0), visual=visual)

@@ -13,15 +13,17 @@ from .output import Output
 class Args:
     """Arguments of ``poise speed``."""
 
-    what: tuple[Literal["filters", "bicycle", "arrays", "latency", "environments", "vectors"], ...] = (
+    what: tuple[Literal["filters", "bicycle", "arrays", "learned", "latency", "environments", "vectors"], ...] = (
         "filters",
         "bicycle",
         "arrays",
+        "learned",
         "latency",
         "environments",
         "vectors",
     )
-    """parts to measure; bicycle and arrays are families of filters, vectors are environments many at a time"""
+    """parts to measure; bicycle and arrays are families of filters, learned are networks, vectors are environments many
+    at a time"""
     json: bool = False
     """print one JSON document instead of tables"""
 
@@ -32,12 +34,12 @@ def run(args: Args) -> int:
     from itertools import groupby
 
     from ..baselines.speed.environments import environment_speeds
-    from ..baselines.speed.families import FAMILIES, family_speeds
+    from ..baselines.speed.families import FAMILIES, family_speeds, learned_speeds
     from ..baselines.speed.filters import filter_speeds, latencies
     from ..baselines.speed.vectors import vector_speeds
 
     parts = {"filters": filter_speeds, "latency": latencies, "environments": environment_speeds}
-    parts |= {"vectors": vector_speeds}
+    parts |= {"vectors": vector_speeds, "learned": learned_speeds}
     parts |= {family: partial(family_speeds, family) for family in FAMILIES}
     with Output("speed", args) as out:
         for name in args.what:

@@ -18,11 +18,11 @@ DRAWS = 1000
 WORSE = 0.02
 """Relative growth of a mean error from which it counts as a regression."""
 NEGLIGIBLE = 1e-3
-"""deg (or the quantity's unit): growth that is none."""
+"""deg (or the quantity's unit): smaller growth does not count."""
 
 
 def is_measure(table: pandas.DataFrame) -> Any:
-    """Rows of :mod:`.measures`, which are no RMS errors."""
+    """Which rows hold measures beyond the RMS error (:mod:`.measures`)."""
     return table["metric"].str.fullmatch(rf"(.+ )?({'|'.join(MEASURES)})")
 
 

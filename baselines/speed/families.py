@@ -1,4 +1,4 @@
-"""Speed of the filters of a family, in every form, relative to filterpy with the same model functions."""
+"""Speed of the filters of a family, in every form, relative to filterpy with the same model functions; of networks."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from ...filters.core.estimator import run, run_by_steps
 from ...filters.core.kalman import KalmanFilter
 from ...filters.core.model import Model
 from ..registry import list_estimators, make_estimator
@@ -74,6 +75,24 @@ def estimator_speeds(name: str) -> Iterator[Speed]:
     for what, rate in form_rates(estimator, partial(repeated, data), STEPS, LONG, ARRAYS, SAMPLES, BATCHES):
         yardstick = yardstick or rate
         yield Speed(group, what, rate, "updates/s", rate / yardstick)
+
+
+def learned_speeds() -> Iterator[Speed]:
+    """Rates of every shipped network and of the filter that it corrects; steps and whole sequences are own groups.
+
+    The yardstick of a network that stands alone is bounded-motion.
+    """
+    for name in (name for name, info in list_estimators().items() if info.kind == "learned"):
+        own = name.partition("+")[0]
+        contenders = dict.fromkeys((own if own in list_estimators() and own != name else "bounded-motion", name))
+        made = {each: make_estimator(each, dt=0.01) for each in contenders}
+        data = {each: plausible_measurements(estimator, 0, SAMPLES) for each, estimator in made.items()}
+        for what, runner, length in (("step by step", run_by_steps, STEPS), ("whole sequence", run, LONG)):
+            yardstick = 0.0
+            for each, estimator in made.items():
+                rate = measure(partial(runner, estimator, repeated(data[each], length)), length)
+                yardstick = yardstick or rate
+                yield Speed(f"{name}, {what}", each, rate, "updates/s", rate / yardstick)
 
 
 def repeated(data: Mapping[str, np.ndarray], length: int) -> dict[str, np.ndarray]:

@@ -7,39 +7,30 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ...envs.drawn import AXIS_COLOURS, DEVICE_SIZE, device_boxes
 from ...filters.arrays.spatial.orientation import ArrayOrientation
 from ...filters.arrays.spatial.virtual_controller import VIRTUAL_POSITION, advance
 from ...filters.core import rotation
 from .meshes import Colour, Mesh, box, rod
 
-BODY: Colour = (0.25, 0.28, 0.33)
-STICK: Colour = (0.95, 0.75, 0.10)
-AXES: tuple[Colour, ...] = ((0.85, 0.15, 0.15), (0.15, 0.65, 0.20), (0.20, 0.35, 0.95))
-"""x red, y green, z blue."""
-SIZE = (0.16, 0.10, 0.05)
-"""m: extent of the device of ``poise/HandMotion-v0``; that of a recording is not known."""
 Values = Mapping[str, np.ndarray]
 
 
-def device_meshes(size: Sequence[float] = SIZE) -> list[Mesh]:
-    """A controller with two grips and a stick, whose orientation is visible from any side, and its axes.
+def device_meshes(size: Sequence[float] = DEVICE_SIZE) -> list[Mesh]:
+    """The device of the rendered environments, and its axes.
 
     Args:
         size: extent along the body axes, m.
     """
-    x, y, z = (0.5 * side for side in size)
-    return [
-        box((0.0, 0.2 * y, 0.0), (2.0 * x, 1.2 * y, 2.0 * z), BODY),
-        *(box((sign * 0.75 * x, -0.8 * y, 0.0), (0.5 * x, y, 1.6 * z), BODY) for sign in (-1.0, 1.0)),
-        rod((-0.5 * x, 0.3 * y, z), (-0.5 * x, 0.3 * y, 1.7 * z), 0.12 * x, STICK),
-        *axes_meshes(2.2 * x, 0.003),
-    ]
+    boxes = [box(centre, 2.0 * np.array(half), as_colour(colour)) for half, centre, colour in device_boxes(size)]
+    ends = 1.1 * size[0] * np.eye(3)
+    return [*boxes, *(rod((0.0, 0.0, 0.0), end, 0.003, colour) for end, colour in zip(ends, AXIS_COLOURS, strict=True))]
 
 
-def axes_meshes(length: float, radius: float) -> list[Mesh]:
-    """Three rods along the axes, m."""
-    ends = length * np.eye(3)
-    return [rod((0.0, 0.0, 0.0), end, radius, colour) for end, colour in zip(ends, AXES, strict=True)]
+def as_colour(colour: Sequence[float]) -> Colour:
+    """Red, green and blue of a colour."""
+    red, green, blue, *_ = colour
+    return (red, green, blue)
 
 
 @dataclass

@@ -8,11 +8,12 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
+from ...envs.drawn import DEVICE_SIZE
 from ...filters.bicycle.geometry import RiderGeometry
 from ...filters.core import rotation
 from ...filters.core.quantity import Quantity
 from .curves import TRUTH, Arrays, Curves, curves_of
-from .device import SIZE, DeviceAttitude, VirtualController, device_meshes
+from .device import DeviceAttitude, VirtualController, device_meshes
 from .meshes import Mesh
 from .rider import Placed, Poses, estimated_values, forces_on, rider_meshes, rider_poses
 
@@ -155,7 +156,7 @@ class Device:
 
     outputs: Mapping[str, Sequence[Quantity]]
     dt: float
-    size: Sequence[float] = SIZE
+    size: Sequence[float] = DEVICE_SIZE
     _attitudes: dict[str, DeviceAttitude] = field(default_factory=dict, init=False)
     _virtual: dict[str, VirtualController] = field(default_factory=dict, init=False)
 
@@ -166,7 +167,7 @@ class Device:
     def motion(self, block: Block) -> Motion:
         """What is drawn of a block."""
         n = len(block.time)
-        place = np.asarray(block.truth.get("position", np.zeros((n, 3))), float)
+        place = np.nan_to_num(np.asarray(block.truth.get("position", np.zeros((n, 3))), float))
         truth = true_orientation(block.truth)
         figures: dict[str, Poses] = {}
         if truth is not None:

@@ -14,7 +14,6 @@ from ...envs.data.trajectory import Trajectory
 from ...filters.bicycle.geometry import RiderGeometry
 from ...filters.core.estimator import Estimator
 from ...filters.core.model import equations_of
-from .device import SIZE
 from .motion import Block, Device, Motion, Rider, Subject, joined
 from .online import OnlineEstimator, Timed
 
@@ -23,11 +22,10 @@ if TYPE_CHECKING:
 
 DRAWN = 50.0
 """Hz at which motion is drawn; estimators run at the rate of the samples."""
-KEPT = 120.0
+KEPT = 60.0
 """s of a live motion that are kept."""
 USUAL = {"imu/gyr": ("bounded-motion", "vqf", "tilt"), "bicycle_imu/gyr": ("whole-body", "two-gyro")}
 """Channel → estimators that are shown where none are named, as far as their channels and packages are there."""
-EMPTY = np.empty(0)
 
 
 def usual_estimators(channels: Sequence[str]) -> tuple[str, ...]:
@@ -80,7 +78,7 @@ def subject_of(
     ride = "bicycle/orientation" in truth or "bicycle_imu/gyr" in channels
     if ride:
         return Rider(RiderGeometry.of(metadata), outputs)
-    return Device(outputs, dt, metadata.get("size", SIZE))
+    return Device(outputs, dt)
 
 
 def with_derived(truth: Mapping[str, np.ndarray], made: Mapping[str, Estimator[Any]]) -> dict[str, np.ndarray]:
@@ -93,6 +91,11 @@ def with_derived(truth: Mapping[str, np.ndarray], made: Mapping[str, Estimator[A
     return {**found, **truth}
 
 
+def drawn_stride(dt: float) -> int:
+    """How many samples ``dt`` seconds apart go to one that is drawn."""
+    return max(1, round(1.0 / (DRAWN * dt)))
+
+
 def finished(trajectory: Trajectory, names: Sequence[str]) -> tuple[Subject, Motion]:
     """A recording with estimates, drawn at 50 Hz or its own rate.
 
@@ -101,14 +104,13 @@ def finished(trajectory: Trajectory, names: Sequence[str]) -> tuple[Subject, Mot
     """
     grid = trajectory.on_grid()
     made = made_estimators(names, grid)
-    stride = max(1, round(1.0 / (DRAWN * grid.dt))) if len(grid) > 1 else 1
     subject = subject_of(tuple(grid.measurements), tuple(grid.truth), grid.metadata, made, grid.dt)
     poses = {label: run_on(estimator, grid).pose for label, estimator in made.items()}
     truth = dict(grid.truth)
     if "orientation" not in truth and "up" in grid.quantities:
         truth["up"] = grid.truth_of("up")
     block = Block(grid.time, with_derived(truth, made), grid.measurements, poses)
-    return subject, subject.motion(block).rows(slice(None, None, stride))
+    return subject, subject.motion(block).rows(slice(None, None, drawn_stride(grid.dt)))
 
 
 @dataclass
@@ -128,6 +130,7 @@ class LiveMotion:
     dt: float
     kept: float = KEPT
     motion: Motion | None = field(default=None, init=False)
+    _count: int = field(default=0, init=False)
 
     def add(self, samples: Sequence[Timed], truth: Mapping[str, np.ndarray] | None = None) -> None:
         """Estimate and append samples.
@@ -153,9 +156,11 @@ class LiveMotion:
             {name: np.array([sample.measurement[name] for sample in samples]) for name in channels},
             poses,
         )
-        added = self.subject.motion(block)
+        stride = drawn_stride(self.dt)
+        added = self.subject.motion(block).rows(slice(-self._count % stride, None, stride))
+        self._count += len(samples)
         whole = added if self.motion is None else joined(self.motion, added)
-        first = int(np.searchsorted(whole.time, whole.time[-1] - self.kept))
+        first = int(np.searchsorted(whole.time, block.time[-1] - self.kept))
         self.motion = whole.rows(slice(first, None))
 
 

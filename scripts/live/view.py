@@ -21,6 +21,7 @@ import tyro
 from ...filters.support.optional import extra
 from ..main import run_command
 from ..output import Output
+from .curves import TRUTH
 from .lines import LineFormat
 from .sources import lines_of
 from .stream import Counts, clock_of, reader_of, timed_samples
@@ -33,6 +34,8 @@ if TYPE_CHECKING:
 
 AHEAD = 0.25
 """s of an environment that are simulated at a time."""
+PICTURE, MANY = 1.0 / 30.0, 200
+"""s, or samples, that are shown together while they arrive."""
 
 
 @dataclass
@@ -76,7 +79,7 @@ class Args:
     plot: str | None = None
     """which curves are shown, such as roll or inclination"""
     beside: bool = False
-    """figures stand side by side"""
+    """figures stand side by side, as they do where there is no truth"""
     screenshot: Path | None = None
     """write a picture of the page, drawn by a Chromium without a window, and leave"""
 
@@ -87,9 +90,14 @@ def run(args: Args) -> int:
         from .viewer import Viewer
 
     with Output("view", args) as out, interrupted_by_signals(), opened(args, out) as (subject, motion, newer, title):
+        if not motion.figures:
+            raise ValueError(
+                f"{title} has neither a true attitude nor an estimate of one; name --estimators that fit to it"
+            )
         viewer = Viewer(subject, motion, title, host=args.host, port=args.port, live=newer is not None)
         try:
-            viewer.begin(args.at, args.plot, beside=args.beside)
+            # without truth there is nothing in the middle that the others could be compared with
+            viewer.begin(args.at, args.plot, beside=args.beside or TRUTH not in motion.figures)
             if args.screenshot is not None:
                 return picture(viewer, args, out)
             out.say(f"{title} at {viewer.url} (Ctrl-C ends)")
@@ -202,10 +210,10 @@ def recording(args: Args, out: Output) -> tuple[Subject, Motion]:
     """A finished recording, one of its sensors.
 
     Raises:
-        ValueError: it cannot be read, or holds several sensors and none is named.
+        ValueError: it cannot be read, or an estimator does not fit to it.
     """
     from ..recordings.load import load_all, plain_warnings, sensors_of
-    from .shown import finished, made_estimators
+    from .shown import finished
 
     with plain_warnings():
         loaded, _ = load_all([Path(args.source)], args.calibration, args.site)
@@ -216,61 +224,63 @@ def recording(args: Args, out: Output) -> tuple[Subject, Motion]:
         )
         sensors = [trajectory] if ride else [sensor for one in loaded for sensor in sensors_of(one)]
         if len(sensors) > 1:
-            out.say(
-                f"showing {sensors[0].name}; --site shows another one of {', '.join(each.name for each in sensors)}"
-            )
-        made_estimators(chosen(args, sensors[0]), sensors[0].on_grid())
+            names = ", ".join(str(each.metadata.get("sensor") or each.name) for each in sensors)
+            out.say(f"showing the first of {names}; name another one by its file, or by --site")
         return finished(sensors[0].reference_clock_corrected(), chosen(args, sensors[0]))
 
 
 Blocks = Iterator["tuple[list[Timed], dict[str, Any], Trajectory | None]"]
-"""Samples, their truth, and (with the first block) a trajectory that says channels, truth, metadata and rate."""
+"""Samples, their truth, and a trajectory that says channels, truth, metadata and rate; None before the first sample."""
 
 
 def environment_blocks(env: Any, seed: int) -> Blocks:
     """An environment in real time, as fast as it is simulated."""
-    from ...envs.data.trajectory import Trajectory
     from ...envs.record import describe
     from .shown import PlayedEnvironment
 
     played = PlayedEnvironment(env, seed)
-    begin, shown = time.monotonic(), 0.0
+    begin, shown, kind = time.monotonic(), 0.0, None
     while not played.over:
         shown = min(time.monotonic() - begin, shown + AHEAD)
         samples, truth = played.block(shown)
-        if samples:
-            measurements = {name: values[None] for name, values in samples[0].measurement.items()}
+        if samples and kind is None:
             first = {name: values[:1] for name, values in truth.items()}
-            details = {**describe(env, seed), "rate": env.unwrapped.rate}
-            yield samples, truth, Trajectory([samples[0].time], measurements, first, metadata=details)  # type: ignore[arg-type]
-        else:
-            yield [], {}, None
+            kind = described(samples[0], first, {**describe(env, seed), "rate": env.unwrapped.rate})
+        yield samples, truth, kind
+        if not samples:
             time.sleep(0.01)
+
+
+def described(sample: Timed, truth: dict[str, Any], metadata: dict[str, Any]) -> Trajectory:
+    """A trajectory of the first sample, which says what those after it hold."""
+    import numpy as np
+
+    from ...envs.data.trajectory import Trajectory
+
+    measurements = {name: values[None] for name, values in sample.measurement.items()}
+    return Trajectory(np.array([sample.time]), measurements, truth, metadata=metadata)
 
 
 def line_blocks(args: Args) -> Blocks:
     """Lines of samples as they arrive."""
     from ...baselines.registry import make_estimator
-    from ...envs.data.trajectory import Trajectory
 
     channels = [channel for name in args.estimators for channel in make_estimator(name).channels]
     reader, clock = reader_of(args, channels), clock_of(args.rate)
     lines = lines_of(args.source, udp=args.udp, follow=args.live, baud=args.baud)
     waiting: list[Timed] = []
+    kind: Trajectory | None = None
     for sample in timed_samples(lines, reader, clock, Counts()):
         if sample is not None:
             waiting.append(sample)
-            if len(waiting) < 200 and sample.time - waiting[0].time < 1.0 / 30.0:
+            if kind is None:
+                assert clock.dt is not None
+                kind = described(sample, {}, {"rate": 1.0 / clock.dt})
+            if len(waiting) < MANY and sample.time - waiting[0].time < PICTURE:
                 continue
-        if not waiting:
-            yield [], {}, None
-            continue
-        assert clock.dt is not None
-        measurements = {name: values[None] for name, values in waiting[0].measurement.items()}
-        yield waiting, {}, Trajectory([waiting[0].time], measurements, metadata={"rate": 1.0 / clock.dt})  # type: ignore[arg-type]
+        yield waiting, {}, kind
         waiting = []
-    if waiting:
-        yield waiting, {}, None
+    yield waiting, {}, kind
 
 
 @contextmanager

@@ -28,8 +28,8 @@ class ConsistentForceInertial(ForceInertial):
 
     The noises have the largest likelihood of the true angles on simulated rides of training riders, for devices from
     laboratory to phone grade, worn with placement errors, and a rider measured with a tape. They are no noise of a
-    sample: they stand for errors that last. The usual posture is one more, weak measurement, without which the second
-    equilibrium is not left again.
+    sample: they stand for lasting (time-correlated) errors. The usual posture is one more, weak measurement, without
+    which the second equilibrium is not left again.
     """
 
     usual_pitch: float = 0.5 * math.pi - 0.5847

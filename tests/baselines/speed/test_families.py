@@ -65,3 +65,16 @@ def test_unknown_channels_are_named():
 
     with pytest.raises(ValueError, match="nose/cold"):
         plausible_measurements(Odd(), 0)
+
+
+@pytest.mark.usefixtures("_hurry")
+def test_networks_are_compared_with_what_they_correct():
+    rows = list(speed_families.learned_speeds())
+    groups = {row.group: [row.what] for row in rows}
+    for row in rows:
+        groups[row.group].append(row.what)
+    learned = [name for name, info in list_estimators().items() if info.kind == "learned"]
+    assert len(groups) == 2 * len(learned)
+    assert groups["two-gyro+network, whole sequence"][1:] == ["two-gyro", "two-gyro+network"]
+    assert groups["gru, step by step"][1:] == ["bounded-motion", "gru"]
+    assert all(row.rate > 0.0 for row in rows)
