@@ -102,8 +102,9 @@ def spread_claims(results: Sequence[Mapping[str, Any]], angles: Sequence[str], f
     for angle in angles:
         time, mean, deviation = errors_over_time(results, angle)
         settled, late = time >= SETTLED, time >= 0.5 * (SETTLED + time[-1])
-        early = settled & ~late
-        if early.any() and np.isfinite(deviation).all():
+        known = np.isfinite(mean) & np.isfinite(deviation)
+        settled, late, early = settled & known, late & known, settled & known & ~late
+        if early.any() and late.any():
             size = np.sqrt(np.mean(deviation[settled] ** 2))
             centred[angle] = float(abs(mean[settled].mean()) / size)
             growth[angle] = float(np.sqrt(np.mean(deviation[late] ** 2) / np.mean(deviation[early] ** 2)))

@@ -78,8 +78,9 @@ def roll_errors(
         with_band(ax, time, errors[name]["φ"], estimates[name], color, name)
     covariance = estimates[methods[-1]].covariance
     assert covariance is not None
+    # without the start, where little is known yet
     late = time >= 0.1 * time[-1]
-    limit = max(np.abs(errors[methods[-1]]["φ"]).max(), 3.0 * np.sqrt(covariance[late, 0, 0].max()) / DEG)
+    limit = max(np.nanmax(np.abs(errors[methods[-1]]["φ"][late])), 3.0 * np.sqrt(covariance[late, 0, 0].max()) / DEG)
     ax.set(ylabel="error of φ, deg", ylim=(-1.4 * limit, 1.4 * limit))
     legend_above(ax)
 
