@@ -206,7 +206,7 @@ def claims(every: list[dict[str, Any]], torque: dict[str, dict[str, float]], bou
 
 def follows(every: list[dict[str, Any]]) -> Claim:
     """Whether the trunk of each rider is estimated better than by the best constant of each ride."""
-    ratios = {}
+    ratios: dict[str, float] = {}
     for subject in dict.fromkeys(each["subject"] for each in every):
         rides = [each for each in every if each["subject"] == subject]
         ours, best = mean_rms(rides, OURS), mean_rms(rides, MEAN)
