@@ -88,6 +88,7 @@ class RideStudy:
         extra: further numbers of a ride, from the ride and the estimates of its variants; ``bound`` (angle → deg, RMS
             over time of the posterior bound) goes into the table of skill.
         cells: a row of errors as cells of a table; None rounds them.
+        bound: what the posterior bound of ``extra`` is the bound of.
     """
 
     name: str
@@ -109,6 +110,7 @@ class RideStudy:
     prepare: Callable[[Trajectory], Trajectory] | None = None
     extra: Callable[[RideStudy, Trajectory, dict[str, Estimate]], dict[str, Any]] | None = None
     cells: Callable[[Mapping[str, float]], Mapping[str, Any]] | None = None
+    bound: str = "for the noises that the filter assumes, white"
 
     def load(self, path: Path) -> Trajectory:
         """A recorded ride, prepared."""
@@ -226,7 +228,7 @@ class RideStudy:
                     rows.append(row | {"values": values, "unit": "deg"})
         if rows:
             report.compare(f"{self.table}, {course}", rows, f"RMS from {SETTLED:g} s on.", interval=STD)
-        report.table(f"Skill, {course}, RMS in deg", self.skill(course, results), SKILL)
+        report.table(f"Skill, {course}, RMS in deg", self.skill(course, results), SKILL.format(bound=self.bound))
         cells = self.cells or rounded
         methods = [*self.variants, ZERO, MEAN]
         report.table(
@@ -310,11 +312,10 @@ def assessed(study: RideStudy, path: Path) -> dict[str, Any]:
 
 
 SKILL = (
-    f"Mean over rides from {SETTLED:g} s on. *{STRAPDOWN}*: gyroscopes alone. *Posterior bound*: for the noises that "
-    "the "
-    "filter assumes. *NEES*: of the angle alone, 1 if the covariance is right; mean over rides, with the 95 % "
-    "interval of "
-    "that mean by the spread between rides, since errors within a ride are correlated."
+    f"Mean over rides from {SETTLED:g} s on. *{STRAPDOWN}*: gyroscopes alone. *Posterior bound*: {{bound}}. *NEES*: "
+    "of the "
+    "angle alone, 1 if the covariance is right; mean over rides, with the 95 % interval of that mean by the spread "
+    "between rides, since errors within a ride are correlated."
 )
 
 

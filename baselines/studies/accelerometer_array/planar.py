@@ -22,6 +22,7 @@ from ....filters.registry import make
 from ..claims import Claim
 from ..kit import Study
 from ..report import OVER_MOTIONS, Report
+from ..ride_study import MEAN, ZERO
 from .tables import Row, grouped, mean_of, values_of
 
 RATE = 100.0
@@ -102,11 +103,18 @@ def planar_errors(seed: int, motion: str, duration: float = DURATION) -> list[Ro
     Returns:
         A row for each of :data:`METHODS`: ``method``, ``motion``, ``seed``; ``rms`` and ``largest`` in degrees,
         ``within``, the share of samples within 10°; ``rate``, the rms error of ω in rad/s (None if it is not
-        estimated).
+        estimated); ``nees`` of the angle (None without a covariance). The last two rows are the baselines
+        :data:`~.ride_study.ZERO` and :data:`~.ride_study.MEAN`.
     """
     trajectory = moved(seed, motion, duration)
     common = {"motion": motion, "seed": seed}
-    return [common | {"method": name} | errors_of(trajectory, estimator(name, motion)) for name in METHODS]
+    rows = [common | {"method": name} | errors_of(trajectory, estimator(name, motion)) for name in METHODS]
+    scored = trajectory.time >= SETTLED
+    angle = trajectory.truth[PLANAR_ANGLE.name][scored, 0]
+    middle = np.angle(np.mean(np.exp(1j * angle)))
+    for name, constant in ((ZERO, 0.0), (MEAN, middle)):
+        rows.append(common | {"method": name} | numbers(np.abs(wrap(angle - constant))) | {"rate": None, "nees": None})
+    return rows
 
 
 def inflation_errors(seed: int, duration: float = DURATION) -> list[Row]:
@@ -120,17 +128,26 @@ def inflation_errors(seed: int, duration: float = DURATION) -> list[Row]:
 
 def errors_of(trajectory: Trajectory, filter: Estimator[Any]) -> Row:
     """The numbers of a row."""
-    pose, scored = run(filter, trajectory.measurements).pose, trajectory.time >= SETTLED
+    estimate, scored = run(filter, trajectory.measurements), trajectory.time >= SETTLED
+    pose = estimate.pose
 
     def error(quantity: Any) -> np.ndarray:
         return metrics.error(quantity, pose[quantity.name], trajectory.truth[quantity.name])[scored]
 
     angle = error(PLANAR_ANGLE)
+    variance = None if estimate.covariance is None else np.asarray(estimate.covariance)[scored, 0, 0]
+    return numbers(angle) | {
+        "rate": float(metrics.rms(error(PLANAR_RATE))) if PLANAR_RATE.name in pose else None,
+        "nees": None if variance is None else float(np.mean(angle**2 / variance)),
+    }
+
+
+def numbers(angle: np.ndarray) -> Row:
+    """RMS and largest of sizes of errors ``(T,)``, rad, in degrees, and the share of those within 10°."""
     return {
         "rms": float(np.rad2deg(metrics.rms(angle))),
         "largest": float(np.rad2deg(angle.max())),
         "within": float(np.mean(angle < LIMIT)),
-        "rate": float(metrics.rms(error(PLANAR_RATE))) if PLANAR_RATE.name in pose else None,
     }
 
 
@@ -152,6 +169,7 @@ def planar_table(rows: list[Row], key: str = "method") -> list[Row]:
         "largest error (°)": ("largest", np.mean),
         "within 10°": ("within", np.mean),
         "ω (rad/s)": ("rate", np.mean),
+        "NEES": ("nees", np.mean),
     }
     return grouped(rows, {"motion": "motion", key: key}, columns)
 
@@ -252,7 +270,10 @@ def planar(study: Study, report: Report) -> None:
         f"{seeds} motions of {duration:g} s.",
         interval=OVER_MOTIONS,
     )
-    note = "*Literal* averages raw angles; *published R* and *published H* are (3.44) and (3.45) as in the thesis."
+    note = (
+        "*NEES* is 1 if the covariance is right; the acceleration of the ∞ is not white. "
+        "*Literal* averages raw angles; *published R* and *published H* are (3.44) and (3.45) as in the thesis."
+    )
     report.table("Planar methods", planar_table(rows), note)
     found = study.map("planar inflation", inflation_errors, [(seed, duration) for seed in roots])
     inflated = [row for part in found for row in part]

@@ -22,6 +22,7 @@ from ...plots import new_figure
 from ..claims import Claim
 from ..kit import Study
 from ..report import OVER_MOTIONS, Report
+from ..ride_study import ZERO
 from .tables import Row, grouped, mean_of, values_of
 
 RATE = 100.0
@@ -89,8 +90,8 @@ def rate_errors(seed: int, errors: str, duration: float = DURATION) -> list[Row]
     """Root mean square of |ω̂ − ω| of every method on one motion, rad/s (2.57), and the mean weights by |ω|.
 
     Returns:
-        A row for each of :data:`METHODS`: ``method``, ``errors``, ``seed``, ``rms``; ``weights`` (None unless
-        weighted); and what :func:`over_time` gives.
+        A row for each of :data:`METHODS`, and one for a rate that is always zero: ``method``, ``errors``, ``seed``,
+        ``rms``; ``weights`` (None unless weighted); and what :func:`over_time` gives.
     """
     trajectory, rows = shaken(seed, errors, duration), []
     truth = trajectory.truth["angular_rate"]
@@ -100,6 +101,8 @@ def rate_errors(seed: int, errors: str, duration: float = DURATION) -> list[Row]
         weights = weights_by_speed(pose["array-rate/weights"], truth) if "array-rate/weights" in pose else None
         row = {"method": method, "errors": errors, "seed": seed, "rms": rms, "weights": weights}
         rows.append(row | over_time(pose[ANGULAR_RATE.name], truth))
+    row = {"method": ZERO, "errors": errors, "seed": seed, "rms": float(metrics.rms(np.linalg.norm(truth, axis=-1)))}
+    rows.append(row | {"weights": None} | over_time(0.0 * truth, truth))
     return rows
 
 

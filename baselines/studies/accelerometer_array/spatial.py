@@ -31,6 +31,7 @@ from ....filters.imu.marins import Marins
 from ..claims import Claim
 from ..kit import Study
 from ..report import OVER_MOTIONS, Report
+from ..ride_study import ZERO
 from .figures import move_figure, pointing_figures, readings_figure
 from .tables import Row, grouped, mean_of, values_of
 
@@ -142,17 +143,22 @@ def attitude_errors(
         seed: of motion and noise.
         duration: s.
         dip: of the field, rad.
-        methods: their names; none for all.
+        methods: their names; none for all, and for a device that always points north and level.
 
     Returns:
         A row for each method: ``device``, ``method``, ``seed``, ``pitch`` and ``azimuth`` (rms), ``pitch_max`` and
         ``azimuth_max``, ``inside`` (share of samples within ±3° in both), ``total`` (rms of the whole rotation).
     """
-    trajectory, rows, wanted = pointed(device, seed, duration, dip), [], set(methods) or set(METHODS[device])
-    for method in METHODS[device]:
+    trajectory, rows, wanted = pointed(device, seed, duration, dip), [], set(methods) or {*METHODS[device], ZERO}
+    for method in (*METHODS[device], ZERO):
         if method not in wanted:
             continue
-        estimate = estimated(method, device, trajectory, dip)
+        if method == ZERO:
+            # north and level
+            estimate = np.zeros_like(trajectory.truth["orientation"])
+            estimate[:, 0] = 1.0
+        else:
+            estimate = estimated(method, device, trajectory, dip)
         pitch, azimuth, total = map(np.degrees, pointing_errors(estimate, trajectory.truth["orientation"]))
         inside = (np.abs(pitch) < LIMIT) & (np.abs(azimuth) < LIMIT)
         rows.append(

@@ -91,6 +91,8 @@ RIDES = RideStudy(
     sampled="relative/orientation",
     windows=_windows,
     extra=_extra,
+    bound="for the true noises, with the alignment error of the camera's marker (1° constant, 1° over 60 s) to be "
+    "estimated too",
 )
 
 
