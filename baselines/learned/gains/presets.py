@@ -83,7 +83,7 @@ class GainPreset(Preset):
         return {**super().describe(), "limits": dict(self.limits)}
 
 
-HANDS = {"hand-held-prompt": 120, "carried-prompt": 72}
+HANDS = {"hand-held-prompt": 96, "carried-prompt": 48}
 FIT = FitConfig(epochs=5, batch=4, window=10**6, learning_rate=6e-3)
 """A whole sequence is one window: the filter runs over it from its start."""
 NOISE, SHARE = 30.0, 10.0
