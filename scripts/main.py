@@ -62,6 +62,7 @@ COMMANDS: dict[str, Command] = {
     "estimate": Command(".recordings.estimate", "angles, quaternions, standard deviations of a recording, as a file"),
     "evaluate": Command(".recordings.evaluate", "measure estimators on recorded trajectories"),
     "stream": Command(".live.stream", "estimate sample by sample while lines of samples arrive: stdin, serial, UDP"),
+    "align": Command(".recordings.align", "clocks of several devices, axes of worn sensors, magnetometers"),
     "calibrate": Command(
         ".recordings.calibrate", "scale, offset and axes of raw sensors, from rate-table and tumbling runs"
     ),

@@ -187,7 +187,9 @@ def train(args: Args, folder: Run, start: np.ndarray) -> Trained:
     from ..filters.adaptation.gains import tunable_filter
 
     config, kalman = training_config(args), tunable_filter(args.filter)
-    unseen = config.motions.draw_many(child_seed(args.seed, VALIDATION_SEED), min(24, config.trajectories))
+    # The exact gradient holds back some of its own trajectories.
+    count = 0 if config.agent == "analytic" else min(24, config.trajectories)
+    unseen = config.motions.draw_many(child_seed(args.seed, VALIDATION_SEED), count)
     curve = Curve(folder.folder / CURVE, resumed=args.resume is not None)
     with progress_bar(config.total_timesteps, f"tune {args.filter}", "step") as bar:
 

@@ -168,11 +168,11 @@ def shipped_config(filter: str) -> TrainingConfig:
             filter=filter,
             gains=(gain,),
             motions=RiddenMotions(),
-            trajectories=96,
-            total_timesteps=200_000,
-            n_envs=96,
+            trajectories=48,
+            total_timesteps=260_000,
+            n_envs=48,
             gain_search=16,
-            warm_start=96,
+            warm_start=48,
         )
     # The valley in which the measurement variance does the work, and c_a, which trusts the filter's own error, little.
     centre = (-0.7, 0.7, -0.7) if filter == "external-acceleration" else None

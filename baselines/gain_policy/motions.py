@@ -91,12 +91,24 @@ class GradedMotions:
 UNEVEN = ("indoor_circle", "outdoor", "straight", "slalom", "slow", "gusts", "bumps", "bumps", "pitch", "pitch")
 """Scenarios of rides, drawn evenly: two fifths with bumps or a ramp, where level ground must not be believed."""
 
+PAPER_SENSORS = {
+    "devices": ["paper"],
+    "noise_scale": [1.0, 1.0],
+    "timing": {"late_share": 0.0, "packet_loss_share": 0.0},
+}
+"""Sensors of the published experiments: with noisier gyroscopes the filters, which are not told so, diverge anyway."""
+
+
+def uneven_rides() -> RideSource:
+    """Rides of 40 s, half of them on other roads than the scenario's, with the sensors of the publications."""
+    return RideSource(24, 2, 40.0, {"scenarios": list(UNEVEN), "sensors": dict(PAPER_SENSORS)})
+
 
 @dataclass(frozen=True)
 class RiddenMotions:
     """Rides with several draws of devices on each; the rides are kept in the user's cache folder."""
 
-    source: RideSource = field(default_factory=lambda: RideSource(24, 4, 40.0, {"scenarios": list(UNEVEN)}))
+    source: RideSource = field(default_factory=uneven_rides)
     """which rides"""
 
     def draw_many(self, seed: int, count: int) -> list[Trajectory]:

@@ -97,7 +97,7 @@ def fit(
     for name, part in (("data", data), ("validation", validation)):
         if not part.mask.any():
             raise ValueError(f"{name} scores nothing: the truth of its {len(part)} sequences is unknown everywhere")
-        check_finite(name, part)
+        check_finite(name, part, head)
     if resume and folder is None:
         raise ValueError("resume needs the folder of the interrupted training")
     home = None if folder is None else Path(folder)
@@ -132,13 +132,13 @@ def fit(
     return FitResult(estimator, trainer.history, trainer.best_epoch, tuple(residuals.tolist()))
 
 
-def check_finite(name: str, data: SequenceData) -> None:
-    """Refuse data that score what is not a number.
+def check_finite(name: str, data: SequenceData, head: Head) -> None:
+    """Refuse data that score what is not a number; in sequences of a head's own making NaN is a missing sample.
 
     Raises:
         ValueError: names the array and the sequence.
     """
-    for field in ("features", "target"):
+    for field in ("features",) if hasattr(head, "sequence") else ("features", "target"):
         bad = (data.mask & ~np.isfinite(getattr(data, field)).all(axis=-1)).any(axis=1)
         if bad.any():
             where = data.names[int(np.argmax(bad))]

@@ -114,7 +114,8 @@ def fit_preset(
     say: Callable[[str], object] | None = None,
 ) -> FitResult:
     """Train the network of a preset on data that were made with its front end and head; see :func:`train_preset`."""
-    front_end, head = preset.front_end(), preset.head()
+    front_end: Any = preset.front_end()
+    head: Any = preset.head()
     number = (seeds_of(seed)[2] + replicate) % 2**31
     if start is None:
         module, config = preset.module(front_end.size, head.size, number), preset.fit

@@ -37,7 +37,7 @@ from ..inputs.gain_features import GainFeatures
 if TYPE_CHECKING:
     from ..data import SequenceData
 
-SMALL_ERROR = math.radians(0.2)
+SMALL_ERROR = math.radians(0.5)
 """rad, e₀: errors below it count little"""
 FREEDOM = 8.0
 """ν, degrees of freedom of the distribution of errors"""

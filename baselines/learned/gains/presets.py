@@ -83,8 +83,8 @@ class GainPreset(Preset):
         return {**super().describe(), "limits": dict(self.limits)}
 
 
-HANDS = {"hand-held-prompt": 64, "carried-prompt": 24, "carried-running": 8}
-FIT = FitConfig(epochs=8, batch=4, window=10**6, learning_rate=6e-3)
+HANDS = {"hand-held-prompt": 96, "carried-prompt": 48}
+FIT = FitConfig(epochs=5, batch=4, window=10**6, learning_rate=6e-3)
 """A whole sequence is one window: the filter runs over it from its start."""
 NOISE, SHARE = 30.0, 10.0
 """Largest factors on a standard deviation, and on a share of the Kalman gain."""
@@ -128,7 +128,7 @@ GAIN_PRESETS: dict[str, Preset] = {
         units=32,
         limits={"process": NOISE, "measurement": NOISE, "constraint": 100.0},
         noise=0.1,
-        fit=replace(FIT, epochs=6),
+        fit=replace(FIT, epochs=8),
     ),
 }
 """Name of the weights → training."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -47,7 +47,7 @@ class RiderSuite:
     """test rides of each group, one rider each"""
     draws: int = 2
     """of devices and measured geometry on each"""
-    training: int = 40
+    training: int = 24
     """rides from which references learn"""
     seed: int = 0
     """root seed: that with which the networks were trained, so that test riders are others"""
@@ -88,55 +88,40 @@ def estimators_of(paper: str) -> list[str]:
     return [name for name in own if name in FILTERS] + [name for name in networks if name in TRAINED]
 
 
-def methods(paper: str, learnt: Learnt) -> dict[str, Callable[[Trajectory, np.ndarray], Errors]]:
-    """Label → errors of a method on a drawn ride at the samples that count."""
-
-    def estimator(name: str, **parameters: Any) -> Callable[[Trajectory, np.ndarray], Errors]:
-        def errors(ride: Trajectory, scored: np.ndarray) -> Errors:
-            kept = {"keep_covariance": True} if name in FILTERS else {}
-            made = make_estimator(name, dt=ride.dt, metadata=ride.metadata, **kept, **parameters)
-            return errors_of(made, ride, made.run(ride.measurements), scored)
-
-        return errors
-
-    def always(ride: Trajectory, scored: np.ndarray) -> Errors:
-        truth = angles_of(outputs, truth_of(make(paper), ride))[scored]
-        return Errors(np.asarray(rotation.wrap(learnt.mean - truth)))
-
-    def shifted(ride: Trajectory, scored: np.ndarray) -> Errors:
-        return Errors(np.asarray(rotation.wrap(published(ride, scored).values - learnt.bias)))
-
-    def regression(ride: Trajectory, scored: np.ndarray) -> Errors:
-        front_end = learnt.front_end.with_dt(ride.dt).configured(ride.metadata)
-        seen = front_end.run({c.name: ride.measurements[c.name] for c in front_end.channels})
-        due = seen.due == 1.0
-        correction = learnt.ridge.predict(moving_averages(seen.features[due]))
-        truth = angles_of(outputs, truth_of(front_end.kalman, ride))
-        wrong = angles_of(outputs, seen.base)[due] + correction - truth[due]
-        return Errors(np.asarray(rotation.wrap(wrong[scored[due]])))
-
-    def centred(ride: Trajectory, scored: np.ndarray) -> Errors:
-        values = published(ride, scored).values
-        return Errors(values - values.mean(axis=0))
-
-    def odometry(ride: Trajectory, scored: np.ndarray) -> Errors:
-        made: Any = make(ROLL_ONLY, dt=ride.dt, metadata=ride.metadata)
-        roll = np.asarray(made.run(ride.measurements).pose["bicycle/roll"])
-        values = np.full((int(scored.sum()), learnt.head.size), np.nan)
-        values[:, 0] = rotation.wrap(roll - ride.truth["bicycle/roll"])[scored, 0]
-        return Errors(values)
-
-    outputs, published = learnt.head.outputs, estimator(paper)
-    found: dict[str, Callable[[Trajectory, np.ndarray], Errors]] = {
-        MEAN: always,
+def all_errors(paper: str, learnt: Learnt, ride: Trajectory, scored: np.ndarray) -> dict[str, Errors]:
+    """Label → errors of every method on a drawn ride at the samples that count ``(T,)``."""
+    outputs = learnt.head.outputs
+    truth = angles_of(outputs, truth_of(make(paper), ride))
+    published = estimated(paper, ride, scored)
+    front_end = learnt.front_end.with_dt(ride.dt).configured(ride.metadata)
+    seen = front_end.run({c.name: ride.measurements[c.name] for c in front_end.channels})
+    due = seen.due == 1.0
+    corrected = angles_of(outputs, seen.base)[due] + learnt.ridge.predict(moving_averages(seen.features[due]))
+    odometry: Any = make(ROLL_ONLY, dt=ride.dt, metadata=ride.metadata)
+    roll = np.full((int(scored.sum()), learnt.head.size), np.nan)
+    roll[:, :1] = (odometry.run(ride.measurements).pose["bicycle/roll"] - ride.truth["bicycle/roll"])[scored]
+    found = {
+        MEAN: Errors(wrapped(learnt.mean - truth[scored])),
         paper: published,
-        BIAS: shifted,
-        RIDGE: regression,
-        f"{paper} ({TUNED})": estimator(paper, **learnt.tuned),
-        ROLL_ONLY: odometry,
+        BIAS: Errors(wrapped(published.values - learnt.bias)),
+        RIDGE: Errors(wrapped((corrected - truth[due])[scored[due]])),
+        f"{paper} ({TUNED})": estimated(paper, ride, scored, **learnt.tuned),
+        ROLL_ONLY: Errors(wrapped(roll)),
     }
-    found |= {name: estimator(name) for name in estimators_of(paper) if name != paper}
-    return found | {f"{paper}, {ORACLE}": centred}
+    found |= {name: estimated(name, ride, scored) for name in estimators_of(paper) if name != paper}
+    return found | {f"{paper}, {ORACLE}": Errors(published.values - published.values.mean(axis=0))}
+
+
+def estimated(name: str, ride: Trajectory, scored: np.ndarray, **parameters: Any) -> Errors:
+    """Errors of an estimator, with deviations."""
+    kept = {"keep_covariance": True} if name in FILTERS else {}
+    made = make_estimator(name, dt=ride.dt, metadata=ride.metadata, **kept, **parameters)
+    return errors_of(made, ride, made.run(ride.measurements), scored)
+
+
+def wrapped(angles: np.ndarray) -> np.ndarray:
+    """Angles in [−π, π)."""
+    return np.asarray(rotation.wrap(angles))
 
 
 def scored_samples(ride: Trajectory, interval: float = 0.04) -> np.ndarray:
@@ -153,8 +138,8 @@ def ride_rows(settings: RiderSuite, learnt: dict[str, Learnt], group: str, index
     for _, draw, ride in unseen_rides(source, seeds_of(settings.seed)[3], group, index):
         ride, scored = ride.on_grid(), scored_samples(ride)
         for paper in settings.papers:
-            for label, errors in methods(paper, learnt[paper]).items():
-                found = score(errors(ride, scored))
+            for label, errors in all_errors(paper, learnt[paper], ride, scored).items():
+                found = score(errors)
                 angles = tuple(float(angle) for angle in found.angles)
                 rows.append(Row(paper, label, group, index, draw, angles, found.nees, found.coverage))
     return rows
