@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from poise.baselines.comparison.data_sets import dataset_of, with_other_clocks
-from poise.baselines.evaluation import evaluate
-from poise.baselines.recommendation import (
+from poise.baselines.comparison.recommendation import (
     CORRECTED,
     MOUNTINGS,
     Motion,
@@ -15,6 +14,7 @@ from poise.baselines.recommendation import (
     recommend,
     results_of,
 )
+from poise.baselines.evaluation import evaluate
 from poise.baselines.registry import list_estimators
 from poise.envs.hand.sensing import simulate_hand
 
