@@ -70,6 +70,17 @@ TRAINED: dict[str, Entry] = {
         )
         for name in ("two-gyro", "whole-body")
     },
+    **{
+        f"{name}+noise": Entry(
+            "..baselines.learned.gains.gain_filter:shipped",
+            f"{name}, its noises set by a recurrent network that was trained through the filter",
+            HERE,
+            "learned",
+            {"weights": f"{name}_noise"},
+            name,
+        )
+        for name in ("external-acceleration",)
+    },
 }
 """Name → estimator with shipped weights."""
 
