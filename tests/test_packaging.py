@@ -120,6 +120,10 @@ def requirements() -> set[str]:
     return {name_of(requirement) for requirement in asked} - {"poise"}
 
 
+IMPORTED = {"pillow": "PIL"}
+"""Package → module, where the names differ."""
+
+
 def name_of(requirement: str) -> str:
     return re.split(r"[<>=!~\[; ]", requirement)[0].lower()
 
@@ -139,7 +143,7 @@ def test_messages_about_missing_packages_name_the_extra_that_brings_them() -> No
 
 
 def test_every_import_is_a_declared_requirement() -> None:
-    names = {name.replace("-", "_") for name in requirements()}
+    names = {IMPORTED.get(name, name.replace("-", "_")) for name in requirements()}
     for path in (p for floor in FLOORS for p in (ROOT / floor).rglob("*.py")):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             modules = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []

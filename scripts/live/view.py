@@ -81,7 +81,10 @@ class Args:
     beside: bool = False
     """figures stand side by side, as they do where there is no truth"""
     screenshot: Path | None = None
-    """write a picture of the page, drawn by a Chromium without a window, and leave"""
+    """write a picture of the page (.png) or a film of the scene (.webp, .gif) that a Chromium without a window draws,
+    and leave"""
+    until: float | None = None
+    """end of the film, s; that of the motion by default"""
 
 
 def run(args: Args) -> int:
@@ -113,13 +116,17 @@ def run(args: Args) -> int:
 
 def picture(viewer: Any, args: Args, out: Output) -> int:
     """Write a picture of the page."""
-    from .picture import take_picture
+    from .picture import FILMS, take_film, take_picture
 
     assert args.screenshot is not None
     viewer.player.playing = False
+    if args.screenshot.suffix.lower() in FILMS:
+        until = viewer.player.end if args.until is None else args.until
+        out.say(f"film: {take_film(viewer, args.screenshot, until)}")
+        return 0
     thread = threading.Thread(target=viewer.run, daemon=True)
     thread.start()
-    out.say(f"picture: {take_picture(viewer.url, args.screenshot)}")
+    out.say(f"picture: {take_picture(viewer, args.screenshot)}")
     viewer.stopped.set()
     thread.join()
     return 0

@@ -158,6 +158,12 @@ class Viewer:
         self._slider.max = max(self.player.end, self.player.begin + 0.01)
         self._row = -1
 
+    def show(self, time: float) -> None:
+        """Show a time, s, at once."""
+        self.player.seek(time)
+        self._changed.set()
+        self.tick(0.0)
+
     def tick(self, clock: float) -> None:
         """Advance the player and update what has changed.
 
