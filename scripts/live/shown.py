@@ -45,6 +45,11 @@ def usual_estimators(channels: Sequence[str]) -> tuple[str, ...]:
     return tuple(found)
 
 
+def possible_estimators(channels: Sequence[str]) -> tuple[str, ...]:
+    """Names of all estimators that run on these channels."""
+    return tuple(name for name, info in list_estimators().items() if set(info.channels) <= set(channels))
+
+
 def made_estimators(names: Sequence[str], trajectory: Trajectory) -> dict[str, Estimator[Any]]:
     """Estimators by name, configured for a trajectory.
 
