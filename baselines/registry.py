@@ -85,7 +85,7 @@ TRAINED: dict[str, Entry] = {
             {"weights": f"{name}_noise"},
             name,
         )
-        for name in ("external-acceleration",)
+        for name in ("external-acceleration", "mekf")
     },
 }
 """Name → estimator with shipped weights."""
