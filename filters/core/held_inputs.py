@@ -67,7 +67,11 @@ def ridden(channel: str, parameter: str, power: int = 1) -> HeldInput:
 
 
 def pedalled(channel: str, parameter: str, power: int = 1) -> HeldInput:
-    """The angular rate of a leg that pedals; chosen on lumped rides of riders 0 and 3: 0.035 rad after 0.1 s, 2.1 rad after 2 s."""
+    """The angular rate of a leg that pedals.
+
+    Chosen on lumped rides (indoor circle, outdoor, slalom, bumps; riders 0 and 3, ideal sensors): 0.035 rad after
+    0.1 s, 2.1 rad after 2 s.
+    """
     return HeldInput(channel, parameter, power, spread=1.05, share=0.0, time=0.15)
 
 

@@ -1,13 +1,13 @@
 """The delay of an accelerometer relative to the gyroscope beside it, from the innovations of a whole recording.
 
-The low-pass filters inside of inertial sensors delay their samples by milliseconds, and those of the two sensors differ.
-While a hand turns and accelerates, a force that is turned into the world by an attitude of another time has a mean that
-no motion explains: at 10 rad/s and 10 m/s², one millisecond makes 0.1 m/s², or 0.6° of tilt.
+The low-pass filters inside of inertial sensors delay their samples by milliseconds, not both by the same. While a hand
+turns and accelerates, a force that is turned into the world by an attitude of another time has a mean that no motion
+explains: at 10 rad/s and 10 m/s², one millisecond makes 0.1 m/s², or 0.6° of tilt.
 
 The innovations of a filter are smallest at the right delay. With their squares J(l) summed over sections of the
-recording, one step of Newton's method gives the delay and the scatter of the sections its deviation, which needs neither
-their size nor their whiteness (H. White, "Maximum likelihood estimation of misspecified models", Econometrica 50(1),
-1982):
+recording, one step of Newton's method gives the delay. The scatter of the sections gives its deviation, whatever the
+size and the correlation of the innovations (H. White, "Maximum likelihood estimation of misspecified models",
+Econometrica 50(1), 1982):
 
     l = − Σ J' / Σ J'',   s² = Σ (J' + l J'')² / (Σ J'')²
 
@@ -43,10 +43,10 @@ def relative_delay(before: np.ndarray, now: np.ndarray, after: np.ndarray, dt: f
     """
     length = round(SECTION / dt)
     count = len(now) // length
-    parts = (np.nan_to_num(part[: count * length]).reshape(count, length, -1).sum(axis=1) for part in (before, now, after))
-    low, middle, high = (part.ravel() for part in parts)
     if count < 3:
         return 0.0
+    sections = (np.nan_to_num(part[: count * length]).reshape(count, length, -1) for part in (before, now, after))
+    low, middle, high = (section.sum(axis=1).ravel() for section in sections)
     slope, curvature = (high - low) / 2.0, low - 2.0 * middle + high
     total = float(curvature.sum())
     if not total > 0.0:

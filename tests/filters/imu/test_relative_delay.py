@@ -1,4 +1,4 @@
-"""The delay between accelerometer and gyroscope from innovations: known curves, and a hand whose accelerometer is late."""
+"""The delay between accelerometer and gyroscope from innovations: known curves, a hand with a late accelerometer."""
 
 from __future__ import annotations
 
