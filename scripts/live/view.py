@@ -44,7 +44,8 @@ class Args:
     """Arguments of ``poise view``."""
 
     source: tyro.conf.Positional[str] = "hand-motion"
-    """a recording, an environment (hand-motion, rider-bicycle or an id), or - for lines of samples"""
+    """a recording, an environment (hand-motion, rider-bicycle or an id), or lines of samples from a serial device, a
+    named pipe or - for standard input"""
     estimators: tuple[str, ...] = ()
     """names of estimators, see `poise list estimators`; by default some that the channels allow"""
     options: tuple[str, ...] = ()
@@ -190,7 +191,8 @@ def opened(args: Args, out: Output) -> Iterator[Opened]:
     """
     lines = args.udp is not None or args.source == "-"
     path = Path(args.source)
-    if lines or (args.live and path.exists()):
+    device = path.exists() and not (path.is_file() or path.is_dir())
+    if lines or device or (args.live and path.exists()):
         with fed(line_blocks(args), args) as found:
             yield Opened("samples", *found)
     elif path.exists():
