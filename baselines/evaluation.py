@@ -17,7 +17,7 @@ from ..filters.core.estimator import Estimator
 from ..filters.core.offline import SUFFIX, Offline
 from ..filters.core.quantity import ORIENTATION
 from ..filters.support.parallel import progress_bar
-from .comparison.measures import measures
+from .measures import measures
 from .registry import list_estimators, make_estimator
 from .run import fitted, run_on
 from .scoring import (

@@ -29,17 +29,22 @@ RULED = {
     "mekf": ("innovation", "acceleration"),
 }
 """Filter → rules that set one of its gains."""
+POLICIES = ("external-acceleration", "bounded-motion")
+"""Filters with a shipped policy."""
+LOSING = frozenset({"bounded-motion+policy", "mekf+innovation", "mekf+acceleration"})
+"""Policies and rules that lose to the plain filter on recordings."""
 TRAINED: dict[str, Entry] = {
     **{
         f"{name}+policy": Entry(
             "..baselines.gain_policy.adaptive:shipped",
-            f"{name}, gains set by a policy trained with PPO",
+            f"{name}, gains set by a policy trained in simulation",
             HERE,
             "adaptive",
             {"weights": f"{name.replace('-', '_')}_policy"},
-            FILTERS[name].factory,
+            name,
+            experimental=f"{name}+policy" in LOSING,
         )
-        for name in ("external-acceleration", "bounded-motion")
+        for name in POLICIES
     },
     **{
         f"{name}+{rule}": Entry(
@@ -49,6 +54,7 @@ TRAINED: dict[str, Entry] = {
             "adaptive",
             {"filter": name, "rule": rule},
             name,
+            experimental=f"{name}+{rule}" in LOSING,
         )
         for name, rules in RULED.items()
         for rule in rules
@@ -69,6 +75,17 @@ TRAINED: dict[str, Entry] = {
             {"weights": f"{name}_network"},
         )
         for name in ("two-gyro", "whole-body")
+    },
+    **{
+        f"{name}+noise": Entry(
+            "..baselines.learned.gains.gain_filter:shipped",
+            f"{name}, its noises set by a recurrent network that was trained through the filter",
+            HERE,
+            "learned",
+            {"weights": f"{name}_noise"},
+            name,
+        )
+        for name in ("external-acceleration", "mekf")
     },
 }
 """Name → estimator with shipped weights."""

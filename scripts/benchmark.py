@@ -111,8 +111,8 @@ def run(args: Args) -> int:
 def tasks_of(args: Args, recorded: list[Trajectory]) -> tuple[list[Task], list[str]]:
     """What is to be done, and the channels that estimators may read."""
     from ..baselines.comparison.data_sets import HAND_CHANNELS, contenders, with_other_clocks
+    from ..baselines.comparison.recommendation import CORRECTED
     from ..baselines.comparison.tasks import hand_tasks, imu_ride_tasks, recording_tasks
-    from ..baselines.recommendation import CORRECTED
 
     channels = list(dict.fromkeys([*HAND_CHANNELS, *(name for each in recorded for name in each.measurements)]))
     contenders(args.estimators, channels)  # an unknown name is told before anything is simulated
@@ -155,7 +155,7 @@ def show_suite(suite: str, results: Results, tasks: list[Task], args: Args, fold
 
 def show_data_sets(suites: dict[str, Results], args: Args, folder: Run, out: Output) -> dict[str, str]:
     """Mean errors of all data sets side by side; heading → Markdown. Saves what ``--save`` asks for."""
-    from ..baselines.recommendation import ERRORS, dataset_errors
+    from ..baselines.comparison.recommendation import ERRORS, dataset_errors
     from ..filters.support.files import write_json
     from .tables import markdown_table
 

@@ -44,7 +44,7 @@ class Args:
 
 def benchmark(metric: str = "inclination") -> Rows:
     """Every estimator's mean error on every data set of the shipped benchmark, deg."""
-    from ..baselines.recommendation import dataset_errors, load_results
+    from ..baselines.comparison.recommendation import dataset_errors, load_results
 
     recordings = load_results()["recordings"]
     names = list(dict.fromkeys(one["dataset"] for one in recordings))

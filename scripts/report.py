@@ -35,7 +35,7 @@ def kinds_of(labels: Any) -> dict[str, str]:
     from ..baselines.registry import list_estimators
     from ..filters.core.offline import SUFFIX
 
-    known = list_estimators()
+    known = list_estimators(experimental=True)
     kinds = {label: known[name].kind for label in map(str, labels) if (name := label.split(" (")[0]) in known}
     return {label: "offline" if label.endswith(SUFFIX) else kind for label, kind in kinds.items()}
 

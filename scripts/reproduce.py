@@ -84,7 +84,6 @@ def run_every(args: Args, settings: dict[str, Any]) -> int:
     from ..baselines.studies import PAPERS, coverage
     from ..filters.support.files import write_text
     from ..filters.support.parallel import in_parallel
-    from .report import provenance
 
     check(settings)
     folder = open_run("reproduce", args, may_differ=("page",))
@@ -98,11 +97,22 @@ def run_every(args: Args, settings: dict[str, Any]) -> int:
             shown = [{name: row[name] for name in ("item", "content", "verdict")} for row in rows]
             out.table(shown, paper, console=console(None))
         command = command_line("reproduce", args, ("quick", "seed", "subjects", "seeds", "duration"))
-        page = coverage.page(works, f"- `{command}`\n{provenance(folder)}")
+        page = coverage.page(works, f"- `{command}`\n{made_with(folder)}")
         if args.page is not None:
             write_text(args.page, page)
         out.report(write_text(folder.folder / "report.md", page))
     return 0
+
+
+def made_with(run: Run) -> str:
+    """Lines of a page that is kept: version, commit and packages that a run was made with, and no machine."""
+    import json
+
+    state = json.loads((run.folder / "versions.json").read_text(encoding="utf-8"))
+    commit = f", commit {state['poise']['commit'][:12]}" if "commit" in state["poise"] else ""
+    changed = " with changes" if state["poise"].get("changed") else ""
+    packages = ", ".join(f"{name} {version}" for name, version in state["packages"].items() if version)
+    return f"- poise {state['poise']['version']}{commit}{changed}, Python {state['python']}\n- {packages}"
 
 
 def one_study(paper: str, settings: dict[str, Any], run: Run) -> str:

@@ -91,6 +91,7 @@ def test_the_wheel_holds_the_data_of_the_package(wheel: tuple[set[str], set[str]
 def test_files_are_short() -> None:
     written = {".py", ".md", ".toml", ".cff"}
     kept = [path for path in project_files() if path.suffix in written or path.name == "Makefile"]
+    kept = [path for path in kept if path.name != "pylock.toml"]
     lengths = {str(path.relative_to(ROOT)): len(path.read_text(encoding="utf-8").splitlines()) for path in kept}
     assert {name: n for name, n in lengths.items() if n > LINES} == {}
 
@@ -119,6 +120,10 @@ def requirements() -> set[str]:
     return {name_of(requirement) for requirement in asked} - {"poise"}
 
 
+IMPORTED = {"pillow": "PIL"}
+"""Package → module, where the names differ."""
+
+
 def name_of(requirement: str) -> str:
     return re.split(r"[<>=!~\[; ]", requirement)[0].lower()
 
@@ -138,7 +143,7 @@ def test_messages_about_missing_packages_name_the_extra_that_brings_them() -> No
 
 
 def test_every_import_is_a_declared_requirement() -> None:
-    names = {name.replace("-", "_") for name in requirements()}
+    names = {IMPORTED.get(name, name.replace("-", "_")) for name in requirements()}
     for path in (p for floor in FLOORS for p in (ROOT / floor).rglob("*.py")):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             modules = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
@@ -154,6 +159,16 @@ def test_constraints_pin_every_requirement_exactly() -> None:
     assert requirements() <= set(pins)
     # A local suffix (+cpu) would tie the set to one index.
     assert not any("+" in pin for pin in pins.values())
+
+
+def test_the_lock_file_is_that_of_the_constraints() -> None:
+    """``uv pip compile -c constraints.txt …``; the command is in its first lines."""
+    lock = tomllib.loads((ROOT / "pylock.toml").read_text(encoding="utf-8"))
+    lines = [line for line in (ROOT / "constraints.txt").read_text().splitlines() if line and not line.startswith("#")]
+    pins = dict(line.split("==") for line in lines)
+    locked = {package["name"]: package["version"] for package in lock["packages"]}
+    assert requirements() - {"ray"} <= set(locked)
+    assert {name: version for name, version in locked.items() if pins.get(name, version) != version} == {}
 
 
 def test_the_citation_file_names_the_five_works() -> None:

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..error_table import COMPLETE, coverage
+from ..measures import MEASURES
 from ..statistics import bootstrap_interval, mean_score, probability_of_improvement
-from .measures import MEASURES
 
 if TYPE_CHECKING:
     import pandas

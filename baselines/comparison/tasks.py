@@ -16,9 +16,9 @@ from ...filters.support.parallel import in_parallel
 from ...filters.support.seeds import child_seeds
 from ...filters.support.version import code_version
 from ..evaluation import evaluate
-from ..recommendation import results_of
 from ..scoring import COLUMNS, has_truth
 from .data_sets import GESTURES, RIDES, contenders, hand_episode, ride_imus
+from .recommendation import results_of
 
 if TYPE_CHECKING:
     import pandas

@@ -96,7 +96,7 @@ PAPER_SENSORS = {
     "noise_scale": [1.0, 1.0],
     "timing": {"late_share": 0.0, "packet_loss_share": 0.0},
 }
-"""Sensors of the published experiments: with noisier gyroscopes the filters, which are not told so, diverge anyway."""
+"""Sensors of the published experiments: filters that assume these noises diverge with noisier gyroscopes."""
 
 
 def uneven_rides() -> RideSource:

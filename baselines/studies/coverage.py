@@ -118,9 +118,10 @@ def page(works: Mapping[str, Sequence[Mapping[str, Any]]], provenance: str) -> s
     every = [row for rows in works.values() for row in rows]
     parts = [
         "# Coverage of the five works",
-        "Each table, figure and statement of the five works, with the verdict of a run. *Reproduced*: the run shows it "
-        "and every claim that it makes holds. *Differs*: a claim does not hold; its number and, where the run measures "
-        "one, the cause follow. *Cannot be answered*: a simulator has no counterpart.",
+        "Each table, figure and statement of the five works, with the verdict of a run.",
+        "* *Reproduced*: the run shows it, and every claim that decides it holds.\n"
+        "* *Differs*: a claim does not hold. Its number follows, then the cause, as a claim where a run measures it.\n"
+        "* *Cannot be answered*: a simulator has no counterpart.",
         f"{len(every)} items: {counted(every)}. The page is written by `poise reproduce all --page FILE`.",
     ]
     for work, rows in works.items():
@@ -133,4 +134,7 @@ def markdown(rows: Sequence[Mapping[str, str]]) -> list[str]:
     """Lines of a table of four columns."""
     columns = COLUMNS[:4]
     lines = [f"| {' | '.join(columns)} |", f"|{' --- |' * len(columns)}"]
-    return [*lines, *(f"| {' | '.join(row[name].replace('|', chr(92) + '|') for name in columns)} |" for row in rows)]
+    for row in rows:
+        cells = (row[name].replace("|", "\\|") for name in columns)
+        lines.append(f"| {' | '.join(cells)} |")
+    return lines

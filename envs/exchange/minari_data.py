@@ -99,7 +99,12 @@ def play(env: gymnasium.Env[Any, Any], choose: Policy, seed: int) -> EpisodeBuff
     from minari.data_collector import EpisodeBuffer
 
     observation, info = env.reset(seed=seed)
-    observations, infos, actions, rewards, terminations, truncations = [observation], [info], [], [], [], []
+    observations: list[Any] = [observation]
+    infos: list[Any] = [info]
+    actions: list[Any] = []
+    rewards: list[float] = []
+    terminations: list[bool] = []
+    truncations: list[bool] = []
     while not actions or not (terminations[-1] or truncations[-1]):
         actions.append(choose(restored(observation)))
         observation, reward, terminated, truncated, info = env.step(actions[-1])

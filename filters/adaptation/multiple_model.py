@@ -24,15 +24,19 @@ import numpy as np
 from ..compile.differentiable import DifferentiableEquations
 from ..core.estimator import Enclosing, check_measurements
 from ..core.kalman import KalmanFilter
+from ..core.model import structure_of
 from ..core.quantity import Estimate, Measurement, Quantity
 from ..core.sampling import FilterState
 from .gains import gain_ranges
 
-LEVELS = (-0.8, -0.4, 0.0, 0.4, 0.8)
+LEVELS = (-0.7, 0.0, 0.7)
 """Shares of the range of each gain that :func:`bank_of` combines."""
 
 SECTION = 200_000
 """Samples of all filters together that are computed at a time, which bounds the memory."""
+
+_EQUATIONS: dict[Any, DifferentiableEquations] = {}
+"""Structure and gains → compiled filter, which serves banks of all riders, vehicles and devices."""
 
 
 class BankState(NamedTuple):
@@ -80,7 +84,10 @@ class MultipleModel(Enclosing):
     @cached_property
     def equations(self) -> DifferentiableEquations:
         """The compiled filter that tells log det S."""
-        return DifferentiableEquations(replace(self.filter, restart=False), self.gains)
+        key = (structure_of(self.filter.model), self.gains)
+        if key not in _EQUATIONS:
+            _EQUATIONS[key] = DifferentiableEquations(replace(self.filter, restart=False), self.gains)
+        return _EQUATIONS[key].of_rows([self.filter.model])
 
     def configured(self, metadata: Mapping[str, Any]) -> MultipleModel:
         """The same for the person, vehicle or device that a recording's metadata describe."""

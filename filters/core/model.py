@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, fields, replace
 from typing import Any, ClassVar, Self, TypeVar
 
@@ -152,6 +152,14 @@ class Model(Equations):
     def retract(self, x: Array, dx: Array) -> Array:
         """The state ``x`` corrected by the error ``dx``: a sum, unless the state holds rotations."""
         return x + dx
+
+    def fitted(self, nis: Callable[[Self], Any]) -> Self:
+        """The same equations with constants that a whole recording tells, for smoothing it; as given here.
+
+        Args:
+            nis: equations → normalised innovations squared ``(T, *batch)`` of the recording.
+        """
+        return self
 
 
 @dataclass(frozen=True)

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NoReturn
 
+from .backend import is_torch
 from .estimator import Enclosing, Estimator
+from .kalman import KalmanFilter
 from .quantity import Estimate, Measurement
 
 SUFFIX = " (offline)"
@@ -35,8 +37,17 @@ class Offline(Enclosing):
             )
 
     def run(self, measurements: Mapping[str, Any]) -> Estimate:
-        """Smoothed estimates of a whole sequence, ``(T, *batch, size)`` in and out."""
-        return self.filter.smooth(measurements)  # type: ignore[attr-defined]
+        """Smoothed estimates of a whole sequence, ``(T, *batch, size)`` in and out.
+
+        Constants of the model that the recording itself tells (:meth:`.Model.fitted`) are found first.
+        """
+        smoother: Any = self.filter
+        if isinstance(smoother, KalmanFilter) and not any(is_torch(array) for array in measurements.values()):
+            causal = replace(smoother, keep_covariance=False)
+            model = smoother.model.fitted(lambda model: replace(causal, model=model).run(measurements).nis)
+            smoother = replace(smoother, model=model)
+        estimate: Estimate = smoother.smooth(measurements)
+        return estimate
 
     def init(self, measurement: Measurement) -> NoReturn:
         """Not available, since a smoother has no state between samples.

@@ -31,8 +31,11 @@ violates the assumption and appears as growing innovations.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import ClassVar
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, Self
+
+import numpy as np
 
 from ..core.backend import Array, expand, namespace
 from ..core.held_inputs import HeldInput
@@ -54,6 +57,7 @@ from ..core.quantity import (
 )
 from ..core.rotation import level, normalize, up_in_body
 from .magnetic_heading import MagneticHeading
+from .relative_delay import STEP, relative_delay
 from .strapdown import (
     accelerated,
     advance,
@@ -90,7 +94,7 @@ class BoundedMotion(Model):
     clipped_inflation: float = 100.0
     """factor on σ_a for saturated samples"""
     accelerometer_lag: float = 0.0
-    """s: delay of the accelerometer relative to the gyroscope (filters inside the sensor)"""
+    """s: delay of the accelerometer relative to the gyroscope (filters inside the sensor), negative if it is ahead"""
     tilt_prior: float = 0.05
     """rad"""
     bias_prior: float = 8.727e-3
@@ -178,6 +182,13 @@ class BoundedMotion(Model):
             "gyroscope_bias": x[..., 4:7],
             "external_acceleration": x[..., 10:13],
         }
+
+    def fitted(self, nis: Callable[[Self], Any]) -> Self:
+        """The delay of the accelerometer by :func:`.relative_delay`, unless one was given."""
+        if self.accelerometer_lag != 0.0:
+            return self
+        found = [np.asarray(nis(replace(self, accelerometer_lag=lag))) for lag in (-STEP, 0.0, STEP)]
+        return replace(self, accelerometer_lag=relative_delay(*found, dt=self.dt))
 
     def _external(self, q: Array, f: Array) -> Array:
         return f - expand(self.gravity, 1) * up_in_body(q)

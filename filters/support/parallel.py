@@ -58,7 +58,7 @@ def on_backend(name: str, processes: int = 2) -> Iterator[None]:
 
             # one thread a worker, since compiled filters have their own
             address = os.environ.get("DASK_SCHEDULER_ADDRESS")
-            cluster = {"n_workers": processes, "threads_per_worker": 1, "dashboard_address": None}
+            cluster: dict[str, Any] = {"n_workers": processes, "threads_per_worker": 1, "dashboard_address": None}
             with Client(address) if address else Client(**cluster), joblib.parallel_config("dask"):
                 yield
         else:

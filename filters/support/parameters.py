@@ -16,7 +16,7 @@ import numpy as np
 POSITIVE = re.compile(r"(dt|gravity|interval|time|step|window|length|width|wide|forearm|shank|thigh|arm)$|tau_")
 """Names of numbers that are above zero: times, lengths of limbs."""
 NOT_NEGATIVE = re.compile(
-    r"(noise|std|mass|wheelbase|deviation|variance|prior|drift|bound|range|tolerance|threshold|adaptation|rejection|decay|jerk|lag|hold"
+    r"(noise|std|mass|wheelbase|deviation|variance|prior|drift|bound|range|tolerance|threshold|adaptation|rejection|decay|jerk|hold"
     r"|inflation|filter|gain|scale|share|weight|guard|follow|acceleration)$|^(gain|k)_"
 )
 """Names of numbers that are zero or above: standard deviations, masses, limits, gains."""

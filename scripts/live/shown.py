@@ -25,6 +25,7 @@ DRAWN = 50.0
 KEPT = 60.0
 """s of a live motion that are kept."""
 USUAL = {"imu/gyr": ("bounded-motion", "vqf", "tilt"), "bicycle_imu/gyr": ("whole-body", "two-gyro")}
+USUAL |= {"array/acc": ("array-orientation", "planar-orientation")}
 """Channel → estimators that are shown where none are named, as far as their channels and packages are there."""
 
 
@@ -42,6 +43,11 @@ def usual_estimators(channels: Sequence[str]) -> tuple[str, ...]:
                     continue
                 found.append(name)
     return tuple(found)
+
+
+def possible_estimators(channels: Sequence[str]) -> tuple[str, ...]:
+    """Names of all estimators that run on these channels."""
+    return tuple(name for name, info in list_estimators().items() if set(info.channels) <= set(channels))
 
 
 def made_estimators(names: Sequence[str], trajectory: Trajectory) -> dict[str, Estimator[Any]]:
@@ -197,7 +203,8 @@ class PlayedEnvironment:
     def __init__(self, env: Any, seed: int) -> None:
         self.env: PoseEnv = env.unwrapped
         if not hasattr(self.env, "measurement"):
-            raise ValueError(f"{env} is not an environment whose agent estimates a pose")
+            named = env.spec.id if env.spec is not None else env
+            raise ValueError(f"{named} is not an environment whose agent estimates a pose")
         _, self._info = self.env.reset(seed=seed)
         self.over = False
 

@@ -10,11 +10,12 @@ import signal
 import threading
 import time
 import webbrowser
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import tyro
 
@@ -43,7 +44,8 @@ class Args:
     """Arguments of ``poise view``."""
 
     source: tyro.conf.Positional[str] = "hand-motion"
-    """a recording, an environment (hand-motion, rider-bicycle or an id), or - for lines of samples"""
+    """a recording, an environment (hand-motion, rider-bicycle or an id), or lines of samples from a serial device, a
+    named pipe or - for standard input"""
     estimators: tuple[str, ...] = ()
     """names of estimators, see `poise list estimators`; by default some that the channels allow"""
     options: tuple[str, ...] = ()
@@ -81,7 +83,10 @@ class Args:
     beside: bool = False
     """figures stand side by side, as they do where there is no truth"""
     screenshot: Path | None = None
-    """write a picture of the page, drawn by a Chromium without a window, and leave"""
+    """write a picture of the page (.png) or a film of the scene (.webp, .gif) that a Chromium without a window draws,
+    and leave"""
+    until: float | None = None
+    """end of the film, s; that of the motion by default"""
 
 
 def run(args: Args) -> int:
@@ -89,12 +94,22 @@ def run(args: Args) -> int:
     with extra("view"):
         from .viewer import Viewer
 
-    with Output("view", args) as out, interrupted_by_signals(), opened(args, out) as (subject, motion, newer, title):
+    with Output("view", args) as out, interrupted_by_signals(), opened(args, out) as found:
+        title, subject, motion, newer, addable, more = found
         if not motion.figures:
             raise ValueError(
                 f"{title} has neither a true attitude nor an estimate of one; name --estimators that fit to it"
             )
-        viewer = Viewer(subject, motion, title, host=args.host, port=args.port, live=newer is not None)
+        viewer = Viewer(
+            subject,
+            motion,
+            title,
+            host=args.host,
+            port=args.port,
+            live=newer is not None,
+            addable=addable,
+            more=more,
+        )
         try:
             # without truth there is nothing in the middle that the others could be compared with
             viewer.begin(args.at, args.plot, beside=args.beside or TRUTH not in motion.figures)
@@ -113,13 +128,17 @@ def run(args: Args) -> int:
 
 def picture(viewer: Any, args: Args, out: Output) -> int:
     """Write a picture of the page."""
-    from .picture import take_picture
+    from .picture import FILMS, take_film, take_picture
 
     assert args.screenshot is not None
     viewer.player.playing = False
+    if args.screenshot.suffix.lower() in FILMS:
+        until = viewer.player.end if args.until is None else args.until
+        out.say(f"film: {take_film(viewer, args.screenshot, until)}")
+        return 0
     thread = threading.Thread(target=viewer.run, daemon=True)
     thread.start()
-    out.say(f"picture: {take_picture(viewer.url, args.screenshot)}")
+    out.say(f"picture: {take_picture(viewer, args.screenshot)}")
     viewer.stopped.set()
     thread.join()
     return 0
@@ -142,8 +161,24 @@ def interrupted_by_signals() -> Iterator[None]:
         signal.signal(signal.SIGTERM, before)
 
 
-Opened = tuple["Subject", "Motion", "Callable[[], Motion | None] | None", str]
-"""What moves, its motion so far, what gives the motion that has grown (None: it does not), title."""
+class Opened(NamedTuple):
+    """What is shown.
+
+    Attributes:
+        title: of the page.
+        subject: what moves.
+        motion: so far.
+        newer: gives the motion that has grown; None: it does not grow.
+        addable: names of estimators that may be added.
+        more: subject and motion with other estimators, by their names.
+    """
+
+    title: str
+    subject: Subject
+    motion: Motion
+    newer: Callable[[], Motion | None] | None = None
+    addable: Sequence[str] = ()
+    more: Callable[[Sequence[str]], tuple[Subject, Motion]] | None = None
 
 
 @contextmanager
@@ -156,21 +191,21 @@ def opened(args: Args, out: Output) -> Iterator[Opened]:
     """
     lines = args.udp is not None or args.source == "-"
     path = Path(args.source)
-    if lines or (args.live and path.exists()):
+    device = path.exists() and not (path.is_file() or path.is_dir())
+    if lines or device or (args.live and path.exists()):
         with fed(line_blocks(args), args) as found:
-            yield (*found, "samples")
+            yield Opened("samples", *found)
     elif path.exists():
-        yield (*recording(args, out), None, path.name)
+        yield whole(path.name, recording(args, out), args)
     elif args.live:
         env_id, env = environment(args)
         try:
             with fed(environment_blocks(env, args.seed), args) as found:
-                yield (*found, env_id)
+                yield Opened(env_id, *found)
         finally:
             env.close()
     else:
         from ...envs.record import record
-        from .shown import finished
 
         env_id, env = environment(args)
         try:
@@ -178,7 +213,21 @@ def opened(args: Args, out: Output) -> Iterator[Opened]:
             trajectory = record(env, seed=args.seed, progress=True)
         finally:
             env.close()
-        yield (*finished(trajectory, chosen(args, trajectory)), None, env_id)
+        yield whole(env_id, trajectory, args)
+
+
+def whole(title: str, trajectory: Trajectory, args: Args) -> Opened:
+    """A finished trajectory with its estimates, to which others may be added.
+
+    Raises:
+        ValueError: an estimator does not fit to it.
+    """
+    from .shown import finished, possible_estimators
+
+    shown = finished(trajectory, chosen(args, trajectory))
+    return Opened(
+        title, *shown, None, possible_estimators(tuple(trajectory.measurements)), partial(finished, trajectory)
+    )
 
 
 def environment(args: Args) -> tuple[str, Any]:
@@ -206,14 +255,13 @@ def chosen(args: Args, trajectory: Trajectory) -> tuple[str, ...]:
     return args.estimators or usual_estimators(tuple(trajectory.measurements))
 
 
-def recording(args: Args, out: Output) -> tuple[Subject, Motion]:
-    """A finished recording, one of its sensors.
+def recording(args: Args, out: Output) -> Trajectory:
+    """A recording, one of its sensors.
 
     Raises:
-        ValueError: it cannot be read, or an estimator does not fit to it.
+        ValueError: it cannot be read.
     """
     from ..recordings.load import load_all, plain_warnings, sensors_of
-    from .shown import finished
 
     with plain_warnings():
         loaded, _ = load_all([Path(args.source)], args.calibration, args.site)
@@ -226,7 +274,7 @@ def recording(args: Args, out: Output) -> tuple[Subject, Motion]:
         if len(sensors) > 1:
             names = ", ".join(str(each.metadata.get("sensor") or each.name) for each in sensors)
             out.say(f"showing the first of {names}; name another one by its file, or by --site")
-        return finished(sensors[0].reference_clock_corrected(), chosen(args, sensors[0]))
+        return sensors[0].reference_clock_corrected()
 
 
 Blocks = Iterator["tuple[list[Timed], dict[str, Any], Trajectory | None]"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import redirect_stdout
 from functools import partial
 from io import StringIO
@@ -14,6 +14,7 @@ import numpy as np
 
 from ...filters.support.names import look_up
 from ...filters.support.optional import extra
+from .curves import TRUTH
 from .motion import Motion, Rider, Subject
 from .player import SPEEDS, Player
 from .plots import colours_of, curve_figure
@@ -39,6 +40,8 @@ class Viewer:
         host: address that the server listens on.
         port: of the server; 0 takes a free one.
         live: whether the motion grows.
+        addable: names of estimators that may be added.
+        more: subject and motion with other estimators, by their names.
     """
 
     def __init__(
@@ -50,8 +53,11 @@ class Viewer:
         host: str = "127.0.0.1",
         port: int = 8080,
         live: bool = False,
+        addable: Sequence[str] = (),
+        more: Callable[[Sequence[str]], tuple[Subject, Motion]] | None = None,
     ) -> None:
-        self.motion = motion
+        self.motion, self._addable, self._more = motion, tuple(addable), more
+        self._lock = threading.RLock()
         self.player = Player(float(motion.time[0]), float(motion.time[-1]), following=live, time=float(motion.time[0]))
         ride = isinstance(subject, Rider)
         self.options = Options(dict.fromkeys(motion.figures, True), turn=ride)
@@ -60,11 +66,16 @@ class Viewer:
         self.stopped = threading.Event()
         self._changed = threading.Event()
         self._changed.set()
-        self._colours = colours_of(list(motion.figures))
-        self._row, self._plotted = -1, -np.inf
-        self._scene = MotionScene(self.server, subject.meshes(), motion, self._colours, RIDE if ride else DEVICE)
-        self._controls(title, ride)
+        self._row, self._plotted, self._ride = -1, -np.inf, ride
+        self._draw(subject, motion)
+        self._controls(title)
         self.tick(0.0)
+
+    def _draw(self, subject: Subject, motion: Motion) -> None:
+        """Make the bodies anew."""
+        self._colours = colours_of(list(motion.figures))
+        self._scene = MotionScene(self.server, subject.meshes(), motion, self._colours, RIDE if self._ride else DEVICE)
+        self._row = -1
 
     @property
     def url(self) -> str:
@@ -72,7 +83,7 @@ class Viewer:
         host = self.server.get_host()
         return f"http://{'localhost' if host == '0.0.0.0' else host}:{self.server.get_port()}"
 
-    def _controls(self, title: str, ride: bool) -> None:
+    def _controls(self, title: str) -> None:
         gui, player = self.server.gui, self.player
         gui.configure_theme(control_width="large", show_logo=False, show_share_button=False)
         gui.main_panel.dock_right()
@@ -91,17 +102,54 @@ class Viewer:
         self._choice: Any = gui.add_dropdown("plot", list(self.motion.curves) or [NOTHING])
         self._choice.on_update(lambda event: self._act(lambda: None))
         self._plot = gui.add_plotly(self._figure(), aspect=0.66)
-        with gui.add_folder("Shown"):
+        self._shown = gui.add_folder("Truth and estimates")
+        with self._shown:
+            if self._more is not None and self._addable:
+                add = gui.add_dropdown("add", [NOTHING, *self._addable], initial_value=NOTHING, order=1e6)
+                add.on_update(lambda event: self._add(add.value, event.client))
             for label in self.options.visible:
                 self._checkbox(label, True, partial(self._choose, label))
+        with gui.add_folder("Shown"):
             if self.motion.arrows:
-                self._checkbox("forces" if ride else "acceleration", True, self._set("forces"))
+                self._checkbox("forces" if self._ride else "acceleration", True, self._set("forces"))
             self._checkbox("trail", True, self._set("trails"))
             self._beside = self._checkbox("side by side", False, self._set("beside"))
             if self.motion.virtual:
                 self._checkbox("virtual controller", False, self._set("virtual"))
-            if ride:
+            if self._ride:
                 self._checkbox("follow heading", True, self._set("turn"))
+
+    def _add(self, name: str, client: Any) -> None:
+        """Add an estimator; what is wrong with it is said on the page."""
+        try:
+            self.add(name)
+        except (ValueError, ImportError) as reason:
+            if client is not None:
+                client.add_notification(f"{name} cannot be shown", str(reason), color="red")
+
+    def add(self, name: str) -> None:
+        """Run another estimator and show it.
+
+        Raises:
+            ValueError: it does not fit to the recording, or says nothing of the attitude.
+            ImportError: the package that it wraps is not installed.
+        """
+        if self._more is None or name == NOTHING or name in self.motion.figures:
+            return
+        subject, motion = self._more((*(label for label in self.motion.figures if label != TRUTH), name))
+        if name not in motion.figures:
+            raise ValueError(f"{name} does not estimate an attitude")
+        with self._lock:
+            self.motion = motion
+            self.options.visible[name] = True
+            self.server.scene.reset()
+            self._draw(subject, motion)
+            chosen = self._choice.value
+            self._choice.options = list(motion.curves) or [NOTHING]
+            self._choice.value = chosen if chosen in motion.curves else self._choice.options[0]
+            with self._shown:
+                self._checkbox(name, True, partial(self._choose, name))
+            self._act(lambda: None)
 
     def _choose(self, label: str, value: bool) -> None:
         self.options.visible[label] = value
@@ -158,12 +206,22 @@ class Viewer:
         self._slider.max = max(self.player.end, self.player.begin + 0.01)
         self._row = -1
 
+    def show(self, time: float) -> None:
+        """Show a time, s, at once."""
+        self.player.seek(time)
+        self._changed.set()
+        self.tick(0.0)
+
     def tick(self, clock: float) -> None:
         """Advance the player and update what has changed.
 
         Args:
             clock: s of a monotonic clock.
         """
+        with self._lock:
+            self._tick(clock)
+
+    def _tick(self, clock: float) -> None:
         before = self.player.playing
         shown = self.player.advance(clock)
         changed = self._changed.is_set()

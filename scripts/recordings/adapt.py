@@ -47,6 +47,7 @@ def run(args: Args) -> int:
     from ...baselines.gain_policy.config import shipped_config
     from ...baselines.gain_policy.constant_gains import best_constant_gains
     from ...baselines.gain_policy.contenders import contenders, rows_of
+    from ...baselines.gain_policy.explained import gains_by_motion
     from ...baselines.gain_policy.policy import GainPolicy
     from ...baselines.weights_io import list_weights
     from ...envs.gain_reward import scored_quantity
@@ -90,6 +91,9 @@ def run(args: Args) -> int:
             )
             title = f"Error of {args.filter} ({quantity.name}) on {len(trajectories)} {group} trajectories, deg"
             out.table(rows_of(errors[group]), title)
+            for name, policy in policies.items():
+                explained = gains_by_motion(tuned.kalman, policy, trajectories)
+                out.table(explained, f"Factors on the variances by {name}, geometric means of {group} seconds")
         folder.write_results(results(errors, sets, quantity))
         out.say(f"errors of every trajectory: {folder.folder / 'results.csv'}")
     return 0

@@ -32,8 +32,8 @@ def run(args: Args) -> int:
     """Describe the motion, find its neighbours, rank."""
     from dataclasses import asdict
 
+    from ...baselines.comparison.recommendation import recommend
     from ...baselines.evaluation import report_findings
-    from ...baselines.recommendation import recommend
     from .load import load_all, plain_warnings, sensors_of
 
     with plain_warnings(), Output("recommend", args) as out:

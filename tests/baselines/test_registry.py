@@ -11,7 +11,7 @@ from poise.filters.core.estimator import Estimator
 
 
 def test_every_entry_tells_what_it_is():
-    listed = poise.list_estimators()
+    listed = poise.list_estimators(experimental=True)
     assert list(dict.fromkeys(info.kind for info in listed.values())) == list(KINDS)
     for name, info in listed.items():
         assert info.name == name
@@ -23,9 +23,9 @@ def test_every_entry_tells_what_it_is():
         assert info.source
 
 
-@pytest.mark.parametrize("name", poise.list_estimators())
+@pytest.mark.parametrize("name", poise.list_estimators(experimental=True))
 def test_every_estimator_is_what_the_list_says(name):
-    info = poise.list_estimators()[name]
+    info = poise.list_estimators(experimental=True)[name]
     if info.kind == "external":
         pytest.importorskip(name.split("-")[0])
     estimator = poise.make_estimator(name, dt=0.02)
@@ -35,6 +35,12 @@ def test_every_estimator_is_what_the_list_says(name):
     assert {quantity.name for quantity in estimator.outputs} == set(info.outputs)
     if "orientation" in info.outputs:
         assert "imu/mag" in info.channels, "nothing else tells the heading"
+
+
+def test_what_loses_to_its_own_filter_is_listed_on_request_only():
+    everything, usual = poise.list_estimators(experimental=True), poise.list_estimators()
+    assert everything["bounded-motion+policy"].experimental
+    assert set(everything) - set(usual) == {name for name, info in everything.items() if info.experimental}
 
 
 def test_unknown_names_list_the_valid_ones():

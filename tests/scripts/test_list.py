@@ -12,7 +12,15 @@ from poise.scripts.main import main
 def test_every_list_is_printed(capsys):
     assert main(["list"]) == 0
     out = capsys.readouterr().out
-    for name in (*LISTS, "bounded-motion+policy", "poise/HandMotion-v0", "xsens-mti-100", "walk", "slalom", "BROAD"):
+    for name in (
+        *LISTS,
+        "external-acceleration+policy",
+        "poise/HandMotion-v0",
+        "xsens-mti-100",
+        "walk",
+        "slalom",
+        "BROAD",
+    ):
         assert name in out
 
 

@@ -123,12 +123,12 @@ GAIN_PRESETS: dict[str, Preset] = {
     ),
     "two-gyro-level+noise": GainPreset(
         "two-gyro-level, its noises and how far level ground is believed set by a recurrent network",
-        rides=replace(RIDES, rides=24, draws=3),
+        rides=replace(RIDES, rides=20, draws=3),
         filter="two-gyro-level",
         units=32,
         limits={"process": NOISE, "measurement": NOISE, "constraint": 100.0},
         noise=0.1,
-        fit=replace(FIT, epochs=8),
+        fit=replace(FIT, epochs=6),
     ),
 }
 """Name of the weights → training."""

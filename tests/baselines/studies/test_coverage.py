@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+from pathlib import Path
 
 import pytest
 
@@ -10,6 +11,8 @@ from poise.baselines.studies import PAPERS, coverage
 from poise.baselines.studies.claims import Claim
 from poise.baselines.studies.coverage import Item, cover, page, read, verdict
 from poise.baselines.studies.report import Report
+
+ROOT = Path(__file__).resolve().parents[3]
 
 
 @pytest.fixture
@@ -80,4 +83,15 @@ def test_items_of_a_paper_are_told_apart(paper):
     assert all(
         isinstance(start, str) for item in module.ITEMS for key in (*item.decided, *item.causes) for start in key
     )
-    assert coverage.TITLE == "Coverage"
+
+
+@pytest.mark.parametrize("paper", PAPERS)
+def test_the_page_has_every_item(paper):
+    text = (ROOT / "docs" / "coverage.md").read_text(encoding="utf-8")
+    (section,) = [part for part in text.split("\n## ") if part.startswith(f"{paper}\n")]
+    rows = [line.split(" | ")[:2] for line in section.splitlines() if line.startswith("| ")][2:]
+    module = importlib.import_module(PAPERS[paper].replace(".study", ".items"), "poise.baselines.studies")
+    assert [tuple(cell.strip("| ") for cell in row) for row in rows] == [
+        (item.label, item.content.replace("|", "\\|")) for item in module.ITEMS
+    ]
+    assert coverage.ABSENT not in section

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import poise
-from poise.baselines.comparison.measures import measures
+from poise.baselines.measures import measures
 from poise.envs.bicycle.environment import RiderBicycleEnv
 from poise.filters.bicycle.force_inertial.consistent import ConsistentForceInertial
 from poise.filters.bicycle.force_inertial.filter import ForceInertial

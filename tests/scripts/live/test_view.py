@@ -7,6 +7,7 @@ import socket
 import subprocess
 import sys
 import urllib.request
+from functools import partial
 from pathlib import Path
 
 import gymnasium
@@ -168,7 +169,7 @@ def viewer(motion):
     from poise.scripts.live.viewer import Viewer
 
     subject, shown = finished(motion, NAMES)
-    made = Viewer(subject, shown, "test", port=0)
+    made = Viewer(subject, shown, "test", port=0, addable=("mahony", "array-rate"), more=partial(finished, motion))
     yield made
     made.close()
 
@@ -192,6 +193,20 @@ def test_the_page_is_served_and_everything_is_put_in_place(viewer):
     moved = viewer.server.scene.get_handle_by_name("/world/bounded-motion").position
     place = viewer.motion.figures["truth"]["device"].position
     np.testing.assert_allclose(moved + place[50], viewer.motion.virtual["bounded-motion"][50] + place[0], atol=1e-9)
+
+
+def test_an_estimator_is_added(viewer, motion):
+    viewer.begin(1.0, "inclination")
+    viewer.add("mahony")
+    viewer.tick(0.0)
+    assert list(viewer.motion.figures) == ["truth", *NAMES, "mahony"]
+    assert [trace.name for trace in viewer._plot.figure.data] == [*NAMES, "mahony"]
+    body = viewer.server.scene.get_handle_by_name("/world/mahony/device")
+    up = poise.filters.core.rotation.up_in_body(np.array(body.wxyz))
+    np.testing.assert_allclose(up, poise.run("mahony", motion).pose["up"][100], atol=1e-6)
+    with pytest.raises(ValueError, match="array/acc"):
+        viewer.add("array-rate")
+    assert "mahony" in viewer.motion.figures
 
 
 def test_an_unknown_place_hides_the_body_only(viewer):
@@ -277,3 +292,22 @@ def test_a_browser_draws_the_page(motion, tmp_path):
     # the device in the middle of the picture is darker than the ground around it
     assert scene[250:450, 350:550].min() < 0.4 < scene[600:, :100].min()
     assert len(np.unique((255 * scene).astype(int).reshape(-1, 3), axis=0)) > 500
+
+
+@pytest.mark.slow
+def test_a_browser_draws_a_film(viewer, tmp_path):
+    pytest.importorskip("playwright")
+    from PIL import Image
+
+    from poise.scripts.live.picture import find_browser, take_film
+
+    if find_browser() is None:
+        pytest.skip("there is no Chromium")
+    viewer.begin(1.0)
+    with pytest.raises(ValueError, match="until must lie after 1 s"):
+        take_film(viewer, tmp_path / "film.webp", 0.5)
+    with Image.open(take_film(viewer, tmp_path / "film.webp", 1.25, (320, 240))) as film:
+        assert (film.size, film.n_frames) == ((320, 240), 4)
+        first = np.asarray(film.convert("RGB"), float)
+        film.seek(3)
+        assert np.abs(np.asarray(film.convert("RGB"), float) - first).max() > 50.0

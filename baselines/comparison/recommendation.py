@@ -15,15 +15,15 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 
-from ..envs.data.plausibility import vectors
-from ..envs.data.trajectory import Trajectory
-from .comparison.data_sets import NORTH, dataset_of
-from .registry import list_estimators
+from ...envs.data.plausibility import vectors
+from ...envs.data.trajectory import Trajectory
+from ..registry import list_estimators
+from .data_sets import NORTH, dataset_of
 
 if TYPE_CHECKING:
     import pandas
 
-RESULTS = Path(__file__).parent / "weights" / "benchmark.json"
+RESULTS = Path(__file__).parents[1] / "weights" / "benchmark.json"
 """Errors of the shipped benchmark."""
 Mounting = Literal["worn", "hand-held", "vehicle", "bicycle"]
 MOUNTINGS: dict[str, Mounting] = {
@@ -212,7 +212,7 @@ def rank_of(name: str, near: Sequence[Mapping[str, Any]], fed: Collection[str]) 
 
 def notes_on(trajectory: Trajectory, motion: Motion, near: Sequence[Mapping[str, Any]]) -> list[str]:
     """Conditions of this recording under which the measured errors may not hold."""
-    from ..envs.data.inspection import inspect_recording
+    from ...envs.data.inspection import inspect_recording
 
     notes = []
     away = min(motion.distance(Motion(**one["motion"])) for one in near)

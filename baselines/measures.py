@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from ...envs.data.trajectory import Trajectory
-from ...filters.core import rotation
-from ...filters.core.consistency import nees
-from ...filters.core.estimator import Estimator
-from ...filters.core.metrics import metrics_of
-from ...filters.core.quantity import RELATIVE_ORIENTATION, UP, Estimate, Quantity
-from ..scoring import Row, with_derived_truth, with_up
+from ..envs.data.trajectory import Trajectory
+from ..filters.core import rotation
+from ..filters.core.consistency import nees
+from ..filters.core.estimator import Estimator
+from ..filters.core.metrics import metrics_of
+from ..filters.core.quantity import RELATIVE_ORIENTATION, UP, Estimate, Quantity
+from .scoring import Row, with_derived_truth, with_up
 
 WINDOW = 1.0
 """s: the RMS error of this long decides whether an estimate has settled."""

@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import poise
-from poise.baselines.comparison.measures import error_vector, measures, of_error, settling
+from poise.baselines.measures import error_vector, measures, of_error, settling
 from poise.filters.core import rotation
 from poise.filters.core.quantity import ORIENTATION, RELATIVE_ORIENTATION, UP, Estimate, Layout, Quantity
 

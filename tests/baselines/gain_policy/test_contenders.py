@@ -1,0 +1,73 @@
+"""All that may set gains, on the same trajectories: what is equal by definition is equal, bounds are bounds."""
+
+import numpy as np
+import pytest
+
+from poise.baselines.gain_policy.constant_gains import constant_errors
+from poise.baselines.gain_policy.contenders import REFERENCE, contenders, improvement, rows_of
+from poise.baselines.gain_policy.explained import gains_by_motion
+from poise.baselines.gain_policy.oracles import schedule_error, windowed_oracle
+from poise.baselines.gain_policy.policy import GainPolicy
+from poise.envs.hand.trajectories import HandTrajectories
+from poise.filters.adaptation.gains import tunable_filter
+from poise.filters.adaptation.tuned import TunedFilter
+
+TUNED = TunedFilter.of(tunable_filter("external-acceleration"), ("process", "measurement"))
+
+
+@pytest.fixture(scope="module")
+def motions():
+    return HandTrajectories(duration=3.0).draw_many(4, 3)
+
+
+@pytest.fixture(scope="module")
+def found(motions):
+    policies = {"policy": GainPolicy.neutral(TUNED)}
+    constant = np.array([0.3, 0.4])
+    return contenders(TUNED, motions, constant, policies=policies, twins=motions, leave_out=True, points=2)
+
+
+def test_contenders_are_measured_alike(found, motions):
+    np.testing.assert_allclose(found["policy"], found["published"], rtol=1e-9)
+    np.testing.assert_allclose(found[REFERENCE], constant_errors(TUNED, motions, np.array([0.3, 0.4])))
+    assert {"random gains", "innovation-adaptive", "rule: acceleration", "multiple model"} <= set(found)
+    assert all(errors.shape == (3,) and np.isfinite(errors).all() for errors in found.values())
+
+
+def test_bounds_are_bounds(found):
+    hindsight = found["hindsight constant (knows the truth)"]
+    for name in ("published", REFERENCE, "best constant of the other trajectories"):
+        assert (hindsight <= found[name] + 1e-12).all()
+    # on the same errors, the oracle of another draw is the oracle itself
+    oracle = found["oracle of windows (knows the truth)"]
+    np.testing.assert_array_equal(found["oracle of another draw (knows the truth)"], oracle)
+
+
+def test_the_oracle_of_one_window_is_the_best_constant(motions):
+    actions = np.array([[0.0, 0.0], [-0.5, 0.5], [0.5, -0.5]])
+    schedule = windowed_oracle(TUNED, motions[0], actions, window=10.0)
+    assert (schedule == schedule[0]).all()
+    errors = [schedule_error(TUNED, motions[0], action) for action in actions]
+    assert schedule_error(TUNED, motions[0], schedule) == pytest.approx(min(errors), rel=1e-9)
+
+
+def test_what_is_saved_has_an_interval():
+    reference = np.array([1.0, 2.0, 3.0, 4.0])
+    interval = improvement(0.75 * reference, reference)
+    assert interval == pytest.approx((0.25, 0.25, 0.25))
+    worse = improvement(reference[::-1], reference)
+    assert worse.low < 0.0 < worse.high
+    rows = rows_of({REFERENCE: reference, "other": 0.5 * reference})
+    assert rows[0]["saved"] == "0 % (0 to 0)"
+    assert rows[1]["saved"] == "50 % (50 to 50)"
+
+
+def test_a_policy_is_explained_by_its_factors(motions):
+    constant = GainPolicy.constant(TUNED, np.array([0.0, 1.0]))
+    rows = gains_by_motion(TUNED.kalman, constant, motions)
+    assert {row["gain"] for row in rows} == {"process", "measurement"}
+    largest = np.exp(TUNED.ranges[1].upper)
+    for row in rows:
+        wanted = largest if row["gain"] == "measurement" else 1.0
+        assert row["factor here"] == pytest.approx(wanted)
+        assert row["of the lowest fifth"] <= row["of the highest fifth"]
