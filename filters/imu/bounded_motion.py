@@ -187,8 +187,8 @@ class BoundedMotion(Model):
         """The delay of the accelerometer by :func:`.relative_delay`, unless one was given."""
         if self.accelerometer_lag != 0.0:
             return self
-        found = [np.asarray(nis(replace(self, accelerometer_lag=lag))) for lag in (-STEP, 0.0, STEP)]
-        return replace(self, accelerometer_lag=relative_delay(*found, dt=self.dt))
+        before, now, after = (np.asarray(nis(replace(self, accelerometer_lag=lag))) for lag in (-STEP, 0.0, STEP))
+        return replace(self, accelerometer_lag=relative_delay(before, now, after, self.dt))
 
     def _external(self, q: Array, f: Array) -> Array:
         return f - expand(self.gravity, 1) * up_in_body(q)

@@ -109,9 +109,9 @@ def test_weights_and_card_give_the_same_estimator_at_another_rate(tmp_path):
 
 
 def test_options_of_a_filter_are_described():
-    kalman = make("two-gyro", model="sigma1", constraint=True, constraint_noise=0.1)
+    kalman = make("two-gyro", model="sigma1", roll_prior=0.1)
     described = described_filter(kalman)
-    assert described["parameters"] == {"model": "sigma1", "constraint": True, "constraint_noise": 0.1}
+    assert described == {"name": "two-gyro", "shares": False, "parameters": {"model": "sigma1", "roll_prior": 0.1}}
     assert filter_of(described, 0.01).model == replace(kalman.model, dt=0.01)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -130,3 +131,17 @@ def test_the_quick_form_of_a_preset_learns_visibly(name, tmp_path):
     assert np.mean(np.log(errors["trained"])) < np.mean(np.log(errors["plain"]))
     again = GainFilter.load(made.save(tmp_path / "weights"))
     assert again.front_end.describe() == made.front_end.describe()
+
+
+def test_angles_are_scored_with_their_own_variances():
+    head = GainHead(make("two-gyro-level"), ("constraint",), (1.0,))
+    assert [quantity.size for quantity in head.outputs] == [1, 3]
+    rng = np.random.default_rng(0)
+    angles, truth = (torch.from_numpy(rng.uniform(-3.0, 3.0, (5, 4))) for _ in range(2))
+    variances = torch.arange(1.0, 11.0, dtype=torch.float64)
+    pose = {head.outputs[0].name: angles[:, None, :1], head.outputs[1].name: angles[:, None, 1:]}
+    found = SimpleNamespace(pose=pose, covariance=torch.diag(variances).expand(5, 1, 10, 10))
+    error, variance = head._scored(found, truth)
+    np.testing.assert_allclose(torch.cos(error), torch.cos(angles - truth), atol=1e-12)
+    assert error.abs().max() <= math.pi
+    np.testing.assert_array_equal(variance, np.tile([1.0, 2.0, 3.0, 4.0], (5, 1)))
