@@ -99,7 +99,7 @@ class ExternalAcceleration(Model):
     gains: ClassVar = {
         "process": Gain("gyroscope_noise", description="process variance σ_G²"),
         "measurement": Gain("accelerometer_noise", description="measurement variance σ_A²"),
-        "c_a": Gain("c_a", 1.0, 1.0, "constant of the acceleration model", (SMALLEST_C_A, LARGEST_C_A)),
+        "c_a": Gain("c_a", 1.0, 1.0, "constant of the acceleration model", (SMALLEST_C_A, LARGEST_C_A), False),
     }
 
     held_inputs: ClassVar = (HeldInput("imu/gyr", "gyroscope_noise", power=2),)
