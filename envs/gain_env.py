@@ -34,7 +34,7 @@ class GainTuningEnv(DrawnEnv):
             gyroscope. It is configured with the rider and bicycle, or the device,
             in the metadata of the trajectory.
         gains: names of the gains to be tuned, in the order of the action; None for those that suit exploration
-            (:func:`poise.filters.adaptation.gains.acted_gains`): all but ``c_a``.
+            (:func:`poise.filters.adaptation.gains.acted_gains`).
         quantity: output of the filter whose error counts, or several, whose root mean square does; None for ``up``,
             or the filter's first output.
         interval: time from decision to decision, s, rounded to samples.

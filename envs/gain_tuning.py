@@ -38,11 +38,12 @@ class HandMotionGainEnv(GainTuningEnv):
 
     | filter | gains (constant that is scaled) |
     |---|---|
-    | ``external-acceleration`` | ``process`` (σ_G), ``measurement`` (σ_A); where named, ``c_a`` (10⁻³ to 0.5) |
+    | ``external-acceleration`` | ``measurement`` (σ_A); where named, ``process`` (σ_G), ``c_a`` (10⁻³ to 0.5) |
     | ``bounded-motion`` | ``process`` (σ_g), ``bias`` (σ_b), ``velocity`` (σ_V) |
 
-    c_a is never so large that a gyroscope error of 1 °/s could lock the filter out (:mod:`.gains`), and is not acted on
-    unless ``gains`` names it: almost every change of it does harm. The gains follow the actions with the time constant
+    c_a is never so large that a gyroscope error of 1 °/s could lock the filter out (:mod:`.gains`). It is acted on only
+    where ``gains`` names it, since almost every change of it does harm, and so is σ_G, since the ratio to σ_A is what
+    counts. The gains follow the actions with the time constant
     ``smoothing``, so that noise of unit variance in single decisions changes them by a few tenths of a decade only.
 
     ## Observation space
@@ -85,8 +86,8 @@ class HandMotionGainEnv(GainTuningEnv):
 
     ## Version history
 
-    v0: first release. Before it, the default motions were ``mixed``, the reward was ``error``, ``c_a`` was acted on and
-    the gains followed the actions at once: agents with the exploration that libraries have by default then did worse
+    v0: first release. Before it, the default motions were ``mixed``, the reward was ``error``, all gains were acted
+    on and they followed the actions at once: agents with the exploration that libraries have by default then did worse
     than the published gains.
     """
 
@@ -161,7 +162,7 @@ class ReplayGainEnv(GainTuningEnv):
 
     ## Version history
 
-    v0: first release. Before it, the reward was ``error``, ``c_a`` was acted on and the gains followed the actions at
+    v0: first release. Before it, the reward was ``error``, all gains were acted on and they followed the actions at
     once by default.
     """
 

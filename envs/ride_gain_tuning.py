@@ -44,7 +44,7 @@ class RiderBicycleGainEnv(GainTuningEnv):
 
     | filter | gains (constant that is scaled) |
     |---|---|
-    | ``external-acceleration`` | ``process`` (σ_G), ``measurement`` (σ_A); where named, ``c_a`` |
+    | ``external-acceleration`` | ``measurement`` (σ_A); where named, ``process`` (σ_G), ``c_a`` |
     | ``bounded-motion`` | ``process`` (σ_g), ``bias`` (σ_b), ``velocity`` (σ_V) |
     | ``two-gyro``, ``force-inertial``, ``whole-body``, ``odometry-aided`` … | ``env.unwrapped.tuned.kalman.gains`` |
 
@@ -110,7 +110,7 @@ class RiderBicycleGainEnv(GainTuningEnv):
 
     ## Version History
 
-    * v0: first release. Before it, the reward was ``error``, ``c_a`` was acted on and the gains followed the actions at
+    * v0: first release. Before it, the reward was ``error``, all gains were acted on and they followed the actions at
       once by default.
     """
 

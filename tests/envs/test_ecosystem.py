@@ -52,7 +52,7 @@ def test_checkers_and_pickles(identity, options):
         # an unbounded part of an observation, for critics only, is what the first checker warns of
         warnings.filterwarnings("ignore", message=".*A Box observation space m")
         # angles are in radians
-        warnings.filterwarnings("ignore", message=".*For Box action spaces, we recommend")
+        warnings.filterwarnings("ignore", message=".*(For Box action spaces, we|We) recommend")
         check_env(env.unwrapped, skip_render_check=True)
         check_env_sb3(env.unwrapped, warn=True)
     env.reset(seed=3)
