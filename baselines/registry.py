@@ -74,7 +74,7 @@ TRAINED: dict[str, Entry] = {
             "learned",
             {"weights": f"{name}_network"},
         )
-        for name in ("two-gyro", "whole-body")
+        for name in ("two-gyro", "force-inertial", "whole-body")
     },
     **{
         f"{name}+noise": Entry(

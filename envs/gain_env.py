@@ -11,7 +11,7 @@ from typing import Any, ClassVar
 import numpy as np
 from gymnasium import spaces
 
-from ..filters.adaptation.gains import gain_sizes, tunable_filter
+from ..filters.adaptation.gains import acted_gains, gain_sizes, tunable_filter
 from ..filters.adaptation.named_features import features_of
 from ..filters.adaptation.tuned import TunedFilter
 from ..filters.core.kalman import KalmanFilter
@@ -33,7 +33,8 @@ class GainTuningEnv(DrawnEnv):
         filter: name of a Kalman filter with gains (:func:`poise.list_estimators`), or such a filter; it must read a
             gyroscope. It is configured with the rider and bicycle, or the device,
             in the metadata of the trajectory.
-        gains: names of the gains to be tuned, in the order of the action; None for all.
+        gains: names of the gains to be tuned, in the order of the action; None for those that suit exploration
+            (:func:`poise.filters.adaptation.gains.acted_gains`).
         quantity: output of the filter whose error counts, or several, whose root mean square does; None for ``up``,
             or the filter's first output.
         interval: time from decision to decision, s, rounded to samples.
@@ -63,20 +64,20 @@ class GainTuningEnv(DrawnEnv):
         gains: Sequence[str] | None = None,
         quantity: str | Sequence[str] | None = None,
         interval: float = 0.1,
-        reward: RewardKind = "error",
+        reward: RewardKind = "relative",
         consistency: float = 0.0,
         reference: Sequence[float] | None = None,
         error_scale: float = 5.0,
-        smoothing: float = 0.0,
+        smoothing: float = 1.0,
         privileged: bool = False,
         render_mode: str | None = None,
     ) -> None:
         self.reward = GainReward(reward, float(consistency), math.radians(error_scale))
         super().__init__(render_mode, 1.0 / interval if interval > 0.0 else 1.0)
-        names = None if gains is None else tuple(gains)
         if not 0.0 <= smoothing < math.inf:
             raise ValueError(f"smoothing must be 0 or more seconds, got {smoothing}")
         kalman = tunable_filter(filter)
+        names = acted_gains(kalman) if gains is None else tuple(gains)
         self.tuned = TunedFilter.of(kalman, names, features_of(kalman, interval), float(smoothing))
         self._published = self.tuned.kalman
         self.quantities = scored_quantities(self.tuned.kalman, quantity)

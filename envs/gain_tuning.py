@@ -38,10 +38,13 @@ class HandMotionGainEnv(GainTuningEnv):
 
     | filter | gains (constant that is scaled) |
     |---|---|
-    | ``external-acceleration`` | ``process`` (σ_G), ``measurement`` (σ_A), ``c_a`` (10⁻³ to 0.5) |
+    | ``external-acceleration`` | ``measurement`` (σ_A); where named, ``process`` (σ_G), ``c_a`` (10⁻³ to 0.5) |
     | ``bounded-motion`` | ``process`` (σ_g), ``bias`` (σ_b), ``velocity`` (σ_V) |
 
-    c_a is never so large that a gyroscope error of 1 °/s could lock the filter out (:mod:`.gains`).
+    c_a is never so large that a gyroscope error of 1 °/s could lock the filter out (:mod:`.gains`). It is acted on only
+    where ``gains`` names it, since almost every change of it does harm, and so is σ_G, since the ratio to σ_A is what
+    counts. The gains follow the actions with the time constant
+    ``smoothing``, so that noise of unit variance in single decisions changes them by a few tenths of a decade only.
 
     ## Observation space
 
@@ -53,6 +56,7 @@ class HandMotionGainEnv(GainTuningEnv):
 
     ## Reward
 
+    ``relative`` (the default) and ``improvement`` are zero with the ``reference`` gains, which run beside the agent's.
     ``error``: minus the mean error of ``quantity`` over the interval, rad (:func:`poise.filters.core.metrics.error`).
     ``improvement``: that of the ``reference`` gains, run beside it, minus the agent's: the same optimal policy with far
     less variance. ``relative``: the same of s ln(1 + e / s) with s = ``error_scale``, divided by its mean over the
@@ -82,7 +86,9 @@ class HandMotionGainEnv(GainTuningEnv):
 
     ## Version history
 
-    v0: first release.
+    v0: first release. Before it, the default motions were ``mixed``, the reward was ``error``, all gains were acted
+    on and they followed the actions at once: agents with the exploration that libraries have by default then did worse
+    than the published gains.
     """
 
     @renamed(grade="noise_scale")
@@ -90,7 +96,7 @@ class HandMotionGainEnv(GainTuningEnv):
         self,
         filter: str | KalmanFilter = "external-acceleration",
         *,
-        gesture: str | GestureConfig | Sequence[str | GestureConfig] = "mixed",
+        gesture: str | GestureConfig | Sequence[str | GestureConfig] = "hand-held",
         rate: float | Sequence[float] = 100.0,
         sensors: str | SensorPreset | Sequence[str | SensorPreset] = "xsens-mtw-awinda",
         noise_scale: float | tuple[float, float] = 1.0,
@@ -156,7 +162,8 @@ class ReplayGainEnv(GainTuningEnv):
 
     ## Version history
 
-    v0: first release.
+    v0: first release. Before it, the reward was ``error``, all gains were acted on and they followed the actions at
+    once by default.
     """
 
     def __init__(

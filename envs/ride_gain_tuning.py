@@ -44,7 +44,7 @@ class RiderBicycleGainEnv(GainTuningEnv):
 
     | filter | gains (constant that is scaled) |
     |---|---|
-    | ``external-acceleration`` | ``process`` (σ_G), ``measurement`` (σ_A), ``c_a`` |
+    | ``external-acceleration`` | ``measurement`` (σ_A); where named, ``process`` (σ_G), ``c_a`` |
     | ``bounded-motion`` | ``process`` (σ_g), ``bias`` (σ_b), ``velocity`` (σ_V) |
     | ``two-gyro``, ``force-inertial``, ``whole-body``, ``odometry-aided`` … | ``env.unwrapped.tuned.kalman.gains`` |
 
@@ -102,7 +102,7 @@ class RiderBicycleGainEnv(GainTuningEnv):
         sampling: ``interval`` or ``instant``.
         rides: number of different rides, each as likely as any other; None for a new one in every episode.
         rides_seed: root seed of these rides; evaluate with another one than in training.
-        common: ``gains``, ``quantity``, ``interval`` (s), ``reward``, ``consistency`` of
+        common: ``gains``, ``quantity``, ``interval`` (s), ``reward``, ``consistency``, ``smoothing`` (s) of
             :class:`poise.envs.gain_env.GainTuningEnv`, and ``render_mode``.
 
     Raises:
@@ -110,7 +110,8 @@ class RiderBicycleGainEnv(GainTuningEnv):
 
     ## Version History
 
-    * v0: first release.
+    * v0: first release. Before it, the reward was ``error``, all gains were acted on and they followed the actions at
+      once by default.
     """
 
     _episode_fields = (*GainTuningEnv._episode_fields, "_ridden", "_present")

@@ -85,6 +85,8 @@ def reference_scores(identity: str, count: int = EPISODES, points: int = POINTS,
         points: constant actions of the search and of the oracle.
         seed: root seed.
     """
+    from scipy.signal import lfilter
+
     env: Any = make_environment(identity).unwrapped
     tuned, quantity = env.tuned, env.quantities[0].name
     train, test = (episodes_of(identity, split, count, seed) for split in (0, 1))
@@ -96,6 +98,9 @@ def reference_scores(identity: str, count: int = EPISODES, points: int = POINTS,
         kalman = filter_for(tuned.kalman, trajectory)
         interval = tuned.features.interval_samples(trajectory.dt)
         actions = rng.uniform(-1.0, 1.0, (len(trajectory) // interval + 1, tuned.actions))
+        if tuned.smoothing:
+            share = -np.expm1(-interval * trajectory.dt / tuned.smoothing)
+            actions = lfilter([share], [1.0, share - 1.0], actions, axis=0)
         gains = tuned.gains(np.repeat(actions, interval, axis=0)[: len(trajectory)])
         pose = kalman.run(trajectory.measurements, gains).pose
         errors = errors_of(env.quantities, pose, true_values(trajectory, env.quantities[0], kalman))

@@ -66,6 +66,11 @@ def filter_name(filter: KalmanFilter) -> str:
     return name_of(filter.model) or type(filter.model).__name__
 
 
+def acted_gains(kalman: KalmanFilter) -> tuple[str, ...]:
+    """The gains that an agent sets unless they are named."""
+    return tuple(name for name, gain in kalman.model.gains.items() if gain.acted)
+
+
 def gain_ranges(kalman: KalmanFilter, gains: Sequence[str] | None = None) -> tuple[GainRange, ...]:
     """Ranges of the gains that may be chosen.
 

@@ -34,6 +34,8 @@ class Gain:
         bounds: smallest and largest value of the scaled field that a gain policy may choose; None for a range of powers
             of ten (:data:`poise.filters.adaptation.gains.DECADES`).
         description: what the gain does, in one line.
+        acted: whether an agent sets it unless the gains are named. False where another gain does the same, or where
+            almost every change does harm, so that the noise of exploration costs more than the gain can bring.
     """
 
     parameter: str
@@ -41,6 +43,7 @@ class Gain:
     maximum: float = math.inf
     description: str = ""
     bounds: tuple[float, float] | None = None
+    acted: bool = True
 
 
 @dataclass(frozen=True)

@@ -97,9 +97,9 @@ class ExternalAcceleration(Model):
     error_parts: ClassVar = {"up": (0, 3)}
     residual_size: ClassVar = 3
     gains: ClassVar = {
-        "process": Gain("gyroscope_noise", description="process variance σ_G²"),
+        "process": Gain("gyroscope_noise", description="process variance σ_G²", acted=False),
         "measurement": Gain("accelerometer_noise", description="measurement variance σ_A²"),
-        "c_a": Gain("c_a", 1.0, 1.0, "constant of the acceleration model", (SMALLEST_C_A, LARGEST_C_A)),
+        "c_a": Gain("c_a", 1.0, 1.0, "constant of the acceleration model", (SMALLEST_C_A, LARGEST_C_A), acted=False),
     }
 
     held_inputs: ClassVar = (HeldInput("imu/gyr", "gyroscope_noise", power=2),)

@@ -71,20 +71,32 @@ def test_reward_is_minus_the_error_or_the_improvement(name, trajectory):
     def choose(observation):
         return np.array([0.5, -0.5, 0.2], np.float32)
 
-    errors, infos = play(ReplayGainEnv(trajectory, name), choose)
+    gains = tuple(tunable_filter(name).gains)
+    errors, infos = play(ReplayGainEnv(trajectory, name, gains=gains, reward="error"), choose)
     np.testing.assert_allclose(errors, [-np.radians(info["error_deg"]) for info in infos[1:]], rtol=1e-12)
-    published, _ = play(ReplayGainEnv(trajectory, name), lambda observation: np.zeros(3, np.float32))
-    better, _ = play(ReplayGainEnv(trajectory, name, reward="improvement"), choose)
+    neutral = np.zeros(3, np.float32)
+    published, _ = play(ReplayGainEnv(trajectory, name, gains=gains, reward="error"), lambda observation: neutral)
+    better, _ = play(ReplayGainEnv(trajectory, name, gains=gains, reward="improvement"), choose)
     np.testing.assert_allclose(better, np.subtract(errors, published), atol=1e-12)
-    nothing, _ = play(
-        ReplayGainEnv(trajectory, name, reward="improvement"), lambda observation: np.zeros(3, np.float32)
-    )
-    assert not np.any(nothing)
+    for reward in ("improvement", "relative"):
+        nothing, _ = play(ReplayGainEnv(trajectory, name, gains=gains, reward=reward), lambda observation: neutral)
+        assert not np.any(nothing)
+
+
+def test_by_default_an_agent_sets_what_suits_exploration_and_the_gains_follow(trajectory):
+    env = ReplayGainEnv(trajectory)
+    assert [part.gain for part in env.tuned.ranges] == ["measurement"]
+    assert env.reward.kind == "relative"
+    env.reset(seed=0)
+    *_, info = env.step(np.array([1.0]))
+    share = -np.expm1(-0.1 / 1.0)
+    published = env.tuned.kalman.model.accelerometer_noise
+    assert info["gains"]["measurement"] == pytest.approx(published * 10.0 ** (0.5 * DECADES * share))
 
 
 def test_consistency_costs(trajectory):
-    plain, _ = play(ReplayGainEnv(trajectory), lambda observation: np.zeros(3))
-    strict, _ = play(ReplayGainEnv(trajectory, consistency=0.1), lambda observation: np.zeros(3))
+    plain, _ = play(ReplayGainEnv(trajectory), lambda observation: np.zeros(1))
+    strict, _ = play(ReplayGainEnv(trajectory, consistency=0.1), lambda observation: np.zeros(1))
     assert np.all(np.array(strict) <= np.array(plain))
     assert np.mean(strict) < np.mean(plain)
 
@@ -94,7 +106,7 @@ def test_unscored_and_unknown_ticks_do_not_count(trajectory):
     mask[:300] = False
     truth = {"up": trajectory.truth_of("up").copy()}
     truth["up"][300:] = np.nan
-    rewards, infos = play(ReplayGainEnv(trajectory.replace(mask=mask, truth=truth)), lambda observation: np.ones(3))
+    rewards, infos = play(ReplayGainEnv(trajectory.replace(mask=mask, truth=truth)), lambda observation: np.ones(1))
     assert rewards == [0.0] * len(rewards)
     assert np.isnan([info["error_deg"] for info in infos]).all()
 
@@ -105,7 +117,7 @@ def test_the_agent_sees_nothing_of_the_truth(trajectory):
     for item in (trajectory, other):
         env = ReplayGainEnv(item)
         observations = [env.reset()[0]]
-        observations += [env.step(np.array([0.1, 0.2, 0.3]))[0] for _ in range(20)]
+        observations += [env.step(np.array([0.1]))[0] for _ in range(20)]
         seen.append(observations)
     np.testing.assert_array_equal(seen[0], seen[1])
 
@@ -113,7 +125,7 @@ def test_the_agent_sees_nothing_of_the_truth(trajectory):
 def test_the_interval_is_kept_at_any_rate():
     for rate, ticks in ((50.0, 5), (100.0, 10), (286.0, 29)):
         env = HandMotionGainEnv(rate=rate, duration=2.0)
-        _, infos = play(env, lambda observation: np.zeros(3))
+        _, infos = play(env, lambda observation: np.zeros(1))
         assert env.tuned.interval_samples == ticks
         assert np.allclose(np.diff([info["time"] for info in infos[1:]]), ticks / rate)
     assert TunedFilter.of(tunable_filter("bounded-motion"), None, InnovationFeatures(1e-3)).interval_samples == 1
@@ -139,7 +151,7 @@ def test_the_dynamic_drive_is_nearly_the_same_motion():
     # an arm lags and trembles by tenths of a degree
     assert 0.01 < np.degrees(np.max(direction_error(kinematic.truth_of("up"), dynamic.truth_of("up")))) < 2.0
     env = HandMotionGainEnv(duration=1.0, drive="dynamic")
-    play(env, lambda observation: np.zeros(3))
+    play(env, lambda observation: np.zeros(1))
 
 
 def test_replay_draws_parts_of_several_trajectories():
@@ -156,7 +168,7 @@ def test_replay_draws_parts_of_several_trajectories():
 
 def test_recordings_are_read_from_files(tmp_path, trajectory):
     path = trajectory.save(tmp_path / "one.h5")
-    rewards, _ = play(gym.make("poise/ReplayGain-v0", trajectory=path), lambda observation: np.zeros(3, np.float32))
+    rewards, _ = play(gym.make("poise/ReplayGain-v0", trajectory=path), lambda observation: np.zeros(1, np.float32))
     assert len(rewards) == len(trajectory) // 10
 
 
@@ -188,7 +200,7 @@ def test_wrong_arguments_are_explained(arguments, words):
 
 
 def test_wrong_calls_are_explained(trajectory):
-    env = ReplayGainEnv(trajectory)
+    env = ReplayGainEnv(trajectory, gains=("process", "measurement", "c_a"))
     with pytest.raises(RuntimeError, match="call reset first"):
         env.step(np.zeros(3))
     env.reset()
@@ -282,7 +294,7 @@ def test_features_do_not_depend_on_the_mounting(name):
 
 def test_features_tell_rest_from_motion_and_have_names():
     names = InnovationFeatures().names
-    tuned = TunedFilter.of(tunable_filter("external-acceleration"))
+    tuned = TunedFilter.of(tunable_filter("external-acceleration"), ("measurement",))
     assert len(names) + tuned.actions == tuned.observation_size == HandMotionGainEnv().observation_space.shape[0]
     last = {}
     for gesture in ("rest", "fast"):
@@ -296,7 +308,9 @@ def test_features_tell_rest_from_motion_and_have_names():
 
 
 def test_a_filter_of_ones_own_can_be_tuned():
-    env = HandMotionGainEnv(KalmanFilter(BoundedMotion(velocity_bound=2.0)), gains=("velocity",), duration=2.0)
+    env = HandMotionGainEnv(
+        KalmanFilter(BoundedMotion(velocity_bound=2.0)), gains=("velocity",), duration=2.0, smoothing=0.0
+    )
     _, infos = play(env, lambda observation: np.ones(1))
     assert infos[-1]["gains"] == {"velocity": pytest.approx(2.0 * 10.0 ** (DECADES / 2.0))}
 
@@ -306,7 +320,7 @@ def test_samples_that_are_missing_do_no_harm(trajectory):
     holes["imu/acc"][100:160] = np.nan
     holes["imu/gyr"][::7] = np.nan
     holes["imu/acc"][:5] = np.nan
-    rewards, infos = play(ReplayGainEnv(trajectory.replace(measurements=holes)), lambda observation: np.ones(3))
+    rewards, infos = play(ReplayGainEnv(trajectory.replace(measurements=holes)), lambda observation: np.ones(1))
     assert np.isfinite(rewards).all()
     assert np.isfinite(infos[-1]["error_deg"])
 

@@ -27,7 +27,7 @@ def rewards_of(env, seed=0):
 @pytest.mark.parametrize("site", SITES)
 @pytest.mark.parametrize("name", ["external-acceleration", "bounded-motion"])
 def test_it_tunes_named_filters_at_both_sites(site, name):
-    env = gym.make("poise/RiderBicycleGain-v0", filter=name, site=site, duration=1.0)
+    env = gym.make("poise/RiderBicycleGain-v0", filter=name, site=site, duration=1.0, reward="error")
     rewards, info = rewards_of(env)
     assert len(rewards) == 10
     assert np.isfinite(rewards).all()

@@ -17,7 +17,7 @@ SHORT = {"duration": 1.0, "gesture": ("slow", "fast")}
 CASES = {
     "two rates": (HAND, {**SHORT, "rate": (50.0, 100.0), "consistency": 0.1}),
     "relative": (HAND, {**SHORT, "filter": "bounded-motion", "reward": "relative", "motions": 3}),
-    "privileged": (HAND, {**SHORT, "reference": (0.1, 0.2, -0.3), "privileged": True, "reward": "improvement"}),
+    "privileged": (HAND, {**SHORT, "reference": (0.1,), "privileged": True, "reward": "improvement"}),
     "two angles": (HAND, {**SHORT, "filter": "bounded-motion", "quantity": ("up", "relative_orientation")}),
     "recordings": (PARTS, {"duration": 1.0}),
     "replay": (REPLAY, {"duration": 0.15, "random_start": True}),
@@ -92,13 +92,13 @@ def test_rows_are_reset_one_by_one():
     env.reset(seed=0)
     played(env, 10)
     with pytest.raises(RuntimeError, match=r"rows \[0, 1, 2\] are over"):
-        env.step(np.zeros((3, 3)))
+        env.step(np.zeros((3, 1)))
     mask = np.array([True, False, True])
     _, info = env.reset(seed=[7, None, 8], options={"reset_mask": mask})
     np.testing.assert_array_equal(info["_time"], mask)
     assert info["time"][1] == 0.0
     env.reset(options={"reset_mask": ~mask})
-    np.testing.assert_array_equal(env.step(np.zeros((3, 3)))[4]["time"], [0.09, 0.09, 0.09])
+    np.testing.assert_array_equal(env.step(np.zeros((3, 1)))[4]["time"], [0.09, 0.09, 0.09])
 
 
 def test_equal_seeds_repeat_and_others_do_not():
@@ -153,7 +153,7 @@ def test_filters_that_are_not_compiled_give_the_same_numbers():
     [
         ({"autoreset_mode": "Never"}, "autoreset_mode must be one of"),
         ({"render_mode": "rgb_array"}, "to draw, use vectorization_mode='sync'"),
-        ({"reference": (2.0, 0.0, 0.0)}, r"reference must hold 3 numbers in \[-1, 1\]"),
+        ({"reference": (2.0,)}, r"reference must hold 1 numbers in \[-1, 1\]"),
         ({"motions": 0}, "motions must be None or at least 1"),
         ({"reward": "best"}, "reward must be one of"),
         ({"error_scale": 0.0}, "error_scale must be positive"),
@@ -168,7 +168,7 @@ def test_wrong_arguments_are_explained(options, words):
 def test_wrong_calls_are_explained():
     env = native(HAND, **SHORT)
     with pytest.raises(RuntimeError, match="call reset first"):
-        env.step(np.zeros((3, 3)))
+        env.step(np.zeros((3, 1)))
     with pytest.raises(ValueError, match="one number or 3 of them, got 2"):
         env.reset(seed=[1, 2])
     with pytest.raises(ValueError, match="every row at the first reset"):
@@ -176,7 +176,7 @@ def test_wrong_calls_are_explained():
     with pytest.raises(ValueError, match="unknown reset options"):
         env.reset(options={"speed": 3})
     env.reset()
-    with pytest.raises(ValueError, match=r"shape \(3, 3\), got \(3,\)"):
+    with pytest.raises(ValueError, match=r"shape \(3, 1\), got \(3,\)"):
         env.step(np.zeros(3))
     with pytest.raises(ValueError, match=r"those of the rows \[1\] are not"):
-        env.step(np.array([[0.0] * 3, [np.nan, 0.0, 0.0], [0.0] * 3]))
+        env.step(np.array([[0.0], [np.nan], [0.0]]))

@@ -98,11 +98,14 @@ def test_a_batch_is_its_sequences(name, measurements):
             np.testing.assert_allclose(together.pose[output][:, 0, index], values, atol=1e-10)
 
 
+@pytest.mark.parametrize("smoothing", [0.0, 0.7])
 @pytest.mark.parametrize("name", FILTERS)
-def test_environment_and_estimator_are_the_same_thing(name):
+def test_environment_and_estimator_are_the_same_thing(name, smoothing):
     trajectory = HandTrajectories(duration=5.0).draw_many(8, 1)[0]
     estimator = adaptive(name)
-    env = ReplayGainEnv(trajectory, name)
+    estimator = replace(estimator, policy=replace(estimator.policy, smoothing=smoothing))
+    gains = [part.gain for part in estimator.policy.ranges]
+    env = ReplayGainEnv(trajectory, name, gains=gains, smoothing=smoothing)
     observation, _ = env.reset(seed=0)
     said, over = [], False
     while not over:

@@ -46,14 +46,14 @@ def test_returns_and_lengths_are_those_of_the_episodes():
     env.reset()
     rewards = []
     for _ in range(10):
-        _, reward, over, infos = env.step(np.zeros((2, 3)))
+        _, reward, over, infos = env.step(np.zeros((2, 1)))
         rewards.append(reward)
     assert over.all()
     assert infos[1]["episode"]["l"] == 10
     assert infos[1]["episode"]["r"] == pytest.approx(np.sum(rewards, axis=0)[1], rel=1e-5)
     with pytest.raises(NotImplementedError, match="no attributes of their own"):
         env.set_attr("tuned", None)
-    assert env.get_attr("neutral_action")[1].shape == (3,)
+    assert env.get_attr("neutral_action")[1].shape == (1,)
 
 
 def test_ppo_trains_on_it():
