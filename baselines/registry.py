@@ -66,6 +66,13 @@ TRAINED: dict[str, Entry] = {
         "learned",
         {"weights": "gru"},
     ),
+    "bounded-motion+network": Entry(
+        "..baselines.learned.estimator:shipped",
+        "bounded-motion in eight tunings, weighed by a recurrent network trained on simulated motion",
+        HERE,
+        "learned",
+        {"weights": "bounded-motion_network"},
+    ),
     **{
         f"{name}+network": Entry(
             "..baselines.learned.estimator:shipped",

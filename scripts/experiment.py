@@ -28,7 +28,7 @@ from ..filters.support.files import write_text
 from ..filters.support.parallel import processors
 from ..filters.support.resume import refuse_changes
 from ..filters.support.version import ROOT, code_version, package_version
-from .tables import jsonable, markdown_table, records
+from .tables import jsonable, records
 
 if TYPE_CHECKING:
     from ..envs.data.trajectory import Trajectory
@@ -202,11 +202,6 @@ def write_results(path: Path, rows: Iterable[Any]) -> Path:
             raise ValueError(f"a result has the fields {', '.join(columns)}, got {', '.join(map(str, record))}")
         writer.writerow([repr(float(record[name])) if name == "value" else record[name] for name in columns])
     return write_text(path, text.getvalue())
-
-
-def results_markdown(rows: Iterable[Any]) -> str:
-    """Return rows of results as a Markdown table for a report."""
-    return markdown_table(rows, COLUMNS)
 
 
 def versions(packages: Sequence[str] = PACKAGES) -> dict[str, Any]:

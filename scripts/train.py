@@ -58,8 +58,8 @@ class Args:
     """what is right in the recordings: their truth, or the smoother of the corrected filter, which needs none"""
     start: Path | None = None
     """weights to start from, such as those of a training on simulation"""
-    test_episodes: int = 48
-    """simulated episodes that the finished network is tested on"""
+    test_episodes: int | None = None
+    """simulated episodes that the finished network is tested on; 48 by default, 8 of the small version"""
     processes: int = 2
     """how many episodes are simulated at a time; the weights do not depend on it"""
     resume: Path | None = None
@@ -129,6 +129,11 @@ def chosen(args: Args) -> Preset:
     return preset if args.units is None else replace(preset, units=args.units)
 
 
+def tested(args: Args) -> int:
+    """How many episodes the finished network is tested on."""
+    return (8 if args.quick else 48) if args.test_episodes is None else args.test_episodes
+
+
 def test(result: FitResult, preset: Preset, args: Args, out: Output) -> pandas.DataFrame:
     """Errors on episodes that training never saw, beside those of others."""
     import pandas
@@ -140,7 +145,7 @@ def test(result: FitResult, preset: Preset, args: Args, out: Output) -> pandas.D
     others = CONTENDERS if preset.rides is None else (corrected.removesuffix("-consistent"),)
     contenders |= {name: name for name in dict.fromkeys([corrected, *others])}
     if preset.rides is not None:
-        groups, tables = test_rides(preset, args.seed, args.test_episodes), []
+        groups, tables = test_rides(preset, args.seed, tested(args)), []
         for group, rides in groups.items():
             for ride in rides:
                 # only what is named is configured for the rider by itself
@@ -153,7 +158,7 @@ def test(result: FitResult, preset: Preset, args: Args, out: Output) -> pandas.D
         table = pandas.concat(tables)
         angles = {quantity.name for quantity in result.estimator.outputs}
         return table[table["quantity"].isin(angles) & (table["metric"] == "angle")]
-    table = evaluate(contenders, test_trajectories(preset, args.seed, args.test_episodes), progress=True)
+    table = evaluate(contenders, test_trajectories(preset, args.seed, tested(args)), progress=True)
     for name, reason in dict.fromkeys((name, reason) for name, _, reason in table.attrs["skipped"]):
         out.say(f"not compared with {name}: {reason}")
     return table[table["metric"] == "inclination"]

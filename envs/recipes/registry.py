@@ -76,11 +76,6 @@ def kind_of(name: str) -> type[Recipe]:
     return found
 
 
-def list_recipes() -> list[str]:
-    """Names that :func:`recipe` takes."""
-    return list(RECIPES)
-
-
 def recipe(of: str | Path | Mapping[str, Any] | Recipe) -> Recipe:
     """A recipe by name, from a JSON file (a name that ends in ``.json``), from what it describes itself, or as given.
 

@@ -16,6 +16,7 @@ from ..data.trajectory import Trajectory
 from ..episodes import EpisodeStore
 from .recipe import Recipe
 from .registry import described_recipe, recipe
+from .slopes import sloped
 
 ON_DISK = 4 * 10**9
 """bytes of rides that are kept"""
@@ -39,11 +40,15 @@ class RideSource:
     """s"""
     changes: dict[str, Any] = field(default_factory=dict)
     """fields of the recipe that differ"""
+    sloped_share: float = 0.0
+    """of draws whose ground rises and falls, see :func:`.slopes.sloped`: those have no other channels"""
 
     def __post_init__(self) -> None:
         for name in ("rides", "draws"):
             if getattr(self, name) < 1:
                 raise ValueError(f"{name} must be at least 1, got {getattr(self, name)}")
+        if not 0.0 <= self.sloped_share <= 1.0:
+            raise ValueError(f"sloped_share must lie in [0, 1], got {self.sloped_share}")
 
     def recipe(self) -> Recipe:
         """The distribution of the rides."""
@@ -70,7 +75,9 @@ def drawn(source: RideSource, seed: int, index: int) -> list[Trajectory]:
     made: Any = source.recipe()
     ridden = ride(source, seed, index)
     children = np.random.SeedSequence(seed, spawn_key=(index, 1)).spawn(source.draws)
-    return [made.sensed(ridden, child).replace(mask=ridden.time > SETTLED) for child in children]
+    draws = [made.sensed(ridden, child).replace(mask=ridden.time > SETTLED) for child in children]
+    ground = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(index, 2)))
+    return [sloped(each, ground) if ground.random() < source.sloped_share else each for each in draws]
 
 
 def held_out(source: RideSource, **changes: Any) -> RideSource:

@@ -164,7 +164,7 @@ def test_a_write_that_fails_leaves_nothing(tmp_path: Path) -> None:
 
 
 def test_report(run: experiment.Run) -> None:
-    path = run.write_report("Benchmark", {"Errors": experiment.results_markdown([ROW])})
+    path = run.write_report("Benchmark", {"Errors": tables.markdown_table([ROW], experiment.COLUMNS)})
     text = path.read_text(encoding="utf-8")
     assert text.startswith("# Benchmark\n\n## Errors\n\n| estimator |")
     assert "| vqf | hand-0 | orientation | rmse | 0.333 | deg |" in text

@@ -123,7 +123,7 @@ GAIN_PRESETS: dict[str, Preset] = {
     ),
     "two-gyro-level+noise": GainPreset(
         "two-gyro-level, its noises and how far level ground is believed set by a recurrent network",
-        rides=replace(RIDES, rides=20, draws=3),
+        rides=replace(RIDES, rides=20, draws=4, sloped_share=0.6),
         filter="two-gyro-level",
         units=32,
         limits={"process": NOISE, "measurement": NOISE, "constraint": 100.0},

@@ -30,8 +30,8 @@ TUNINGS = (
     *((0.1, 1.0), (0.3, 1.0), (0.3, 5.0), (1.0, 0.5)),
     *((1.0, 4.0), (3.0, 1.0), (3.0, 4.0)),
 )
-"""Factors on the deviations σ_g of the gyroscope and σ_V of the velocity of bounded-motion, one pair a candidate; they
-surround the published pair, which is the best one of these for hand-held devices (simulated and recorded)."""
+"""Factors on the deviations σ_g of the gyroscope and σ_V of the velocity of bounded-motion, one pair a candidate. They
+surround the published pair as far as recordings of hands, phones and a drone prefer one of them."""
 VELOCITY = 1
 """Which of the vectors the directions of the others are told from: the filter's velocity in its level frame."""
 

@@ -20,11 +20,13 @@ from poise.baselines.learned.inputs.gravity_aligned_frame import FEATURES
 from poise.baselines.learned.inputs.level_frame import LevelFrame
 from poise.baselines.learned.networks.gru import GruNetwork
 from poise.baselines.learned.networks.modules import GruModule
+from poise.baselines.registry import make_estimator
 from poise.baselines.weights_io import save_weights
 from poise.envs.data.trajectory import Trajectory
 from poise.envs.hand.gestures import make_gesture
 from poise.envs.hand.hand_held import HandHeld
 from poise.envs.recipes.hand import HandRecipe
+from poise.envs.recipes.registry import recipe
 from poise.envs.sensors.suite import imu_suite
 from poise.filters.core import rotation
 from poise.filters.core.estimator import Estimator, run, run_by_steps
@@ -248,3 +250,13 @@ def test_at_rest_only_the_bias_of_the_accelerometer_is_left() -> None:
     gyr = np.deg2rad([0.8, -0.5, 0.3]) + 0.002 * rng.standard_normal((6000, 3))
     trajectory = Trajectory(np.arange(6000) / 100.0, {"imu/gyr": gyr, "imu/acc": acc}, {"up": np.tile(up, (6000, 1))})
     assert inclination(shipped(), trajectory, skip=30.0) < np.rad2deg(0.062 / 9.8) + 0.15
+
+
+def test_the_shipped_mixture_beats_the_filter_on_carried_devices() -> None:
+    """On motions and devices that its training did not draw."""
+    motions = [replace(recipe("carried"), duration=60.0).episode(90, index) for index in range(4)]
+    errors = {
+        name: np.mean([inclination(make_estimator(name), each, skip=5.0) for each in motions])
+        for name in ("bounded-motion+network", "bounded-motion")
+    }
+    assert errors["bounded-motion+network"] < 0.95 * errors["bounded-motion"], errors

@@ -12,7 +12,7 @@ import pytest
 from poise.envs.data.trajectory import Trajectory, load_trajectory
 from poise.envs.hand.hand_held import HandHeld
 from poise.envs.recipes.hand import HandRecipe
-from poise.envs.recipes.registry import list_recipes, rebuilt, recipe, save_recipe
+from poise.envs.recipes.registry import RECIPES, rebuilt, recipe, save_recipe
 
 SHORT = HandRecipe("short", duration=6.0, carried_share=0.0, held=HandHeld(first_rest=(0.3, 1.0)))
 
@@ -27,7 +27,7 @@ def assert_same(one: Trajectory, other: Trajectory) -> None:
             np.testing.assert_array_equal(arrays[name], others[name], err_msg=name)
 
 
-@pytest.mark.parametrize("name", list_recipes())
+@pytest.mark.parametrize("name", RECIPES)
 def test_every_shipped_recipe_survives_json(name: str) -> None:
     made = recipe(name)
     assert made.name == name

@@ -6,6 +6,7 @@ import signal
 import socket
 import subprocess
 import sys
+import threading
 import urllib.request
 from functools import partial
 from pathlib import Path
@@ -311,3 +312,34 @@ def test_a_browser_draws_a_film(viewer, tmp_path):
         first = np.asarray(film.convert("RGB"), float)
         film.seek(3)
         assert np.abs(np.asarray(film.convert("RGB"), float) - first).max() > 50.0
+
+
+@pytest.mark.slow
+def test_the_page_is_operated_in_a_browser(viewer):
+    pytest.importorskip("playwright")
+    from poise.scripts.live.picture import find_browser, opened_page
+
+    if find_browser() is None:
+        pytest.skip("there is no Chromium")
+    viewer.begin(1.0)
+    thread = threading.Thread(target=viewer.run, daemon=True)
+    thread.start()
+    patience = 100e3
+    with opened_page(viewer, (1000, 700)) as page:
+        page.get_by_role("button", name="Play").click(timeout=patience)
+        page.get_by_role("button", name="Pause").click(timeout=patience)
+        page.get_by_role("button", name="Play").wait_for(timeout=patience)
+        assert not viewer.player.playing
+        assert viewer.player.time != 1.0
+        page.get_by_role("checkbox").first.click(timeout=patience, force=True)
+        page.locator(".mantine-Select-input").last.click(timeout=patience, force=True)
+        page.locator("[role=option]:visible", has_text="mahony").first.click(timeout=patience, force=True)
+        page.get_by_text("mahony").first.wait_for(timeout=patience)
+        for _ in range(60):
+            if "mahony" in viewer.motion.figures:
+                break
+            page.wait_for_timeout(500.0)
+        assert list(viewer.motion.figures) == ["truth", *NAMES, "mahony"]
+        assert not viewer.options.visible["truth"]
+    viewer.stopped.set()
+    thread.join(10.0)
