@@ -52,10 +52,20 @@ def true_angle(study: RideStudy, truth: Mapping[str, np.ndarray], angle: str) ->
     return np.asarray(np.degrees(np.unwrap(truth[name][:, part])))
 
 
-def draw_angle(ax: Any, time: np.ndarray, true: np.ndarray, errors: Mapping[str, np.ndarray], label: str) -> None:
-    """The true angle and the estimates of some methods; the scale is that of the truth and of the last method."""
+def draw_angle(
+    ax: Any,
+    time: np.ndarray,
+    true: np.ndarray,
+    errors: Mapping[str, np.ndarray],
+    label: str,
+    colors: Sequence[str] = DRAWN,
+) -> None:
+    """The true angle and the estimates of some methods; the scale is that of the truth and of the last method.
+
+    Methods have the last ``colors``.
+    """
     ax.plot(time, true, color=TRUTH_COLOR, linewidth=1.2, label="truth")
-    for (method, error), color in zip(errors.items(), DRAWN[-len(errors) :], strict=True):
+    for (method, error), color in zip(errors.items(), colors[-len(errors) :], strict=True):
         ax.plot(time, true + error, color=color, linewidth=0.9, label=method)
     scale = np.concatenate([true, true + list(errors.values())[-1]])
     low, high = np.nanmin(scale), np.nanmax(scale)

@@ -101,7 +101,8 @@ def fixture_figure(push: Trajectory, estimates: Mapping[str, Estimate], study: R
     truth, methods = true_angles(push.truth, "disk"), (f"Σ1, {sensor}", f"Σ2, {sensor}")
     errors = {name: study.errors(estimates[name].pose, truth) for name in methods}
     drawn, axes = new_figure(7.5, 8.5, 5)
-    draw_angle(axes[0], push.time, true_angle(study, truth, "φ"), {name: errors[name]["φ"] for name in methods}, "φ")
+    rolls = {name: errors[name]["φ"] for name in methods}
+    draw_angle(axes[0], push.time, true_angle(study, truth, "φ"), rolls, "φ", (DRAWN[1], DRAWN[-1]))
     roll_errors(axes[1], push.time, errors, estimates, methods)
     for ax, angle in zip(axes[2:], THETA, strict=True):
         draw_angle(ax, push.time, true_angle(study, truth, angle), {methods[1]: errors[methods[1]][angle]}, angle)
