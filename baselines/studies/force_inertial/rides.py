@@ -188,7 +188,9 @@ def claims(every: list[dict[str, Any]], torque: dict[str, dict[str, float]], bou
         for name in ("no bias model", CELLS)
     }
     std, off = ({name: torque[name][f"τ_φh{label}"] for name in torque} for label in (" std", " − read, rms"))
-    start = max(time for each in every for time in each["wrong start"])
+    starts = [time for each in every for time in each["wrong start"]]
+    good = [time for time in starts if time <= 6.0]
+    recovered = f"{len(good)} of {len(starts)} starts, the slowest of these in {max(good, default=float('nan')):.2g} s"
     others = max(error for angle, error in ours.items() if angle != "φ")
     return [
         follows(every),
@@ -200,7 +202,7 @@ def claims(every: list[dict[str, Any]], torque: dict[str, dict[str, float]], bou
         Claim.less("The static torque underestimates how much τ_φh fluctuates", std["static"], std["read"], "N·m"),
         Claim.less("The dynamic torque is nearer to what is read", off["dynamic"], off["static"], "N·m"),
         Claim.less("The dynamic torque lacks less than half of what is read", off["dynamic"], 0.5 * std["read"], "N·m"),
-        Claim.less("φ_h that starts 35° off is right within 1° after 6 s at most", start, 6.0, "s"),
+        Claim("φ_h that starts 35° off is right within 1° after 6 s", recovered, len(good) == len(starts)),
     ]
 
 
