@@ -70,7 +70,7 @@ ITEMS = (
         "the bias model improves the estimates a little",
         shown=("Table II, indoor_circle",),
         decided=both("The bias model changes no angle by more"),
-        because="the estimated bias also takes up errors of the force sensors that last",
+        because="here it helps φ_h indoors and costs θ and φ",
     ),
     Item(
         "Table II",

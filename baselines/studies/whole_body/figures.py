@@ -87,10 +87,11 @@ def residual_figure(results: Sequence[dict[str, Any]]) -> Figure:
     time = SPACING * np.arange(length)
     for ax, name in zip(axes, CONSTRAINTS, strict=True):
         values = np.abs([each["residuals"][name][:length] for each in results])
-        mean = np.nanmean(values, axis=0)
+        # nothing is known before the first sample
+        mean = values.mean(axis=0)
         ax.plot(time, mean, color=DRAWN[-1], linewidth=0.9)
         if len(values) > 1:
-            ax.plot(time, mean + np.nanstd(values, axis=0, ddof=1), "--", color=DRAWN[-1], linewidth=0.7)
+            ax.plot(time, mean + values.std(axis=0, ddof=1), "--", color=DRAWN[-1], linewidth=0.7)
         ax.set(ylabel=f"|{name}|", ylim=(0.0, None))
         if name == "C2":
             ax.axhline(0.05, color=TRUTH_COLOR, linewidth=0.7, linestyle=":")
