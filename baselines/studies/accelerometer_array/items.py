@@ -86,6 +86,7 @@ ITEMS = (
         "averaging is as bad as tilt, the linear filter errs by 200°, UKF and EKF agree",
         shown=("Figure 3.12",),
         decided=((THREE, "Figure 3.12"), (THREE, "Unscented and extended")),
+        because="raw angles go wrong once the angle passes half a turn, which a short walk need not",
     ),
     Item(
         "Section 3.5",
@@ -106,7 +107,7 @@ ITEMS = (
         "the complete pose estimates ω poorly",
         shown=("Figure 3.14", "Figure 3.15"),
         decided=((THREE, "planar-walk: the complete pose estimates"), (THREE, "infinity: the complete pose estimates")),
-        because="the walk's rate is small (0.35 rad/s), the error is of that size",
+        because="on the ∞ the corrected filter follows the rate; the square root matters near zero only",
     ),
     Item("Figures 4.1 to 4.5, 4.10", "photographs and drawings", because="they show no result"),
     Item("Figures 4.6, 4.7", "imposed rates and output", shown=("Figure 4.6", "Figure 4.7")),

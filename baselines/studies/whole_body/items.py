@@ -34,6 +34,7 @@ ITEMS = (
         "the filter follows, integration drifts after 20 s",
         shown=("Figure 6: angles, indoor",),
         decided=((INDOOR, "Figure 6"),),
+        because="a constant bias averages out of the trunk's angles in a steady turn",
     ),
     Item(
         "Figure 7",
@@ -59,7 +60,7 @@ ITEMS = (
         "elbow and knee by C4 and C8",
         shown=("Skill, indoor", "Variants, indoor"),
         decided=both("Elbow: the filter halves"),
-        because="a rider who holds still elbows is known from the handlebar",
+        because="an error of the trunk's angles moves the shoulder, and with it the elbow by up to three times as much",
     ),
     Item(
         "Table III",
@@ -113,7 +114,8 @@ ITEMS = (
         "insensitive to speed",
         shown=("Speed sweep on exact rides", "Errors by speed, outdoor"),
         decided=(("Speed sweep: what", "Insensitive"), (OUTDOOR, "Insensitive")),
-        because="(3) weighs an error of the yaw rate with the speed",
+        causes=(("Speed sweep: what", "Insensitive"),),
+        because="on rides speed comes with other turns and leans",
     ),
     Item("Section V", "yaw cannot be estimated", because="yaw is no state of the filter; no sensor of it observes yaw"),
     Item(
