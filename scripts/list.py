@@ -16,9 +16,9 @@ import tyro
 
 from ..filters.core.offline import SUFFIX
 from ..filters.support.optional import MissingExtraError
+from ..filters.support.rows import markdown_table
 from .main import run_command
 from .output import Output
-from .tables import markdown_table
 
 Rows = list[dict[str, Any]]
 BEGIN, END = "<!-- list: {} -->", "<!-- end of list -->"

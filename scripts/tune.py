@@ -16,11 +16,11 @@ import tyro
 from ..baselines.gain_policy.compared.runs import CURVE, SETS
 from ..filters.support.files import write_json, write_text
 from ..filters.support.parallel import progress_bar
+from ..filters.support.rows import markdown_table
 from ..filters.support.seeds import child_seed
 from .experiment import Run, command_line, known_recordings, open_run, start_run, versions
 from .main import run_command
 from .output import Output
-from .tables import markdown_table
 
 if TYPE_CHECKING:
     from ..baselines.gain_policy.agents.learners import Trained
