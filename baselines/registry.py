@@ -84,6 +84,16 @@ TRAINED: dict[str, Entry] = {
         for name in ("two-gyro", "force-inertial", "whole-body")
     },
     **{
+        f"gru-{name}": Entry(
+            "..baselines.learned.estimator:shipped",
+            f"angles of {name} from its sensors by a recurrent network alone, trained on simulated rides",
+            HERE,
+            "learned",
+            {"weights": f"gru-{name}"},
+        )
+        for name in ("two-gyro", "force-inertial")
+    },
+    **{
         f"{name}+noise": Entry(
             "..baselines.learned.gains.gain_filter:shipped",
             f"{name}, its noises set by a recurrent network that was trained through the filter",

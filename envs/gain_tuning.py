@@ -77,12 +77,20 @@ class HandMotionGainEnv(GainTuningEnv):
 
     ## Arguments
 
-    Those of :class:`GainTuningEnv`, and ``gesture``, ``rate`` (Hz), ``sensors`` (preset), each a single one or
-    several to draw from, ``noise_scale`` (factor on the sensor's errors, or lowest and highest), ``duration`` (s),
-    ``mounting``, ``drive``; see :class:`poise.envs.hand.trajectories.HandTrajectories`. The dynamic drive takes
-    several times as long. Or ``recipe``, a :class:`poise.envs.recipes.hand.HandRecipe`, its name or JSON file, in
-    place of them all (:func:`poise.envs.recipes.registry.recipe`). ``motions``: number of different motions, each as
-    likely as any other, of the root seed ``motions_seed``; None for a new one in every episode.
+    Those of :class:`.GainTuningEnv`, and those of the motions (:class:`poise.envs.hand.trajectories.HandTrajectories`).
+
+    Args:
+        gesture: name of a motion, or a configuration, or several to draw from with equal probability.
+        rate: samples per second, Hz, or several to draw from.
+        sensors: name of a preset, or a preset, or several to draw from.
+        noise_scale: factor on all errors of the sensor, or the lowest and the highest.
+        duration: of an episode, s.
+        mounting: ``random`` (axes of the sensor drawn from all rotations) or ``aligned`` (those of the body).
+        drive: ``kinematic``, or ``dynamic``, which takes several times as long.
+        recipe: :class:`poise.envs.recipes.hand.HandRecipe`, its name or JSON file, in place of all of these
+            (:func:`poise.envs.recipes.registry.recipe`).
+        motions: number of different motions, each as likely as any other; None for a new one in every episode.
+        motions_seed: root seed of these.
 
     ## Version history
 
@@ -156,9 +164,12 @@ class ReplayGainEnv(GainTuningEnv):
 
     ## Arguments
 
-    Those of :class:`GainTuningEnv`, and ``trajectory``: a :class:`poise.Trajectory`, the path of a recording, or a
-    sequence of such; ``duration``: length of an episode, s (None: the whole trajectory). Without a ``trajectory`` a
-    simulated hand motion of a minute stands in, always the same.
+    Those of :class:`.GainTuningEnv`, and:
+
+    Args:
+        trajectory: a :class:`poise.Trajectory`, the path of a recording, or a sequence of such; None for a simulated
+            hand motion of a minute, always the same.
+        duration: of an episode, s; None for the whole trajectory.
 
     ## Version history
 

@@ -135,8 +135,8 @@ def show_suite(suite: str, results: Results, tasks: list[Task], args: Args, fold
     """Tables of a suite, its intervals and an example over time; heading → Markdown."""
     from ..baselines.comparison.data_sets import contenders
     from ..baselines.comparison.intervals import errors_of, intervals, is_measure
+    from ..filters.support.rows import markdown_table
     from .report import draw_example, print_comparison
-    from .tables import markdown_table
 
     table = results.table[~is_measure(results.table)]
     table.attrs |= results.table.attrs
@@ -157,7 +157,7 @@ def show_data_sets(suites: dict[str, Results], args: Args, folder: Run, out: Out
     """Mean errors of all data sets side by side; heading → Markdown. Saves what ``--save`` asks for."""
     from ..baselines.comparison.recommendation import ERRORS, dataset_errors
     from ..filters.support.files import write_json
-    from .tables import markdown_table
+    from ..filters.support.rows import markdown_table
 
     results = [one for each in suites.values() for one in each.recordings]
     sections = {}
@@ -178,7 +178,7 @@ def show_data_sets(suites: dict[str, Results], args: Args, folder: Run, out: Out
 def show_paper(trials: int, out: Output) -> dict[str, str]:
     """The tests of the external-acceleration paper; heading → Markdown."""
     from ..baselines.studies.external_acceleration.simulation import compare_modes
-    from .tables import markdown_table
+    from ..filters.support.rows import markdown_table
 
     out.say(f"the three tests of the external-acceleration paper, {trials} trials each")
     modes = compare_modes(range(trials))
@@ -213,7 +213,7 @@ def show_regressions(
 ) -> list[dict[str, Any]]:
     """What grew against the baseline."""
     from ..baselines.comparison.intervals import regressions
-    from .tables import markdown_table
+    from ..filters.support.rows import markdown_table
 
     grown = regressions(table, before)
     sections[REGRESSIONS] = markdown_table(grown) if grown else "None."
@@ -230,8 +230,8 @@ def show_costs(args: Args, channels: list[str], sections: dict[str, str], out: O
     from ..baselines.run import fitted
     from ..baselines.speed.measure import measure
     from ..filters.core.estimator import run, run_by_steps
+    from ..filters.support.rows import markdown_table
     from .report import kinds_of
-    from .tables import markdown_table
 
     (trajectory,) = hand_episode("mixed", 1, args.seed, sensors=args.sensors, duration=5.0)
     rows = []

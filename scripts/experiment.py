@@ -27,8 +27,8 @@ from ..filters.support.files import write_json as write_plain_json
 from ..filters.support.files import write_text
 from ..filters.support.parallel import processors
 from ..filters.support.resume import refuse_changes
+from ..filters.support.rows import jsonable, records
 from ..filters.support.version import ROOT, code_version, package_version
-from .tables import jsonable, records
 
 if TYPE_CHECKING:
     from ..envs.data.trajectory import Trajectory

@@ -16,9 +16,9 @@ import tyro
 
 from ..filters.core.offline import SUFFIX
 from ..filters.support.optional import MissingExtraError
+from ..filters.support.rows import markdown_table
 from .main import run_command
 from .output import Output
-from .tables import markdown_table
 
 Rows = list[dict[str, Any]]
 BEGIN, END = "<!-- list: {} -->", "<!-- end of list -->"
@@ -38,6 +38,8 @@ class Args:
     """print the tables in Markdown, as the documentation has them"""
     update: tuple[Path, ...] = ()
     """pages whose lists are updated, for instance `poise list --update docs/*.md`"""
+    environments: Path | None = None
+    """folder in which the page of every environment is written anew, for instance docs/environments"""
     json: bool = False
     """print one JSON document instead of tables"""
 
@@ -84,7 +86,11 @@ def run(args: Args) -> int:
     chosen = {name: look_up("list", name, LISTS) for name in args.lists or LISTS}
     for page in args.update:
         page.write_text(updated(page.read_text(encoding="utf-8")), encoding="utf-8")
-    if args.update:
+    if args.environments is not None:
+        from .pages.environments import write_pages
+
+        write_pages(args.environments)
+    if args.update or args.environments is not None:
         return 0
     with Output("list", args) as out:
         for name, rows in chosen.items():

@@ -13,8 +13,9 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
+from ..filters.support.rows import jsonable, records
 from ..filters.support.version import poise_version
-from .tables import jsonable, print_table, records
+from .tables import print_table
 
 
 class Output:

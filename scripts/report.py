@@ -7,9 +7,9 @@ import statistics
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from ..filters.support.rows import markdown_table
 from .experiment import Run
 from .output import Output
-from .tables import markdown_table
 
 if TYPE_CHECKING:
     import pandas

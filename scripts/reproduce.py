@@ -223,8 +223,8 @@ def console(width: int | None) -> Any:
 def write(title: str, folder: Run, report: Report) -> Path:
     """Write ``report.md`` with all entries so far."""
     from ..filters.support.files import write_text
+    from ..filters.support.rows import markdown_table
     from .report import provenance
-    from .tables import markdown_table
 
     parts = [f"# {title}"]
     for entry in report.entries:

@@ -13,14 +13,14 @@ from typing import TYPE_CHECKING, Any, Literal, cast
 import numpy as np
 import tyro
 
-from ..baselines.gain_policy.comparison import CURVE, SETS
+from ..baselines.gain_policy.compared.runs import CURVE, SETS
 from ..filters.support.files import write_json, write_text
 from ..filters.support.parallel import progress_bar
+from ..filters.support.rows import markdown_table
 from ..filters.support.seeds import child_seed
 from .experiment import Run, command_line, known_recordings, open_run, start_run, versions
 from .main import run_command
 from .output import Output
-from .tables import markdown_table
 
 if TYPE_CHECKING:
     from ..baselines.gain_policy.agents.learners import Trained
@@ -127,7 +127,7 @@ def run(args: Args) -> int:
 
 def compare(args: Args) -> int:
     """Tables and figures of finished runs."""
-    from ..baselines.gain_policy.comparison import TuneRun, comparison, curves_figure, profiles_figure
+    from ..baselines.gain_policy.compared.runs import TuneRun, comparison, curves_figure, profiles_figure
     from ..baselines.plots import save
 
     runs = [TuneRun.read(folder) for folder in args.report]

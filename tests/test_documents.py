@@ -13,7 +13,12 @@ from poise.scripts.list import LISTS, PLACED
 from .envs.data.formats.examples import write_examples
 
 ROOT = Path(__file__).resolve().parents[1]
-DOCUMENTS = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
+DOCUMENTS = [
+    ROOT / "README.md",
+    ROOT / "CONTRIBUTING.md",
+    *sorted((ROOT / "docs").glob("*.md")),
+    *sorted((ROOT / "docs" / "environments").glob("*.md")),
+]
 EXAMPLES = [
     pytest.param(path, code, id=f"{path.name}-{number}")
     for path in DOCUMENTS

@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from ...filters.support.optional import extra
+from ...filters.support.rows import jsonable
 from ..plots import COLOURS
 from .html_page import PAGE
 from .intervals import details, errors_of, intervals, is_measure, win_matrix
@@ -67,7 +68,7 @@ def html_report(
         f"<dt>{html.escape(str(name))}</dt><dd>{html.escape(str(value))}</dd>" for name, value in provenance.items()
     )
     # "</" would end the script that holds the data
-    text = json.dumps(plain_numbers(data), ensure_ascii=False, allow_nan=False).replace("</", "<\\/")
+    text = json.dumps(jsonable(data, lambda value: None), ensure_ascii=False, allow_nan=False).replace("</", "<\\/")
     parts = {"title": html.escape(title), "about": about, "data": text, "plotly": get_plotlyjs()}
     page = PAGE
     for name, part in parts.items():  # the script of Plotly last: it may contain anything
@@ -187,14 +188,3 @@ def win_plot(errors: pandas.DataFrame) -> dict[str, Any]:
         "height": size,
     }
     return {"data": [trace], "layout": layout}
-
-
-def plain_numbers(value: Any) -> Any:
-    """The same in types of JSON; numbers that are not finite become null."""
-    if isinstance(value, Mapping):
-        return {str(key): plain_numbers(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [plain_numbers(item) for item in value]
-    if isinstance(value, float):
-        return value if value == value and abs(value) != float("inf") else None
-    return value

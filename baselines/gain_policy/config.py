@@ -10,7 +10,7 @@ from typing import Any, Literal, get_args
 from ...envs.hand.gestures import Mixed
 from ...envs.hand.trajectories import HandTrajectories
 from ...envs.sensors.presets import sensor_preset
-from .motions import GradedMotions, Motions, RiddenMotions
+from .motions import DEG, GradedMotions, MixedMotions, Motions, RiddenMotions
 
 SUSTAINED = Mixed(lengths=(15.0, 40.0), rest_share=0.1, spread=0.5, single_share=0.25)
 """Sustained motion of one kind, in addition to the quick changes of ``mixed``."""
@@ -33,6 +33,18 @@ TRAINING_MOTIONS = HandTrajectories(
 )
 """Smooth gestures: training data of ``bounded-motion+policy``."""
 
+VARIED_MOTIONS = MixedMotions(
+    (
+        replace(TRAINING_MOTIONS, duration=40.0),
+        GradedMotions(
+            gyroscope_biases=((0.03 * DEG, 0.8 * DEG),),
+            accelerometer_biases=((0.01, 0.1),),
+            first_rest=(0.3, 5.0),
+            duration=40.0,
+        ),
+    )
+)
+"""Smooth gestures, and devices in the hand and carried: training data of the other policies for one sensor."""
 
 AgentName = Literal["ppo", "recurrent-ppo", "sac", "td3", "analytic"]
 """Agents that train a policy."""
@@ -178,11 +190,11 @@ def shipped_config(filter: str) -> TrainingConfig:
     centre = (-0.7, 0.7, -0.7) if filter == "external-acceleration" else None
     return TrainingConfig(
         filter=filter,
-        motions=GradedMotions(),
-        trajectories=120,
-        total_timesteps=300_000,
-        gain_search=16,
-        warm_start=120,
+        motions=VARIED_MOTIONS,
+        trajectories=150,
+        total_timesteps=620_000,
+        gain_search=12,
+        warm_start=150,
         warm_start_centre=centre,
     )
 

@@ -14,6 +14,7 @@ from ...envs.recipes.devices import VariedSensors
 from ...envs.recipes.hand import HandRecipe
 from ...envs.recipes.rides import RideSource, drawn
 from ...filters.support.ranges import Range
+from ...filters.support.seeds import child_seed
 
 DEG = math.pi / 180.0
 
@@ -86,6 +87,23 @@ class GradedMotions:
     def describe(self) -> dict[str, Any]:
         """All fields, for JSON."""
         return {"kind": "graded", **dataclasses.asdict(self)}
+
+
+@dataclass(frozen=True)
+class MixedMotions:
+    """Several distributions, from which trajectories are drawn in turn."""
+
+    parts: tuple[Motions, ...]
+
+    def draw_many(self, seed: int, count: int) -> list[Trajectory]:
+        """The first trajectories of the root seed."""
+        each = -(-count // len(self.parts))
+        drawn = [part.draw_many(child_seed(seed, index), each) for index, part in enumerate(self.parts)]
+        return [one for turn in zip(*drawn, strict=True) for one in turn][:count]
+
+    def describe(self) -> dict[str, Any]:
+        """All fields, for JSON."""
+        return {"kind": "mixed", "parts": [part.describe() for part in self.parts]}
 
 
 UNEVEN = ("indoor_circle", "outdoor", "straight", "slalom", "slow", "gusts", "bumps", "bumps", "pitch", "pitch")

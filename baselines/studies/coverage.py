@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from ...filters.support.rows import markdown_table
 from .claims import Claim
 from .report import Report
 
@@ -126,15 +127,5 @@ def page(works: Mapping[str, Sequence[Mapping[str, Any]]], provenance: str) -> s
     ]
     for work, rows in works.items():
         parts += [f"## {work}", f"{counted(rows)[:1].upper()}{counted(rows)[1:]}."]
-        parts.append("\n".join(markdown(rows)))
+        parts.append(markdown_table(rows, COLUMNS[:4]))
     return "\n\n".join([*parts, "## Provenance", provenance]) + "\n"
-
-
-def markdown(rows: Sequence[Mapping[str, str]]) -> list[str]:
-    """Lines of a table of four columns."""
-    columns = COLUMNS[:4]
-    lines = [f"| {' | '.join(columns)} |", f"|{' --- |' * len(columns)}"]
-    for row in rows:
-        cells = (row[name].replace("|", "\\|") for name in columns)
-        lines.append(f"| {' | '.join(cells)} |")
-    return lines

@@ -32,7 +32,7 @@ def riders(args: Any) -> int:
 def rider_tables(settings: RiderSuite, args: Any, folder: Run, out: Output) -> dict[str, str]:
     """Errors, each angle, consistency: printed, written, and as sections of the report."""
     from ...baselines.studies.riders import suite, tables
-    from ..tables import markdown_table
+    from ...filters.support.rows import markdown_table
 
     out.say(f"references learn from {settings.training} rides; rides are simulated once and kept")
     learnt = suite.learnt_by(settings, quick=args.quick)
@@ -55,7 +55,7 @@ def rider_tables(settings: RiderSuite, args: Any, folder: Run, out: Output) -> d
 def rider_sweeps(settings: RiderSuite, args: Any, folder: Run, out: Output) -> dict[str, str]:
     """Errors while one condition is varied, and a figure."""
     from ...baselines.studies.riders import sweeps
-    from ..tables import markdown_table
+    from ...filters.support.rows import markdown_table
 
     found = sweeps.sweep_points(settings, processes=args.processes, progress=True)
     points = sorted((point for one in found for point in one), key=lambda point: point.ride)

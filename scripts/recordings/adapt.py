@@ -44,10 +44,10 @@ class Args:
 
 def run(args: Args) -> int:
     """Print one table a set of trajectories, and leave the errors of all in a run folder."""
+    from ...baselines.gain_policy.compared.contenders import contenders, rows_of
+    from ...baselines.gain_policy.compared.explained import gains_by_motion
     from ...baselines.gain_policy.config import shipped_config
     from ...baselines.gain_policy.constant_gains import best_constant_gains
-    from ...baselines.gain_policy.contenders import contenders, rows_of
-    from ...baselines.gain_policy.explained import gains_by_motion
     from ...baselines.gain_policy.policy import GainPolicy
     from ...baselines.weights_io import list_weights
     from ...envs.gain_reward import scored_quantity

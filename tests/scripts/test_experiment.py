@@ -18,6 +18,7 @@ import pandas as pd
 import pytest
 from rich.console import Console
 
+from poise.filters.support import rows
 from poise.scripts import experiment, tables
 
 
@@ -164,36 +165,18 @@ def test_a_write_that_fails_leaves_nothing(tmp_path: Path) -> None:
 
 
 def test_report(run: experiment.Run) -> None:
-    path = run.write_report("Benchmark", {"Errors": tables.markdown_table([ROW], experiment.COLUMNS)})
+    path = run.write_report("Benchmark", {"Errors": rows.markdown_table([ROW], experiment.COLUMNS)})
     text = path.read_text(encoding="utf-8")
     assert text.startswith("# Benchmark\n\n## Errors\n\n| estimator |")
     assert "| vqf | hand-0 | orientation | rmse | 0.333 | deg |" in text
 
 
-@pytest.mark.parametrize(
-    ("value", "text"),
-    [(1.23456, "1.23"), (12345.6, "12346"), (1e-7, "1e-07"), (math.nan, "–"), (None, "–"), (True, "yes"), (12, "12")],
-)
-def test_cell(value: Any, text: str) -> None:
-    assert tables.cell(value) == text
-
-
 def test_printed_table_holds_every_row_and_no_markup() -> None:
     console = Console(record=True, width=80, file=open("/dev/null", "w"))  # noqa: SIM115
-    rows = [{"estimator": "[red]vqf", "error": 1.5}, {"estimator": "mekf", "note": "slow"}]
-    tables.print_table(rows, title="Errors", console=console)
+    printed = [{"estimator": "[red]vqf", "error": 1.5}, {"estimator": "mekf", "note": "slow"}]
+    tables.print_table(printed, title="Errors", console=console)
     text = console.export_text()
     assert "Errors" in text
     assert "[red]vqf" in text
     assert "slow" in text
     assert text.count("–") == 2
-
-
-def test_markdown_table_chooses_and_escapes() -> None:
-    text = tables.markdown_table([{"a": "x|y", "b": 2.0, "c": 3}], columns=["b", "a"])
-    assert text.splitlines() == ["| b | a |", "| ---: | --- |", "| 2 | x\\|y |"]
-
-
-def test_a_row_must_be_a_record() -> None:
-    with pytest.raises(TypeError, match="a row is"):
-        tables.records([(1, 2)])

@@ -21,7 +21,7 @@ from ....filters.core.estimator import check_measurements
 from ....filters.core.kalman import KalmanFilter
 from ....filters.core.quantity import UP, Channel, Measurement
 from ....filters.core.rotation import rotate
-from ....filters.core.sampling import FilterState
+from ....filters.core.sampling import FilterState, zeros
 from .front_end import Seen
 from .gravity_aligned_frame import SCALARS, VECTORS
 from .level_frame import LevelFrame, LevelState
@@ -154,13 +154,22 @@ class FilterBank:
         return {name: xp.stack([array] * count, axis=-2) for name, array in arrays.items()}
 
     def _seen(self, seen: Seen, up: Array) -> Seen:
-        xp, due = namespace(up), (seen.due == 1.0)[..., None]
+        xp, batch = namespace(up), tuple(seen.due.shape)
         turned = rotate(seen.base["relative_orientation"][..., None, :], up)[..., :2]
         # before the start there are none
         tilts = xp.where(xp.isfinite(turned), turned, xp.zeros_like(turned))
         sigma = xp.where(xp.isfinite(seen.spread), seen.spread, xp.ones_like(seen.spread))
-        batch = tuple(due.shape[:-1])
-        vectors = xp.reshape(seen.features[..., : 3 * VECTORS], (*batch, VECTORS, 3))
+        spread = xp.concat([sigma, xp.reshape(tilts, (*batch, -1))], axis=-1)
+        now = seen.due == 1.0
+        features = zeros(sigma, self.size)
+        if bool(xp.any(now)):
+            features = xp.where(now[..., None], self._features(seen.features, tilts, sigma), features)
+        return seen._replace(features=features, spread=spread)
+
+    def _features(self, motion: Array, tilts: Array, sigma: Array) -> Array:
+        """Features of the level frame, and candidates ``(..., K, 2)``, in terms that do not depend on the heading."""
+        xp = namespace(motion)
+        vectors = xp.reshape(motion[..., : 3 * VECTORS], (*tuple(motion.shape[:-1]), VECTORS, 3))
         horizontal = xp.concat([vectors[..., :2], tilts / (sigma[..., None] + 0.002)], axis=-2)
         length = xp.sqrt(xp.sum(horizontal * horizontal, axis=-1) + 1e-6)
         unit = horizontal / (length[..., None] + 0.02)
@@ -170,12 +179,9 @@ class FilterBank:
             xp.log(length) / 3.0 + 0.3,
             *(unit[..., part, 0] * x + unit[..., part, 1] * y for part in self._told),
             *(unit[..., part, 0] * y - unit[..., part, 1] * x for part in self._told),
-            seen.features[..., 3 * VECTORS :],
+            motion[..., 3 * VECTORS :],
         ]
-        features = xp.concat(told, axis=-1)
-        features = xp.where(due, features, xp.zeros_like(features))
-        spread = xp.concat([sigma, xp.reshape(tilts, (*batch, -1))], axis=-1)
-        return seen._replace(features=features, spread=spread)
+        return xp.concat(told, axis=-1)
 
     @property
     def _told(self) -> tuple[slice, slice]:

@@ -6,7 +6,7 @@ import json
 import numpy as np
 import pytest
 
-from poise.baselines.gain_policy.comparison import (
+from poise.baselines.gain_policy.compared.runs import (
     CURVE,
     SETS,
     TuneRun,

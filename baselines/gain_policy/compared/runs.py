@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..statistics import DRAWS, bootstrap_interval, interquartile_mean, mean_score, performance_profile
-from ..statistics import probability_of_improvement as improvement
+from ...statistics import DRAWS, bootstrap_interval, interquartile_mean, mean_score, performance_profile
+from ...statistics import probability_of_improvement as improvement
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -154,7 +154,7 @@ def shown(interval: Sequence[float]) -> str:
 
 def profiles_figure(runs: Sequence[TuneRun], group: str) -> Figure:
     """Performance profiles: the share of seeds and trajectories that saves more than a share of the published error."""
-    from ..plots import legend_above, new_figure
+    from ...plots import legend_above, new_figure
 
     found = agents_of(runs)
     filters = list(dict.fromkeys(filter for filter, _ in found))
@@ -173,7 +173,7 @@ def profiles_figure(runs: Sequence[TuneRun], group: str) -> Figure:
 
 def curves_figure(runs: Sequence[TuneRun]) -> Figure | None:
     """Learning curves: mean and range over seeds of the reward while training; None where no run has one."""
-    from ..plots import legend_above, new_figure
+    from ...plots import legend_above, new_figure
 
     found = {key: some for key, some in agents_of(runs).items() if all(run.curve for run in some)}
     if not found:

@@ -12,13 +12,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...envs.data.trajectory import Trajectory
-from ...envs.gain_episode import filter_for
-from ...envs.gain_reward import errors_of, scored_quantities, true_values
-from ...filters.adaptation.tuned import TunedFilter
-from ...filters.core.kalman import KalmanFilter
-from ...filters.core.metrics import rms
-from ...filters.core.sampling import FilterState
+from ....envs.data.trajectory import Trajectory
+from ....envs.gain_episode import filter_for
+from ....envs.gain_reward import errors_of, scored_quantities, true_values
+from ....filters.adaptation.tuned import TunedFilter
+from ....filters.core.kalman import KalmanFilter
+from ....filters.core.metrics import rms
+from ....filters.core.sampling import FilterState
 
 Quantities = str | Sequence[str] | None
 """Names of the outputs that are scored together; None for ``up``."""

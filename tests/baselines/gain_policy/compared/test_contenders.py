@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from poise.baselines.gain_policy.compared.contenders import REFERENCE, contenders, improvement, rows_of
+from poise.baselines.gain_policy.compared.explained import gains_by_motion
+from poise.baselines.gain_policy.compared.oracles import schedule_error, windowed_oracle
 from poise.baselines.gain_policy.constant_gains import constant_errors
-from poise.baselines.gain_policy.contenders import REFERENCE, contenders, improvement, rows_of
-from poise.baselines.gain_policy.explained import gains_by_motion
-from poise.baselines.gain_policy.oracles import schedule_error, windowed_oracle
 from poise.baselines.gain_policy.policy import GainPolicy
 from poise.envs.hand.trajectories import HandTrajectories
 from poise.filters.adaptation.gains import tunable_filter

@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from ...envs.data.trajectory import Trajectory
-from ...envs.gain_episode import filter_for
-from ...filters.core.kalman import KalmanFilter
-from ...filters.core.quantity import GRAVITY
-from .adaptive import AdaptiveEstimator
-from .policy import GainPolicy
+from ....envs.data.trajectory import Trajectory
+from ....envs.gain_episode import filter_for
+from ....filters.core.kalman import KalmanFilter
+from ....filters.core.quantity import GRAVITY
+from ..adaptive import AdaptiveEstimator
+from ..policy import GainPolicy
 
 WINDOW = 1.0
 """s over which motion and gains are averaged."""

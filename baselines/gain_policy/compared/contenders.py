@@ -7,16 +7,16 @@ from typing import Any
 
 import numpy as np
 
-from ...envs.data.trajectory import Trajectory
-from ...envs.gain_episode import filter_for
-from ...filters.adaptation.multiple_model import bank_of
-from ...filters.adaptation.tuned import TunedFilter
-from ...filters.support.seeds import child_seed
-from ..statistics import Interval, bootstrap_interval
-from .constant_gains import constant_errors, policy_errors
+from ....envs.data.trajectory import Trajectory
+from ....envs.gain_episode import filter_for
+from ....filters.adaptation.multiple_model import bank_of
+from ....filters.adaptation.tuned import TunedFilter
+from ....filters.support.seeds import child_seed
+from ...statistics import Interval, bootstrap_interval
+from ..constant_gains import constant_errors, policy_errors
+from ..policy import GainPolicy
+from ..rules import RULES, ruled
 from .oracles import pose_error, schedule_error, windowed_oracle
-from .policy import GainPolicy
-from .rules import RULES, ruled
 
 POINTS = 32
 """Constant actions that hindsight and oracles choose from, besides the published and the best one."""
