@@ -19,11 +19,15 @@ from ....envs.hand.devices import DEVICES, array_preset
 from ....envs.hand.sensing import simulate_hand
 from ....filters.arrays.spatial.pointing import pointing_angles, tilt_error_bound
 from ....filters.core import rotation
+from ....filters.core.consistency import nees
+from ....filters.core.estimator import run
+from ....filters.core.kalman import KalmanFilter
 from ...plots import TRUTH_COLOR, legend_above, new_figure
 from ..claims import Claim
 from ..kit import Study
 from ..report import OVER_MOTIONS, Report
 from ..ride_figures import DRAWN
+from ..ride_study import interval_of_mean
 from .spatial import (
     DURATION,
     FIELD,
@@ -35,6 +39,7 @@ from .spatial import (
     estimated,
     pointed,
     pointing_errors,
+    prepared,
 )
 from .tables import Row
 
@@ -97,6 +102,23 @@ def largest(device: str, seed: int, duration: float) -> list[Row]:
         worst = float(np.degrees(np.abs(np.array(errors)[:, late]).max()))
         rows.append({"device": device, "method": method, "largest": worst})
     return rows
+
+
+def attitude_nees(device: str, seed: int, duration: float, calibrated: bool) -> float:
+    """NEES of the attitude of the proposed filter, a degree of freedom, after calibration or with white noise.
+
+    An attitude error e about the body's axes changes row i of Q by q_i × e; the rows' covariance gives that of e.
+    """
+    trajectory = tracked(device, seed, duration)[0] if calibrated else pointed(device, seed, duration)
+    model, measurements = prepared(FIRST[device], device, trajectory)
+    estimate = run(KalmanFilter(model), measurements)
+    truth, late = trajectory.truth["orientation"], trajectory.time >= SETTLED
+    error = rotation.log(rotation.multiply(rotation.conjugate(truth), estimate.pose["orientation"]))[late]
+    Q = rotation.to_matrix(truth[late])
+    # three rows of crosses below each other; their product with their transpose is twice the identity
+    J = np.concatenate([rotation.skew(Q[:, i]) for i in range(3)], axis=-2)
+    P = 0.25 * J.mT @ np.asarray(estimate.covariance)[late, :9, :9] @ J
+    return float(np.mean(nees(error, P))) / 3.0
 
 
 def experiment(study: Study, report: Report, simulated: list[Row]) -> None:
@@ -162,6 +184,16 @@ def experiment(study: Study, report: Report, simulated: list[Row]) -> None:
         )
     )
     report.claims("Table 5.1: what holds", claims)
+    jobs = [(device, seed, duration, calibrated) for device in FIRST for calibrated in (False, True) for seed in roots]
+    found_nees = dict(zip(jobs, study.map("attitude NEES", attitude_nees, jobs), strict=True))
+    rows = []
+    for device in FIRST:
+        row: dict[str, Any] = {"device": device, "method": FIRST[device]}
+        for kind, calibrated in (("white noise", False), ("after calibration", True)):
+            values = [value for job, value in found_nees.items() if job[0] == device and job[3] is calibrated]
+            row[f"NEES, {kind}, 95 % interval"] = interval_of_mean(values)
+        rows.append(row)
+    report.table("Consistency of the proposed method", rows, "Of the attitude, a degree of freedom; 1 if P is right.")
     for device in FIRST:
         one = study.cached(f"experiment curves {device}", curves, device, roots[0], duration)
         experiment_figure(report, device, one)

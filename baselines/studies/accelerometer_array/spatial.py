@@ -102,15 +102,21 @@ def pointed(
     return simulate_hand(gesture or Pointing(), seed, None, RATE, duration, device=held)
 
 
-def estimated(
+def estimated(*args: Any, **kwargs: Any) -> np.ndarray:
+    """Orientation ``(T, 4)`` by a method of :func:`prepared`."""
+    model, measurements = prepared(*args, **kwargs)
+    return run(KalmanFilter(model, keep_covariance=False), measurements).pose["orientation"]
+
+
+def prepared(
     method: str,
     device: str,
     trajectory: Trajectory,
     dip: float = 0.0,
     start: np.ndarray | None = None,
     **parameters: Any,
-) -> np.ndarray:
-    """Orientation ``(T, 4)`` by a method that knows the start (None: the true one) and the field, as the thesis' do."""
+) -> tuple[Any, dict[str, np.ndarray]]:
+    """Model and samples of a method that knows the start (None: the true one) and the field, as the thesis' do."""
     array, measurements = DEVICES[device].array, dict(trajectory.measurements)
     if "array's rate" in method:
         observer = Observer(ArrayRate(dt=trajectory.dt, array=array, bias_noise=0.0))
@@ -123,7 +129,7 @@ def estimated(
         model: Any = Marins(**common)
     else:
         model = ArrayOrientation(array=array, gravity=STANDARD_GRAVITY, **common)
-    return run(KalmanFilter(model, keep_covariance=False), measurements).pose["orientation"]
+    return model, measurements
 
 
 def pointing_errors(estimate: np.ndarray, truth: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -7,6 +7,7 @@ import pytest
 
 from poise.baselines.studies.accelerometer_array import comparison as array_comparison
 from poise.baselines.studies.accelerometer_array import spatial as spatial_study
+from poise.baselines.studies.accelerometer_array.experiment import attitude_nees
 from poise.baselines.studies.accelerometer_array.spatial import (
     METHODS,
     PROPOSED,
@@ -56,6 +57,10 @@ def test_errors_of_pitch_are_signed_and_those_of_azimuth_wrap():
     np.testing.assert_allclose(pitch, 0.1, atol=1e-12)
     np.testing.assert_allclose(azimuth, -(2.0 * np.pi - 6.2), atol=1e-12)
     assert total[0] > 0.1
+
+
+def test_the_covariance_of_the_controller_is_that_of_its_errors():
+    assert 0.3 < attitude_nees("controller", 1, 20.0, calibrated=False) < 3.0
 
 
 def canned(device, seed, duration, dip=0.0, methods=()):
