@@ -14,11 +14,11 @@ MARKS = "<!-- packages -->\n", "<!-- end of packages -->"
 
 
 def licence_of(name: str) -> str:
-    """SPDX expression, classifier or free text of a package, in a few words."""
+    """SPDX expression, classifiers, or the first line of the free text of a package."""
     about = metadata.metadata(name)
     classifiers = [one.split(" :: ")[-1] for one in about.get_all("Classifier") or () if one.startswith("License ::")]
     text = about.get("License-Expression") or ", ".join(classifiers) or about.get("License") or "see the package"
-    return text.strip().splitlines()[0][:60]
+    return text.strip().splitlines()[0]
 
 
 def table() -> str:

@@ -24,6 +24,8 @@ Rows = list[dict[str, Any]]
 BEGIN, END = "<!-- list: {} -->", "<!-- end of list -->"
 PLACED = re.compile(r"<!-- list: ([a-z-]+) -->\n.*?<!-- end of list -->", re.DOTALL)
 """A list in a page, with its name."""
+BEST = 12
+"""Rows of the short table of errors."""
 
 
 @dataclass
@@ -32,8 +34,8 @@ class Args:
 
     lists: tyro.conf.Positional[tuple[str, ...]] = ()
     """which lists: estimators, environments, sensors, sensor-drift, sensor-kinds, timings, magnetics, gestures,
-    scenarios, surfaces, recipes, presets, learned, formats, benchmark, benchmark-heading, benchmark-limits; all if
-    none is named"""
+    scenarios, surfaces, recipes, presets, learned, formats, benchmark, benchmark-best, benchmark-heading,
+    benchmark-limits; all if none is named"""
     markdown: bool = False
     """print the tables in Markdown, as the documentation has them"""
     update: tuple[Path, ...] = ()
@@ -53,6 +55,11 @@ def benchmark(metric: str = "inclination") -> Rows:
     means = dataset_errors(recordings, metric)
     shown = [name for name in names if any(name in errors for errors in means.values())]
     return [{"name": name, **{each: errors.get(each) for each in shown}} for name, errors in means.items()]
+
+
+def benchmark_best() -> Rows:
+    """The first rows of :func:`benchmark` that have an error on every data set."""
+    return [row for row in benchmark() if None not in row.values()][:BEST]
 
 
 def benchmark_heading() -> Rows:
@@ -302,7 +309,7 @@ LISTS: Mapping[str, Callable[[], Rows]] = {
             *(presets, learned),
             formats,
         ),
-        *(benchmark, benchmark_heading, benchmark_limits),
+        *(benchmark, benchmark_best, benchmark_heading, benchmark_limits),
     )
 }
 """Name → rows."""

@@ -37,8 +37,6 @@ from ..inputs.gain_features import GainFeatures
 if TYPE_CHECKING:
     from ..data import SequenceData
 
-SMALL_ERROR = math.radians(0.5)
-"""rad, e₀: errors below it count little"""
 FREEDOM = 8.0
 """ν, degrees of freedom of the distribution of errors"""
 CONSTANT_STEPS = 60
@@ -56,6 +54,7 @@ class GainHead:
         gains: names of the gains that the network sets, in the order of its outputs.
         limits: largest log factor of each gain, on a variance for a gain of power ½.
         likelihood: w, weight of the likelihood.
+        small_error: e₀, rad; errors below it count little.
 
     Raises:
         ValueError: a gain is unknown, limits are not one positive number a gain, or nothing that is estimated can be
@@ -66,6 +65,7 @@ class GainHead:
     gains: tuple[str, ...]
     limits: tuple[float, ...]
     likelihood: float = 0.01
+    small_error: float = math.radians(0.5)
 
     kind: ClassVar[str] = "gains"
 
@@ -92,12 +92,14 @@ class GainHead:
     def describe(self) -> dict[str, Any]:
         """Kind and settings for a card; JSON-able."""
         limits = [round(limit, 6) for limit in self.limits]
-        return {"kind": self.kind, "gains": list(self.gains), "limits": limits, "likelihood": self.likelihood}
+        weights = {"likelihood": self.likelihood, "small_error": self.small_error}
+        return {"kind": self.kind, "gains": list(self.gains), "limits": limits, **weights}
 
     @classmethod
     def read(cls, described: Mapping[str, Any], kalman: KalmanFilter) -> Self:
         """The inverse of :meth:`describe`."""
-        return cls(kalman, tuple(described["gains"]), tuple(described["limits"]), float(described["likelihood"]))
+        weights = {name: float(described[name]) for name in ("likelihood", "small_error") if name in described}
+        return cls(kalman, tuple(described["gains"]), tuple(described["limits"]), **weights)
 
     def factors(self, output: Array) -> Array:
         """Log factors ``(..., gains)`` of outputs; zeros for zeros."""
@@ -155,7 +157,7 @@ class GainHead:
             rms = torch.sqrt(square.clamp(max=LARGEST_ERROR**2).mean(dim=0) + 1e-12)
             heavy = (FREEDOM + 1.0) * torch.log1p(square / (FREEDOM * s2))
             likelihood = 0.5 * (torch.log(s2) + heavy).mean(dim=0)
-            total = total + (torch.log(rms + SMALL_ERROR) + self.likelihood * likelihood).mean()
+            total = total + (torch.log(rms + self.small_error) + self.likelihood * likelihood).mean()
             scored += 1
         return total / max(scored, 1)
 

@@ -41,6 +41,8 @@ class GainPreset(Preset):
     """whether shares of the Kalman gain are among the gains"""
     likelihood: float = 0.01
     """weight of the likelihood of the errors"""
+    small_error: float = 0.5 * DEG
+    """rad: errors below it count little"""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -63,7 +65,7 @@ class GainPreset(Preset):
         """What it says."""
         kalman = self.kalman()
         limits = [math.log(limit) / kalman.gains[name].power for name, limit in self.limits.items()]
-        return GainHead(kalman, tuple(self.limits), tuple(limits), self.likelihood)
+        return GainHead(kalman, tuple(self.limits), tuple(limits), self.likelihood, self.small_error)
 
     def recipe(self, name: str) -> Recipe:
         """Episodes of a minute with devices that may be uncalibrated."""
@@ -91,14 +93,15 @@ NOISE, SHARE = 30.0, 10.0
 GAIN_PRESETS: dict[str, Preset] = {
     "external-acceleration+noise": GainPreset(
         "external-acceleration, its process and measurement noise set by a recurrent network",
-        HANDS,
+        {"hand-held-prompt": 64, "carried-prompt": 24, "carried-running": 8},
         filter="external-acceleration",
         observed="mekf",
         units=32,
         limits={"process": NOISE, "measurement": 1000.0, "c_a": NOISE},
         scale=2.0,
         noise=0.05,
-        fit=FIT,
+        fit=replace(FIT, epochs=8),
+        small_error=0.2 * DEG,
     ),
     "mekf+noise": GainPreset(
         "mekf, its process, bias and measurement noise set by a recurrent network",
