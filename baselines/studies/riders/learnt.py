@@ -18,6 +18,7 @@ from ...gain_policy.constant_gains import best_constant_gains
 from ...learned.data import sequence_of
 from ...learned.head import AngleHead
 from ...learned.inputs.filter_features import FilterFeatures
+from ..averages import circular_mean
 from .errors import angles_of, truth_of
 from .references import Ridge, moving_averages
 
@@ -107,11 +108,6 @@ def best_ridge(inputs: list[np.ndarray], targets: list[np.ndarray], rides: list[
             losses[penalty] = float(np.mean((ridge.predict(joined(inputs, kept)) - joined(targets, kept)) ** 2))
     penalty = min(losses, key=losses.__getitem__) if losses else PENALTIES[1]
     return Ridge.fit(np.concatenate(inputs), np.concatenate(targets), penalty)
-
-
-def circular_mean(angles: np.ndarray) -> np.ndarray:
-    """Mean ``(K,)`` of angles ``(N, K)``, rad."""
-    return np.arctan2(np.sin(angles).mean(axis=0), np.cos(angles).mean(axis=0))
 
 
 def tuned_parameters(
