@@ -67,7 +67,8 @@ def learn(paper: str, start: str, source: RideSource, seed: int, *, samples: int
     head = AngleHead(outputs, (1.0,) * sum(quantity.size for quantity in outputs))
     kalman: Any = make(start)
     front_end = FilterFeatures(kalman)
-    truths, biases, inputs, targets, rides, tuning = [], [], [], [], [], []
+    truths, biases, inputs, targets, rides = [], [], [], [], []
+    tuning: list[Trajectory] = []
     for index in range(source.rides):
         draws = drawn(source, seed, index)
         if float(draws[0].time[-1]) < 2.0 * SETTLED:
@@ -75,7 +76,7 @@ def learn(paper: str, start: str, source: RideSource, seed: int, *, samples: int
         if len(tuning) < TUNED_RIDES:
             tuning.append(draws[0])
         for each in draws:
-            own = make(paper, dt=each.dt, metadata=each.metadata)
+            own: Any = make(paper, dt=each.dt, metadata=each.metadata)
             truth = angles_of(outputs, truth_of(own, each))[each.mask][:: 4 * THINNED]
             told = angles_of(outputs, own.run(each.measurements).pose)[each.mask][:: 4 * THINNED]
             truths.append(truth)
