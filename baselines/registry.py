@@ -93,6 +93,13 @@ TRAINED: dict[str, Entry] = {
         )
         for name in ("two-gyro", "force-inertial")
     },
+    "gru-two-gyro-bicycle": Entry(
+        "..baselines.learned.estimator:shipped",
+        "the same from the bicycle's gyroscope: what a rider's habits tell of the trunk, for comparison",
+        HERE,
+        "learned",
+        {"weights": "gru-two-gyro-bicycle"},
+    ),
     **{
         f"{name}+noise": Entry(
             "..baselines.learned.gains.gain_filter:shipped",

@@ -202,9 +202,14 @@ class Costs:
         assert poses.grad is not None
         wanted = np.zeros_like(followed.poses)
         wanted[..., columns] = poses.grad.numpy()
-        nothing = [np.zeros_like(array) for array in (followed.covariances, followed.nis, followed.logarithms)]
         found, _, _ = equations.back(
-            followed, wanted, *nothing, np.zeros_like(after.x), np.zeros_like(after.covariance)
+            followed,
+            wanted,
+            np.zeros_like(followed.covariances),
+            np.zeros_like(followed.nis),
+            np.zeros_like(followed.logarithms),
+            np.zeros_like(after.x),
+            np.zeros_like(after.covariance),
         )
         summed = found.reshape(len(actions), part.interval, *found.shape[1:]).sum(axis=1)
         return weighted.detach().numpy(), np.where(inside, summed * free, 0.0)
@@ -280,9 +285,9 @@ def train_analytically(
             optimizer.step()
             schedule.step()
             total.append(cost)
-        cost = costs.of_policy(unseen, actor.policy(tuned)) if unseen else np.nan
-        if cost < least:
-            best, least = actor.policy(tuned), cost
+        held_out = costs.of_policy(unseen, actor.policy(tuned)) if unseen else np.nan
+        if held_out < least:
+            best, least = actor.policy(tuned), held_out
         if report is not None:
-            report(epoch, float(np.concatenate(total).mean()), cost)
+            report(epoch, float(np.concatenate(total).mean()), held_out)
     return best or actor.policy(tuned)

@@ -18,7 +18,7 @@ from ..weights_io import load_weights, save_weights
 from .head import AngleHead, Head, TiltHead
 from .inputs.filter_bank import FilterBank
 from .inputs.filter_features import FilterFeatures
-from .inputs.front_end import FrontEnd, RawChannels, Seen
+from .inputs.front_end import FrontEnd, RawChannels
 from .inputs.level_frame import LevelFrame
 from .mixture_head import MixtureHead
 from .networks.gru import GruNetwork
@@ -81,7 +81,75 @@ class LearnedState(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class LearnedEstimator:
+class NetworkParts:
+    """What estimators with a network share: a front end before it and a head behind it, kept in one file.
+
+    Attributes:
+        network: the weights.
+        front_end: what the network sees, and the sampling interval.
+        head: what its output means.
+
+    Raises:
+        ValueError: front end, network and head do not fit together.
+    """
+
+    network: Network
+    front_end: Any
+    head: Any
+
+    def __post_init__(self) -> None:
+        if self.network.features != self.front_end.size or self.network.outputs != self.head.size:
+            raise ValueError(
+                f"the network must take {self.front_end.size} features and give {self.head.size} outputs, "
+                f"got {self.network.features} and {self.network.outputs}"
+            )
+
+    def save(self, path: str | Path, card: Mapping[str, Any] | None = None) -> Path:
+        """Write weights and card, which ``load`` of the same class reads.
+
+        Args:
+            path: of the weights; see :func:`poise.baselines.weights_io.save_weights`.
+            card: further entries of the card.
+        """
+        parts = {"network": self.network.kind, "front_end": self.front_end.describe(), "head": self.head.describe()}
+        return save_weights(path, self.network.arrays(), {**(card or {}), **parts})
+
+    @property
+    def dt(self) -> float:
+        """Sampling interval, s."""
+        return float(self.front_end.dt)
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        """Required channels."""
+        return tuple(self.front_end.channels)
+
+    def with_dt(self, dt: float) -> Self:
+        """The same estimator for another sampling interval."""
+        return replace(self, front_end=self.front_end.with_dt(dt))
+
+    def configured(self, metadata: Mapping[str, Any]) -> Self:
+        """The same for the person, vehicle or device that a recording's metadata describe."""
+        return replace(self, front_end=self.front_end.configured(metadata))
+
+    def _advance(
+        self, features: np.ndarray, due: np.ndarray, memory: np.ndarray, output: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Memory and output after ``(T, *batch, …)`` samples, and the output of every sample; inputs stay."""
+        length, batch = features.shape[0], features.shape[1:-1]
+        memory, output = np.array(memory, dtype=float), np.array(output, dtype=float)
+        count = int(np.prod(batch, dtype=int))
+        outputs = self.network.advance(
+            np.ascontiguousarray(features).reshape(length, count, -1),
+            np.ascontiguousarray(due, dtype=float).reshape(length, count),
+            memory.reshape(count, -1),
+            output.reshape(count, -1),
+        )
+        return memory, output, outputs.reshape(length, *batch, -1)
+
+
+@dataclass(frozen=True, eq=False)
+class LearnedEstimator(NetworkParts):
     """A network behind a front end, whose output a head makes a pose.
 
     The front end runs at the rate of the sensors. At fixed intervals, independent of that rate, the network receives
@@ -97,17 +165,9 @@ class LearnedEstimator:
         ValueError: front end, network and head do not fit together.
     """
 
-    network: Network
     front_end: FrontEnd
     head: Head
     compiled: bool = True
-
-    def __post_init__(self) -> None:
-        if self.network.features != self.front_end.size or self.network.outputs != self.head.size:
-            raise ValueError(
-                f"the network must take {self.front_end.size} features and give {self.head.size} outputs, "
-                f"got {self.network.features} and {self.network.outputs}"
-            )
 
     @classmethod
     def load(cls, path_or_name: str | Path = "gru", dt: float = 0.01, network: Network | None = None) -> Self:
@@ -133,26 +193,6 @@ class LearnedEstimator:
                 f"{path_or_name}: the card does not describe a network of this package ({reason})"
             ) from None
 
-    def save(self, path: str | Path, card: Mapping[str, Any] | None = None) -> Path:
-        """Write weights and card, for :meth:`load`.
-
-        Args:
-            path: of the weights; see :func:`poise.baselines.weights_io.save_weights`.
-            card: further entries of the card.
-        """
-        parts = {"network": self.network.kind, "front_end": self.front_end.describe(), "head": self.head.describe()}
-        return save_weights(path, self.network.arrays(), {**(card or {}), **parts})
-
-    @property
-    def dt(self) -> float:
-        """Sampling interval, s."""
-        return self.front_end.dt
-
-    @property
-    def channels(self) -> tuple[Channel, ...]:
-        """Required channels."""
-        return self.front_end.channels
-
     @property
     def outputs(self) -> tuple[Quantity, ...]:
         """Estimated quantities."""
@@ -162,14 +202,6 @@ class LearnedEstimator:
     def error_parts(self) -> dict[str, tuple[int, int]]:
         """Quantity → its part of the covariance; empty where the head gives none."""
         return getattr(self.head, "error_parts", {})
-
-    def with_dt(self, dt: float) -> Self:
-        """The same estimator for another sampling interval."""
-        return replace(self, front_end=self.front_end.with_dt(dt))
-
-    def configured(self, metadata: Mapping[str, Any]) -> Self:
-        """The same for the person, vehicle or device that a recording's metadata describe."""
-        return replace(self, front_end=self.front_end.configured(metadata))
 
     def truth(self, truth: Mapping[str, Any]) -> dict[str, Any]:
         """True values of outputs that only the corrected filter defines; see :meth:`.Equations.truth`."""
@@ -190,8 +222,7 @@ class LearnedEstimator:
         memory, output = state.memory, state.output
         if bool((seen.due == 1.0).any()):
             if self.compiled and not is_torch(seen.features):
-                one = Seen(seen.features[None], seen.due[None], {}, seen.spread)
-                memory, output, _ = self._advance(one, memory, output)
+                memory, output, _ = self._advance(seen.features[None], seen.due[None], memory, output)
             else:
                 xp, now = namespace(seen.features), (seen.due == 1.0)[..., None]
                 moved, told = self.network.step(xp.where(now, seen.features, xp.zeros_like(seen.features)), memory)
@@ -205,21 +236,8 @@ class LearnedEstimator:
             return run_by_steps(self, arrays)
         state = self.init({name: array[0] for name, array in arrays.items()})
         seen = self.front_end.run(arrays)
-        _, _, outputs = self._advance(seen, state.memory, state.output)
+        _, _, outputs = self._advance(seen.features, seen.due, state.memory, state.output)
         return self.head.estimate(seen, outputs)
-
-    def _advance(self, seen: Seen, memory: np.ndarray, output: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Memory and output after ``(T, *batch, …)`` samples, and the output of every sample."""
-        length, batch = seen.features.shape[0], seen.features.shape[1:-1]
-        memory, output = np.array(memory, dtype=float), np.array(output, dtype=float)
-        count = int(np.prod(batch, dtype=int))
-        outputs = self.network.advance(
-            np.ascontiguousarray(seen.features).reshape(length, count, -1),
-            np.ascontiguousarray(seen.due).reshape(length, count),
-            memory.reshape(count, -1),
-            output.reshape(count, -1),
-        )
-        return memory, output, outputs.reshape(length, *batch, -1)
 
 
 def shipped(weights: str = "gru", dt: float = 0.01) -> LearnedEstimator:

@@ -62,8 +62,36 @@ class Head(Protocol):
         ...
 
 
+class InclinationHead:
+    """What heads of the inclination share; subclasses say the up vector in the level frame."""
+
+    outputs: ClassVar[tuple[Quantity, ...]] = (UP,)
+
+    def up(self, output: Array, spread: Array) -> Array:
+        """The up vector ``(..., 3)``, of any length, in the level frame.
+
+        Args:
+            output: ``(..., size)`` of the network.
+            spread: of the front end (:class:`.front_end.Seen`).
+        """
+        raise NotImplementedError
+
+    def estimate(self, seen: Seen, output: Array) -> Estimate:
+        """See :class:`Head`."""
+        orientation = seen.base["relative_orientation"]
+        return Estimate({"up": rotation.rotate_back(orientation, rotation.normalize(self.up(output, seen.spread)))})
+
+    def target(self, seen: Seen, trajectory: Trajectory) -> np.ndarray:
+        """See :class:`Head`: the true up vector in the level frame."""
+        return np.asarray(rotation.rotate(seen.base["relative_orientation"], trajectory.truth_of("up")))
+
+    def errors(self, output: Array, target: Array, spread: Array) -> Array:
+        """See :class:`Head`."""
+        return direction_error(self.up(output, spread), target)[..., None]
+
+
 @dataclass(frozen=True)
-class TiltHead:
+class TiltHead(InclinationHead):
     """The inclination: a tilt ``(2,)`` of the level frame, horizontal part of the up vector in it.
 
     Attributes:
@@ -76,7 +104,6 @@ class TiltHead:
     floor: float = 0.002
 
     kind: ClassVar[str] = "tilt"
-    outputs: ClassVar[tuple[Quantity, ...]] = (UP,)
     size: ClassVar[int] = 2
 
     def describe(self) -> dict[str, Any]:
@@ -87,11 +114,6 @@ class TiltHead:
     def read(cls, described: Mapping[str, Any]) -> Self:
         """The inverse of :meth:`describe`."""
         return cls(described.get("limit"), float(described.get("floor", 0.002)))
-
-    def estimate(self, seen: Seen, output: Array) -> Estimate:
-        """See :class:`Head`."""
-        orientation = seen.base["relative_orientation"]
-        return Estimate({"up": rotation.rotate_back(orientation, rotation.normalize(self.up(output, seen.spread)))})
 
     def up(self, output: Array, spread: Array) -> Array:
         """The up vector ``(..., 3)``, of any length, in the level frame."""
@@ -104,10 +126,6 @@ class TiltHead:
             tilt = tilt * longest * xp.tanh(length / longest) / length
         return xp.concat([tilt, xp.ones_like(tilt[..., :1])], axis=-1)
 
-    def target(self, seen: Seen, trajectory: Trajectory) -> np.ndarray:
-        """See :class:`Head`: the true up vector in the level frame."""
-        return np.asarray(rotation.rotate(seen.base["relative_orientation"], trajectory.truth_of("up")))
-
     def loss(self, output: Any, target: Any, spread: Any, mask: Any) -> Any:
         """Mean over sequences of the root mean square inclination error in time, rad.
 
@@ -115,10 +133,6 @@ class TiltHead:
         contrast to the mean square over all samples. Zero, with gradient zero, where nothing is scored.
         """
         return mean_of_sequences(direction_error(self.up(output, spread), target), mask)
-
-    def errors(self, output: Array, target: Array, spread: Array) -> Array:
-        """See :class:`Head`."""
-        return direction_error(self.up(output, spread), target)[..., None]
 
     def augmented(
         self, features: np.ndarray, target: np.ndarray, generator: np.random.Generator

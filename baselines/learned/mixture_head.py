@@ -8,17 +8,13 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from ...envs.data.trajectory import Trajectory
-from ...filters.core import rotation
 from ...filters.core.backend import Array, constant, namespace
 from ...filters.core.metrics import direction_error
-from ...filters.core.quantity import UP, Estimate, Quantity
-from .head import of_sequences
-from .inputs.front_end import Seen
+from .head import InclinationHead, of_sequences
 
 
 @dataclass(frozen=True)
-class MixtureHead:
+class MixtureHead(InclinationHead):
     """The inclination: a weighted mean of the filter's and of its candidates'.
 
     The network says logarithms of K + 1 weights, that of the published filter first. The weights are positive and have
@@ -36,7 +32,6 @@ class MixtureHead:
     least: float = 0.003
 
     kind: ClassVar[str] = "mixture"
-    outputs: ClassVar[tuple[Quantity, ...]] = (UP,)
 
     def __post_init__(self) -> None:
         if self.candidates < 1:
@@ -56,11 +51,6 @@ class MixtureHead:
         """The inverse of :meth:`describe`."""
         return cls(**{name: value for name, value in described.items() if name != "kind"})
 
-    def estimate(self, seen: Seen, output: Array) -> Estimate:
-        """See :class:`.head.Head`."""
-        orientation = seen.base["relative_orientation"]
-        return Estimate({"up": rotation.rotate_back(orientation, rotation.normalize(self.up(output, seen.spread)))})
-
     def up(self, output: Array, spread: Array) -> Array:
         """The up vector ``(..., 3)``, of any length, in the level frame."""
         xp, count = namespace(output), self.candidates
@@ -71,10 +61,6 @@ class MixtureHead:
         tilts = xp.reshape(spread[..., 1:], (*tuple(spread.shape[:-1]), count, 2))
         return _vector(xp.sum(weights[..., 1:, None] * tilts, axis=-2))
 
-    def target(self, seen: Seen, trajectory: Trajectory) -> np.ndarray:
-        """See :class:`.head.Head`: the true up vector in the level frame."""
-        return np.asarray(rotation.rotate(seen.base["relative_orientation"], trajectory.truth_of("up")))
-
     def loss(self, output: Any, target: Any, spread: Any, mask: Any) -> Any:
         """Mean over sequences of the ratio of root mean square errors, this one's to the published filter's.
 
@@ -83,10 +69,6 @@ class MixtureHead:
         error = of_sequences(direction_error(self.up(output, spread), target), mask)
         published = of_sequences(direction_error(_vector(0.0 * target[..., :2]), target), mask)
         return (error / (published + self.least)).mean()
-
-    def errors(self, output: Array, target: Array, spread: Array) -> Array:
-        """See :class:`.head.Head`."""
-        return direction_error(self.up(output, spread), target)[..., None]
 
     def augmented(
         self, features: np.ndarray, target: np.ndarray, generator: np.random.Generator

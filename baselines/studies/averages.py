@@ -17,17 +17,23 @@ def windowed(
 ) -> dict[str, float]:
     """RMS (or another statistic) of each column between two times, both included; NaN where a ride is too short."""
     part = (time >= begin) & (time <= end)
-    statistic = statistic or _rms
+    statistic = statistic or rms
     return {name: float(statistic(error[part])) if part.any() else float("nan") for name, error in errors.items()}
 
 
-def _rms(values: np.ndarray) -> float:
+def rms(values: np.ndarray) -> float:
+    """Root mean square of all values."""
     return float(np.sqrt(np.mean(values**2)))
 
 
 def largest(values: np.ndarray) -> float:
     """Largest size."""
     return float(np.abs(values).max())
+
+
+def circular_mean(angles: np.ndarray) -> np.ndarray:
+    """Mean ``(K,)`` of angles ``(N, K)``, rad."""
+    return np.arctan2(np.sin(angles).mean(axis=0), np.cos(angles).mean(axis=0))
 
 
 def mean_of(rows: Iterable[Mapping[str, float]]) -> dict[str, float]:

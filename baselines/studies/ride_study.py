@@ -17,7 +17,7 @@ from ...filters.core.kalman import KalmanFilter
 from ...filters.core.observer import Observer
 from ...filters.core.quantity import Estimate
 from ..evaluation import COLUMNS
-from .averages import largest, mean_of, mean_rms, rounded, windowed
+from .averages import circular_mean, largest, mean_of, mean_rms, rounded, windowed
 from .claims import Claim
 from .kit import Study, load_ride
 from .report import STD, Report
@@ -144,7 +144,7 @@ class RideStudy:
         zero = self.errors({name: np.zeros_like(truth[name]) for name, _ in self.angles.values()}, truth)
         part = time >= (SETTLED if time[-1] >= SETTLED else 0.0)
         mean = {
-            angle: np.degrees(rotation.wrap(np.radians(error) - _circular_mean(np.radians(error[part]))))
+            angle: np.degrees(rotation.wrap(np.radians(error) - circular_mean(np.radians(error[part]))))
             for angle, error in zero.items()
         }
         return {ZERO: zero, MEAN: mean}
@@ -336,7 +336,3 @@ def _settled(ride: Trajectory) -> np.ndarray:
 
 def _rounded(value: float | None) -> float | None:
     return None if value is None or np.isnan(value) else round(value, 2)
-
-
-def _circular_mean(angles: np.ndarray) -> np.ndarray:
-    return np.arctan2(np.sin(angles).mean(axis=0), np.cos(angles).mean(axis=0))

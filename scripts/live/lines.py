@@ -12,6 +12,7 @@ import numpy as np
 
 from ...envs.data.formats.names import groups, time_column
 from ...envs.data.formats.table import Table, factor, split_unit, units_row
+from ...envs.data.formats.text import is_number
 from ...filters.core.quantity import Channel
 from ...filters.support.names import unknown
 
@@ -189,7 +190,7 @@ class LineReader:
             if units_row(cells):
                 return None
             if self._names:
-                wrong = next(cell for cell in cells if cell and not _is_number(cell))
+                wrong = next(cell for cell in cells if cell and not is_number(cell))
                 raise BadLineError(f"{wrong[:40]!r} is not a number") from None
             self._understand(cells)
             self._names = tuple(split_unit(cell)[0] for cell in cells)
@@ -229,11 +230,3 @@ class LineReader:
     def _needed(self) -> set[str]:
         assert self.layout is not None
         return {column for columns, _ in self.layout.channels.values() for column in columns} | {self.layout.time or ""}
-
-
-def _is_number(cell: str) -> bool:
-    try:
-        float(cell)
-    except ValueError:
-        return False
-    return True

@@ -12,7 +12,7 @@ import numpy as np
 from gymnasium import spaces
 
 from ...filters.support.files import write_text
-from ..tables import markdown_table
+from ...filters.support.rows import markdown_table
 
 HEADINGS = {
     "action space": "Action Space",
@@ -118,7 +118,8 @@ def described(kind: type) -> dict[str, str]:
 
 def arguments_of(kind: type) -> list[dict[str, Any]]:
     """Every argument of an environment, also those that it hands on to its bases, with its default."""
-    texts, rows = described(kind), {}
+    texts = described(kind)
+    rows: dict[str, dict[str, Any]] = {}
     for each in kind.__mro__:
         parameters = inspect.signature(each.__init__).parameters  # type: ignore[misc]
         for name, one in parameters.items():
@@ -150,10 +151,10 @@ def rows_of(space: spaces.Space[Any]) -> list[dict[str, Any]]:
     parts = space.spaces.items() if isinstance(space, spaces.Dict) else [("", space)]
     rows = []
     for name, each in parts:
-        box = isinstance(each, spaces.Box)
         row = {"key": f"`{name}`"} if name else {}
         row |= {"shape": str(each.shape), "type": str(each.dtype)}
-        rows.append(row | {"low": bound(each.low) if box else "0", "high": bound(each.high) if box else "1"})
+        low, high = (bound(each.low), bound(each.high)) if isinstance(each, spaces.Box) else ("0", "1")
+        rows.append(row | {"low": low, "high": high})
     return rows
 
 

@@ -67,9 +67,7 @@ def gains_by_motion(
             order = np.argsort(number[known], kind="stable")
             groups = np.array_split(order, SHARES)
             means = [float(np.exp(log[known][group].mean())) for group in groups]
-            rank = np.empty((2, len(order)))
-            for row, values in zip(rank, (number[known], log[known]), strict=True):
-                row[np.argsort(values, kind="stable")] = np.arange(len(order))
+            ranks = [np.argsort(np.argsort(values, kind="stable")) for values in (number[known], log[known])]
             rows.append(
                 {
                     "gain": gain,
@@ -79,7 +77,7 @@ def gains_by_motion(
                     "in the middle": means[SHARES // 2],
                     "of the highest fifth": float(number[known][groups[-1]].mean()),
                     "factor here": means[-1],
-                    "rank correlation": float(np.corrcoef(rank)[0, 1]),
+                    "rank correlation": float(np.corrcoef(ranks[0], ranks[1])[0, 1]),
                 }
             )
     return rows

@@ -16,11 +16,11 @@ import numpy as np
 
 from ....filters.core.estimator import check_measurements
 from ....filters.core.kalman import KalmanFilter
-from ....filters.core.quantity import Channel, Estimate, Measurement, Quantity
+from ....filters.core.quantity import Estimate, Measurement, Quantity
 from ....filters.core.sampling import FilterState
 from ....filters.support.names import look_up
-from ...weights_io import load_weights, save_weights
-from ..estimator import NETWORKS, Network
+from ...weights_io import load_weights
+from ..estimator import NETWORKS, NetworkParts
 from ..inputs.gain_features import GainFeatures, ObservedState
 from .gain_head import GainHead
 
@@ -42,7 +42,7 @@ class GainFilterState(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class GainFilter:
+class GainFilter(NetworkParts):
     """A filter with gains of a network: an :class:`~poise.filters.core.estimator.Estimator` on NumPy arrays.
 
     A network that says zeros leaves the filter as it is, bit by bit.
@@ -56,16 +56,8 @@ class GainFilter:
         ValueError: front end, network and head do not fit together.
     """
 
-    network: Network
     front_end: GainFeatures
     head: GainHead
-
-    def __post_init__(self) -> None:
-        if self.network.features != self.front_end.size or self.network.outputs != self.head.size:
-            raise ValueError(
-                f"the network must take {self.front_end.size} features and give {self.head.size} outputs, "
-                f"got {self.network.features} and {self.network.outputs}"
-            )
 
     @classmethod
     def load(cls, path_or_name: str | Path, dt: float = 0.01) -> Self:
@@ -87,43 +79,15 @@ class GainFilter:
         except (KeyError, TypeError) as reason:
             raise ValueError(f"{path_or_name}: the card does not describe gains of a filter ({reason})") from None
 
-    def save(self, path: str | Path, card: Mapping[str, Any] | None = None) -> Path:
-        """Write weights and card, for :meth:`load`.
-
-        Args:
-            path: of the weights; see :func:`poise.baselines.weights_io.save_weights`.
-            card: further entries of the card.
-        """
-        parts = {"network": self.network.kind, "front_end": self.front_end.describe(), "head": self.head.describe()}
-        return save_weights(path, self.network.arrays(), {**(card or {}), **parts})
-
     @property
     def filter(self) -> KalmanFilter:
         """The filter whose gains are set, in its published tuning."""
         return replace(self.front_end.kalman, keep_covariance=True)
 
     @property
-    def dt(self) -> float:
-        """Sampling interval, s."""
-        return self.front_end.dt
-
-    @property
-    def channels(self) -> tuple[Channel, ...]:
-        """Required channels."""
-        return self.front_end.channels
-
-    @property
     def outputs(self) -> tuple[Quantity, ...]:
         """Estimated quantities: those of the filter."""
         return self.front_end.kalman.outputs
-
-    def with_dt(self, dt: float) -> Self:
-        """The same estimator for another sampling interval."""
-        return replace(self, front_end=self.front_end.with_dt(dt))
-
-    def configured(self, metadata: Mapping[str, Any]) -> Self:
-        """The same for the person, vehicle or device that a recording's metadata describe."""
-        return replace(self, front_end=self.front_end.configured(metadata))
 
     def init(self, measurement: Measurement) -> GainFilterState:
         """Initial state with the batch shape of ``measurement``, which is not processed."""
@@ -163,21 +127,6 @@ class GainFilter:
         factors = self.head.factors(output)
         named = {name: factors[..., index] for index, name in enumerate(self.head.gains)}
         return self.front_end.kalman.model.limited(named)
-
-    def _advance(
-        self, features: np.ndarray, due: np.ndarray, memory: np.ndarray, output: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Memory and output after ``(T, *batch, …)`` samples, and the output of every sample; inputs stay."""
-        length, batch = features.shape[0], features.shape[1:-1]
-        memory, output = np.array(memory, dtype=float), np.array(output, dtype=float)
-        count = int(np.prod(batch, dtype=int))
-        outputs = self.network.advance(
-            np.ascontiguousarray(features).reshape(length, count, -1),
-            np.ascontiguousarray(due, dtype=float).reshape(length, count),
-            memory.reshape(count, -1),
-            output.reshape(count, -1),
-        )
-        return memory, output, outputs.reshape(length, *batch, -1)
 
 
 def shipped(weights: str, dt: float = 0.01) -> GainFilter:

@@ -184,13 +184,13 @@ def experiment(study: Study, report: Report, simulated: list[Row]) -> None:
         )
     )
     report.claims("Table 5.1: what holds", claims)
-    jobs = [(device, seed, duration, calibrated) for device in FIRST for calibrated in (False, True) for seed in roots]
-    found_nees = dict(zip(jobs, study.map("attitude NEES", attitude_nees, jobs), strict=True))
+    cases = [(device, seed, duration, calibrated) for device in FIRST for calibrated in (False, True) for seed in roots]
+    found_nees = dict(zip(cases, study.map("attitude NEES", attitude_nees, cases), strict=True))
     rows = []
     for device in FIRST:
         row: dict[str, Any] = {"device": device, "method": FIRST[device]}
         for kind, calibrated in (("white noise", False), ("after calibration", True)):
-            values = [value for job, value in found_nees.items() if job[0] == device and job[3] is calibrated]
+            values = [value for case, value in found_nees.items() if case[0] == device and case[3] is calibrated]
             row[f"NEES, {kind}, 95 % interval"] = interval_of_mean(values)
         rows.append(row)
     report.table("Consistency of the proposed method", rows, "Of the attitude, a degree of freedom; 1 if P is right.")

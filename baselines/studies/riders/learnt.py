@@ -18,6 +18,7 @@ from ...gain_policy.constant_gains import best_constant_gains
 from ...learned.data import sequence_of
 from ...learned.head import AngleHead
 from ...learned.inputs.filter_features import FilterFeatures
+from ..averages import circular_mean
 from .errors import angles_of, truth_of
 from .references import Ridge, moving_averages
 
@@ -66,7 +67,8 @@ def learn(paper: str, start: str, source: RideSource, seed: int, *, samples: int
     head = AngleHead(outputs, (1.0,) * sum(quantity.size for quantity in outputs))
     kalman: Any = make(start)
     front_end = FilterFeatures(kalman)
-    truths, biases, inputs, targets, rides, tuning = [], [], [], [], [], []
+    truths, biases, inputs, targets, rides = [], [], [], [], []
+    tuning: list[Trajectory] = []
     for index in range(source.rides):
         draws = drawn(source, seed, index)
         if float(draws[0].time[-1]) < 2.0 * SETTLED:
@@ -74,7 +76,7 @@ def learn(paper: str, start: str, source: RideSource, seed: int, *, samples: int
         if len(tuning) < TUNED_RIDES:
             tuning.append(draws[0])
         for each in draws:
-            own = make(paper, dt=each.dt, metadata=each.metadata)
+            own: Any = make(paper, dt=each.dt, metadata=each.metadata)
             truth = angles_of(outputs, truth_of(own, each))[each.mask][:: 4 * THINNED]
             told = angles_of(outputs, own.run(each.measurements).pose)[each.mask][:: 4 * THINNED]
             truths.append(truth)
@@ -107,11 +109,6 @@ def best_ridge(inputs: list[np.ndarray], targets: list[np.ndarray], rides: list[
             losses[penalty] = float(np.mean((ridge.predict(joined(inputs, kept)) - joined(targets, kept)) ** 2))
     penalty = min(losses, key=losses.__getitem__) if losses else PENALTIES[1]
     return Ridge.fit(np.concatenate(inputs), np.concatenate(targets), penalty)
-
-
-def circular_mean(angles: np.ndarray) -> np.ndarray:
-    """Mean ``(K,)`` of angles ``(N, K)``, rad."""
-    return np.arctan2(np.sin(angles).mean(axis=0), np.cos(angles).mean(axis=0))
 
 
 def tuned_parameters(

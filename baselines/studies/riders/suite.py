@@ -115,7 +115,7 @@ def all_errors(paper: str, learnt: Learnt, ride: Trajectory, scored: np.ndarray)
 def estimated(name: str, ride: Trajectory, scored: np.ndarray, **parameters: Any) -> Errors:
     """Errors of an estimator, with deviations."""
     kept = {"keep_covariance": True} if name in FILTERS else {}
-    made = make_estimator(name, dt=ride.dt, metadata=ride.metadata, **kept, **parameters)
+    made: Any = make_estimator(name, dt=ride.dt, metadata=ride.metadata, **kept, **parameters)
     return errors_of(made, ride, made.run(ride.measurements), scored)
 
 

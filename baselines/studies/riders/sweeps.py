@@ -147,7 +147,7 @@ def ride_points(settings: RiderSuite, index: int) -> list[Point]:
 
 def mean_error(name: str, drawn: Trajectory) -> float:
     """Mean over a paper's angles of the root mean square error, deg."""
-    made = make_estimator(name, dt=drawn.dt, metadata=drawn.metadata)
+    made: Any = make_estimator(name, dt=drawn.dt, metadata=drawn.metadata)
     return score(errors_of(made, drawn, made.run(drawn.measurements), scored_samples(drawn))).mean
 
 

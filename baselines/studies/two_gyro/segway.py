@@ -17,7 +17,7 @@ from ....filters.core.consistency import nees
 from ....filters.core.kalman import KalmanFilter
 from ....filters.core.rotation import wrap
 from ...plots import TRUTH_COLOR, legend_above, new_figure
-from ..averages import mean_of, rounded
+from ..averages import mean_of, rms, rounded
 from ..claims import Claim
 from ..kit import Study
 from ..report import Report
@@ -69,7 +69,7 @@ def outcome(motion: str, seed: int) -> dict[str, dict[str, float]]:
         late = ride.time >= LATE
         variance = estimate.covariance[late, :1, :1]
         found[name] = {
-            "χ": _rms(error[late]),
+            "χ": rms(error[late]),
             "NEES": float(np.mean(nees(error[late, None] * DEG, variance))),
         }
     equations = replace(filter_of(Errors(), DT), platform="segway", integration="midpoint")
@@ -77,12 +77,8 @@ def outcome(motion: str, seed: int) -> dict[str, dict[str, float]]:
     bound = posterior_bound(equations, true_states(ideal.truth, equations), ideal.measurements)[:, 0, 0]
     pitch = true_angles(ideal.truth)["two-gyro/pitch"][:, 0] / DEG
     found["posterior bound"] = {"χ": float(np.sqrt(np.mean(bound[late]))) / DEG}
-    found[ZERO], found[MEAN] = {"χ": _rms(pitch[late])}, {"χ": float(pitch[late].std())}
+    found[ZERO], found[MEAN] = {"χ": rms(pitch[late])}, {"χ": float(pitch[late].std())}
     return found
-
-
-def _rms(values: np.ndarray) -> float:
-    return float(np.sqrt(np.mean(values**2)))
 
 
 def segway(study: Study, report: Report) -> None:

@@ -65,8 +65,7 @@ def align_clocks(
 
     Raises:
         ValueError: no such gyroscope, recordings that do not overlap long enough, no motion, or devices that do not
-        turn
-            alike.
+            turn alike.
     """
     grids = [rate_on_grid(one, name) for one, name in ((trajectory, site), (reference, reference_site))]
     (start, own), (other_start, other) = grids
