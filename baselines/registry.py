@@ -116,7 +116,7 @@ TRAINED: dict[str, Entry] = {
 
 KINDS: dict[Kind, str] = {
     "filter": "published or this package's",
-    "adaptive": "a filter whose gains a policy sets",
+    "adaptive": "a filter whose gains a policy or a rule sets",
     "learned": "a trained network",
     "baseline": "a classical reference without tuning",
     "external": "another package's, if that is installed",
