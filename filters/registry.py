@@ -33,8 +33,8 @@ class Entry:
             ``.module:name`` relative to this package.
         description: what it estimates and how, in one line.
         source: where it was published.
-        kind: ``filter`` (published or this package's), ``adaptive`` (a filter whose gains a policy or a rule sets), ``learned``,
-            ``baseline`` (a classical reference without tuning), ``external`` (another package's).
+        kind: ``filter`` (published or this package's), ``adaptive`` (a filter whose gains a policy or a rule sets),
+            ``learned``, ``baseline`` (a classical reference without tuning), ``external`` (another package's).
         fixed: parameters that the name implies; they cannot be passed.
         describes: the class whose channels and outputs are those of the estimator, where ``factory`` is a function,
             or the name of a filter.
