@@ -18,11 +18,9 @@ extensions = [
     "sphinx_copybutton",
     "sphinx_gallery.gen_gallery",
 ]
-exclude_patterns = ["gallery/GALLERY_HEADER.rst", "_templates"]
-templates_path = ["_templates"]
+exclude_patterns = ["gallery/GALLERY_HEADER.rst"]
 html_theme = "furo"
 html_title = "poise: pose from inertial sensors"
-html_static_path = ["_static"]
 
 myst_enable_extensions = ["dollarmath", "colon_fence"]
 myst_heading_anchors = 3
