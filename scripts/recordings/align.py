@@ -68,7 +68,7 @@ def run(args: Args) -> int:
 
 def clocks(args: Args, recordings: list[Trajectory], out: Output) -> None:
     """All times on the first device's clock."""
-    from ...envs.data.alignment.clocks import align_clocks, merged, rate_on_grid
+    from ...envs.data.alignment.clocks import RATE, align_clocks, merged, rate_on_grid
 
     if len(recordings) < 2:
         raise ValueError("poise align clocks takes two recordings at least, the reference first")
@@ -88,7 +88,7 @@ def clocks(args: Args, recordings: list[Trajectory], out: Output) -> None:
         curves = {}
         for name, one in sites.items():
             start, rate = rate_on_grid(one, args.site)
-            curves[name] = (start, 1.0 / 200.0, rate)
+            curves[name] = (start, 1.0 / RATE, rate)
         save_curves(args.plot, curves, "angular rate, rad/s", out)
 
 
