@@ -94,6 +94,8 @@ def run(args: Args) -> int:
     if args.test_trajectories < 1:
         raise ValueError(f"test_trajectories must be at least 1, got {args.test_trajectories}")
     recorded = known_recordings(args.recordings)
+    for each in recorded:
+        check_recording(tuned, each)
     folder = open_run("tune", args, may_differ=("steps", "test_trajectories", "test_seed", "recordings", "report"))
     sets = {"simulated": config.motions.draw_many(child_seed(args.test_seed, TEST_SEED), args.test_trajectories)}
     if recorded:
@@ -123,6 +125,22 @@ def run(args: Args) -> int:
             out.say(f"weights: {final.save(args.export, card)}")
         out.add(run=str(folder.folder), card=card)
     return 0
+
+
+def check_recording(tuned: TunedFilter, recording: Trajectory) -> None:
+    """Refuse a recording on which the filter cannot be scored.
+
+    Raises:
+        ValueError: it lacks a channel of the filter, a channel holds no sample, or nothing of it is scored.
+    """
+    for channel in tuned.kalman.channels:
+        values = recording.measurements.get(channel.name)
+        if values is None:
+            raise ValueError(f"recording {recording.name!r} lacks the channel {channel.name!r} of {tuned.name}")
+        if not np.isfinite(values).all(axis=-1).any():
+            raise ValueError(f"recording {recording.name!r} has no sample of {channel.name!r}: all are NaN")
+    if not (recording.mask & np.isfinite(recording.truth_of("up")).all(axis=-1)).any():
+        raise ValueError(f"recording {recording.name!r} has no scored sample with a known orientation")
 
 
 def compare(args: Args) -> int:

@@ -19,6 +19,7 @@ import gymnasium
 import numpy as np
 import torch
 from gymnasium.wrappers import FlattenObservation, FrameStackObservation
+from matplotlib import pyplot
 from torch import nn
 from torch.distributions import Normal
 
@@ -38,6 +39,7 @@ def arguments(words: list[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--rate", type=float, default=3e-4, help="learning rate, falls to zero")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--curve", help="CSV file of the learning curve")
+    parser.add_argument("--figure", help="picture of the learning curve")
     return parser.parse_args(words)
 
 
@@ -148,6 +150,12 @@ def main(words: list[str] | None = None) -> list[tuple[int, float]]:
     if args.curve:
         with open(args.curve, "w", newline="") as file:
             csv.writer(file).writerows([("steps", "reward"), *curve])
+    if args.figure:
+        figure, axes = pyplot.subplots(figsize=(5.0, 3.0), layout="constrained")
+        axes.plot(*zip(*curve, strict=True))
+        axes.set(xlabel="steps", ylabel="mean reward of a step", title=" ".join([args.id, *args.option]))
+        axes.title.set_fontsize(9)
+        figure.savefig(args.figure, dpi=120)
     return curve
 
 

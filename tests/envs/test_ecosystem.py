@@ -96,8 +96,8 @@ def test_torchrl_rolls_out(identity):
     env.close()
 
 
-def single_file():
-    spec = importlib.util.spec_from_file_location("ppo_single_file", EXAMPLES / "ppo_single_file.py")
+def example(name):
+    spec = importlib.util.spec_from_file_location(name, EXAMPLES / f"{name}.py")
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
@@ -113,11 +113,18 @@ def single_file():
 )
 def test_a_single_file_that_knows_only_the_id(words, tmp_path):
     common = ["--steps", "128", "--envs", "2", "--rollout", "32", "--curve", str(tmp_path / "curve.csv")]
-    curve = single_file().main([*words, *common])
+    curve = example("ppo_single_file").main([*words, *common])
     assert [steps for steps, _ in curve] == [64, 128]
     assert all(np.isfinite(reward) for _, reward in curve)
     assert (tmp_path / "curve.csv").read_text().startswith("steps,reward\n64,")
-    assert single_file().main([*words, *common]) == curve
+    assert example("ppo_single_file").main([*words, *common]) == curve
+
+
+@pytest.mark.slow
+def test_plain_ppo_beats_the_published_gains():
+    ((published, constant, ppo),) = example("plain_ppo").main(["--steps", "25000"])
+    assert ppo < 0.95 * published
+    assert constant < published
 
 
 def test_the_zoo_knows_every_environment_that_it_configures():

@@ -5,10 +5,13 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 
-from poise.baselines.gain_policy.config import TRAINING_MOTIONS
+from poise.baselines.gain_policy.config import shipped_config
+from poise.envs.hand.trajectories import HandTrajectories
 from poise.envs.recipes.hand import HandRecipe
 from poise.envs.recipes.registry import recipe, save_recipe
 from poise.scripts.main import main
@@ -16,7 +19,7 @@ from poise.scripts.tune import Args, Curve, training_config
 
 
 def test_a_recipe_replaces_the_motions_of_the_shipped_policies(tmp_path: Path) -> None:
-    assert training_config(Args()).motions is TRAINING_MOTIONS
+    assert training_config(Args()).motions == shipped_config("external-acceleration").motions
     chosen = training_config(Args(recipe="carried")).motions
     assert isinstance(chosen, HandRecipe)
     assert chosen.rates == (100.0, 100.0)
@@ -71,6 +74,29 @@ def test_wrong_input_is_one_line(
     assert main(["tune", *words]) == 2
     assert said in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("spoil", "said"),
+    [
+        (lambda one: {"measurements": {"imu/gyr": one.measurements["imu/gyr"]}}, "lacks the channel 'imu/acc' of mekf"),
+        (
+            lambda one: {"measurements": {name: np.nan * values for name, values in one.measurements.items()}},
+            "all are NaN",
+        ),
+        (lambda one: {"truth": {"up": np.nan * one.truth_of("up")}}, "no scored sample"),
+        (lambda one: {"mask": np.zeros(len(one), bool)}, "no scored sample"),
+    ],
+)
+def test_recordings_that_cannot_be_scored_are_refused(
+    spoil: Any, said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    one = HandTrajectories(duration=1.0).draw_many(0, 1)[0]
+    one.replace(**spoil(one)).save(tmp_path / "one.h5")
+    assert main(["tune", "mekf", "--recordings", "one.h5"]) == 2
+    assert said in capsys.readouterr().err
+    assert [each.name for each in tmp_path.iterdir()] == ["one.h5"]
 
 
 def test_a_curve_continues_where_a_checkpoint_was(tmp_path: Path) -> None:
