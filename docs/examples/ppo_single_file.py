@@ -38,6 +38,7 @@ def arguments(words: list[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--std", type=float, default=0.3, help="of the exploration, at the start")
     parser.add_argument("--rate", type=float, default=3e-4, help="learning rate, falls to zero")
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--evaluate", type=int, default=500, help="steps of each environment in the last evaluation")
     parser.add_argument("--curve", help="CSV file of the learning curve")
     parser.add_argument("--figure", help="picture of the learning curve")
     return parser.parse_args(words)
@@ -146,6 +147,8 @@ def main(words: list[str] | None = None) -> list[tuple[int, float]]:
                 (0.5 * error - gain).backward()
                 nn.utils.clip_grad_norm_(agent.parameters(), 0.5)
                 optimizer.step()
+    for name, chosen in (("zero actions", None), ("the policy without noise", agent)):
+        print(f"{name}: mean reward {evaluated(envs, chosen, inputs, args):.4f}")
     envs.close()
     if args.curve:
         with open(args.curve, "w", newline="") as file:
@@ -157,6 +160,22 @@ def main(words: list[str] | None = None) -> list[tuple[int, float]]:
         axes.title.set_fontsize(9)
         figure.savefig(args.figure, dpi=120)
     return curve
+
+
+def evaluated(
+    envs: gymnasium.vector.VectorEnv, agent: Agent | None, inputs: Running, args: argparse.Namespace
+) -> float:
+    """Mean reward of a step on episodes of another seed, of actions without noise; None: of zeros."""
+    seen, _ = envs.reset(seed=args.seed + 1_000_000)
+    rewards, low, high = [], envs.action_space.low, envs.action_space.high
+    for _ in range(args.evaluate):
+        actions = np.zeros(envs.action_space.shape, np.float32)
+        if agent is not None:
+            with torch.no_grad():
+                actions = np.clip(agent.actor(inputs.normalised(seen)).numpy(), low, high)
+        seen, reward, *_ = envs.step(actions)
+        rewards.append(reward)
+    return float(np.mean(rewards))
 
 
 class Running:

@@ -112,7 +112,18 @@ def example(name):
     ],
 )
 def test_a_single_file_that_knows_only_the_id(words, tmp_path):
-    common = ["--steps", "128", "--envs", "2", "--rollout", "32", "--curve", str(tmp_path / "curve.csv")]
+    common = [
+        "--steps",
+        "128",
+        "--envs",
+        "2",
+        "--rollout",
+        "32",
+        "--evaluate",
+        "10",
+        "--curve",
+        str(tmp_path / "curve.csv"),
+    ]
     curve = example("ppo_single_file").main([*words, *common])
     assert [steps for steps, _ in curve] == [64, 128]
     assert all(np.isfinite(reward) for _, reward in curve)
