@@ -59,8 +59,13 @@ def score(errors: Errors) -> Score:
 
 
 def angle_names(outputs: tuple[Quantity, ...]) -> list[str]:
-    """``roll`` or ``trunk_angles 2`` for each of the K angles."""
-    short = [(quantity.name.split("/")[-1], quantity.size) for quantity in outputs if quantity.kind == "angle"]
+    """``roll``, ``relative_angles 2``, ``hip_left/angles 3``: for each of the K angles a name of its own."""
+    ends = [quantity.name.split("/")[-1] for quantity in outputs if quantity.kind == "angle"]
+    short = [
+        (quantity.name if ends.count(end := quantity.name.split("/")[-1]) > 1 else end, quantity.size)
+        for quantity in outputs
+        if quantity.kind == "angle"
+    ]
     return [name if size == 1 else f"{name} {index + 1}" for name, size in short for index in range(size)]
 
 

@@ -77,6 +77,9 @@ def test_errors_and_deviations_of_a_filter() -> None:
     np.testing.assert_allclose(found.deviations[:, 0], np.sqrt(np.asarray(estimate.covariance)[scored, 0, 0]))
     names = angle_names(tuple(kalman.outputs))
     assert names == ["roll", "relative_angles 1", "relative_angles 2", "relative_angles 3"]
+    many = suite.names_of("whole-body")
+    assert len(set(many)) == len(many) == 20
+    assert {"roll", "hip_left/angles 3", "knee_right/flexion"} <= set(many)
 
 
 def test_conditions_change_what_they_say() -> None:
