@@ -88,16 +88,19 @@ def turned(recipe: Any, ridden: Trajectory, seed: np.random.SeedSequence, value:
 
 
 def at_rate(recipe: Any, ridden: Trajectory, seed: np.random.SeedSequence, value: float) -> Trajectory:
-    """Sampled at ``value`` Hz: means of gyroscopes and accelerometers, the last sample of all others."""
+    """Sampled at ``value`` Hz: means of gyroscopes and accelerometers, of all others the last sample that came."""
     drawn = usual(recipe, ridden, seed)
     every = round(1.0 / (value * drawn.dt))
     count = (len(drawn) - 1) // every
     last = every * np.arange(count + 1)
     measurements = {}
     for name, values in drawn.measurements.items():
-        kept = values[last].copy()
+        kept, blocks = values[last].copy(), values[1 : 1 + count * every].reshape(count, every, -1)
         if name.split("/")[1] in AVERAGED:
-            kept[1:] = values[1 : 1 + count * every].reshape(count, every, -1).mean(axis=1)
+            kept[1:] = blocks.mean(axis=1)
+        else:
+            for row in np.moveaxis(blocks, 1, 0):
+                kept[1:] = np.where(np.isfinite(row).all(axis=1, keepdims=True), row, kept[1:])
         measurements[name] = kept
     truth = {name: values[last] for name, values in drawn.truth.items()}
     return drawn.replace(time=drawn.time[last], measurements=measurements, truth=truth, mask=drawn.mask[last])

@@ -100,6 +100,9 @@ def test_conditions_change_what_they_say() -> None:
     np.testing.assert_allclose(
         slow.measurements["bicycle_imu/gyr"][5], usual.measurements["bicycle_imu/gyr"][17:21].mean(axis=0)
     )
+    camera = [each.measurements["relative/orientation"] for each in (usual, slow)]
+    seen = [np.isfinite(each[1:]).all(axis=1) for each in camera]
+    assert seen[1].sum() == seen[0][: len(seen[1]) * 4].reshape(-1, 4).any(axis=1).sum()
     np.testing.assert_array_equal(slow.truth["bicycle/roll"][5], usual.truth["bicycle/roll"][20])
 
 
