@@ -27,11 +27,11 @@ from poise.baselines.learned.inputs.level_frame import LevelFrame
 from poise.baselines.learned.networks.modules import GruModule
 
 folder, rng, end = Path(sys.argv[1]), np.random.default_rng(0), LevelFrame()
-target = np.concatenate([rng.normal(0.0, 0.05, (64, 200, 2)), np.ones((64, 200, 1))], axis=-1)
-parts = (rng.standard_normal((64, 200, end.size)), target, np.ones((64, 200, 0)))
+target = np.concatenate([rng.normal(0.0, 0.05, (24, 100, 2)), np.ones((24, 100, 1))], axis=-1)
+parts = (rng.standard_normal((24, 100, end.size)), target, np.ones((24, 100, 0)))
 arrays = [part.astype(np.float32) for part in parts]
-data = SequenceData(*arrays, np.ones((64, 200), bool), tuple(map(str, range(64))))
-config = FitConfig(epochs=40, batch=8, window=50)
+data = SequenceData(*arrays, np.ones((24, 100), bool), tuple(map(str, range(24))))
+config = FitConfig(epochs=40, batch=8, window=25)
 module = GruModule(end.size, 2, 24, scale=0.1, noise=0.1)
 print("begin", flush=True)
 resume = (folder / CHECKPOINT).is_file()
@@ -50,7 +50,7 @@ def started(folder: Path) -> subprocess.Popen[str]:
 
 def finished(folder: Path) -> str:
     """Digest of the weights of a training that may go on to its end."""
-    assert started(folder).wait(timeout=300) == 0
+    assert started(folder).wait(timeout=900) == 0
     return hashlib.sha256((folder / "done.safetensors").read_bytes()).hexdigest()
 
 
