@@ -116,9 +116,9 @@ class Preset:
 
     def quick(self) -> Preset:
         """A small version that learns visibly within minutes."""
-        sources = {name: min(count, 24 if self.bank else 48) for name, count in self.sources.items()}
+        sources = {name: min(count, 40 if self.bank else 48) for name, count in self.sources.items()}
         rides = None if self.rides is None else replace(self.rides, rides=6, draws=3)
-        fit = replace(self.fit, epochs=4, batch=16)
+        fit = replace(self.fit, epochs=4, batch=8 if self.bank else 16)
         return replace(self, sources=sources, rides=rides, units=min(self.units, 32), fit=fit)
 
     def describe(self) -> dict[str, Any]:
