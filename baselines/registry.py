@@ -109,7 +109,7 @@ TRAINED: dict[str, Entry] = {
             {"weights": f"{name}_noise"},
             name,
         )
-        for name in ("external-acceleration", "mekf")
+        for name in ("external-acceleration", "mekf", "two-gyro-level")
     },
 }
 """Name → estimator with shipped weights."""
