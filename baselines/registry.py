@@ -93,13 +93,16 @@ TRAINED: dict[str, Entry] = {
         )
         for name in ("two-gyro", "force-inertial")
     },
-    "gru-two-gyro-bicycle": Entry(
-        "..baselines.learned.estimator:shipped",
-        "the same from the bicycle's gyroscope: what a rider's habits tell of the trunk, for comparison",
-        HERE,
-        "learned",
-        {"weights": "gru-two-gyro-bicycle"},
-    ),
+    **{
+        f"gru-{name}-bicycle": Entry(
+            "..baselines.learned.estimator:shipped",
+            f"the same from sensors of the bicycle alone: what a rider's habits tell, to compare with gru-{name}",
+            HERE,
+            "learned",
+            {"weights": f"gru-{name}-bicycle"},
+        )
+        for name in ("two-gyro", "force-inertial")
+    },
     **{
         f"{name}+noise": Entry(
             "..baselines.learned.gains.gain_filter:shipped",
