@@ -22,7 +22,7 @@ MOVED = {
     "poise.envs.recordings": "poise.envs.data.formats.load",
     "poise.envs.trajectory": "poise.envs.data.trajectory",
 }
-"""Name in version 0.1.0 → name now; goes with the next version."""
+"""Name in version 0.1.0 → name now; goes with version 0.3.0."""
 
 
 class MovedModules:
