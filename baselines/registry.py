@@ -29,7 +29,7 @@ RULED = {
     "mekf": ("innovation", "acceleration"),
 }
 """Filter → rules that set one of its gains."""
-POLICIES = ("external-acceleration", "bounded-motion")
+POLICIES = ("external-acceleration", "bounded-motion", "two-gyro-level")
 """Filters with a shipped policy."""
 LOSING = frozenset({"bounded-motion+policy", "mekf+innovation", "mekf+acceleration"})
 """Policies and rules that lose to the plain filter on recordings."""
