@@ -73,8 +73,8 @@ def test_the_exported_policy_is_the_trained_one(trajectories):
     from poise.baselines.gain_policy.vec_env import SB3VecEnv
 
     tuned = TunedFilter.of(tunable_filter("external-acceleration"))
-    batch = SB3VecEnv.make("poise/ReplayGain-v0", 16, trajectory=trajectories, privileged=True)
-    env = VecNormalize(batch, clip_obs=1e6)
+    options = {"trajectory": trajectories, "privileged": True, "gains": tuple(one.gain for one in tuned.ranges)}
+    env = VecNormalize(SB3VecEnv.make("poise/ReplayGain-v0", 16, **options), clip_obs=1e6)
     model = make_model(dataclasses.replace(SMALL, gains=None, net_arch=(32, 32)), env, np.array([0.5, -0.5, 0.1]))
     model.learn(2048)
     env.training = False

@@ -36,9 +36,9 @@ def test_statistics_and_settings_come_back(options, tmp_path):
 def test_other_files_are_refused(tmp_path):
     env = VecNormalize(made(GAIN))
     path = save_normalisation(env, tmp_path / "normalisation")
-    narrower = made({**GAIN, "gains": ("process",)})
+    wider = made({**GAIN, "gains": ("process", "measurement")})
     with pytest.raises(ValueError, match="the environment needs"):
-        load_normalisation(path, narrower)
+        load_normalisation(path, wider)
     with pytest.raises(ValueError, match="is not a normalisation of observations but"):
         load_normalisation("external_acceleration_policy", made(GAIN))
     path.with_suffix(".json").unlink()
