@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import time
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -158,11 +159,16 @@ def run_task(
     found: dict[str, Any] = {"groups": {one.name: str(one.metadata.get("group") or one.name) for one in trajectories}}
     settings = {"offline": offline, "reference": reference, "detailed": True, **task.settings}
     try:
-        table = evaluate(contenders(names, channels), trajectories, **settings)
+        # kept with the results: whoever puts them together tells them, also after an interruption
+        with warnings.catch_warnings(record=True) as told:
+            warnings.simplefilter("always")
+            table = evaluate(contenders(names, channels), trajectories, **settings)
+        found["warnings"] = list(dict.fromkeys(str(one.message) for one in told))
     except ValueError as reason:  # nothing could be run here; other tasks go on
         found |= {"rows": [], "attrs": {"refused": str(reason)}, "recordings": []}
     else:
-        known = [one for one in trajectories if has_truth(one)]
+        six_axes = {"imu/gyr", "imu/acc"}  # of which the statistics of a motion are
+        known = [one for one in trajectories if has_truth(one) and six_axes <= set(one.measurements)]
         found |= {
             "rows": [[None if cell != cell else cell for cell in row] for row in table.itertuples(index=False)],
             "attrs": table.attrs,
@@ -182,6 +188,8 @@ def collected(files: Sequence[Path]) -> Results:
     from ..error_table import ErrorTable
 
     parts = [json.loads(file.read_text(encoding="utf-8")) for file in files]
+    for text in dict.fromkeys(text for part in parts for text in part.get("warnings", [])):
+        warnings.warn(text, stacklevel=3)
     rows = [[float("nan") if cell is None else cell for cell in row] for part in parts for row in part["rows"]]
     if not rows:
         raise ValueError("; ".join(dict.fromkeys(part["attrs"]["refused"] for part in parts)))

@@ -50,6 +50,9 @@ def test_a_task_in_which_nothing_runs_leaves_the_others(tasks: list[Task], tmp_p
     magnetic = {"imu/mag": trajectory.measurements["imu/mag"]}
     deaf = trajectory.replace(measurements=magnetic, metadata={**trajectory.metadata, "name": "deaf"})
     both = [*recording_tasks([trajectory]), Task("recordings", "deaf", given, (deaf,))]
+    together = [Task("both", "both", list, ([trajectory, deaf],))]
+    with pytest.warns(UserWarning, match="was not run on deaf"):
+        run_tasks(together, tmp_path / "warned", NAMES, HAND_CHANNELS)
     table = run_tasks(both, tmp_path, NAMES, HAND_CHANNELS)["recordings"].table
     assert set(table["trajectory"]) == {trajectory.name}
     with pytest.raises(ValueError, match="nothing could be run"):
