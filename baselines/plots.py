@@ -121,7 +121,7 @@ def rms_bars(table: pandas.DataFrame, kinds: Mapping[str, str], metric: str = "i
     ax.set_xlim(0.0, (1.45 if (chosen["value"] > limit).any() else 1.12) * limit)
     ax.set_xticks([tick for tick in ax.get_xticks() if tick <= 1.001 * limit])
     beyond = ", triangle: cut" if (chosen["value"] > limit).any() else ""
-    ax.set_xlabel(f"{metric} error, RMS, {unit} (bar: mean, dot: one trajectory{beyond})")
+    ax.set_xlabel(f"{metric} error, RMS, {unit}\n(bar: mean, dot: one trajectory{beyond})")
     ax.grid(axis="y", visible=False)
     present = [kind for kind in COLOURS if kind in {kinds.get(str(name)) for name in means.index}]
     patches = [_patch(COLOURS[kind]) for kind in present]
@@ -195,7 +195,9 @@ def error_curves(
     legend_above(errors)
     cut = [label for label, value in zip(estimates, usual, strict=True) if value > end]
     if cut:
-        errors.text(0.0, 1.02, f"cut: {', '.join(cut)}", transform=errors.transAxes, fontsize=8)
+        box = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1.0}
+        text = f"cut: {', '.join(cut)}"
+        errors.text(0.005, 0.97, text, transform=errors.transAxes, fontsize=8, verticalalignment="top", bbox=box)
     if title:
         figure.suptitle(title, x=0.01, ha="left", fontsize=10.5)
     return figure

@@ -10,6 +10,7 @@ import pytest
 
 from poise.baselines.comparison.data_sets import HAND_CHANNELS
 from poise.baselines.comparison.html_report import html_report
+from poise.baselines.comparison.recommendation import load_results
 from poise.baselines.comparison.tasks import Task, given, hand_tasks, recording_tasks, run_tasks
 
 NAMES = ("bounded-motion", "tilt")
@@ -71,3 +72,14 @@ def test_page_holds_everything_it_needs(tasks: list[Task], tmp_path: Path) -> No
     section = sections["simulation: inclination, deg"]
     assert [row[0] for row in section["tables"][0]["rows"]] == ["bounded-motion", "tilt"]
     assert "src=" not in page.split("<main>")[0].split("</style>")[0], "nothing is fetched from a network"
+
+
+def test_the_reference_result_is_recomputed_in_part(tmp_path: Path) -> None:
+    """The errors that ``poise recommend`` reads are those of today's code, on the first simulated episode."""
+    shipped = {one["name"]: one["errors"] for one in load_results()["recordings"]}
+    task = hand_tasks(0, 3, sensors="xsens-mtw-awinda")[0]
+    names = ("bounded-motion", "mekf-9", "external-acceleration", "mahony")
+    found = run_tasks([task], tmp_path, names, HAND_CHANNELS)["simulation"].recordings[0]
+    assert found["name"] == "slow-1"
+    for name in names:
+        assert found["errors"][name] == pytest.approx(shipped["slow-1"][name], abs=2e-4)
