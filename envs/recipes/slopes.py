@@ -16,6 +16,7 @@ import numpy as np
 
 from ...filters.core import rotation
 from ...filters.support.ranges import log_uniform
+from ..bicycle.rider.body_motion import smooth_step
 from ..data.trajectory import Trajectory
 
 DEG = math.pi / 180.0
@@ -67,19 +68,13 @@ def pitch_profile(count: int, dt: float, generator: np.random.Generator) -> np.n
     for _ in range(generator.poisson(time[-1] / EVERY)):
         start, angle = generator.uniform(2.0, max(2.0, time[-1])), log_uniform(generator, SLOPE)
         rise, top = log_uniform(generator, RISE), log_uniform(generator, TOP)
-        climb = smooth_step((time - start) / rise) - smooth_step((time - start - rise - top) / rise)
+        climb = smooth_step(time - start, 0.0, rise) - smooth_step(time - start - rise - top, 0.0, rise)
         pitch += generator.choice([-1.0, 1.0]) * angle * climb
     for _ in range(generator.poisson(time[-1] / EVERY)):
         start, angle = generator.uniform(2.0, max(2.0, time[-1])), log_uniform(generator, JOLT)
         along = np.clip((time - start) / log_uniform(generator, JOLT_LENGTH), 0.0, 1.0)
         pitch += angle * np.sin(2.0 * math.pi * along) * np.sin(math.pi * along)
     return pitch
-
-
-def smooth_step(along: np.ndarray) -> np.ndarray:
-    """From 0 at 0 to 1 at 1, with continuous curvature."""
-    x = np.clip(along, 0.0, 1.0)
-    return x**3 * (10.0 - 15.0 * x + 6.0 * x**2)
 
 
 def midway(orientation: np.ndarray) -> np.ndarray:

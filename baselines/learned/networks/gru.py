@@ -12,15 +12,16 @@ reset after the product, as PyTorch has it,
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import ClassVar, Self
+from typing import ClassVar
 
 import numpy as np
 
 from ....filters.compile.cache import jit
 from ....filters.core.backend import Array, constant, namespace
+from .weights import NetworkWeights
 
 NAMES = (
     "input.weight",
@@ -36,7 +37,7 @@ NAMES = (
 
 
 @dataclass(frozen=True, eq=False)
-class GruNetwork:
+class GruNetwork(NetworkWeights):
     """The weights, with H units, F features and O outputs.
 
     Attributes:
@@ -62,9 +63,10 @@ class GruNetwork:
     output_weight: np.ndarray
     output_bias: np.ndarray
 
-    def __post_init__(self) -> None:
+    def shapes(self) -> dict[str, tuple[int, ...]]:
+        """Field → its shape."""
         size, features, outputs = self.size, np.shape(self.input_weight)[-1:], np.shape(self.output_weight)[:1]
-        wanted = {
+        return {
             "input_weight": (size, *features),
             "input_bias": (size,),
             "gru_weight": (3 * size, size),
@@ -74,23 +76,8 @@ class GruNetwork:
             "output_weight": (*outputs, size),
             "output_bias": outputs,
         }
-        for name, shape in wanted.items():
-            array = np.array(getattr(self, name), dtype=float)
-            if array.shape != shape:
-                raise ValueError(f"{name} must have shape {shape}, got {array.shape}")
-            object.__setattr__(self, name, array)
 
-    @classmethod
-    def from_arrays(cls, arrays: Mapping[str, np.ndarray]) -> Self:
-        """The network of a weights file.
-
-        Raises:
-            ValueError: an array is missing or unknown, or has the wrong shape.
-        """
-        if set(arrays) != set(NAMES):
-            raise ValueError(f"weights of a network hold the arrays {list(NAMES)}, got {sorted(arrays)}")
-        return cls(*(arrays[name] for name in NAMES))
-
+    names: ClassVar[tuple[str, ...]] = NAMES
     kind: ClassVar[str] = "gru"
 
     @property
@@ -112,12 +99,6 @@ class GruNetwork:
     def outputs(self) -> int:
         """Outputs O."""
         return len(self.output_bias)
-
-    def arrays(self) -> dict[str, np.ndarray]:
-        """The inverse of :meth:`from_arrays`, float32."""
-        fields = [self.input_weight, self.input_bias, self.gru_weight, self.gru_bias]
-        fields += [self.memory_weight, self.memory_bias, self.output_weight, self.output_bias]
-        return {name: array.astype(np.float32) for name, array in zip(NAMES, fields, strict=True)}
 
     def step(self, features: Array, memory: Array) -> tuple[Array, Array]:
         """One update: features ``(..., F)`` and memory ``(..., H)`` → new memory and output ``(..., O)``."""

@@ -11,15 +11,16 @@ inputs of each block that later updates need; before the start they are zero.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import ClassVar, Self
+from typing import ClassVar
 
 import numpy as np
 
 from ....filters.compile.cache import jit
 from ....filters.core.backend import Array, constant, namespace
+from .weights import NetworkWeights
 
 TAPS = 3
 NAMES = ("input.weight", "input.bias", "blocks.weight", "blocks.bias", "output.weight", "output.bias")
@@ -27,7 +28,7 @@ NAMES = ("input.weight", "input.bias", "blocks.weight", "blocks.bias", "output.w
 
 
 @dataclass(frozen=True, eq=False)
-class TcnNetwork:
+class TcnNetwork(NetworkWeights):
     """The weights, with C channels, L blocks, F features and O outputs.
 
     Attributes:
@@ -49,12 +50,14 @@ class TcnNetwork:
     output_weight: np.ndarray
     output_bias: np.ndarray
 
+    names: ClassVar[tuple[str, ...]] = NAMES
     kind: ClassVar[str] = "tcn"
 
-    def __post_init__(self) -> None:
+    def shapes(self) -> dict[str, tuple[int, ...]]:
+        """Field → its shape."""
         channels, blocks = np.shape(self.block_bias)[-1], len(np.atleast_1d(self.block_bias))
         features, outputs = np.shape(self.input_weight)[-1:], np.shape(self.output_weight)[:1]
-        wanted = {
+        return {
             "input_weight": (channels, *features),
             "input_bias": (channels,),
             "block_weight": (blocks, TAPS, channels, channels),
@@ -62,22 +65,6 @@ class TcnNetwork:
             "output_weight": (*outputs, channels),
             "output_bias": outputs,
         }
-        for name, shape in wanted.items():
-            array = np.array(getattr(self, name), dtype=float)
-            if array.shape != shape:
-                raise ValueError(f"{name} must have shape {shape}, got {array.shape}")
-            object.__setattr__(self, name, array)
-
-    @classmethod
-    def from_arrays(cls, arrays: Mapping[str, np.ndarray]) -> Self:
-        """The network of a weights file.
-
-        Raises:
-            ValueError: an array is missing or unknown, or has the wrong shape.
-        """
-        if set(arrays) != set(NAMES):
-            raise ValueError(f"weights of a network hold the arrays {list(NAMES)}, got {sorted(arrays)}")
-        return cls(*(arrays[name] for name in NAMES))
 
     @property
     def features(self) -> int:
@@ -94,12 +81,6 @@ class TcnNetwork:
         """Numbers that are remembered of each sequence."""
         blocks, channels = self.block_bias.shape
         return (TAPS - 1) * (2**blocks - 1) * channels
-
-    def arrays(self) -> dict[str, np.ndarray]:
-        """The inverse of :meth:`from_arrays`, float32."""
-        fields = [self.input_weight, self.input_bias, self.block_weight, self.block_bias]
-        fields += [self.output_weight, self.output_bias]
-        return {name: array.astype(np.float32) for name, array in zip(NAMES, fields, strict=True)}
 
     def step(self, features: Array, memory: Array) -> tuple[Array, Array]:
         """One update: features ``(..., F)`` and memory ``(..., M)`` → new memory and output ``(..., O)``."""
