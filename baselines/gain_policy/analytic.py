@@ -9,8 +9,9 @@ an action through the next observations is neglected; observations are recorded 
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
 
@@ -30,7 +31,7 @@ from .policy import GainPolicy
 with extra("rl"):
     import torch
 
-ROWS = 20
+ROWS = 5
 """Episodes of one update."""
 BEYOND = 1.0
 """Weight of the squared distance of an action from its range, where it has no effect on the filter."""
@@ -232,6 +233,8 @@ def train_analytically(
     noise: float = 0.2,
     validation: Sequence[Trajectory] = (),
     report: Callable[[int, float, float], None] | None = None,
+    save: Callable[[dict[str, Any]], None] | None = None,
+    state: dict[str, Any] | None = None,
 ) -> GainPolicy:
     """Train a policy from constant gains on.
 
@@ -249,23 +252,39 @@ def train_analytically(
         validation: trajectories that are not trained on; the policy of least cost on them is returned, otherwise the
             last one.
         report: called after every pass with its number, the mean cost before it and that on ``validation`` after it
-            (NaN without).
+            (NaN without); of a resumed training also for the passes before.
+        save: called after every pass with all that the rest of the training depends on.
+        state: from ``save``: continue there, bit by bit as if there had been no interruption.
     """
     reward = GainReward("relative", error_scale=np.radians(error_scale))
     costs = Costs(tuned, reward, quantity)
     sets, unseen = (costs.episodes(some, np.asarray(start, float)) for some in (trajectories, validation))
     generator = np.random.default_rng(seed)
-    best, least = None, np.inf
-    first = np.concatenate(
-        [each.observations(GainPolicy.constant(tuned, start)).reshape(-1, tuned.observation_size) for each in sets]
-    )
+    best, least, told = None, np.inf, []
+    if state is None:
+        neutral = GainPolicy.constant(tuned, start)
+        first = np.concatenate([each.observations(neutral).reshape(-1, tuned.observation_size) for each in sets])
+        mean, std = first.mean(axis=0), first.std(axis=0) + 1e-2
+    else:
+        mean, std = state["normalisation"]
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(seed)
-        actor = Actor(first.mean(axis=0), first.std(axis=0) + 1e-2, np.asarray(start, float), net_arch)
+        actor = Actor(mean, std, np.asarray(start, float), net_arch)
     optimizer = torch.optim.Adam(actor.parameters(), lr=learning_rate)
     updates = epochs * sum(-(-len(each.episodes) // ROWS) for each in sets)
     schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimizer, updates)
-    for epoch in range(epochs):
+    if state is not None:
+        actor.load_state_dict(state["actor"])
+        optimizer.load_state_dict(state["optimizer"])
+        schedule.load_state_dict(state["schedule"])
+        generator.bit_generator.state = json.loads(state["generator"])
+        told, least = state["told"], state["least"]
+        if state["best"] is not None:
+            best = replace(GainPolicy.neutral(tuned), layers=[(weight, bias) for weight, bias in state["best"]])
+        for epoch, (cost, unseen_cost) in enumerate(told):
+            if report is not None:
+                report(epoch, cost, unseen_cost)
+    for epoch in range(len(told), epochs):
         policy, total = actor.policy(tuned), []
         seen = [each.observations(policy) for each in sets]
         jobs = [
@@ -288,6 +307,20 @@ def train_analytically(
         held_out = costs.of_policy(unseen, actor.policy(tuned)) if unseen else np.nan
         if held_out < least:
             best, least = actor.policy(tuned), held_out
+        told.append([float(np.concatenate(total).mean()), float(held_out)])
         if report is not None:
-            report(epoch, float(np.concatenate(total).mean()), held_out)
+            report(epoch, *told[-1])
+        if save is not None:
+            save(
+                {
+                    "normalisation": [mean, std],
+                    "actor": dict(actor.state_dict()),
+                    "optimizer": optimizer.state_dict(),
+                    "schedule": schedule.state_dict(),
+                    "generator": json.dumps(generator.bit_generator.state),
+                    "told": told,
+                    "least": float(least),
+                    "best": None if best is None else [list(layer) for layer in best.layers],
+                }
+            )
     return best or actor.policy(tuned)

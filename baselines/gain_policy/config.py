@@ -10,7 +10,7 @@ from typing import Any, Literal, get_args
 from ...envs.hand.gestures import Mixed
 from ...envs.hand.trajectories import HandTrajectories
 from ...envs.sensors.presets import sensor_preset
-from .motions import DEG, GradedMotions, MixedMotions, Motions, RiddenMotions
+from .motions import DEG, FLOWN_MOTIONS, GradedMotions, MixedMotions, Motions, RiddenMotions
 
 SUSTAINED = Mixed(lengths=(15.0, 40.0), rest_share=0.1, spread=0.5, single_share=0.25)
 """Sustained motion of one kind, in addition to the quick changes of ``mixed``."""
@@ -42,9 +42,12 @@ VARIED_MOTIONS = MixedMotions(
             first_rest=(0.3, 5.0),
             duration=40.0,
         ),
+        GradedMotions(carried_share=0.5, first_rest=(0.3, 5.0), duration=40.0),
+        FLOWN_MOTIONS,
     )
 )
-"""Smooth gestures, and devices in the hand and carried: training data of the other policies for one sensor."""
+"""Smooth gestures, devices of all grades in the hand and carried, and on things that travel: training data of the other
+policies for one sensor."""
 
 AgentName = Literal["ppo", "recurrent-ppo", "sac", "td3", "analytic"]
 """Agents that train a policy."""
@@ -191,8 +194,8 @@ def shipped_config(filter: str) -> TrainingConfig:
     return TrainingConfig(
         filter=filter,
         motions=VARIED_MOTIONS,
-        trajectories=150,
-        total_timesteps=620_000,
+        trajectories=160,
+        total_timesteps=1_100_000,
         gain_search=12,
         warm_start=150,
         warm_start_centre=centre,

@@ -9,7 +9,8 @@ from typing import Any, Protocol
 
 from ...envs.data.trajectory import Trajectory
 from ...envs.hand.carried import Carried
-from ...envs.hand.hand_held import HandHeld
+from ...envs.hand.hand_held import HandHeld, Over
+from ...envs.hand.parts.shaking import Vibration
 from ...envs.recipes.devices import VariedSensors
 from ...envs.recipes.hand import HandRecipe
 from ...envs.recipes.rides import RideSource, drawn
@@ -52,6 +53,10 @@ class GradedMotions:
     """s"""
     duration: float = 60.0
     """s"""
+    held: HandHeld = field(default_factory=lambda: HandHeld(moving_start_share=0.15))
+    """motion of the devices that are not carried; their first rest is that of all"""
+    sensors: VariedSensors = field(default_factory=VariedSensors)
+    """other errors of the devices"""
 
     def __post_init__(self) -> None:
         if not self.rates or not self.gyroscope_biases:
@@ -70,10 +75,10 @@ class GradedMotions:
                 name="graded",
                 duration=self.duration,
                 rates=(rate, rate),
-                held=HandHeld(first_rest=self.first_rest, moving_start_share=0.15),
+                held=dataclasses.replace(self.held, first_rest=self.first_rest),
                 carried=Carried(first_rest=self.first_rest, running_share=self.running_share),
                 carried_share=self.carried_share,
-                sensors=VariedSensors(gyroscope_bias=gyroscope, accelerometer_bias=accelerometer),
+                sensors=dataclasses.replace(self.sensors, gyroscope_bias=gyroscope, accelerometer_bias=accelerometer),
             )
             for gyroscope, accelerometer in grades
             for rate in self.rates
@@ -87,6 +92,40 @@ class GradedMotions:
     def describe(self) -> dict[str, Any]:
         """All fields, for JSON."""
         return {"kind": "graded", **dataclasses.asdict(self)}
+
+
+FLOWN_MOTIONS = GradedMotions(
+    gyroscope_biases=((0.03 * DEG, 0.8 * DEG), (0.5 * DEG, 6.0 * DEG)),
+    accelerometer_biases=((0.01, 0.1), (0.02, 0.2)),
+    carried_share=0.0,
+    first_rest=(0.3, 5.0),
+    duration=40.0,
+    held=HandHeld(
+        moving_start_share=0.15,
+        rest_shares=(0.0, 0.0, 0.0, 0.1),
+        acceleration=(0.3, 4.0),
+        largest_acceleration=8.0,
+        rate=(0.1, 2.5),
+        largest_rate=5.0,
+        reach=5.0,
+        position_band=((0.03, 0.3), (0.2, 1.5)),
+        angle_band=((0.03, 0.3), (0.15, 3.0)),
+        rhythmic_share=0.1,
+        over=Over(
+            clean_share=0.1,
+            tremor_share=0.0,
+            drift_share=0.0,
+            taps_share=0.0,
+            vibration_share=0.9,
+            set_down_share=0.0,
+            tissue_share=0.0,
+            vibration=Vibration(frequency=(20.0, 200.0), acceleration=(0.3, 6.0)),
+        ),
+    ),
+    sensors=VariedSensors(gyroscope_noise=(0.005 * DEG, 0.1 * DEG), accelerometer_noise=(5e-3, 0.1)),
+)
+"""Devices that travel metres with slow accelerations and shake, as on a drone, a vehicle or a running machine; their
+levels are our choice."""
 
 
 @dataclass(frozen=True)

@@ -89,13 +89,16 @@ def train_policy(
     filter = tunable_filter(config.filter) if kalman is None else kalman
     tuned = TunedFilter.of(filter, config.gains, features_of(filter, config.interval), config.smoothing)
     motions = config.motions.draw_many(config.seed, config.trajectories) if trajectories is None else list(trajectories)
-    if config.agent == "analytic":
-        if resume:
-            raise ValueError("a training by the exact gradient takes minutes and keeps no checkpoint: start it anew")
-        start = starting_action(config, tuned, motions) if start is None else np.asarray(start, float)
-        return analytic_policy(config, tuned, motions, start, report)
     home = None if folder is None else Path(folder)
     key = training_key(config, tuned, motions)
+    if config.agent == "analytic":
+        # Its learning rate falls to zero at the end, so another length is another training.
+        key["config"]["total_timesteps"] = config.total_timesteps
+        state = load_checkpoint(home / CHECKPOINT, key) if resume and home is not None else None
+        if state is not None:
+            start = state["start"]
+        start = starting_action(config, tuned, motions) if start is None else np.asarray(start, float)
+        return analytic_policy(config, tuned, motions, start, home, key, report, state)
     threads = torch.get_num_threads()
     torch.set_num_threads(1)
     try:
@@ -114,11 +117,19 @@ def train_policy(
 
 
 def analytic_policy(
-    config: TrainingConfig, tuned: TunedFilter, motions: list[Trajectory], start: np.ndarray, report: Report | None
+    config: TrainingConfig,
+    tuned: TunedFilter,
+    motions: list[Trajectory],
+    start: np.ndarray,
+    home: Path | None,
+    key: dict[str, Any],
+    report: Report | None,
+    state: dict[str, Any] | None,
 ) -> GainPolicy:
     """A policy trained by the exact gradient; the last :data:`HELD_BACK` of the motions choose among its passes.
 
-    ``report`` is given the decisions so far and the share of the cost that is saved on the motions held back.
+    ``report`` is given the decisions so far and the share of the cost that is saved on the motions held back;
+    ``state`` is that of a checkpoint; see :class:`PolicyTraining` for the others.
     """
     from .analytic import train_analytically
 
@@ -126,13 +137,21 @@ def analytic_policy(
     train, unseen = (motions[:-kept], motions[-kept:]) if len(motions) > kept else (motions, [])
     decisions = sum(len(one) // tuned.features.interval_samples(one.dt) for one in train)
     epochs, started = max(1, round(config.total_timesteps / decisions)), time.perf_counter()
+    earlier = 0.0 if state is None else state["seconds"]
     costs: list[float] = []
 
     def told(epoch: int, cost: float, unseen_cost: float) -> None:
         costs.append(unseen_cost if unseen else cost)
         if report is not None:
-            seconds = time.perf_counter() - started
-            report({"steps": float(decisions * (epoch + 1)), "gain": 1.0 - costs[-1], "seconds": seconds})
+            report({"steps": float(decisions * (epoch + 1)), "gain": 1.0 - costs[-1], "seconds": seconds()})
+
+    def save(content: dict[str, Any]) -> None:
+        if home is not None:
+            home.mkdir(parents=True, exist_ok=True)
+            save_checkpoint(home / CHECKPOINT, key, {**content, "start": start, "seconds": seconds()})
+
+    def seconds() -> float:
+        return earlier + time.perf_counter() - started
 
     policy = train_analytically(
         tuned,
@@ -145,6 +164,8 @@ def analytic_policy(
         seed=config.seed,
         validation=unseen,
         report=told,
+        save=save,
+        state=state,
     )
     card = {
         "training": config.describe(),
@@ -152,7 +173,7 @@ def analytic_policy(
         "steps": decisions * epochs,
         "chosen_steps": decisions * (1 + int(np.argmin(costs))),
         "costs": [round(cost, 4) for cost in costs],
-        "seconds": round(time.perf_counter() - started, 1),
+        "seconds": round(seconds(), 1),
     }
     return replace(policy, card=json.loads(json.dumps(card)))
 

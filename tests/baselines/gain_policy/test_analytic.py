@@ -8,7 +8,9 @@ import pytest
 pytest.importorskip("torch")
 
 from poise.baselines.gain_policy.analytic import Costs, Episodes, train_analytically
+from poise.baselines.gain_policy.config import TrainingConfig, config_of
 from poise.baselines.gain_policy.constant_gains import constant_errors, policy_errors
+from poise.baselines.gain_policy.training import train_policy
 from poise.envs.gain_episode import GainEpisode
 from poise.envs.gain_reward import GainReward
 from poise.envs.hand.trajectories import HandTrajectories
@@ -76,3 +78,32 @@ def test_it_finds_gains_that_were_wrong_and_repeats_bit_by_bit(motions):
     assert (
         policy_errors(wrong, first, motions[4:]).mean() < 0.8 * constant_errors(tuned, motions[4:], np.zeros(2)).mean()
     )
+
+
+def test_stopped_after_a_pass_it_gives_the_same_policy(motions, tmp_path):
+    steps = 3 * 60 * 5
+    config = config_of("analytic", TrainingConfig(total_timesteps=steps, net_arch=(8,)))
+
+    def train(folder, stop_at=0, resume=False, config=config):
+        calls = []
+
+        def report(_):
+            calls.append(None)
+            if len(calls) == stop_at:
+                raise InterruptedError
+
+        return train_policy(
+            config, trajectories=motions, start=np.zeros(3), folder=folder, resume=resume, report=report
+        )
+
+    whole = train(None)
+    for stop in (2, 3):
+        with pytest.raises(InterruptedError):
+            train(tmp_path, stop, resume=stop > 2)
+    resumed = train(tmp_path, resume=True)
+    for one, other in zip(resumed.layers, whole.layers, strict=True):
+        np.testing.assert_array_equal(one[0], other[0])
+        np.testing.assert_array_equal(one[1], other[1])
+    assert resumed.card["costs"] == whole.card["costs"]
+    with pytest.raises(ValueError, match="total_timesteps"):
+        train(tmp_path, resume=True, config=dataclasses.replace(config, total_timesteps=2 * steps))
