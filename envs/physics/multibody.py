@@ -23,9 +23,6 @@ with extra("sim"):
 
 Tuple3 = tuple[float, float, float]
 
-LinkState = tuple[Tuple3, tuple[float, float, float, float], Tuple3, Tuple3]
-"""Position, quaternion (w, x, y, z), velocity and angular velocity of a centre-of-mass frame, world axes."""
-
 
 class CentreMotion(NamedTuple):
     """Motion of the centre-of-mass frames of n links, world axes."""
@@ -118,13 +115,6 @@ class Multibody:
             self._moved_at = self.physics.changes
         return self._frames
 
-    def link_tuples(self, links: Sequence[int]) -> list[LinkState]:
-        """Position, quaternion (w, x, y, z), velocity and angular velocity of links (not the base) as plain tuples."""
-        rows = pybullet.getLinkStates(
-            self.body, links, computeLinkVelocity=1, computeForwardKinematics=1, physicsClientId=self.physics.client
-        )
-        return [(row[0], (row[1][3], *row[1][:3]), row[6], row[7]) for row in rows]
-
     def centre_motion(self, links: Sequence[int]) -> CentreMotion:
         """Motion of the centre-of-mass frames of links; the base may be among them."""
         return CentreMotion.of_frames(self.frames[np.array(links) + 1])
@@ -209,7 +199,6 @@ def connect_points(
     parent_point: Vector,
     child: tuple[int, int],
     child_point: Vector,
-    max_force: float = 5e4,
 ) -> int:
     """Hold two points of two links together.
 
@@ -219,7 +208,6 @@ def connect_points(
         parent_point: ``(3,)`` m in that link's body frame.
         child: (body, link).
         child_point: ``(3,)`` m in that link's body frame.
-        max_force: N.
 
     Returns:
         The constraint's number, for :func:`constraint_force`.
@@ -232,7 +220,7 @@ def connect_points(
     constraint = pybullet.createConstraint(
         *parent, *child, pybullet.JOINT_POINT2POINT, [0.0, 0.0, 0.0], *pivots, physicsClientId=physics.client
     )
-    pybullet.changeConstraint(constraint, maxForce=max_force, physicsClientId=physics.client)
+    pybullet.changeConstraint(constraint, maxForce=5e4, physicsClientId=physics.client)
     return int(constraint)
 
 

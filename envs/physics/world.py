@@ -92,7 +92,6 @@ class Physics:
         *,
         centre_of_mass: Vector = (0.0, 0.0, 0.0),
         visual: int = -1,
-        collision: int = -1,
     ) -> int:
         """Create a free rigid body without any damping, body frame at the origin.
 
@@ -101,7 +100,6 @@ class Physics:
             inertia: moments ``(3,)`` along the body axes or tensor ``(3, 3)``, about the centre of mass, kg·m².
             centre_of_mass: ``(3,)`` m, in the body frame.
             visual: shape to draw (a PyBullet number); −1 for none.
-            collision: shape to collide, likewise.
 
         Returns:
             The body's number.
@@ -116,7 +114,6 @@ class Physics:
             )
         body = pybullet.createMultiBody(
             baseMass=mass,
-            baseCollisionShapeIndex=collision,
             baseVisualShapeIndex=visual,
             baseInertialFramePosition=floats(centre_of_mass),
             baseInertialFrameOrientation=xyzw(axes),
@@ -138,7 +135,6 @@ class Physics:
         source: str | Path,
         *,
         position: Vector = (0.0, 0.0, 0.0),
-        orientation: Vector = (1.0, 0.0, 0.0, 0.0),
         fixed: bool = False,
     ) -> int:
         """Load a multibody with the inertias of its description, without dampings and motors.
@@ -146,7 +142,6 @@ class Physics:
         Args:
             source: path of a URDF file, or the URDF text itself (begins with ``<``).
             position: ``(3,)`` of the base frame, m.
-            orientation: ``(4,)`` quaternion w, x, y, z of the base frame.
             fixed: whether the base is fixed to the world.
 
         Raises:
@@ -160,7 +155,6 @@ class Physics:
                 body = pybullet.loadURDF(
                     str(path),
                     floats(position),
-                    xyzw(orientation),
                     useFixedBase=fixed,
                     flags=pybullet.URDF_USE_INERTIA_FROM_FILE | pybullet.URDF_USE_IMPLICIT_CYLINDER,
                     physicsClientId=self.client,
@@ -228,15 +222,6 @@ class Physics:
         velocity, angular_velocity = pybullet.getBaseVelocity(body, self.client)
         return position, (w, x, y, z), velocity, angular_velocity
 
-    def set_base_tuples(
-        self, body: int, position: Vector, orientation: Vector, velocity: Vector, turning: Vector
-    ) -> None:
-        """Undo :meth:`base_tuples`; ``turning`` is the angular velocity."""
-        w, x, y, z = orientation
-        self.changes += 1
-        pybullet.resetBasePositionAndOrientation(body, position, (x, y, z, w), physicsClientId=self.client)
-        pybullet.resetBaseVelocity(body, velocity, turning, physicsClientId=self.client)
-
     def state(self, body: int, link: int = BASE) -> BodyState:
         """State of the body frame of one link (or the base); accelerations are None."""
         if link == BASE:
@@ -300,14 +285,6 @@ class Physics:
         )
         velocity = state.velocity + rotation.cross(state.angular_velocity, lever)
         pybullet.resetBaseVelocity(body, floats(velocity), floats(state.angular_velocity), physicsClientId=self.client)
-
-    def apply_force(self, body: int, force: Vector, point: Vector, link: int = BASE) -> None:
-        """Act on a link with ``force`` (N, world axes) at ``point`` (m, world) during the next step."""
-        pybullet.applyExternalForce(body, link, force, point, pybullet.WORLD_FRAME, physicsClientId=self.client)
-
-    def apply_torque(self, body: int, torque: Vector, link: int = BASE) -> None:
-        """Act on a link with ``torque`` (N·m, world axes) during the next step."""
-        pybullet.applyExternalTorque(body, link, torque, pybullet.WORLD_FRAME, physicsClientId=self.client)
 
     def step(self) -> None:
         """Advance by one time step; forces applied before act in it and end with it."""

@@ -103,23 +103,21 @@ def start_of(model: Model, measurements: Mapping[str, Any]) -> tuple[int, np.nda
     return first, P[first]
 
 
-def posterior_bound(
-    model: Model, states: np.ndarray, measurements: Mapping[str, Any], prior: np.ndarray | None = None
-) -> np.ndarray:
-    """Bound ``(T, e, e)`` on the covariance of any estimate at each sample, in Riccati form; NaN before the start.
+def posterior_bound(model: Model, states: np.ndarray, measurements: Mapping[str, Any]) -> np.ndarray:
+    """Bound ``(T, e, e)`` on the covariance of any estimate at each sample, in Riccati form.
+
+    NaN before the sample at which a filter can start, whose bound is the covariance of the model's prior.
 
     Args:
         model: the equations, with the true noises of the sensors.
         states: ``(T, n)`` true states.
         measurements: as for :func:`linearise`.
-        prior: ``(e, e)`` covariance at the first sample, including its measurement; None for that of the model at the
-            sample at which a filter can start.
 
     Raises:
         ValueError: shapes do not fit, or the samples never suffice for the model's prior.
     """
     F, Q, H, R, usable = linearise(model, states, measurements)
-    first, P = start_of(model, measurements) if prior is None else (0, np.asarray(prior, dtype=float))
+    first, P = start_of(model, measurements)
     bounds = [np.full_like(P, np.nan)] * first + [P]
     for k in range(first, len(F)):
         P = F[k] @ P @ F[k].T + Q[k]
@@ -127,21 +125,6 @@ def posterior_bound(
             P = correct(P, np.where(usable[k + 1], 0.0, np.nan), H[k + 1], R[k + 1])[1]
         bounds.append(P)
     return np.array(bounds)
-
-
-def information_step(J: np.ndarray, F: np.ndarray, Q: np.ndarray, H: np.ndarray, R: np.ndarray) -> np.ndarray:
-    """One step of the information recursion as published; Q must not be singular.
-
-    Args:
-        J: ``(e, e)`` information at sample k.
-        F: ``(e, e)`` Jacobian from k to k + 1.
-        Q: ``(e, e)`` process covariance.
-        H: ``(m, e)`` rows measured at k + 1.
-        R: ``(m, m)`` their covariance.
-    """
-    weighted = np.linalg.solve(Q, F)  # Q⁻¹ F
-    D22 = np.linalg.inv(Q) + H.T @ np.linalg.solve(R, H)
-    return D22 - weighted @ np.linalg.solve(J + F.T @ weighted, weighted.T)
 
 
 def with_gaps(ideal: Mapping[str, Any], recorded: Mapping[str, Any]) -> dict[str, np.ndarray]:

@@ -49,7 +49,6 @@ TABLE_4_2 = {"x": (8.7700, -0.4978, 0.999994), "y": (8.8805, -0.2228, 0.999993),
 """Axis of the L3G4200D → scale factor in mdps/digit, offset in dps, correlation coefficient"""
 PLACES = (0.0, 0.2)
 """m from the axis of the table: the two places of Figure 4.15 (the thesis gives none)"""
-OTHER_WAY = tuple(reversed(BOTH_WAYS))
 
 
 def thesis_device(seed: int) -> CalibrationRecord:

@@ -12,8 +12,6 @@ from ....filters.core import rotation
 
 HEAD = 0.28
 """m: centre of the head above the middle of the shoulders, about a seventh of a rider's height"""
-HUB = 0.02
-"""m: half width of a hub, so that wheels have a side"""
 RIM = np.linspace(0.0, 2.0 * np.pi, 33)
 """rad: angles of the points of a wheel"""
 

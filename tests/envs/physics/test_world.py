@@ -1,4 +1,5 @@
 import numpy as np
+import pybullet
 import pytest
 
 from poise.envs.physics.multibody import Multibody, connect_points, constraint_force
@@ -141,8 +142,10 @@ def test_saved_states_replay_bitwise_and_can_be_forgotten():
 
         def play():
             for _ in range(50):
-                physics.apply_torque(body, (0.1, 0.2, -0.1))
-                physics.apply_force(body, (0.1, 0.2, 3.0), physics.base_tuples(body)[0])
+                frame, client = pybullet.WORLD_FRAME, physics.client
+                pybullet.applyExternalTorque(body, BASE, (0.1, 0.2, -0.1), frame, physicsClientId=client)
+                place = physics.base_tuples(body)[0]
+                pybullet.applyExternalForce(body, BASE, (0.1, 0.2, 3.0), place, frame, physicsClientId=client)
                 physics.step()
             return physics.base_tuples(body), physics.time
 
