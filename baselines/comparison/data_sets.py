@@ -79,7 +79,7 @@ def ride_imus(scenario: str, subject: int, seed: int, duration: float = 40.0) ->
     finally:
         env.close()
     ride = ride.replace(metadata={**ride.metadata, "name": scenario})
-    return [imu_of(ride, site) for site in SITES]
+    return [imu_of(ride, site) for site in SITES if f"{site}/acc" in ride.measurements]
 
 
 def dataset_of(trajectory: Trajectory) -> str:

@@ -75,6 +75,7 @@ class RiderBicycleEnv(PoseEnv):
     | ``steer/angle``, ``crank/angle`` | (1,) | rad, left positive; 0 with the left pedal in front | whole-body |
     | ``relative/orientation`` | (4,) | trunk to bicycle, camera at 16 Hz | two-gyro |
     | ``relative/distances`` | (3,) | m, of three markers on the trunk from the camera, 16 Hz | all |
+    | ``head_imu/gyr``, ``head_imu/acc`` | (3,) | rad/s; m/s² at the crown, head axes | only in a list of channels |
     | ``bicycle_imu/mag``, ``trunk_imu/mag`` | (3,) | µT | only in a list of channels |
     | ``fresh`` | (channels,) int8 | 1 for a new sample, 0 where the last value is repeated | all |
 
@@ -99,7 +100,7 @@ class RiderBicycleEnv(PoseEnv):
 
     | key | size | meaning |
     |---|---|---|
-    | ``pose/<body>/orientation`` | 4 | bicycle, trunk, upper_arm, forearm, thigh, shank with ``_left`` and ``_right`` |
+    | ``pose/<body>/orientation`` | 4 | bicycle, trunk, head, upper_arm, … with ``_left`` and ``_right`` |
     | ``pose/bicycle/roll``, ``pitch``, ``yaw`` | 1 | rad, Z-Y-X angles, roll to the right, nose down positive |
     | ``pose/bicycle/steer``, ``crank``, ``speed`` | 1 | rad, rad, m/s |
     | ``pose/trunk/angles``, ``hip_…/angles`` | 3 | rad, ISB Z-X-Y to the bicycle |
@@ -107,6 +108,7 @@ class RiderBicycleEnv(PoseEnv):
     | ``pose/elbow_…/flexion``, ``knee_…/flexion`` | 1 | rad |
     | ``truth/bicycle/position``, ``velocity``, ``acceleration`` | 3 | of the bicycle frame's origin, world |
     | ``truth/trunk/position``, ``acceleration`` | 3 | of the lumbar joint, world |
+    | ``truth/head/position`` | 3 | of the neck's joint, world |
     | ``truth/…/angular_rate`` | 3 | rad/s, body axes |
     | ``truth/pelvis/height``, ``angles`` | 1, 2 | m off the saddle; rad of forward tip and of tip to the right |
     | ``truth/seat/force``, ``moment`` | 3 | of the rider on the saddle, bicycle axes, N, N·m |
@@ -126,7 +128,7 @@ class RiderBicycleEnv(PoseEnv):
             for that of the scenario.
         suite: ``two-gyro``, ``force-inertial``, ``whole-body``, ``all``, or a list of channels
             (:mod:`poise.envs.bicycle.sensors.suites` has their sites and errors) and of your own :class:`.Sensor`
-            objects on the bodies ``bicycle``, ``trunk``, ….
+            objects on the bodies ``bicycle``, ``trunk``, ``head``, ….
         sensors: ``paper``, ``ideal``, or a device (:func:`poise.envs.sensors.presets.list_sensor_presets`) in place of
             the papers' inertial sensors.
         rate: Hz; None for that of the suite.
@@ -296,7 +298,7 @@ class RiderBicycleEnv(PoseEnv):
             hands=contact.hands,
         )
         measurements, of_sensors = self._worn.simulate(bodies, ride)
-        truth = {**other_truth(log), **of_sensors}
+        truth = {**other_truth(log, bodies["head"]), **of_sensors}
         return Block(log.time, measurements, pose, truth, np.ones(len(log.time), bool))
 
     def ending(self) -> tuple[int, bool]:

@@ -12,6 +12,7 @@ from ....envs.data.trajectory import Trajectory
 from ....envs.recipes.hand import HandRecipe
 from ....envs.recipes.recipe import Recipe
 from ....envs.recipes.registry import recipe
+from ....envs.recipes.rider import RiderRecipe
 from ..kit import Study
 from .motion import SHARE_OF_RATE, UNITS, MotionSpectra, motion_spectra, statistics_of
 from .spectra import Spectrum
@@ -73,20 +74,20 @@ def banded(spectrum: Spectrum) -> np.ndarray:
 
 
 def episode_summary(
-    described: Mapping[str, Any], seed: int, index: int, site: str, bandwidths: Sequence[float]
-) -> dict[str, Any]:
-    """Simulate one episode of a recipe and summarise it, for :meth:`.Study.map`.
+    described: Mapping[str, Any], seed: int, index: int, sites: Sequence[str], bandwidths: Sequence[float]
+) -> list[dict[str, Any]]:
+    """Simulate one episode of a recipe and summarise it site by site, for :meth:`.Study.map`.
 
     Args:
         described: of the recipe.
         seed: root seed.
         index: of the episode.
-        site: of the sensor.
+        sites: of the sensors.
         bandwidths: Hz.
     """
     episode = recipe(described).episode(seed, index)
-    found = summary(episode, site, bandwidths, orientation_of(site))
-    return found._asdict() | {"statistics": [found.statistics[each] for each in bandwidths]}
+    found = [summary(episode, site, bandwidths, orientation_of(site)) for site in sites]
+    return [one._asdict() | {"statistics": [one.statistics[each] for each in bandwidths]} for one in found]
 
 
 def orientation_of(site: str) -> str:
@@ -95,27 +96,36 @@ def orientation_of(site: str) -> str:
 
 
 def simulated_summaries(
-    study: Study, made: Recipe, episodes: int, site: str, bandwidths: Sequence[float], rate: float | None = None
-) -> list[Summary]:
-    """Summaries of the first episodes of a recipe, computed once a run folder.
+    study: Study,
+    made: Recipe,
+    episodes: int,
+    sites: Sequence[str],
+    bandwidths: Sequence[float],
+    rate: float | None = None,
+) -> dict[str, list[Summary]]:
+    """Site → summaries of the first episodes of a recipe, computed once a run folder.
 
     Args:
         study: its seed is the root seed of the episodes.
         made: the recipe.
         episodes: how many.
-        site: of the sensor.
+        sites: of the sensors; riders carry these alone.
         bandwidths: Hz.
         rate: Hz, of all episodes of a hand, so that the bandwidths of recordings are within theirs; None for the
             rates of the recipe.
     """
     if rate is not None and isinstance(made, HandRecipe):
         made = replace(made, rates=(rate, rate))
+    if isinstance(made, RiderRecipe):
+        made = replace(made, suite=tuple(f"{site}/{kind}" for site in sites for kind in ("gyr", "acc")))
     seed = study.seed_of("realism", made.name)
-    jobs = [(made.describe(), seed, index, site, tuple(bandwidths)) for index in range(episodes)]
-    found = study.map(f"episodes of {made.name} at {site}", episode_summary, jobs)
-    return [
-        Summary(**(each | {"statistics": dict(zip(bandwidths, each["statistics"], strict=True))})) for each in found
+    jobs = [(made.describe(), seed, index, tuple(sites), tuple(bandwidths)) for index in range(episodes)]
+    found = study.map(f"episodes of {made.name} at {', '.join(sites)}", episode_summary, jobs)
+    read = [
+        [Summary(**(each | {"statistics": dict(zip(bandwidths, each["statistics"], strict=True))})) for each in episode]
+        for episode in found
     ]
+    return {site: [episode[index] for episode in read] for index, site in enumerate(sites)}
 
 
 def ranges(summaries: Sequence[Summary], bandwidth: float) -> dict[str, tuple[float, float, float]]:

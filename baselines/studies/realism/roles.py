@@ -29,7 +29,7 @@ ROLES = {
     "hand": Role("a sensor or device moved by hand", "hand-held", "imu", True),
     "carried": Role("a phone carried by somebody who walks or runs", "carried", "imu", True),
     "chest": Role("a sensor on the chest of a rider", "rider", "trunk_imu", False),
-    "head": Role("a sensor on the head of a rider", "rider", "trunk_imu", False),
+    "head": Role("a sensor on the head of a rider", "rider", "head_imu", False),
 }
 """Name → role."""
 
@@ -80,10 +80,10 @@ def recorded(given: Iterable[str]) -> list[Recorded]:
     return found
 
 
-def by_recipe(groups: Sequence[Recorded]) -> dict[tuple[str, str], list[Recorded]]:
-    """Recipe and site → the recordings that are compared with it there."""
-    found: dict[tuple[str, str], list[Recorded]] = {}
+def by_recipe(groups: Sequence[Recorded]) -> dict[str, dict[str, list[Recorded]]]:
+    """Recipe → site → the recordings that are compared with it there."""
+    found: dict[str, dict[str, list[Recorded]]] = {}
     for group in groups:
         role = ROLES[group.role]
-        found.setdefault((role.recipe, role.site), []).append(group)
+        found.setdefault(role.recipe, {}).setdefault(role.site, []).append(group)
     return found

@@ -55,30 +55,36 @@ def containment(study: Study, report: Report, settings: Settings, groups: Sequen
         return
     report.text(CONTAINED, "Recordings inside of recipes")
     whole = []
-    for (name, site), members in by_recipe(groups).items():
+    for name, places in by_recipe(groups).items():
         made = recipe(name)
-        found: dict[str, list[Summary]] = {}
-        for group in members:
-            label = f"{group.group} ({group.role})"
-            found.setdefault(label, []).extend(
-                summary(each, "imu", [SHARE_OF_RATE / each.dt], "orientation") for each in group.load()
-            )
-        each_one = [each for summaries in found.values() for each in summaries]
+        recordings = {site: recorded_summaries(members) for site, members in places.items()}
+        each_one = [each for found in recordings.values() for summaries in found.values() for each in summaries]
         widths = sorted({width for each in each_one for width in each.statistics})
         rate = max(each.rate for each in each_one)
-        simulated = simulated_summaries(study, made, settings.of(made.kind), site, widths, rate)
-        if made.kind == "rider":
-            falls = sum(each.fell for each in simulated)
-            report.text(f"{falls} of {len(simulated)} rides of the recipe {name} ended in a fall.")
-        for label, summaries in found.items():
-            title = f"{label} in {name} at {site}"
-            rows = containment_rows(summaries, simulated)
-            report.table(title, rows)
-            whole.append({"recordings": label, "recipe": name, "episodes": len(simulated)} | totals(rows))
-            report.numbers(results(label, summaries))
-        report.figure(f"spectra {name} {site}", spectra(simulated, found), f"Spectra: recipe {name} at {site}")
-        report.numbers(results(name, simulated))
+        episodes = simulated_summaries(study, made, settings.of(made.kind), list(places), widths, rate)
+        for site, simulated in episodes.items():
+            if made.kind == "rider":
+                falls = sum(each.fell for each in simulated)
+                report.text(f"{falls} of {len(simulated)} rides of the recipe {name} ended in a fall.")
+            for label, summaries in recordings[site].items():
+                rows = containment_rows(summaries, simulated)
+                report.table(f"{label} in {name} at {site}", rows)
+                whole.append({"recordings": label, "recipe": name, "episodes": len(simulated)} | totals(rows))
+                report.numbers(results(label, summaries))
+            drawn = spectra(simulated, recordings[site])
+            report.figure(f"spectra {name} {site}", drawn, f"Spectra: recipe {name} at {site}")
+            report.numbers(results(f"{name} {site}", simulated))
     report.table("Statistics of recordings inside of recipes", whole)
+
+
+def recorded_summaries(groups: Sequence[Recorded]) -> dict[str, list[Summary]]:
+    """Group with its role → summaries of its recordings."""
+    found: dict[str, list[Summary]] = {}
+    for group in groups:
+        found.setdefault(f"{group.group} ({group.role})", []).extend(
+            summary(each, "imu", [SHARE_OF_RATE / each.dt], "orientation") for each in group.load()
+        )
+    return found
 
 
 def results(label: str, summaries: Sequence[Summary]) -> list[dict[str, Any]]:

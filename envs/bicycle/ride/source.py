@@ -17,6 +17,7 @@ from ..course.terrain import Ground
 from ..frame.parameters import BicycleParameters
 from ..frame.tyre import TyreParameters
 from ..rider.anthropometry import rider_body
+from ..rider.head import HeadMotion, HeadState
 from ..rider.posture import Posture, sit
 from ..rider.rider import Fidelity
 from ..rider.style import RiderMotion, RiderStyle, rider_style
@@ -47,6 +48,7 @@ class SavedRide(NamedTuple):
     samples: int
     fallen_at: float
     quaternions: Quaternions
+    head: HeadState | None
     token: str
     """where PyBullet's state is kept for a quick return"""
 
@@ -128,7 +130,7 @@ class RideSource:
         assert self.ride is not None
         self._recorder = RideRecorder(self.ride, self._each, self.sampling)
         self._began = self._settling * self.ride.physics.time_step
-        self._samples, self.fallen_at = 0, math.inf
+        self._samples, self.fallen_at, self._head.state = 0, math.inf, None
         self._quaternions: Quaternions = {}
 
     def _ride_first_second(self, scenario: Scenario, subject: Any, motion: np.random.Generator) -> None:
@@ -178,6 +180,7 @@ class RideSource:
             )
             self._world_key, self.posture = world, posture
         self.ground = course.ground
+        self._head = HeadMotion(posture, movement.gaze, self.rate)
         for _ in range(self._settling - self._each):
             self.ride.step()
         self._first = self.ride.save()
@@ -190,8 +193,10 @@ class RideSource:
     def record(self, most: int) -> Ridden:
         """Ride on for ``most`` samples, or to the one in which the rider fell."""
         log = self._recorder.record(most)
+        bodies = segment_states(log)
+        bodies["head"] = self._head.carry(bodies["trunk"])
         log = replace(log, time=log.time - self._began)
-        bodies = {name: state._replace(time=log.time) for name, state in segment_states(log).items()}
+        bodies = {name: state._replace(time=log.time) for name, state in bodies.items()}
         pose, self._quaternions = continuous_pose(true_pose(log, bodies), self._quaternions)
         if log.fallen.any():
             self.fallen_at = self._samples + len(log.time) - 1
@@ -205,7 +210,7 @@ class RideSource:
         self._kept[token] = self.ride.save()
         if len(self._kept) > KEPT:
             self.ride.forget(self._kept.pop(next(iter(self._kept))))
-        return SavedRide(self._plan, self._samples, self.fallen_at, dict(self._quaternions), token)
+        return SavedRide(self._plan, self._samples, self.fallen_at, dict(self._quaternions), self._head.state, token)
 
     def restore(self, saved: SavedRide) -> None:
         """Undo :meth:`save`: from memory if the state is still there, else by simulating the ride again."""
@@ -218,6 +223,7 @@ class RideSource:
             if saved.samples:
                 self._recorder.record(saved.samples)
         self._samples, self.fallen_at, self._quaternions = saved.samples, saved.fallen_at, dict(saved.quaternions)
+        self._head.state = saved.head
 
     def close(self) -> None:
         """End the world; may be called twice."""

@@ -21,6 +21,7 @@ ISB = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 BODIES = (
     "bicycle",
     "trunk",
+    "head",
     *(f"{part}_{side}" for part in ("upper_arm", "forearm", "thigh", "shank") for side in SIDES),
 )
 """Bodies with an orientation."""
@@ -90,7 +91,10 @@ def _limb_root(log: RideLog, limb: str) -> np.ndarray:
 
 
 def segment_states(log: RideLog) -> dict[str, BodyState]:
-    """Motion of every body in :data:`BODIES`; a lumped rider's limbs have orientations only, no rates."""
+    """Motion of every body in :data:`BODIES` but the head, which :class:`.HeadMotion` adds.
+
+    A lumped rider's limbs have orientations only, no rates.
+    """
     states = {"bicycle": log.frames["rear_frame"], "trunk": log.frames["trunk"]}
     for limb, held in log.limbs.items():
         kinds = ("upper_arm", "forearm") if limb.startswith("arm") else ("thigh", "shank")
@@ -157,7 +161,7 @@ def joint_angles(log: RideLog) -> np.ndarray:
     return np.concatenate([log.trunk_joints, *(limb.angles for limb in limbs)], axis=1)
 
 
-def other_truth(log: RideLog) -> dict[str, np.ndarray]:
+def other_truth(log: RideLog, head: BodyState) -> dict[str, np.ndarray]:
     """What is known besides the pose, name → ``(n, size)``; see the environment's table."""
     frame, contact = log.frames["rear_frame"], log.contact
     trunk = log.frames["trunk"]
@@ -170,6 +174,8 @@ def other_truth(log: RideLog) -> dict[str, np.ndarray]:
         "trunk/position": trunk.position,
         "trunk/acceleration": trunk.acceleration,
         "trunk/angular_rate": rotation.rotate_back(trunk.orientation, trunk.angular_velocity),
+        "head/position": head.position,
+        "head/angular_rate": rotation.rotate_back(head.orientation, head.angular_velocity),
         "pelvis/angles": log.pelvis[:, :2],
         "pelvis/height": log.pelvis[:, 2:],
         "seat/force": rotation.rotate_back(back, contact.seat_force),

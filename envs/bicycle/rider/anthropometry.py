@@ -55,6 +55,8 @@ MEAN_STATURE = {False: 1.741, True: 1.735}
 """m; True for women"""
 VERTEX_ABOVE_SUPRASTERNALE = {False: 0.3143, True: 0.3292}
 """m: table 4, vertex to cervicale plus cervicale above suprasternale"""
+VERTEX_ABOVE_CERVICALE = {False: 0.2429, True: 0.2437}
+"""m: table 4, vertex to cervicale"""
 STATURES, MASSES = (1.50, 1.95), (45.0, 110.0)
 """m and kg: of random riders"""
 SHALLOWEST, HEAVIEST = (1.2, 2.3), (30.0, 200.0)
@@ -119,6 +121,11 @@ class RiderBody:
     def vertex_height(self) -> float:
         """Top of the head above the suprasternal notch, m."""
         return VERTEX_ABOVE_SUPRASTERNALE[self.female] * self.scale
+
+    @property
+    def crown_height(self) -> float:
+        """Top of the head above the cervicale, m."""
+        return VERTEX_ABOVE_CERVICALE[self.female] * self.scale
 
     @property
     def shoulder_half_width(self) -> float:

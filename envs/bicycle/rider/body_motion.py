@@ -30,6 +30,11 @@ SHIFT_TIME, GLANCE_TIME = (0.5, 1.5), (0.3, 0.5)
 """s: from one posture to another, and into a glance"""
 GLANCE_HOLD = (0.3, 1.2)
 """s: over the shoulder"""
+NODS, LOOKS_AHEAD = 0.4, 0.4
+"""1: pitch relative to yaw of the head's turns, and share of looks that return ahead; assumed"""
+TURN_TIME, TURN_PACE = 0.3, 0.25
+"""s, and s/rad: how long a turn of the head lasts. 38 deg peak at 155 deg/s: free movements of people reach 185 deg/s,
+and voluntary ones far more (Grossman et al., Exp. Brain Res. 70, 1988)"""
 BREATHING_RATE = (0.25, 0.5)
 """Hz: 15 to 30 breaths a minute, from rest to moderate work"""
 
@@ -90,6 +95,22 @@ def glances(rng: np.random.Generator, time: np.ndarray, twist: float, interval: 
     return found
 
 
+def gaze_shifts(rng: np.random.Generator, time: np.ndarray, deviation: float, interval: float) -> np.ndarray:
+    """Yaw and pitch of the head ``(n, 2)`` towards what the rider looks at: held, now and then elsewhere, often ahead.
+
+    A larger turn takes longer (:data:`TURN_TIME`, :data:`TURN_PACE`). Deviations of pitch are :data:`NODS` of those of
+    yaw. Before the first look the rider looks ahead.
+    """
+    now, found = np.zeros(2), np.zeros((len(time), 2))
+    for begin in events(rng, interval, float(time[-1])):
+        where, ahead = deviation * rng.standard_normal(2) * (1.0, NODS), rng.random() < LOOKS_AHEAD
+        following = np.zeros(2) if ahead else where
+        change = following - now
+        found += smooth_step(time, begin, TURN_TIME + TURN_PACE * math.hypot(*change))[:, None] * change
+        now = following
+    return found
+
+
 def breathing(rng: np.random.Generator, time: np.ndarray, amplitude: float) -> np.ndarray:
     """Flexion of the trunk ``(n,)`` with each breath; the breaths vary in length."""
     rate, phase = float(rng.uniform(*BREATHING_RATE)), float(rng.uniform(0.0, 2.0 * math.pi))
@@ -108,3 +129,14 @@ def row_at(table, time):  # type: ignore[no-untyped-def]
     after = 0.5 * t + 2.0 * t**2 - 1.5 * t**3
     later = -0.5 * t**2 + 0.5 * t**3
     return before * table[index] + now * table[index + 1] + after * table[index + 2] + later * table[index + 3]
+
+
+def rows_at(table: np.ndarray, time: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Rows of a table ``(n, size)`` at many times (s) as :func:`row_at`, with their first and second derivatives."""
+    place = time * TABLE_RATE
+    index = np.floor(place).astype(int)
+    t = (place - index)[:, None]
+    p0, p1, p2, p3 = (table[index + each] for each in range(4))
+    a, b, c = 0.5 * (p2 - p0), p0 - 2.5 * p1 + 2.0 * p2 - 0.5 * p3, 0.5 * (p3 - p0) + 1.5 * (p1 - p2)
+    values = p1 + t * (a + t * (b + t * c))
+    return values, TABLE_RATE * (a + t * (2.0 * b + 3.0 * t * c)), TABLE_RATE**2 * (2.0 * b + 6.0 * t * c)

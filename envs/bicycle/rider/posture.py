@@ -30,6 +30,8 @@ HIP_ABOVE_SADDLE = 0.08
 """m, likewise"""
 TRUNK_IMU = (-0.10, 0.0, 0.27)
 """m: sixth thoracic vertebra in the trunk frame, likewise"""
+HEAD_AHEAD = 0.03
+"""m: centre of mass of the head ahead of the trunk's long axis; assumed"""
 KNEE_OUT = np.array([1.0, 0.0, 0.0])
 POINTS = 49
 CRANKS = np.linspace(0.0, 2.0 * math.pi, POINTS)
@@ -68,6 +70,22 @@ class Posture:
         """Position of the trunk's IMU in the trunk frame, m."""
         x, y, z = (self.body.scale * part for part in TRUNK_IMU)
         return x, y, z
+
+    @property
+    def neck(self) -> tuple[float, float, float]:
+        """Joint between trunk and neck, under the cervicale (C7), in the trunk frame, m."""
+        return 0.0, 0.0, self._notch + self.body.vertex_height - self.body.crown_height
+
+    @property
+    def head_centre(self) -> tuple[float, float, float]:
+        """Centre of mass of the head from the joint of the neck, in the head frame, m."""
+        return HEAD_AHEAD, 0.0, self.body.crown_height - self.body.segment("head").centre
+
+    @property
+    def _notch(self) -> float:
+        """Height of the suprasternal notch in the trunk frame, m."""
+        upper = sum(self.body.segment(name).length for name in ("middle_trunk", "upper_trunk"))
+        return 0.5 * self.body.segment("lower_trunk").length + upper
 
     def limb(self, name: str) -> Limb:
         """Shape of the limb ``arm_left`` and so on."""
@@ -134,7 +152,7 @@ class Posture:
             segment = self.body.segment(name)
             z += segment.length
             parts.append(hanging(segment, np.array([0.0, 0.0, z])))
-        parts.append(hanging(self.body.segment("head"), np.array([0.03, 0.0, z + self.body.vertex_height])))
+        parts.append(hanging(self.body.segment("head"), np.array([HEAD_AHEAD, 0.0, z + self.body.vertex_height])))
         return join(parts)
 
     def segments(self) -> dict[str, Mass]:

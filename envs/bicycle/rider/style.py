@@ -16,6 +16,7 @@ from .body_motion import (
     TRUNK,
     breathing,
     coloured_noise,
+    gaze_shifts,
     glances,
     posture_changes,
     row_at,
@@ -31,6 +32,11 @@ MOST_TWISTED = 0.2
 """rad by which the shoulders turn at most against the bar: both hands stay on it"""
 MOST_UPRIGHT = 0.04
 """rad by which the trunk straightens at most: beyond, the arms would be straight, above all the outer one in a turn"""
+
+
+LOOK, MOST_TURNED = 5.0, 1.2
+"""1: turn of the head in a look over the shoulder, relative to the twist of the trunk; rad that the neck turns at most
+(ranges of motion of adults are about 70°)"""
 
 
 @dataclass(frozen=True)
@@ -76,12 +82,16 @@ class RiderStyle:
     """s between looks, on average"""
     breath: float = 0.0
     """rad: amplitude of the trunk's flexion with each breath"""
+    gaze: float = 0.0
+    """rad: standard deviation of the head's yaw to the trunk where the rider looks around; assumed"""
+    gaze_interval: float = math.inf
+    """s between turns of the head, on average; assumed"""
 
     def __post_init__(self) -> None:
-        for name in (*SIZES, "hand_load", "unsteadiness"):
+        for name in (*SIZES, "hand_load", "unsteadiness", "gaze"):
             if not 0.0 <= getattr(self, name) < math.inf:
                 raise ValueError(f"{name} must not be negative, got {getattr(self, name)}")
-        for name in ("posture_interval", "glance_interval"):
+        for name in ("posture_interval", "glance_interval", "gaze_interval"):
             if not getattr(self, name) >= 1.0:
                 raise ValueError(f"{name} must be at least 1 s, got {getattr(self, name)}")
         largest = max(SIZES, key=lambda name: getattr(self, name))
@@ -100,14 +110,17 @@ STYLES = {
         RiderStyle(
             "mild", 0.04, 0.038, 0.05, 0.25, 0.3,
             pedalling=0.02, posture=0.01, posture_interval=30.0, glance=0.1, glance_interval=40.0, breath=0.004,
+            gaze=0.2, gaze_interval=5.0,
         ),
         RiderStyle(
             "normal", 0.055, 0.05, 0.055, 0.6, 0.5,
             pedalling=0.03, posture=0.015, posture_interval=20.0, glance=0.15, glance_interval=25.0, breath=0.006,
+            gaze=0.3, gaze_interval=3.0,
         ),
         RiderStyle(
             "aggressive", 0.06, 0.05, 0.07, 0.8, 0.6, unsteadiness=0.25,
             pedalling=0.04, posture=0.015, posture_interval=15.0, glance=0.2, glance_interval=15.0, breath=0.01,
+            gaze=0.5, gaze_interval=1.5,
         ),
     )
 }  # fmt: skip
@@ -184,17 +197,22 @@ class RiderMotion:
 
     def __init__(self, style: RiderStyle, rng: np.random.Generator, duration: float = 120.0) -> None:
         self.style, self.duration = style, duration
-        for_noise, for_posture, for_glances, for_breath, for_rest = rng.spawn(5)
+        for_noise, for_posture, for_glances, for_breath, for_rest, for_gaze = rng.spawn(6)
         # one row before time 0 and two after the end, for the interpolation
         rows = math.ceil(duration * TABLE_RATE) + 4
         time = (np.arange(rows) - 1.0) / TABLE_RATE
         deviations = [style.flexion, style.lean, style.twist, *[style.swivel] * 4, style.unsteadiness]
         self.table = coloured_noise(for_noise, np.array(deviations), rows)
         self.table[:, TRUNK] += posture_changes(for_posture, time, style.posture, style.posture_interval)
-        self.table[:, CHANNELS.index("twist")] += glances(for_glances, time, style.glance, style.glance_interval)
+        looks = glances(for_glances, time, style.glance, style.glance_interval)
+        self.table[:, CHANNELS.index("twist")] += looks
         self.table[:, CHANNELS.index("flexion")] += breathing(for_breath, time, style.breath)
         self.table[:, SWIVEL] += style.swivel * for_rest.standard_normal(4)
         phases = for_rest.uniform(0.0, 2.0 * math.pi, 3)
+        self.gaze = gaze_shifts(for_gaze, time, style.gaze, style.gaze_interval)
+        """yaw and pitch of the head to the trunk, a table of :mod:`.body_motion`, rad"""
+        self.gaze[:, 0] += LOOK * looks
+        self.gaze = MOST_TURNED * np.tanh(self.gaze / MOST_TURNED)
         self.habits = np.array([style.turn_lean, style.levelling, style.pedalling, *phases])
 
     def at(

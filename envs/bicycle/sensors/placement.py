@@ -11,7 +11,7 @@ import numpy as np
 from ....filters.core import rotation
 from ...sensors.ideal import Mounting
 
-PLACED = ("bicycle_imu", "trunk_imu", "upper_arm_right", "upper_arm_left", "thigh_right", "thigh_left")
+PLACED = ("bicycle_imu", "trunk_imu", "upper_arm_right", "upper_arm_left", "thigh_right", "thigh_left", "head_imu")
 """sites of inertial sensors in the order in which their errors are drawn"""
 
 

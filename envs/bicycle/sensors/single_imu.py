@@ -11,7 +11,7 @@ from ....filters.core import rotation
 from ...data.trajectory import Trajectory
 from ...sensors.kinds import KINDS
 
-SITES = ("bicycle_imu", "trunk_imu")
+SITES = ("bicycle_imu", "trunk_imu", "head_imu")
 """Sensor sites with a gyroscope and an accelerometer."""
 
 
@@ -21,7 +21,7 @@ def imu_of(trajectory: Trajectory, site: str = "bicycle_imu") -> Trajectory:
     Args:
         trajectory: an episode of ``poise/RiderBicycle-v0`` or ``poise/BicycleFixture-v0``, recorded, loaded or
             simulated; its metadata contain the sensor sites.
-        site: ``bicycle_imu`` or ``trunk_imu``.
+        site: ``bicycle_imu``, ``trunk_imu`` or ``head_imu``.
 
     Returns:
         The same samples, mask and metadata (``name`` gets the site appended), with

@@ -2,7 +2,8 @@
 
 Sensor axes are x forward, y left, z up along the body that carries them. (The papers' axes point down or to the right,
 which changes signs only.) Bodies and frames: ``bicycle`` (rear frame; origin on the
-ground under the rear hub), ``trunk`` (origin in the lumbar joint, z up the trunk), ``upper_arm_left``,
+ground under the rear hub), ``trunk`` (origin in the lumbar joint, z up the trunk), ``head`` (origin in the lowest joint
+of the neck, z up through the crown), ``upper_arm_left``,
 ``upper_arm_right``, ``thigh_left``, ``thigh_right`` (origin in the proximal joint, z from the distal joint to it).
 """
 
@@ -47,6 +48,8 @@ class SensorSites:
 
     bicycle_imu: Mounting
     trunk_imu: Mounting
+    head_imu: Mounting
+    """on a band or helmet at the crown"""
     upper_arm: Mounting
     """of both gyroscopes on the upper arms"""
     thigh: Mounting
@@ -97,6 +100,7 @@ def sensor_sites(
     return SensorSites(
         bicycle_imu=Mounting(BICYCLE_IMU_SITE, pitched(BICYCLE_IMU_TILT)),
         trunk_imu=Mounting(posture.trunk_imu),
+        head_imu=Mounting((0.0, 0.0, posture.body.crown_height)),
         upper_arm=Mounting((0.0, 0.0, -0.5 * posture.arm.upper)),
         thigh=Mounting((0.0, 0.0, -0.5 * posture.leg.upper)),
         saddle=bicycle.saddle,

@@ -57,6 +57,8 @@ CHANNELS: dict[str, BicycleChannel] = {
     "bicycle_imu/acc": _inertial("accelerometer", "bicycle", "bicycle_imu", devices.MODEL_605_ACCELEROMETER),
     "trunk_imu/gyr": _inertial("gyroscope", "trunk", "trunk_imu", devices.MODEL_605_GYROSCOPE),
     "trunk_imu/acc": _inertial("accelerometer", "trunk", "trunk_imu", devices.MODEL_605_ACCELEROMETER),
+    "head_imu/gyr": _inertial("gyroscope", "head", "head_imu", devices.MODEL_605_GYROSCOPE),
+    "head_imu/acc": _inertial("accelerometer", "head", "head_imu", devices.MODEL_605_ACCELEROMETER),
     **{f"{limb}/gyr": _inertial("gyroscope", limb, limb.rsplit("_", 1)[0], devices.SLIM_GYROSCOPE) for limb in LIMBS},
     "seat/wrench": BicycleChannel(readings.SEAT_WRENCH, "bicycle", "seat_sensor", devices.SEAT_WRENCH),
     "seat/load_cells": BicycleChannel(readings.SEAT_LOAD_CELLS, "bicycle", "", devices.LOAD_CELL),
@@ -74,6 +76,8 @@ CHANNELS: dict[str, BicycleChannel] = {
 
 IMUS = ("bicycle_imu/gyr", "bicycle_imu/acc", "trunk_imu/gyr", "trunk_imu/acc")
 MAGNETOMETERS = ("bicycle_imu/mag", "trunk_imu/mag")
+NOT_PUBLISHED = (*MAGNETOMETERS, "disk/gyr", "head_imu/gyr", "head_imu/acc")
+"""Channels that no work on riders has, and ``all`` leaves out"""
 SUITES: dict[str, tuple[tuple[str, ...], float]] = {
     "two-gyro": (("bicycle_imu/gyr", "trunk_imu/gyr", "relative/orientation"), 100.0),
     "two-gyro-fixture": (("bicycle_imu/gyr", "disk/gyr", "relative/distances"), 100.0),
@@ -82,7 +86,7 @@ SUITES: dict[str, tuple[tuple[str, ...], float]] = {
         (*IMUS, *(f"{limb}/gyr" for limb in LIMBS), "seat/load_cells", "wheel/speed", "steer/angle", "crank/angle"),
         100.0,
     ),
-    "all": (tuple(name for name in CHANNELS if name not in (*MAGNETOMETERS, "disk/gyr")), 100.0),
+    "all": (tuple(name for name in CHANNELS if name not in NOT_PUBLISHED), 100.0),
 }
 """Suite → channels and rate in Hz (force-inertial II-A: 50; whole-body II-A: 100; two-gyro gives none, assumed 100)."""
 

@@ -26,7 +26,7 @@ def ridden(**options):
 @pytest.fixture(scope="module")
 def ride():
     # means of velocities at the ends of an interval leave out what a road shakes in between
-    return ridden(scenario="slalom", subject=2, surface="smooth")
+    return ridden(scenario="slalom", subject=2, surface="smooth", suite=(*IMUS, "head_imu/gyr", "head_imu/acc"))
 
 
 @pytest.mark.parametrize("site", SITES)
