@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -59,13 +60,13 @@ def allan_deviation(
     return np.sqrt(variance)
 
 
-def allan_floors(time: float = FLOOR_TIME) -> list[dict[str, object]]:
+def allan_floors(time: float = FLOOR_TIME) -> list[dict[str, Any]]:
     """Allan deviation of every preset but the ideal one at ``time`` (s), at 100 Hz, warm: one row a preset.
 
     Returns:
         ``name``, ``gyroscope`` (°/h), ``accelerometer`` (µg), and in ``assumed`` the fields that no data sheet states.
     """
-    rows: list[dict[str, object]] = []
+    rows: list[dict[str, Any]] = []
     for preset in PRESETS[1:]:
         floors = [float(allan_deviation(noise, [time])[0]) for noise in (preset.gyroscope, preset.accelerometer)]
         assumed = [f"{kind}: {', '.join(names)}" for kind, names in preset.assumed.items() if names]

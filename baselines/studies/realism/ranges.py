@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..rides.saddle import ACROSS, ALONG, PULL
+from ..rides.vibration import BANDWIDTH, MEASURED
 
 
 @dataclass(frozen=True)
@@ -35,12 +36,22 @@ class Believable:
 
 CHEST = "chest sensor of a recorded ride of 307 s (imt, head_chest_bike), with a margin for other riders and roads"
 SADDLE = "a saddle is about 280 mm long and 140 to 280 mm wide, and nothing holds a rider down"
+CARGO = "seat pan of cargo bicycles ridden at 12 km/h, measured"
+DRIFT = (
+    "data sheets state bias stabilities in run from 5 °/h and 13 µg (MTi-100, VN-100, ADIS16470) and none of consumer "
+    "devices, which drift more: assumed up to 50 °/h and 400 µg"
+)
 BELIEVABLE = {
     "trunk gyroscope rms": Believable(20.0, 45.0, "deg/s", CHEST),
     "trunk gyroscope 95 % frequency": Believable(3.0, 10.0, "Hz", CHEST),
+    "share of samples in which a load cell pulls": Believable(-math.inf, 1.0, "%", SADDLE),
     "least force of a load cell": Believable(-PULL, math.inf, "N", SADDLE),
     "centre of pressure across": Believable(-ACROSS, ACROSS, "mm", SADDLE),
     "centre of pressure along": Believable(-ALONG, ALONG, "mm", SADDLE),
+    **{f"vertical acceleration on {name}": Believable(*range_, "m/s²", CARGO) for name, range_ in MEASURED.items()},
+    "bandwidth of vertical acceleration": Believable(*BANDWIDTH, "Hz", CARGO),
+    "gyroscope Allan deviation": Believable(5.0, 50.0, "°/h", DRIFT),
+    "accelerometer Allan deviation": Believable(10.0, 400.0, "µg", DRIFT),
 }
 """Quantity → range."""
 

@@ -4,20 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 
-import numpy as np
-
 from ....envs.bicycle.course.scenarios import list_scenarios
 from ....envs.sensors.allan import FLOOR_TIME, allan_floors
-from ...studies.rides.vibration import vibration_checks
 from ..kit import Study
 from ..report import Report
+from ..rides.saddle import saddle_rows, worst_of
+from ..rides.vibration import MEASURED, levels, vibration_checks
 from .environments import BANDWIDTH, GESTURE_RATE, GESTURE_TIME, SHOWN, SHOWN_OF_HANDS, gestures, medians, rides
 from .motion import UNITS, motion_statistics
 from .ranges import judged
 from .roles import Recorded
 
-ENDS = ((5, "min"), (95, "max"))
-"""Percentiles of the centre of pressure, and which of several rides is the worst"""
 BUMPY = ("bumps", "pitch")
 """Scenarios in which the wheels leave the ground, or the rider is thrown: their saddle is shown, not judged"""
 
@@ -100,40 +97,34 @@ def ride_motion(study: Study, report: Report, count: int, groups: Sequence[Recor
 
 def saddle(report: Report, found: Mapping[str, Sequence[Mapping[str, float]]]) -> None:
     """Load cells and centre of pressure by scenario, worst of all rides."""
-
-    def worst(name: str, statistic: str, pick: str) -> float:
-        return float(getattr(np, pick)([each[statistic] for each in found[name]]))
-
     report.table(
         "Saddle by scenario",
-        [
-            {
-                "scenario": name,
-                "a cell below -5 N, % of samples": worst(name, "pulls", "max"),
-                "least N": worst(name, "least", "min"),
-                "CoP along mm": f"{worst(name, 'along_5', 'min'):.0f} … {worst(name, 'along_95', 'max'):.0f}",
-                "CoP across mm": f"{worst(name, 'across_5', 'min'):.0f} … {worst(name, 'across_95', 'max'):.0f}",
-            }
-            for name in found
-        ],
+        list(saddle_rows(found)),
         "Largest share, least force and widest 5 to 95 % of the centre of pressure over the rides of a scenario.",
     )
-    firm = [name for name in found if name not in BUMPY]
-    rows = [judged("least force of a load cell", {name: worst(name, "least", "min") for name in firm})]
+    firm = {name: rides for name, rides in found.items() if name not in BUMPY}
+    rows = [
+        judged("share of samples in which a load cell pulls", {n: worst_of(each, "pulls") for n, each in firm.items()}),
+        judged("least force of a load cell", {name: worst_of(each, "least") for name, each in firm.items()}),
+    ]
     for axis in ("across", "along"):
-        ends = {f"{name}, {end} %": worst(name, f"{axis}_{end}", pick) for name in firm for end, pick in ENDS}
+        ends = {f"{name}, {end} %": worst_of(firm[name], f"{axis}_{end}") for name in firm for end in (5, 95)}
         rows.append(judged(f"centre of pressure {axis}", ends))
     report.table("Saddle, against what is believable", rows)
 
 
 def roads(report: Report) -> None:
     """Vertical acceleration of the bicycle on every surface."""
-    report.table("Vibration by road surface", [each._asdict() for each in vibration_checks()])
+    found = levels()
+    report.table("Vibration by road surface", [each._asdict() for each in vibration_checks(found)])
+    rows = [judged(f"vertical acceleration on {name}", {name: found[name][0]}) for name in MEASURED]
+    rows.append(judged("bandwidth of vertical acceleration", {name: found[name][1] for name in MEASURED}))
+    report.table("Roads, against what is believable", rows, "Subject 0 rides straight on at 12 km/h.")
 
 
 def sensors(report: Report) -> None:
     """Allan deviation of the presets where drift shows."""
-    rows = allan_floors()
+    found = allan_floors()
     report.table(
         f"Allan deviation at {FLOOR_TIME:g} s",
         [
@@ -143,7 +134,12 @@ def sensors(report: Report) -> None:
                 "accelerometer µg": each["accelerometer"],
                 "assumed": each["assumed"],
             }
-            for each in rows
+            for each in found
         ],
         "Expected from the parameters (IEEE Std 952); fields that no data sheet states are named assumptions.",
     )
+    rows = [
+        judged(f"{kind} Allan deviation", {str(each["name"]): float(each[kind]) for each in found})
+        for kind in ("gyroscope", "accelerometer")
+    ]
+    report.table("Drift, against what is believable", rows)

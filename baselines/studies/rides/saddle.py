@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -46,11 +46,18 @@ def saddle_statistics(cells: np.ndarray, geometry: LoadCells | None = None) -> d
     return found
 
 
-def saddle_rows(found: Sequence[dict[str, Any]]) -> Iterator[dict[str, Any]]:
-    """Rows of a table by scenario, worst of the rides with their statistics under ``saddle``."""
-    for name in dict.fromkeys(each["scenario"] for each in found):
-        rides = [each["saddle"] for each in found if each["scenario"] == name]
-        worst = {key: pick(each[key] for each in rides) for key in rides[0] for pick in (_pick(key),)}
+def worst_of(rides: Sequence[Mapping[str, float]], statistic: str) -> float:
+    """Worst of several rides: the least force and the outermost centre of pressure, and the largest of the rest."""
+    pick = min if statistic == "least" or statistic.endswith("_5") else max
+    return float(pick(each[statistic] for each in rides))
+
+
+def saddle_rows(found: Mapping[str, Sequence[Mapping[str, float]]]) -> Iterator[dict[str, Any]]:
+    """Rows of a table, worst of the rides of each scenario; ``found``: scenario → :func:`saddle_statistics`."""
+    for name, rides in found.items():
+        worst = {
+            key: worst_of(rides, key) for key in ("pulls", "least", "along_5", "along_95", "across_5", "across_95")
+        }
         yield {
             "scenario": name,
             "a cell below -5 N, %": worst["pulls"],
@@ -59,7 +66,3 @@ def saddle_rows(found: Sequence[dict[str, Any]]) -> Iterator[dict[str, Any]]:
             "CoP across mm": f"{worst['across_5']:.0f} … {worst['across_95']:.0f}",
             "mean along mm": f"{float(np.mean([each['along_mean'] for each in rides])):.0f}",
         }
-
-
-def _pick(key: str) -> Any:
-    return min if key == "least" or key.endswith("_5") else max

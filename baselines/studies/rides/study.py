@@ -18,7 +18,7 @@ from .plots import example_ride, ride_signals
 from .reports import comparison
 from .saddle import ACROSS, ALONG, PULL, saddle_rows
 from .statistics import KINDS, UNITS, ride
-from .vibration import vibration_checks
+from .vibration import levels, vibration_checks
 
 SHOWN = {
     "scenario": "scenario",
@@ -60,8 +60,9 @@ def rides(study: Study, report: Report, scenarios: Sequence[str], fidelity: str)
         f"{len(found)} rides of {study.duration:g} s, {fidelity} rider",
         [{title: each[field] for field, title in shown.items()} for each in found],
     )
+    saddles = {name: [each["saddle"] for each in found if each["scenario"] == name] for name in scenarios}
     accepted = f"Accepted: no cell below -{PULL:g} N but in flight; ±{ALONG:g} mm along and ±{ACROSS:g} mm across."
-    report.table(f"Saddle by scenario, worst of the riders, {fidelity} rider", list(saddle_rows(found)), accepted)
+    report.table(f"Saddle by scenario, worst of the riders, {fidelity} rider", list(saddle_rows(saddles)), accepted)
     if claims := comparison(found):
         report.claims("Beside the papers, range over riders", claims)
     draw(study, report, scenarios, fidelity, seeds)
@@ -81,7 +82,7 @@ def draw(
 
 def checks(study: Study, report: Report) -> None:
     """Physical checks, and what filters of a single IMU make of some rides (minutes)."""
-    report.table("Physical checks", [each._asdict() for each in (*all_checks(), *vibration_checks())])
+    report.table("Physical checks", [each._asdict() for each in (*all_checks(), *vibration_checks(levels()))])
     report.table("RMS errors of inclination, deg, of filters of one IMU", list(inclination_rows()))
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -54,15 +54,19 @@ def vibration(
     return float(up.std()), float(frequency[np.searchsorted(np.cumsum(power) / power.sum(), 0.95)])
 
 
-def vibration_checks() -> Iterator[Check]:
-    """Every surface at 12 km/h."""
-    for name in SURFACES:
-        deviation, bandwidth = vibration(name)
-        found = f"{deviation:.2f} m/s², {bandwidth:.0f} Hz"
+def levels() -> dict[str, tuple[float, float]]:
+    """Surface → :func:`vibration` at 12 km/h."""
+    return {name: vibration(name) for name in SURFACES}
+
+
+def vibration_checks(found: Mapping[str, tuple[float, float]]) -> Iterator[Check]:
+    """Every surface of :func:`levels` beside what was measured."""
+    for name, (deviation, bandwidth) in found.items():
+        text = f"{deviation:.2f} m/s², {bandwidth:.0f} Hz"
         what = f"vertical rms and 95 % frequency of the bicycle on {name}, 12 km/h"
         if name not in MEASURED:
-            yield Check(what, "–", found)
+            yield Check(what, "–", text)
             continue
         low, high = MEASURED[name]
         holds = low <= deviation <= high and BANDWIDTH[0] <= bandwidth <= BANDWIDTH[1]
-        yield Check(what, f"{low:g} … {high:g} m/s², {BANDWIDTH[0]:.0f} … {BANDWIDTH[1]:.0f} Hz", found, holds)
+        yield Check(what, f"{low:g} … {high:g} m/s², {BANDWIDTH[0]:.0f} … {BANDWIDTH[1]:.0f} Hz", text, holds)

@@ -32,8 +32,7 @@ def test_saddle_statistics_of_a_known_load() -> None:
 def test_rows_are_the_worst_of_all_riders() -> None:
     one = saddle_statistics(np.array([[100.0, 100.0, 100.0]] * 2))
     other = saddle_statistics(np.array([[100.0, -20.0, 300.0]] * 2))
-    found = [{"scenario": name, "saddle": each} for name, each in (("slow", one), ("slow", other), ("bumps", one))]
-    slow, bumps = saddle_rows(found)
+    slow, bumps = saddle_rows({"slow": [one, other], "bumps": [one]})
     assert (slow["a cell below -5 N, %"], slow["least N"]) == (100.0, -20.0)
     assert (bumps["a cell below -5 N, %"], bumps["least N"]) == (0.0, 100.0)
     assert slow["CoP across mm"] == "-51 … 0"
