@@ -23,7 +23,7 @@ WIDTHS = (25.0, 40.0)
 
 def test_episodes_of_the_recipe_lie_inside_and_a_stronger_motion_outside(tmp_path: Path) -> None:
     study = Study(tmp_path, processes=1, progress=False)
-    simulated = simulated_summaries(study, SHORT, 20, "imu", WIDTHS, rate=120.0)
+    simulated = simulated_summaries(study, SHORT, 20, ["imu"], WIDTHS, rate=120.0)["imu"]
     assert [each.rate for each in simulated] == pytest.approx([120.0] * 20)
     own = [each._replace(statistics={25.0: each.statistics[25.0]}) for each in simulated]
     rows = containment_rows(own, simulated)
