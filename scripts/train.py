@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import time
 from dataclasses import dataclass, replace
 from datetime import date
 from pathlib import Path
@@ -9,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import tyro
 
+from ..filters.support.rows import jsonable
 from .experiment import command_line, known_recordings, open_run, versions
 from .main import run_command
 from .output import Output
@@ -44,7 +47,7 @@ class Args:
     replicate: int = 0
     """number of a repetition on the same data, with other initial weights and another order"""
     episodes: int | None = None
-    """simulated training episodes in all, instead of the preset's"""
+    """simulated training episodes, or rides, in all, instead of the preset's"""
     epochs: int | None = None
     """passes over the episodes, instead of the preset's"""
     units: int | None = None
@@ -76,6 +79,7 @@ def run(args: Args) -> int:
     """Train, test, and write weights with their card."""
     from ..baselines.learned.training import train_preset
 
+    start = process_times()
     preset = chosen(args)
     own = known_recordings(args.recordings) if args.recordings else None
     folder = open_run("train", args, may_differ=("test_episodes", "processes"))
@@ -90,9 +94,12 @@ def run(args: Args) -> int:
             processes=args.processes,
             say=out.say,
         )
+        spent = [round(now - before) for now, before in zip(process_times(), start, strict=True)]
         table = test(result, preset, args, out)
         folder.write_results(table)
-        card = card_of(args, preset, result, table)
+        card = card_of(args, preset, result, table) | {
+            "training_seconds": {"wall": spent[0], "processor": spent[1], "resumed": args.resume is not None}
+        }
         path = result.estimator.save(folder.folder / args.preset.replace("+", "_"), card)
         out.say(f"weights: {path}")
         if args.export is not None:
@@ -105,6 +112,12 @@ def run(args: Args) -> int:
         out.table(rows, "Error on unseen simulated episodes, mean of RMS, deg")
         out.add(run=str(folder.folder), card=card)
     return 0
+
+
+def process_times() -> tuple[float, float]:
+    """Seconds of a clock, and of processors spent here and in finished processes that were started here."""
+    spent = os.times()
+    return time.perf_counter(), spent.user + spent.system + spent.children_user + spent.children_system
 
 
 def chosen(args: Args) -> Preset:
@@ -123,7 +136,8 @@ def chosen(args: Args) -> Preset:
     if args.episodes is not None:
         whole = sum(preset.sources.values())
         sources = {name: max(1, round(args.episodes * count / whole)) for name, count in preset.sources.items()}
-        preset = replace(preset, sources=sources)
+        rides = None if preset.rides is None else replace(preset.rides, rides=args.episodes)
+        preset = replace(preset, sources=sources, rides=rides)
     if args.epochs is not None:
         preset = replace(preset, fit=replace(preset.fit, epochs=args.epochs))
     return preset if args.units is None else replace(preset, units=args.units)
@@ -211,6 +225,8 @@ def means(table: pandas.DataFrame) -> dict[str, dict[str, dict[str, float]]]:
 
 def card_of(args: Args, preset: Preset, result: FitResult, table: pandas.DataFrame) -> dict[str, Any]:
     """What the weights are and how they came about."""
+    from ..baselines.learned.limits import limits_of
+
     return {
         "name": args.preset,
         "description": preset.summary,
@@ -221,6 +237,8 @@ def card_of(args: Args, preset: Preset, result: FitResult, table: pandas.DataFra
         else [path.name for path in args.recordings],
         "training": preset.describe(),
         "best_epoch": result.best_epoch,
+        "calibration": None if result.calibration is None else jsonable(result.calibration._asdict()),
+        "limits": limits_of(preset, result.estimator, result.calibration),
         "history": [{name: round(value, 6) for name, value in entry.items()} for entry in result.history],
         "test": means(table),
         "versions": versions(("numpy", "numba", "torch", "scipy")),

@@ -23,6 +23,7 @@ from .inputs.level_frame import LevelFrame
 from .mixture_head import MixtureHead
 from .networks.gru import GruNetwork
 from .networks.tcn import TcnNetwork
+from .networks.unlikeness import read_network
 
 FRONT_ENDS: dict[str, Any] = {kind.kind: kind for kind in (LevelFrame, FilterBank, FilterFeatures, RawChannels)}
 HEADS: dict[str, Any] = {kind.kind: kind for kind in (TiltHead, MixtureHead, AngleHead)}
@@ -185,7 +186,7 @@ class LearnedEstimator(NetworkParts):
         arrays, card = load_weights(path_or_name)
         try:
             front, head, kind = card["front_end"], card["head"], card["network"]
-            made = look_up("kind of network", kind, NETWORKS).from_arrays(arrays) if network is None else network
+            made = read_network(look_up("kind of network", kind, NETWORKS) if network is None else network, arrays)
             front_end = look_up("kind of front end", front["kind"], FRONT_ENDS).read(front, dt)
             return cls(made, front_end, look_up("kind of head", head["kind"], HEADS).read(head))
         except (KeyError, TypeError) as reason:

@@ -6,21 +6,24 @@ import copy
 import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from ...filters.core.backend import to_numpy
 from ...filters.support.optional import extra
 from ..checkpoint import load_checkpoint, save_checkpoint
+from .calibration import Calibration, calibrate
 from .config import FitConfig
 from .data import SequenceData
 from .estimator import LearnedEstimator
-from .head import Head
+from .head import AngleHead, Head
 from .inputs.filter_features import standardisation
 from .inputs.front_end import FrontEnd
 from .networks.modules import TorchNetwork
+from .networks.unlikeness import WithUnlikeness
 
 with extra("learn"):
     import torch
@@ -39,13 +42,13 @@ class FitResult(NamedTuple):
         history: one dictionary an epoch: ``epoch``, ``training`` and ``validation`` loss, ``validation_deg`` (mean over
             parts of the root mean square error), ``skipped`` updates.
         best_epoch: the one with the lowest validation loss; 0: the weights before the first.
-        residuals: root mean square errors of the parts that are held out, rad.
+        calibration: of the covariance, on what is held out; None of a head that has none.
     """
 
     estimator: LearnedEstimator
     history: list[dict[str, float]]
     best_epoch: int
-    residuals: tuple[float, ...]
+    calibration: Calibration | None
 
 
 @contextmanager
@@ -100,6 +103,9 @@ def fit(
         check_finite(name, part, head)
     if resume and folder is None:
         raise ValueError("resume needs the folder of the interrupted training")
+    if isinstance(head, AngleHead):
+        # a covariance of other weights is none of these
+        head = replace(head, deviations=(), growth=())
     home = None if folder is None else Path(folder)
     if home is not None:
         home.mkdir(parents=True, exist_ok=True)
@@ -125,11 +131,20 @@ def fit(
         finally:
             log(None)
         module.load_state_dict(trainer.best)
-        _, residuals = validation_loss(trainer, validation)
+        told = np.concatenate([to_numpy(outputs) for _, outputs in whole_sequences(trainer, validation)])
     module.eval()
-    network = module.export() if hasattr(module, "export") else trainer.network  # type: ignore[operator]
+    network: Any = module.export() if hasattr(module, "export") else trainer.network  # type: ignore[operator]
+    calibration = None
+    if isinstance(head, AngleHead):
+        network = WithUnlikeness.of(network, *standardisation(data.features, data.mask))
+        errors, unlikeness = (
+            head.errors(told, validation.target, validation.spread),
+            network.unlikeness(validation.features),
+        )
+        calibration = calibrate(errors, unlikeness, validation.mask, validation.names)
+        head = replace(head, deviations=calibration.deviations, growth=calibration.growth)
     estimator = LearnedEstimator(network, front_end, head)
-    return FitResult(estimator, trainer.history, trainer.best_epoch, tuple(residuals.tolist()))
+    return FitResult(estimator, trainer.history, trainer.best_epoch, calibration)
 
 
 def check_finite(name: str, data: SequenceData, head: Head) -> None:
@@ -274,29 +289,36 @@ class Trainer:
         self.best_loss, self.history, self.best = state["best_loss"], state["history"], state["best"]
 
 
-def validation_loss(
+def whole_sequences(
     trainer: Trainer, data: SequenceData, size: int = 64, length: int = 1000
-) -> tuple[float, np.ndarray]:
-    """Loss of whole sequences, without gradients, and the root mean square error of each part, rad."""
+) -> Iterator[tuple[slice, torch.Tensor]]:
+    """Outputs ``(B, N, O)`` of all sequences, ``size`` at a time: which these are, and what the network says."""
     trainer.module.eval()
-    total, count, squares, scored = 0.0, 0, 0.0, 0
-    with torch.no_grad():
-        for start in range(0, len(data), size):
-            part = slice(start, start + size)
-            memory, told = None, []
-            features = torch.from_numpy(data.features[part])
+    for start in range(0, len(data), size):
+        part = slice(start, start + size)
+        memory, told = None, []
+        features = torch.from_numpy(data.features[part])
+        with torch.no_grad():
             for begin in range(0, features.shape[1], length):
                 output, memory = trainer.forward(features[:, begin : begin + length], memory)
                 told.append(output)
-            outputs, mask = torch.cat(told, dim=1), torch.from_numpy(data.mask[part])
-            target, spread = torch.from_numpy(data.target[part]), torch.from_numpy(data.spread[part])
-            counted = int(mask.any(dim=1).sum())
-            if not counted:
-                continue
+        yield part, torch.cat(told, dim=1)
+
+
+def validation_loss(trainer: Trainer, data: SequenceData) -> tuple[float, np.ndarray]:
+    """Loss of whole sequences, without gradients, and the root mean square error of each part, rad."""
+    total, count, squares, scored = 0.0, 0, 0.0, 0
+    for part, outputs in whole_sequences(trainer, data):
+        mask = torch.from_numpy(data.mask[part])
+        target, spread = torch.from_numpy(data.target[part]), torch.from_numpy(data.spread[part])
+        counted = int(mask.any(dim=1).sum())
+        if not counted:
+            continue
+        with torch.no_grad():
             total += float(trainer.head.loss(outputs, target, spread, mask)) * counted
             error = trainer.head.errors(outputs, target, spread)
-            squares = squares + (error * error)[mask].sum(dim=0).double()
-            count, scored = count + counted, scored + int(mask.sum())
+        squares = squares + (error * error)[mask].sum(dim=0).double()
+        count, scored = count + counted, scored + int(mask.sum())
     return total / max(count, 1), np.sqrt(np.atleast_1d(np.asarray(squares)) / max(scored, 1))
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, Protocol, Self
@@ -151,6 +152,8 @@ class AngleHead:
         limit: largest correction in standard deviations of the front end, if it knows any; None: not limited.
         huber: rad; errors beyond count linearly.
         deviations: standard deviations in rad of what remains, found on held-out data; empty: no covariance.
+        growth: what the variances grow by where inputs are unlike those of the training, ``deviations² (1 + growth u)``
+            (:mod:`.calibration`); the network says u after its corrections. Empty: they are constant.
     """
 
     outputs: tuple[Quantity, ...]
@@ -158,19 +161,28 @@ class AngleHead:
     limit: float | None = None
     huber: float = 0.035
     deviations: tuple[float, ...] = ()
+    growth: tuple[float, ...] = ()
 
     kind: ClassVar[str] = "angles"
 
     def __post_init__(self) -> None:
-        if len(self.scale) != self.size or not all(scale > 0.0 for scale in self.scale):
-            raise ValueError(f"scale must be {self.size} positive numbers, got {self.scale}")
-        if self.deviations and len(self.deviations) != self.size:
-            raise ValueError(f"deviations must be {self.size} numbers or none, got {self.deviations}")
+        if len(self.scale) != self.corrected or not all(scale > 0.0 for scale in self.scale):
+            raise ValueError(f"scale must be {self.corrected} positive numbers, got {self.scale}")
+        for name in ("deviations", "growth"):
+            if getattr(self, name) and len(getattr(self, name)) != self.corrected:
+                raise ValueError(f"{name} must be {self.corrected} numbers or none, got {getattr(self, name)}")
+        if self.growth and not (self.deviations and all(0.0 <= each < math.inf for each in self.growth)):
+            raise ValueError(f"growth must be of deviations that are given, and 0 or more, got {self.growth}")
+
+    @property
+    def corrected(self) -> int:
+        """How many numbers are corrected, K."""
+        return sum(quantity.size for quantity in self.outputs)
 
     @property
     def size(self) -> int:
-        """One for each number that is corrected."""
-        return sum(quantity.size for quantity in self.outputs)
+        """One for each number that is corrected, and one if the covariance grows."""
+        return self.corrected + bool(self.growth)
 
     @property
     def error_parts(self) -> dict[str, tuple[int, int]]:
@@ -184,15 +196,15 @@ class AngleHead:
     def describe(self) -> dict[str, Any]:
         """See :class:`Head`."""
         outputs = [[q.name, q.kind, q.size, q.unit] for q in self.outputs]
-        numbers = {"scale": list(self.scale), "deviations": list(self.deviations)}
+        numbers = {"scale": list(self.scale), "deviations": list(self.deviations), "growth": list(self.growth)}
         return {"kind": self.kind, "outputs": outputs, "limit": self.limit, "huber": self.huber, **numbers}
 
     @classmethod
     def read(cls, described: Mapping[str, Any]) -> Self:
         """The inverse of :meth:`describe`."""
         outputs = tuple(Quantity(*given) for given in described["outputs"])
-        deviations = tuple(described.get("deviations", ()))
-        return cls(outputs, tuple(described["scale"]), described.get("limit"), described["huber"], deviations)
+        numbers = (tuple(described.get(name, ())) for name in ("deviations", "growth"))
+        return cls(outputs, tuple(described["scale"]), described.get("limit"), described["huber"], *numbers)
 
     def estimate(self, seen: Seen, output: Array) -> Estimate:
         """See :class:`Head`."""
@@ -205,14 +217,15 @@ class AngleHead:
             start += quantity.size
         if not self.deviations:
             return Estimate(pose)
-        xp = namespace(output)
-        variances = constant(np.diag(np.square(self.deviations)), output)
-        return Estimate(pose, xp.broadcast_to(variances, (*output.shape[:-1], self.size, self.size)))
+        size = self.corrected
+        growth = constant(np.array(self.growth or (0.0,) * size), output)
+        variances = constant(np.square(self.deviations), output) * (1.0 + growth * output[..., -1:])
+        return Estimate(pose, variances[..., None] * constant(np.eye(size), output))
 
     def correction(self, output: Array, spread: Array) -> Array:
         """What is added ``(..., size)``, rad."""
         xp = namespace(output)
-        correction = output * constant(np.array(self.scale), output)
+        correction = output[..., : self.corrected] * constant(np.array(self.scale), output)
         if self.limit is not None:
             longest = self.limit * spread + 1e-6
             correction = longest * xp.tanh(correction / longest)
@@ -237,7 +250,7 @@ class AngleHead:
         size = error.abs()
         cost = torch.where(size < bend, 0.5 * error * error, bend * (size - 0.5 * bend))
         weight = mask[..., None].to(output.dtype)
-        return (cost * weight).sum() / (weight.sum() * self.size).clamp(min=1.0)
+        return (cost * weight).sum() / (weight.sum() * self.corrected).clamp(min=1.0)
 
     def errors(self, output: Array, target: Array, spread: Array) -> Array:
         """See :class:`Head`."""

@@ -26,6 +26,7 @@ from ...filters.support.version import poise_version
 from ..weights_io import load_weights
 from .networks.gru import GruNetwork
 from .networks.tcn import TAPS, TcnNetwork
+from .networks.unlikeness import LARGEST, WithUnlikeness, read_network
 
 with extra("learn"):
     import onnx
@@ -70,8 +71,8 @@ class Graph:
         return self.node("Reshape", value, self.constant(shape, np.int64), to=to)
 
 
-def write_gru(graph: Graph, network: GruNetwork) -> None:
-    """The recurrent network: ONNX has the blocks of its gates in the order z, r, n."""
+def write_gru(graph: Graph, network: GruNetwork, to: str = "output") -> None:
+    """The recurrent network, its output named ``to``: ONNX has the blocks of its gates in the order z, r, n."""
 
     def ordered(array: np.ndarray) -> np.ndarray:
         r, z, n = np.split(array, 3)
@@ -87,12 +88,15 @@ def write_gru(graph: Graph, network: GruNetwork) -> None:
     )  # (updates, 1, batch, H) and (1, batch, H)
     hidden = graph.node("Squeeze", "hidden", graph.constant([1], np.int64))
     hidden = graph.node("Transpose", hidden, perm=[1, 0, 2])
-    graph.affine(network.output_weight, network.output_bias, hidden, to="output")
+    graph.affine(network.output_weight, network.output_bias, hidden, to=to)
     graph.node("Squeeze", "last", graph.constant([0], np.int64), to="memory_after")
 
 
-def write_tcn(graph: Graph, network: TcnNetwork) -> None:
-    """The convolution network: each block has the inputs that it needs of earlier updates in front of its own."""
+def write_tcn(graph: Graph, network: TcnNetwork, to: str = "output") -> None:
+    """The convolution network, its output named ``to``.
+
+    Each block has the inputs that it needs of earlier updates in front of its own.
+    """
     channels = network.block_bias.shape[1]
     h = graph.affine(network.input_weight, network.input_bias, "features")
     kept, start = [], 0
@@ -108,10 +112,22 @@ def write_tcn(graph: Graph, network: TcnNetwork) -> None:
         h = graph.node("Add", h, graph.node("Tanh", graph.node("Transpose", found, perm=[0, 2, 1])))
         start += length * channels
     graph.node("Concat", *kept, axis=1, to="memory_after")
-    graph.affine(network.output_weight, network.output_bias, h, to="output")
+    graph.affine(network.output_weight, network.output_bias, h, to=to)
 
 
-WRITERS: dict[str, tuple[Any, Callable[[Graph, Any], None]]] = {
+def write_unlikeness(graph: Graph, network: WithUnlikeness, write: Callable[..., None]) -> None:
+    """A network, and how unlike the training data the features are after its outputs."""
+    write(graph, network.network, to="own_output")
+    scaled = graph.node(
+        "Mul", graph.node("Sub", "features", graph.constant(network.mean)), graph.constant(network.factor)
+    )
+    squared = graph.node("Min", graph.node("Mul", scaled, scaled), graph.constant(LARGEST))
+    total = graph.node("ReduceSum", squared, graph.constant([-1], np.int64), keepdims=1)
+    count = graph.constant(network.counted)
+    graph.node("Concat", "own_output", graph.node("Div", total, count), axis=2, to="output")
+
+
+WRITERS: dict[str, tuple[Any, Callable[..., None]]] = {
     GruNetwork.kind: (GruNetwork, write_gru),
     TcnNetwork.kind: (TcnNetwork, write_tcn),
 }
@@ -139,13 +155,16 @@ def export_onnx(path_or_name: str | Path, path: str | Path) -> Path:
     cls, write = look_up("kind of network", card["network"], WRITERS)
     path = Path(path)
     path = path if path.suffix == ".onnx" else path.with_name(path.name + ".onnx")
-    return write_bytes(path, onnx_model(cls.from_arrays(arrays), write, card).SerializeToString())
+    return write_bytes(path, onnx_model(read_network(cls, arrays), write, card).SerializeToString())
 
 
-def onnx_model(network: Any, write: Callable[[Graph, Any], None], card: Mapping[str, Any]) -> Any:
+def onnx_model(network: Any, write: Callable[..., None], card: Mapping[str, Any]) -> Any:
     """The model, checked."""
     graph = Graph()
-    write(graph, network)
+    if isinstance(network, WithUnlikeness):
+        write_unlikeness(graph, network, write)
+    else:
+        write(graph, network)
 
     def value(name: str, *shape: Any) -> Any:
         return helper.make_tensor_value_info(name, TensorProto.FLOAT, list(shape))

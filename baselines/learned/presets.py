@@ -129,6 +129,8 @@ class Preset:
 TRAINED = {"scenarios": ["indoor_circle", "outdoor", "straight", "slalom"], "styles": ["mild", "normal"]}
 """Rides that networks train on; other scenarios and aggressive riders are kept aside."""
 RIDES = RideSource(rides=80, draws=4, duration=40.0, changes=TRAINED)
+KEPT = 0.3
+"""Rides for the best epoch and the covariance, as a share of those of the training; riders differ: 12 are too few."""
 RIDDEN = FitConfig(epochs=14, window=125, learning_rate=3e-3)
 CORRECTED = {
     "two-gyro": "two-gyro",
@@ -162,14 +164,14 @@ PRESETS: dict[str, Preset] = {
     **{
         f"{paper}+network": Preset(
             f"{filter}, all its angles corrected by a recurrent network", rides=RIDES, filter=filter,
-            scale=0.03, noise=0.1, fit=RIDDEN,
+            validation=KEPT, scale=0.03, noise=0.1, fit=RIDDEN,
         )
         for paper, filter in CORRECTED.items()
     },
     **{
         f"gru-{paper}{end}": Preset(
             f"angles of {paper} by a recurrent network alone, {words}", rides=RIDES, paper=paper, sites=sites,
-            scale=0.1, noise=0.1, fit=RIDDEN,
+            validation=KEPT, scale=0.1, noise=0.1, fit=RIDDEN,
         )
         for paper, bicycle in BICYCLE_SITES.items()
         for end, words, sites in (

@@ -121,6 +121,7 @@ def fit_preset(
         module, config = preset.module(front_end.size, head.size, number), preset.fit
     else:
         network = LearnedEstimator.load(start).network
+        network = getattr(network, "network", network)
         if not isinstance(network, GruNetwork):
             raise ValueError(f"start must be weights of a recurrent network, got a {network.kind} in {start}")
         module, config = GruModule.of(network, preset.scale), preset.refined
@@ -134,10 +135,6 @@ def fit_preset(
         usual = data.target[data.mask].mean(axis=0) / np.array(head.scale)
         module.output.bias.data.copy_(torch.from_numpy(usual.astype(np.float32)))
     result = fit(module, front_end, head, data, validation, config, folder=folder, resume=resume, say=say)
-    if isinstance(head, AngleHead):
-        # the covariance that what is held out asks for
-        calibrated = replace(head, deviations=result.residuals)
-        result = result._replace(estimator=replace(result.estimator, head=calibrated))
     if isinstance(head, GainHead):
         made: Any = GainFilter(result.estimator.network, front_end, head)
         result = result._replace(estimator=made)

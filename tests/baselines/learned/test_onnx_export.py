@@ -11,6 +11,7 @@ import pytest
 
 from poise.baselines.learned.estimator import NETWORKS
 from poise.baselines.learned.networks.modules import GruModule, TcnModule
+from poise.baselines.learned.networks.unlikeness import WithUnlikeness, read_network
 from poise.baselines.learned.onnx_export import export_onnx
 from poise.baselines.weights_io import list_weights, load_weights, save_weights
 
@@ -35,7 +36,7 @@ def by_steps(network: Any, features: np.ndarray) -> tuple[np.ndarray, np.ndarray
 
 def compare(weights: str | Path, folder: Path, tolerance: float = 1e-5) -> None:
     arrays, card = load_weights(weights)
-    network = NETWORKS[card["network"]].from_arrays(arrays)
+    network = read_network(NETWORKS[card["network"]], arrays)
     path = export_onnx(weights, folder / "network.onnx")
     run = session(path)
     features = np.random.default_rng(0).normal(0.0, 1.0, (3, 150, network.features)).astype(np.float32)
@@ -63,6 +64,9 @@ def test_networks_of_any_size_are_equal(module: Any, tmp_path: Path) -> None:
     network = module.export()
     arrays = {name: rng.normal(0.0, 0.3, array.shape).astype(np.float32) for name, array in network.arrays().items()}
     compare(save_weights(tmp_path / "own", arrays, {"network": network.kind}), tmp_path)
+    unlike = WithUnlikeness.of(network, rng.normal(size=5), np.array([0.1, 1.0, 2.0, np.inf, 0.5]))
+    assert unlike.unlikeness(np.zeros((3, 5))).shape == (3,)
+    compare(save_weights(tmp_path / "wider", unlike.arrays(), {"network": network.kind}), tmp_path)
 
 
 def test_what_is_no_network_of_this_package_is_refused(tmp_path: Path) -> None:

@@ -1,0 +1,97 @@
+"""Covariance of a trained network's corrections, from sequences that it was not trained on.
+
+The variance of the error of an angle is
+
+    σ² = κ s (1 − ρ + ρ u)
+
+with the unlikeness u of the network's inputs (:mod:`.networks.unlikeness`). For each ρ the likelihood of the errors has
+its maximum at s = mean(e² / (1 − ρ + ρ u)). Most of an error is constant in a ride, so rides, not samples, are what is
+independent: all rides weigh the same, and ρ is the one with the highest likelihood of each ride under the s of the
+others. κ widens the interval of 90 % of a normal distribution to that of Student's with as many degrees of freedom as
+there are rides: a variance of few rides is known badly.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from scipy.stats import norm, t
+
+SHARES = np.linspace(0.0, 0.9, 19)
+"""ρ that are tried"""
+INSIDE = 0.95
+"""quantile at the upper end of an interval of 90 %"""
+
+
+class Calibration(NamedTuple):
+    """What the errors of held-out sequences say, for each of K angles.
+
+    Attributes:
+        deviations: ``(K,)`` rad; the variance is ``deviations² (1 + growth · u)``.
+        growth: ``(K,)``.
+        rides: how many there are.
+        nees: mean of an angle's squared error over its variance, each ride under the calibration of the others; NaN of
+            one ride.
+        coverage: share of the errors inside the stated 90 %, likewise.
+    """
+
+    deviations: tuple[float, ...]
+    growth: tuple[float, ...]
+    rides: int
+    nees: float
+    coverage: float
+
+
+def calibrate(errors: np.ndarray, unlikeness: np.ndarray, mask: np.ndarray, names: Sequence[str]) -> Calibration:
+    """Find the covariance.
+
+    Args:
+        errors: ``(E, N, K)`` rad, of sequences.
+        unlikeness: ``(E, N)`` of the network's inputs.
+        mask: ``(E, N)`` which samples count.
+        names: ``(E,)`` of the rides; sequences of one name count as one.
+
+    Raises:
+        ValueError: the mask is empty.
+    """
+    if not mask.any():
+        raise ValueError("the covariance needs sequences that are scored, got none")
+    rides, ride = np.unique(np.asarray(names)[mask.any(axis=1)], return_inverse=True)
+    counts = mask[mask.any(axis=1)].sum(axis=1)
+    of_sample = np.repeat(ride, counts)
+    squares, u, count = errors[mask].astype(float) ** 2, unlikeness[mask].astype(float), len(rides)
+    number = np.bincount(of_sample)
+
+    def means(values: np.ndarray) -> np.ndarray:
+        """Of each ride."""
+        return np.bincount(of_sample, values, minlength=count) / number
+
+    widened = (t.ppf(INSIDE, count) / norm.ppf(INSIDE)) ** 2
+    deviations, growth, normalised = [], [], np.empty_like(squares)
+    for k in range(squares.shape[1]):
+        best, share = np.inf, 0.0
+        for rho in SHARES if count > 1 else SHARES[:1]:
+            profile = 1.0 - rho + rho * u
+            each, logs = means(squares[:, k] / profile), means(np.log(profile))
+            others = np.maximum(left_out(each), np.finfo(float).tiny)
+            cost = float(np.mean(np.log(others) + logs + each / others))
+            if cost < best:
+                best, share = cost, float(rho)
+        profile = 1.0 - share + share * u
+        each = np.maximum(means(squares[:, k] / profile), np.finfo(float).tiny)
+        deviations.append(float(np.sqrt(widened * each.mean() * (1.0 - share))))
+        growth.append(share / (1.0 - share))
+        normalised[:, k] = squares[:, k] / (widened * left_out(each)[of_sample] * profile)
+    inside = normalised < norm.ppf(INSIDE) ** 2
+    nees, coverage = (float(np.mean([means(column).mean() for column in part.T])) for part in (normalised, inside))
+    nothing = float("nan")
+    both = (nees, coverage) if count > 1 else (nothing, nothing)
+    return Calibration(tuple(deviations), tuple(growth), count, *both)
+
+
+def left_out(values: np.ndarray) -> np.ndarray:
+    """Mean of all others, for each of the values ``(R,)``; the value itself where there is no other."""
+    count = len(values)
+    return (values.sum() - values) / (count - 1) if count > 1 else values

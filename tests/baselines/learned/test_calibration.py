@@ -1,0 +1,120 @@
+"""The covariance of corrections: found again where it is known, and the same in every form of a network."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from poise.baselines.learned.calibration import calibrate
+from poise.baselines.learned.config import FitConfig
+from poise.baselines.learned.data import SequenceData
+from poise.baselines.learned.estimator import LearnedEstimator
+from poise.baselines.learned.fit import fit
+from poise.baselines.learned.head import AngleHead
+from poise.baselines.learned.inputs.front_end import RawChannels
+from poise.baselines.learned.networks.modules import GruModule
+from poise.baselines.learned.networks.unlikeness import LARGEST, WithUnlikeness
+from poise.filters.core.estimator import run, run_by_steps
+from poise.filters.core.quantity import Channel, Quantity
+
+CHANNELS = (Channel("a/gyr", 3, "rad/s"), Channel("a/acc", 3, "m/s²"))
+END = RawChannels(CHANNELS)
+HEAD = AngleHead((Quantity("a", "angle", 2, "rad"),), (0.02, 0.05))
+
+
+def known(rides: int, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[str]]:
+    """Errors of two draws on each ride whose variances are 0.01² (1 + 3 u) and 0.02²; u differs from ride to ride."""
+    u = np.repeat(rng.uniform(0.2, 6.0, rides), 2)[:, None] * np.ones((1, 50))
+    deviations = np.stack([0.01 * np.sqrt(1.0 + 3.0 * u), np.full_like(u, 0.02)], axis=-1)
+    names = [f"ride-{index}" for index in range(rides) for _ in range(2)]
+    return deviations * rng.standard_normal((*u.shape, 2)), u, np.ones(u.shape, bool), names
+
+
+def test_the_covariance_is_found_again() -> None:
+    found = calibrate(*known(300, np.random.default_rng(0)))
+    assert found.rides == 300
+    u = np.array([0.5, 2.0, 5.0])
+    for k, expected in enumerate((0.01 * np.sqrt(1.0 + 3.0 * u), np.full(3, 0.02))):
+        np.testing.assert_allclose(found.deviations[k] * np.sqrt(1.0 + found.growth[k] * u), expected, rtol=0.04)
+    assert found.nees == pytest.approx(1.0, abs=0.03)
+    assert found.coverage == pytest.approx(0.9, abs=0.01)
+
+
+def test_few_rides_widen_it() -> None:
+    """Errors that are constant in a ride: 90 % of other rides lie inside, although only four are known."""
+    rng, inside = np.random.default_rng(1), []
+    for _ in range(200):
+        errors = 0.01 * rng.standard_normal((4, 1, 1)) * np.ones((1, 20, 1))
+        found = calibrate(errors, np.ones((4, 20)), np.ones((4, 20), bool), list("abcd"))
+        deviation = found.deviations[0] * math.sqrt(1.0 + found.growth[0])
+        inside.append(np.mean(np.abs(0.01 * rng.standard_normal(500)) < 1.645 * deviation))
+    assert np.mean(inside) == pytest.approx(0.9, abs=0.02)
+    with pytest.raises(ValueError, match="got none"):
+        calibrate(errors, np.ones((4, 20)), np.zeros((4, 20), bool), list("abcd"))
+
+
+def test_unlikeness_is_one_in_training_and_bounded() -> None:
+    rng = np.random.default_rng(2)
+    network = GruModule(4, 2, 5, seed=1).export()
+    mean, deviation = np.array([1.0, 0.0, -2.0, 5.0]), np.array([0.1, 2.0, 1.0, np.inf])
+    made = WithUnlikeness.of(network, mean, deviation)
+    features = mean + np.where(np.isfinite(deviation), deviation, 9.0) * rng.standard_normal((4000, 4))
+    assert made.unlikeness(features).mean() == pytest.approx(1.0, abs=0.05)
+    assert made.unlikeness(features + 1e6).max() == LARGEST
+    with pytest.raises(ValueError, match="mean must have shape"):
+        WithUnlikeness(network, mean[:2], deviation)
+
+
+@pytest.fixture(scope="module")
+def trained() -> LearnedEstimator:
+    rng = np.random.default_rng(3)
+    features = rng.standard_normal((12, 30, END.size)).astype(np.float32)
+    target = (0.05 * features[..., :2] + 0.02 * rng.standard_normal((12, 1, 2))).astype(np.float32)
+    parts = (features, target, np.ones((12, 30, 0), np.float32), np.ones((12, 30), bool))
+    data = SequenceData(*parts, tuple(f"ride-{index // 2}" for index in range(12)))
+    result = fit(GruModule(END.size, 2, 6, seed=1), END, HEAD, data, data, FitConfig(epochs=2, batch=4, window=30))
+    assert result.calibration is not None
+    assert result.calibration.rides == 6
+    made = result.estimator
+    head = made.head
+    assert isinstance(head, AngleHead)
+    # growth that no covariance of this toy asks for, so that the forms are compared with it
+    return LearnedEstimator(
+        made.network, END, AngleHead(HEAD.outputs, HEAD.scale, None, 0.035, head.deviations, (2.0, 0.5))
+    )
+
+
+def test_every_form_states_the_same_covariance(trained: LearnedEstimator, tmp_path: Path) -> None:
+    rng = np.random.default_rng(4)
+    larger = np.where(np.arange(60) < 30, 0.5, 4.0)[:, None, None]
+    measurements = {c.name: rng.standard_normal((60, 2, 3)) * larger for c in CHANNELS}
+    found = run(trained, measurements)
+    stepped = run_by_steps(trained, measurements)
+    again = run(LearnedEstimator.load(trained.save(tmp_path / "mine", {"name": "mine"})), measurements)
+    for other in (stepped, again):
+        np.testing.assert_allclose(other.pose["a"], found.pose["a"], atol=1e-6)
+        np.testing.assert_allclose(other.covariance, found.covariance, rtol=1e-5)
+    variances = np.diagonal(np.asarray(found.covariance), axis1=-2, axis2=-1)
+    assert (np.asarray(found.covariance)[..., 0, 1] == 0.0).all()
+    head = trained.head
+    assert isinstance(head, AngleHead)
+    np.testing.assert_allclose(variances[0], np.square(head.deviations)[None].repeat(2, 0))  # nothing seen yet
+    assert variances[40:].mean() > 2.0 * variances[10:30].mean()
+    features = torch.tensor(rng.standard_normal((3, END.size)))
+    _, output = trained.network.step(features, torch.zeros(3, 6, dtype=torch.float64))
+    seen = END.run(measurements)._replace(spread=features[:, :0], base={})
+    told = head.estimate(seen, output).covariance
+    assert isinstance(told, torch.Tensor)
+    _, expected = trained.network.step(features.numpy(), np.zeros((3, 6)))
+    np.testing.assert_allclose(told.numpy(), head.estimate(seen, expected).covariance, rtol=1e-9)
+
+
+def test_growth_needs_deviations() -> None:
+    with pytest.raises(ValueError, match="growth must be of deviations"):
+        AngleHead(HEAD.outputs, HEAD.scale, growth=(1.0, 1.0))
+    with pytest.raises(ValueError, match="growth must be 2 numbers or none"):
+        AngleHead(HEAD.outputs, HEAD.scale, deviations=(1.0, 1.0), growth=(1.0,))
