@@ -66,14 +66,7 @@ class InnovationFeatures(Features):
         """
         stream_channels(kalman)
         width = max(3, kalman.model.residual_size)
-        moments = len(STREAMS) * (width + 3) + 2
-        return FeatureMemory(
-            np.zeros((*batch, len(self.scales), moments)),
-            np.zeros((*batch, moments)),
-            np.full((*batch, len(STREAMS), width), np.nan),
-            np.array(0),
-            np.zeros(batch, int),
-        )
+        return self.empty(batch, len(STREAMS) * (width + 3) + 2, (len(STREAMS), width))
 
     def observe(self, memory: FeatureMemory, kalman: KalmanFilter, action: np.ndarray) -> np.ndarray:
         """Features and the action of the last interval: float32 ``(*batch, size)`` in [−1, 1].

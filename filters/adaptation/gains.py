@@ -10,11 +10,12 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from ..core.kalman import KalmanFilter
-from ..core.model import Model, parameters_of
+from ..core.model import Equations, Model, parameters_of
 from ..registry import make, name_of
 
 DECADES = 1.5
@@ -121,10 +122,14 @@ def log_gains(model: Model, ranges: Sequence[GainRange], action: np.ndarray) -> 
     return model.limited({part.gain: factors[..., index] for index, part in enumerate(ranges)})
 
 
-def gain_sizes(model: Model, gains: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """The scaled constants: gain name → value in the unit of the parameter, as used by the filter."""
-    base = parameters_of(model)
-    sizes = {}
+def gain_sizes(
+    model: Equations, gains: Mapping[str, np.ndarray], base: Mapping[str, Any] | None = None
+) -> dict[str, np.ndarray]:
+    """The scaled constants: gain name → value in the unit of the parameter, as used by the filter.
+
+    ``base`` holds other parameters than those of the model, one array each.
+    """
+    base, sizes = parameters_of(model) if base is None else base, {}
     for name, factor in gains.items():
         gain = model.gains[name]
         sizes[name] = np.minimum(base[gain.parameter] * np.exp(gain.power * factor), gain.maximum)

@@ -78,14 +78,7 @@ class NamedFeatures(Features):
         """
         if type(self).of(kalman, self.interval).numbers != self.numbers:
             raise ValueError(f"features are of the numbers {self.numbers}, the filter has other ones")
-        moments = 3 * len(self.numbers)
-        return FeatureMemory(
-            np.zeros((*batch, len(self.scales), moments)),
-            np.zeros((*batch, moments)),
-            np.zeros((*batch, 0, 0)),
-            np.array(0),
-            np.zeros(batch, int),
-        )
+        return self.empty(batch, 3 * len(self.numbers))
 
     def moments(
         self, memory: FeatureMemory, kalman: KalmanFilter, measurements: Mapping[str, np.ndarray], estimate: Estimate

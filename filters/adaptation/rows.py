@@ -16,7 +16,7 @@ from ..core.kalman import KalmanFilter
 from ..core.model import Equations, Model, parameters_of, structure_of
 from ..core.quantity import Estimate
 from ..core.sampling import split
-from .gains import log_gains
+from .gains import gain_sizes, log_gains
 from .tuned import TunedFilter, TunedState
 
 Rows = np.ndarray
@@ -146,13 +146,9 @@ class TunedRows:
 
     def sizes(self, group: RowGroup, rows: Rows, actions: np.ndarray) -> dict[str, np.ndarray]:
         """The scaled constants ``(b,)`` by gain, in the unit of the parameter."""
-        model, names = group.tuned.kalman.model, list(parameters_of(group.tuned.kalman.model))
-        sizes = {}
-        for name, factor in self.gains(group, rows, actions).items():
-            gain = model.gains[name]
-            base = group.base[rows, names.index(gain.parameter)]
-            sizes[name] = np.minimum(base * np.exp(gain.power * factor), gain.maximum)
-        return sizes
+        model = group.tuned.kalman.model
+        base = dict(zip(parameters_of(model), group.base[rows].T, strict=True))
+        return gain_sizes(model, self.gains(group, rows, actions), base)
 
     def _parameters(self, group: RowGroup, rows: Rows, actions: np.ndarray) -> np.ndarray:
         """Parameters of an interval ``(1, b, count)``."""

@@ -38,8 +38,7 @@ class Rule(Features):
 
     def init(self, kalman: KalmanFilter, batch: tuple[int, ...] = ()) -> FeatureMemory:
         """Empty memory."""
-        averages, sums, last = np.zeros((*batch, 1, 2)), np.zeros((*batch, 2)), np.zeros((*batch, 0, 0))
-        return FeatureMemory(averages, sums, last, np.array(0), np.zeros(batch, int))
+        return self.empty(batch, 2)
 
     def observe(self, memory: FeatureMemory, kalman: KalmanFilter, action: np.ndarray) -> np.ndarray:
         """The feature and the action of the last interval: float32 ``(*batch, 1 + k)``."""
@@ -137,8 +136,7 @@ class GuardedInnovationRule(InnovationRule):
 
     def init(self, kalman: KalmanFilter, batch: tuple[int, ...] = ()) -> FeatureMemory:
         """Empty memory of both."""
-        averages, sums = np.zeros((*batch, 1, 4)), np.zeros((*batch, 4))
-        return FeatureMemory(averages, sums, np.zeros((*batch, 0, 0)), np.array(0), np.zeros(batch, int))
+        return self.empty(batch, 4)
 
     def moments(
         self, memory: FeatureMemory, kalman: KalmanFilter, measurements: Mapping[str, np.ndarray], estimate: Estimate

@@ -75,6 +75,11 @@ class Features:
         """
         raise NotImplementedError
 
+    def empty(self, batch: tuple[int, ...], moments: int, previous: tuple[int, int] = (0, 0)) -> FeatureMemory:
+        """Memory before the first sample, of so many moments and of previous values of that shape."""
+        averages, sums = np.zeros((*batch, len(self.scales), moments)), np.zeros((*batch, moments))
+        return FeatureMemory(averages, sums, np.full((*batch, *previous), np.nan), np.array(0), np.zeros(batch, int))
+
     def observe(self, memory: FeatureMemory, kalman: KalmanFilter, action: np.ndarray) -> np.ndarray:
         """Features and the action of the last interval: float32 ``(*batch, size)`` in [−1, 1].
 

@@ -93,22 +93,12 @@ def where_known(
 
 def total_error(estimate: Array, truth: Array) -> Array:
     """Angle ``(...)`` in [0, pi] between two orientations ``(..., 4)``: ``2 acos |w|`` of ``estimate ⊗ truth⁻¹``."""
-
-    def angle(p: Array, q: Array) -> Array:
-        r = rotation.multiply(p, rotation.conjugate(q))
-        return 2.0 * namespace(r).atan2(length(r[..., 1:]), length(r[..., :1]))
-
-    return where_known(angle, estimate, truth, directed=True)
+    return rotation_error(lambda r: (r[..., 1:], r[..., :1]), estimate, truth)
 
 
 def heading_error(estimate: Array, truth: Array) -> Array:
     """Part ``(...)`` in [0, pi] of the total error about the vertical: ``2 atan |z / w|`` of ``estimate ⊗ truth⁻¹``."""
-
-    def angle(p: Array, q: Array) -> Array:
-        r = rotation.multiply(p, rotation.conjugate(q))
-        return 2.0 * namespace(r).atan2(length(r[..., 3:]), length(r[..., :1]))
-
-    return where_known(angle, estimate, truth, directed=True)
+    return rotation_error(lambda r: (r[..., 3:], r[..., :1]), estimate, truth)
 
 
 def inclination_error(estimate: Array, truth: Array) -> Array:
@@ -116,12 +106,16 @@ def inclination_error(estimate: Array, truth: Array) -> Array:
 
     It is the angle between the two inclination vectors in sensor axes, independent of the headings.
     """
+    upright = lambda r: namespace(r).stack([r[..., 0], r[..., 3]], axis=-1)  # noqa: E731
+    return rotation_error(lambda r: (r[..., 1:3], upright(r)), estimate, truth)
+
+
+def rotation_error(parts: Callable[[Array], tuple[Array, Array]], estimate: Array, truth: Array) -> Array:
+    """Twice the angle between two parts of ``estimate ⊗ truth⁻¹``: the sides of a right triangle."""
 
     def angle(p: Array, q: Array) -> Array:
-        r = rotation.multiply(p, rotation.conjugate(q))
-        xp = namespace(r)
-        upright = xp.stack([r[..., 0], r[..., 3]], axis=-1)
-        return 2.0 * xp.atan2(length(r[..., 1:3]), length(upright))
+        opposite, adjacent = parts(rotation.multiply(p, rotation.conjugate(q)))
+        return 2.0 * namespace(opposite).atan2(length(opposite), length(adjacent))
 
     return where_known(angle, estimate, truth, directed=True)
 
