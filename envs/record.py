@@ -6,7 +6,7 @@ import dataclasses
 import itertools
 import re
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -74,6 +74,12 @@ def record(
         return join(rows, infos, describe(env, seed) | {"ended": ended})
 
 
+def record_once(env: Any, seed: int | None = None) -> Trajectory:
+    """One episode (:func:`record`) of an environment that is closed afterwards."""
+    with closing(env):
+        return record(env, seed=seed)
+
+
 def plays_alone(env: Any) -> bool:
     """Whether nobody looks at the single steps of an episode, so that it can be played a block at a time."""
     from gymnasium.wrappers import OrderEnforcing, PassiveEnvChecker
@@ -118,11 +124,8 @@ def opened(env: Any) -> Iterator[Any]:
     if not isinstance(env, str):
         yield env
         return
-    made = make_environment(env)
-    try:
+    with closing(make_environment(env)) as made:
         yield made
-    finally:
-        made.close()
 
 
 def default_policy(env: Any, seed: int) -> Policy:
@@ -201,11 +204,7 @@ def episode_path(folder: Path, env_id: str, index: int) -> Path:
 
 def record_episode(env_id: str, options: Mapping[str, Any], seed: int, path: Path) -> Path:
     """Play one episode and write it; the file appears whole or not at all."""
-    env = make_environment(env_id, **options)
-    try:
-        trajectory = record(env, seed=seed)
-    finally:
-        env.close()
+    trajectory = record_once(make_environment(env_id, **options), seed)
     return trajectory.replace(metadata={**trajectory.metadata, "name": path.stem}).save(path)
 
 

@@ -50,34 +50,20 @@ def hand_episode(gesture: str, number: int, seed: int, **options: Any) -> list[T
     """
     import gymnasium
 
-    from ...envs.record import record
+    from ...envs.record import record_once
 
-    env = gymnasium.make("poise/HandMotion-v0", gesture=gesture, **options)
-    try:
-        trajectory = record(env, seed=seed)
-    finally:
-        env.close()
+    trajectory = record_once(gymnasium.make("poise/HandMotion-v0", gesture=gesture, **options), seed)
     return [trajectory.replace(metadata={**trajectory.metadata, "name": f"{gesture}-{number}", "group": gesture})]
 
 
-def ride_imus(scenario: str, subject: int, seed: int, duration: float = 40.0) -> list[Trajectory]:
-    """One ride of a bicycle; the IMUs of bicycle and trunk become separate trajectories.
-
-    Args:
-        scenario: of ``poise/RiderBicycle-v0``.
-        subject: who rides.
-        seed: of the ride.
-        duration: s.
-    """
+def ride_imus(scenario: str, subject: int, seed: int) -> list[Trajectory]:
+    """40 s of a scenario of ``poise/RiderBicycle-v0``; the IMUs of bicycle and trunk become separate trajectories."""
     from ...envs.bicycle.environment import RiderBicycleEnv
     from ...envs.bicycle.sensors.single_imu import SITES, imu_of
-    from ...envs.record import record
+    from ...envs.record import record_once
 
-    env = RiderBicycleEnv(scenario, subject=subject, suite="whole-body", fidelity="lumped", duration=duration)
-    try:
-        ride = record(env, seed=seed)
-    finally:
-        env.close()
+    env = RiderBicycleEnv(scenario, subject=subject, suite="whole-body", fidelity="lumped", duration=40.0)
+    ride = record_once(env, seed)
     ride = ride.replace(metadata={**ride.metadata, "name": scenario})
     return [imu_of(ride, site) for site in SITES if f"{site}/acc" in ride.measurements]
 

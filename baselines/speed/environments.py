@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
+from contextlib import closing
 from functools import partial
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -129,12 +130,9 @@ def reset_rate(identity: str, options: dict[str, Any]) -> float:
     """Median resets per CPU second, each to a new motion."""
     import gymnasium
 
-    env = gymnasium.make(identity, disable_env_checker=True, **options)
-    env.reset(seed=0)
-    try:
+    with closing(gymnasium.make(identity, disable_env_checker=True, **options)) as env:
+        env.reset(seed=0)
         return measure(env.reset, 1)
-    finally:
-        env.close()
 
 
 def bare_steps(count: int) -> Callable[[], None]:

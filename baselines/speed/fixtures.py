@@ -84,13 +84,10 @@ def array_of(estimator: Any) -> AccelerometerArray:
 def ride() -> Data:
     """All channels of a rider on a bicycle, without errors."""
     from ...envs.bicycle.environment import RiderBicycleEnv
-    from ...envs.record import record
+    from ...envs.record import record_once
 
     env = RiderBicycleEnv("slalom", suite="all", sensors="ideal", rate=100.0, duration=RIDE)
-    try:
-        return record(env, seed=3).measurements
-    finally:
-        env.close()
+    return record_once(env, 3).measurements
 
 
 def piece_of_ride(estimator: Estimator[Any], seed: int, length: int, dt: float) -> Data:

@@ -11,7 +11,7 @@ import numpy as np
 
 from ...filters.core import rotation
 from ..data.trajectory import Trajectory
-from ..record import record
+from ..record import record_once
 from ..sensors.presets import SensorPreset, sensor_preset
 from ..sensors.suite import imu_suite
 from .environment import HandMotionEnv
@@ -99,10 +99,7 @@ class HandTrajectories:
             trajectory = simulate_hand(gesture, seed, suite, duration=self.duration, **site)
         else:
             env = HandMotionEnv(gesture, "dynamic", suite, duration=self.duration, **site)
-            try:
-                trajectory = record(env, seed=seed)
-            finally:
-                env.close()
+            trajectory = record_once(env, seed)
         drawn = {
             "gesture": gesture_name(gesture),
             "device": device.name,

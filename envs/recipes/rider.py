@@ -139,15 +139,12 @@ class RiderRecipe(Recipe):
             name: for the metadata.
         """
         from ..bicycle.environment import RiderBicycleEnv
-        from ..record import record
+        from ..record import record_once
 
         setting, motion, _ = unspawned(seed).spawn(3)
         options = self.options(setting)
         env = RiderBicycleEnv(**options, suite=self.channels, sensors="ideal", rate=self.rate, duration=self.duration)
-        try:
-            trajectory = record(env, seed=int(motion.generate_state(1)[0]))
-        finally:
-            env.close()
+        trajectory = record_once(env, int(motion.generate_state(1)[0]))
         return trajectory.replace(metadata=trajectory.metadata | options | {"name": name})
 
     def draw(self, seed: int | np.random.SeedSequence, name: str = "randomised") -> Trajectory:

@@ -58,7 +58,7 @@ def ride_statistics(scenario: str, subject: int, seed: int, duration: float, fid
         fidelity: ``full`` or ``lumped``.
     """
     from ....envs.bicycle.environment import RiderBicycleEnv
-    from ....envs.record import record
+    from ....envs.record import record_once
 
     env = RiderBicycleEnv(
         scenario,
@@ -70,10 +70,7 @@ def ride_statistics(scenario: str, subject: int, seed: int, duration: float, fid
         fidelity=fidelity,  # type: ignore[arg-type]
         soft_tissue=1.0,
     )
-    try:
-        ride = record(env, seed=seed)
-    finally:
-        env.close()
+    ride = record_once(env, seed)
     found = {
         f"{site}/{name}": value
         for site in ("trunk_imu", "bicycle_imu")

@@ -24,7 +24,7 @@ from ....envs.bicycle.rider.style import STYLES, RiderMotion
 from ....envs.bicycle.sensors.sites import BICYCLE_IMU_SITE, BICYCLE_IMU_TILT, pitched
 from ....envs.data.trajectory import Trajectory
 from ....envs.physics.world import Physics
-from ....envs.record import record
+from ....envs.record import record_once
 from ....envs.sensors.ideal import STANDARD_GRAVITY
 from ....filters.core import rotation
 from .saddle import ACROSS, ALONG, APART, PULL, saddle_statistics
@@ -162,11 +162,7 @@ def momentum_residual(fidelity: Any, path: Path, speed: float, steps: int) -> tu
 
 def ridden(seed: int, **options: Any) -> Trajectory:
     """One recorded episode with ideal sensors."""
-    env = RiderBicycleEnv(**{"sensors": "ideal", **options})
-    try:
-        return record(env, seed=seed)
-    finally:
-        env.close()
+    return record_once(RiderBicycleEnv(**{"sensors": "ideal", **options}), seed)
 
 
 def strapdown_errors(ride: Trajectory) -> tuple[float, float]:

@@ -7,7 +7,7 @@ from typing import Any
 
 from ....envs.bicycle.environment import RiderBicycleEnv
 from ....envs.bicycle.sensors.single_imu import imu_of
-from ....envs.record import record
+from ....envs.record import record_once
 from ....filters.core.metrics import DEGREES, direction_error, rms
 from ...evaluation import evaluate
 
@@ -47,10 +47,7 @@ def inclination_rows(
         if scenario not in ridden:
             suite = ["bicycle_imu/gyr", "bicycle_imu/acc", "trunk_imu/gyr", "trunk_imu/acc"]
             env = RiderBicycleEnv(scenario, subject, suite=suite, duration=duration, fidelity="lumped")
-            try:
-                ridden[scenario] = record(env, seed=seed)
-            finally:
-                env.close()
+            ridden[scenario] = record_once(env, seed)
         recording = imu_of(ridden[scenario], site)
         table = evaluate(list(estimators), recording)
         errors = table[(table["metric"] == "inclination")].set_index("estimator")["value"]

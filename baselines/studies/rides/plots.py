@@ -33,14 +33,10 @@ def example_ride(scenario: str, subject: int, seed: int, duration: float, fideli
         fidelity: ``full`` or ``lumped``.
     """
     from ....envs.bicycle.environment import RiderBicycleEnv
-    from ....envs.record import record
+    from ....envs.record import record_once
 
     options = {"suite": "all", "duration": duration, "fidelity": fidelity}
-    env = RiderBicycleEnv(scenario, subject, **options)  # type: ignore[arg-type]
-    try:
-        return record(env, seed=seed)
-    finally:
-        env.close()
+    return record_once(RiderBicycleEnv(scenario, subject, **options), seed)  # type: ignore[arg-type]
 
 
 def ride_signals(trajectory: Trajectory, title: str = "") -> Figure:

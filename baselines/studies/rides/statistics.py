@@ -111,7 +111,7 @@ def ride(scenario: str, subject: int, duration: float, fidelity: str, seed: int)
     from ....envs.bicycle.environment import RiderBicycleEnv
     from ....envs.bicycle.rider.anthropometry import rider_body
     from ....envs.bicycle.rider.posture import loop_closure_error, sit
-    from ....envs.record import record
+    from ....envs.record import record_once
 
     env = RiderBicycleEnv(
         scenario,
@@ -121,10 +121,7 @@ def ride(scenario: str, subject: int, duration: float, fidelity: str, seed: int)
         duration=duration,
         fidelity=fidelity,  # type: ignore[arg-type]
     )
-    try:
-        trajectory = record(env, seed=seed)
-    finally:
-        env.close()
+    trajectory = record_once(env, seed)
     gaps = (
         loop_closure_error(trajectory.truth, sit(env.parameters, rider_body(subject))) if fidelity == "full" else None
     )

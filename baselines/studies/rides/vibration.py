@@ -12,7 +12,7 @@ from ....envs.bicycle.course.scenarios import SpeedProfile, scenario
 from ....envs.bicycle.course.surfaces import SURFACES, Surface
 from ....envs.bicycle.environment import RiderBicycleEnv
 from ....envs.bicycle.rider.rider import Fidelity
-from ....envs.record import record
+from ....envs.record import record_once
 from .checks import Check
 
 RATE = 250.0
@@ -43,10 +43,7 @@ def vibration(
     """
     steady = replace(scenario("slow"), name="steady", speed=lambda generator, duration: SpeedProfile(np.array([speed])))
     env = RiderBicycleEnv(steady, 0, "still", ["bicycle_imu/acc"], "ideal", RATE, duration, fidelity, surface=surface)
-    try:
-        ride = record(env, seed=seed)
-    finally:
-        env.close()
+    ride = record_once(env, seed)
     if ride.time[-1] < duration - 1.5 / RATE:
         raise RuntimeError(f"the rider fell on {surface!r} after {ride.time[-1]:.1f} s")
     up = ride.measurements["bicycle_imu/acc"][1:, 2]
