@@ -6,6 +6,7 @@ import os
 import warnings
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
@@ -34,6 +35,7 @@ from .scoring import (
     with_up,
     without_truth,
 )
+from .sensor_bound import inclination_bound
 
 if TYPE_CHECKING:
     from .error_table import ErrorTable
@@ -75,7 +77,8 @@ def evaluate(
             clock and the gyroscope's, which loaders measure (``metadata["reference_clock_offset"]``).
         offline: also run the smoother of every estimator that has one, as ``<label> (offline)``.
         check: warn of implausible recordings (:func:`poise.check_recording`).
-        detailed: also measure the largest error, settling, drift and NEES (:func:`.measures`).
+        detailed: also measure the largest error, settling, drift, NEES, the bounds of NIS, and the ratio of the
+            inclination error to what the errors of simulated sensors alone leave (:func:`.measures`).
         progress: show a progress bar.
 
     Returns:
@@ -199,6 +202,11 @@ class Evaluation:
             kind = "" if isinstance(reason, ValueError | ImportError) else f"{type(reason).__name__}: "
             self.skipped[label] = f"{kind}{reason}"
 
+    @cached_property
+    def bound(self) -> float | None:
+        """Bound of the inclination error, deg, where the errors of the sensors are known."""
+        return inclination_bound(self.trajectory)
+
     def rows(self) -> dict[str, list[Row]]:
         """Label → rows of the table."""
         others: list[StandIn] = []
@@ -213,7 +221,8 @@ class Evaluation:
             # Agreement of an estimator with itself carries no information.
             found[label] = errors(estimator, estimate, self.trajectory, [one for one in others if one[0] != label])
             if self.detailed:
-                found[label] += measures(estimator, estimate, self.trajectory)
+                bound = None if isinstance(estimator, Offline) else self.bound
+                found[label] += measures(estimator, estimate, self.trajectory, bound)
             nis = next((value for _, metric, value, _ in found[label] if metric == "nis"), 0.0)
             if nis > LARGEST_NIS.get(family(label), float("inf")):
                 warnings.warn(

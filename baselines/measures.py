@@ -1,4 +1,4 @@
-"""What one run tells beyond its RMS error: largest error, settling, drift, consistency of the covariance."""
+"""What one run tells beyond its RMS error: largest error, settling, drift, ratio to a bound, consistency."""
 
 from __future__ import annotations
 
@@ -13,28 +13,36 @@ from ..filters.core.consistency import nees
 from ..filters.core.estimator import Estimator
 from ..filters.core.metrics import metrics_of
 from ..filters.core.quantity import RELATIVE_ORIENTATION, UP, Estimate, Quantity
-from .scoring import Row, with_derived_truth, with_up
+from .scoring import Row, innovation_consistency, with_derived_truth, with_up
 
 WINDOW = 1.0
 """s: the RMS error of this long decides whether an estimate has settled."""
 SETTLED = 3.0
 """An estimate has settled when its error stays below this multiple of its RMS over the last half."""
-MEASURES = ("p95", "largest", "settling", "drift", "nees")
-"""Endings of the metric of a row: ``inclination largest``; ``nees`` stands alone."""
+OF_ERROR = ("p95", "largest", "settling", "drift", "over bound")
+"""Endings of the metric of a row: ``inclination largest``."""
+MEASURES = (*OF_ERROR, "nees", "nees degrees", "nis lower", "nis upper")
+"""All; those of consistency stand alone."""
 
 
-def measures(estimator: Estimator[Any], estimate: Estimate, trajectory: Trajectory) -> list[Row]:
+def measures(
+    estimator: Estimator[Any], estimate: Estimate, trajectory: Trajectory, bound: float | None = None
+) -> list[Row]:
     """Rows of the measures of every quantity whose truth is known.
 
     ``p95`` and ``largest`` are of the absolute error over the mask, ``drift`` the slope of its least-squares line (a
     minute), ``settling`` the time in s from the first sample until the RMS of 1 s stays below three times the RMS of
     the last half. ``nees`` is the normalised estimation error squared a degree of freedom, mean over the mask: 1 if
-    the covariance is consistent.
+    the covariance is consistent; it has ``nees degrees`` of freedom at each sample. A consistent filter has its ``nis``
+    between ``nis lower`` and ``nis upper`` with 95 % probability. ``over bound`` is the RMS error of the inclination in
+    multiples of the bound.
 
     Args:
         estimator: what ran.
         estimate: its output on the trajectory.
         trajectory: on its grid, with truth.
+        bound: of the inclination error, deg (:func:`.inclination_bound`); None where there is none, and for
+            smoothers.
 
     Returns:
         (quantity, metric, value, unit) each; a value is NaN where nothing could be scored.
@@ -52,9 +60,16 @@ def measures(estimator: Estimator[Any], estimate: Estimate, trajectory: Trajecto
             found = of_error(error, trajectory.time, trajectory.mask)
             units = {"p95": metric.unit, "largest": metric.unit, "settling": "s", "drift": f"{metric.unit}/min"}
             rows += [(name, f"{metric.name} {each}", value, units[each]) for each, value in found.items()]
+            if bound is not None and name == UP.name:
+                inside = error[trajectory.mask & np.isfinite(error)]
+                ratio = float(np.sqrt(np.mean(inside**2))) / bound if len(inside) else float("nan")
+                rows.append((name, f"{metric.name} over bound", ratio, "1"))
         value = consistency_of(quantity, estimate, truth, trajectory.mask)
         if value is not None:
-            rows.append((name, "nees", value, "1"))
+            rows += [(name, "nees", value[0], "1"), (name, "nees degrees", float(value[1]), "1")]
+    innovations = innovation_consistency(estimate, trajectory.mask)
+    if innovations is not None:
+        rows += [("innovation", f"nis {each}", getattr(innovations, each), "1") for each in ("lower", "upper")]
     return rows
 
 
@@ -89,8 +104,10 @@ def settling(error: np.ndarray, time: np.ndarray) -> float:
     return float(time[late[-1] + 1]) if late[-1] + 1 < len(running) // 2 else float("nan")
 
 
-def consistency_of(quantity: Quantity, estimate: Estimate, truth: np.ndarray, mask: np.ndarray) -> float | None:
-    """Mean NEES a degree of freedom of one quantity; None without a covariance of it."""
+def consistency_of(
+    quantity: Quantity, estimate: Estimate, truth: np.ndarray, mask: np.ndarray
+) -> tuple[float, int] | None:
+    """Mean NEES a degree of freedom of one quantity, and the degrees of freedom; None without a covariance of it."""
     parts: Mapping[str, tuple[int, int]] = estimate.layout.error_parts if estimate.layout else {}
     if estimate.covariance is None or quantity.name not in parts:
         return None
@@ -104,7 +121,8 @@ def consistency_of(quantity: Quantity, estimate: Estimate, truth: np.ndarray, ma
     )
     if not scored.any():
         return None
-    return float(np.mean(nees(error[scored], covariance[scored]))) / error.shape[-1]
+    degrees = error.shape[-1]
+    return float(np.mean(nees(error[scored], covariance[scored]))) / degrees, degrees
 
 
 def error_vector(quantity: Quantity, estimate: np.ndarray, truth: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..envs.data.trajectory import Trajectory
 from ..filters.core import rotation
-from ..filters.core.consistency import consistency
+from ..filters.core.consistency import Consistency, consistency
 from ..filters.core.estimator import Estimator
 from ..filters.core.metrics import score
 from ..filters.core.model import equations_of
@@ -118,10 +118,17 @@ def errors(estimator: Estimator[Any], estimate: Estimate, trajectory: Trajectory
                 rows += [
                     row for row in scored_rows(quantity, pose[name], pose[name], trajectory.mask) if row[1] == "valid"
                 ]
-    if estimate.nis is not None and estimate.innovation is not None:
-        degrees = (np.asarray(estimate.innovation) != 0.0).sum(axis=-1)
-        rows.append(("innovation", "nis", consistency(estimate.nis, degrees, trajectory.mask).ratio, "1"))
+    innovations = innovation_consistency(estimate, trajectory.mask)
+    if innovations is not None:
+        rows.append(("innovation", "nis", innovations.ratio, "1"))
     return rows
+
+
+def innovation_consistency(estimate: Estimate, mask: np.ndarray) -> Consistency | None:
+    """Mean NIS a degree of freedom with its bounds; None of an estimate without innovations."""
+    if estimate.nis is None or estimate.innovation is None:
+        return None
+    return consistency(estimate.nis, (np.asarray(estimate.innovation) != 0.0).sum(axis=-1), mask)
 
 
 def heading_offset(estimate: Estimate, trajectory: Trajectory) -> float | None:

@@ -31,8 +31,11 @@ FOOT = {
     "largest": "largest absolute error of all trajectories",
     "settling": "time until the RMS of 1 s stays below three times that of the last half, s",
     "drift": "slope of the absolute error, a minute",
+    "over bound": "RMS error in multiples of what the errors of the simulated sensors alone leave",
     "NEES": "normalised estimation error squared a degree of freedom, 1 if the covariance is consistent",
+    "NEES 95 %": "where it lies for a consistent filter, if each trajectory is one draw",
     "NIS": "the same of innovations",
+    "NIS 95 %": "where it lies for white innovations of the assumed size",
     "step, µs": "time of one update, sample by sample",
     "sequence, samples/s": "rate over a whole sequence",
 }

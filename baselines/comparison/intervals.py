@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ...filters.core.consistency import consistency
 from ..error_table import COMPLETE, coverage
-from ..measures import MEASURES
+from ..measures import MEASURES, OF_ERROR
 from ..statistics import bootstrap_interval, mean_score, probability_of_improvement
 
 if TYPE_CHECKING:
@@ -87,21 +89,34 @@ def win_matrix(errors: pandas.DataFrame) -> tuple[list[str], np.ndarray]:
 
 
 def details(table: pandas.DataFrame, metric: str, quantity: str) -> list[dict[str, Any]]:
-    """Means over trajectories of the measures beyond RMS (the largest of the largest), one row an estimator."""
+    """Means over trajectories of the measures beyond RMS (the largest of the largest), one row an estimator.
+
+    ``NEES 95 %`` holds the mean NEES of a consistent filter if every trajectory counts as one draw of its error, which
+    is correlated over time; ``NIS 95 %`` the mean bounds of white innovations.
+    """
     rows = []
     for name in table["estimator"].unique():
         own = table[table["estimator"] == name]
         own = own[own["quantity"].isin([quantity, "relative_orientation", "innovation"])]
+        of = partial(values_of, own)
         row: dict[str, Any] = {"estimator": name}
-        for label, wanted in (("RMS", metric), *((each, f"{metric} {each}") for each in MEASURES[:-1])):
-            values = own[own["metric"] == wanted]["value"].dropna()
-            row[label] = float(values.max() if label == "largest" else values.mean()) if len(values) else float("nan")
-        for label in ("nees", "nis"):
-            values = own[own["metric"] == label]["value"].dropna()
-            row[label.upper()] = float(values.mean()) if len(values) else float("nan")
+        for label, wanted in (("RMS", metric), *((each, f"{metric} {each}") for each in OF_ERROR)):
+            row[label] = float(of(wanted).max() if label == "largest" else of(wanted).mean())
+        row |= {"NEES": float(of("nees").mean()), "NEES 95 %": "–", "NIS": float(of("nis").mean()), "NIS 95 %": "–"}
+        degrees = of("nees degrees").to_numpy()
+        if len(degrees):
+            bounds = consistency(degrees, degrees)
+            row["NEES 95 %"] = f"{bounds.lower:.2f} – {bounds.upper:.2f}"
+        if len(of("nis lower")):
+            row["NIS 95 %"] = f"{of('nis lower').mean():.2f} – {of('nis upper').mean():.2f}"
         if row["RMS"] == row["RMS"]:
             rows.append(row)
     return sorted(rows, key=lambda row: row["RMS"])
+
+
+def values_of(table: pandas.DataFrame, metric: str) -> pandas.Series:
+    """Known values of a metric."""
+    return table.loc[table["metric"] == metric, "value"].dropna()
 
 
 def regressions(table: pandas.DataFrame, before: pandas.DataFrame) -> list[dict[str, Any]]:

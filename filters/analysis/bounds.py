@@ -116,15 +116,30 @@ def posterior_bound(model: Model, states: np.ndarray, measurements: Mapping[str,
     Raises:
         ValueError: shapes do not fit, or the samples never suffice for the model's prior.
     """
-    F, Q, H, R, usable = linearise(model, states, measurements)
     first, P = start_of(model, measurements)
+    return riccati(linearise(model, states, measurements), P, first)
+
+
+def riccati(system: Linearisation, P: np.ndarray, first: int = 0) -> np.ndarray:
+    """Covariances ``(T, e, e)`` of the optimal filter of a linear system; NaN before the start.
+
+    Args:
+        system: matrices of all steps and measurements.
+        P: ``(e, e)`` covariance at the first sample, including its measurement.
+        first: number of that sample.
+    """
+    F, Q = system.F, system.Q
     bounds = [np.full_like(P, np.nan)] * first + [P]
     for k in range(first, len(F)):
-        P = F[k] @ P @ F[k].T + Q[k]
-        if usable[k + 1].any():
-            P = correct(P, np.where(usable[k + 1], 0.0, np.nan), H[k + 1], R[k + 1])[1]
+        P = measured(F[k] @ P @ F[k].T + Q[k], system, k + 1)
         bounds.append(P)
     return np.array(bounds)
+
+
+def measured(P: np.ndarray, system: Linearisation, k: int) -> np.ndarray:
+    """Covariance ``(e, e)`` after the measurement of sample k."""
+    H, R, usable = system.H, system.R, system.usable
+    return correct(P, np.where(usable[k], 0.0, np.nan), H[k], R[k])[1] if usable[k].any() else P
 
 
 def with_gaps(ideal: Mapping[str, Any], recorded: Mapping[str, Any]) -> dict[str, np.ndarray]:

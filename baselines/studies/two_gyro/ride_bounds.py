@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 
 from ....envs.data.trajectory import Trajectory
-from ....filters.analysis.bounds import linearise, posterior_bound, with_gaps
+from ....filters.analysis.bounds import Linearisation, linearise, measured, posterior_bound, riccati, with_gaps
 from ....filters.bicycle.geometry import RiderGeometry
 from ....filters.bicycle.two_gyro.filter import TwoGyro
 from ....filters.bicycle.two_gyro.kinematics import body_rate_matrix
 from ....filters.bicycle.two_gyro.truth import true_angles, true_states
 from ....filters.core import rotation
-from ....filters.core.kalman import KalmanFilter, correct
+from ....filters.core.kalman import KalmanFilter
 from ..ride_study import SETTLED, RideStudy
 from ..sensors import without_errors
 from ..signals import DEG, gauss_markov
@@ -88,20 +88,13 @@ def with_alignment(model: TwoGyro, states: np.ndarray, exact: dict[str, np.ndarr
     H = np.concatenate([H, A, A], axis=-1)
     deviations = [model.roll_prior, *[WIDE] * 3, *[model.body_bias_prior] * 3]
     deviations += [model.platform_bias_prior] * model.platform_rates
-    P = np.diag(np.square([*deviations, *[CONSTANT] * 3, *[DRIFTING] * 3]))
-    moves, grows = np.diag([1.0] * 3 + [kept] * 3), np.diag([0.0] * 3 + [DRIFTING**2 * (1.0 - kept**2)] * 3)
-    found = []
-    for k in range(len(states)):
-        if k > 0:
-            step = np.zeros((size + 6, size + 6))
-            step[:size, :size], step[size:, size:] = F[k - 1], moves
-            noise = np.zeros_like(step)
-            noise[:size, :size], noise[size:, size:] = Q[k - 1], grows
-            P = step @ P @ step.T + noise
-        if usable[k].any():
-            P = correct(P, np.where(usable[k], 0.0, np.nan), H[k], R[k])[1]
-        found.append(P)
-    return np.array(found)
+    prior = np.diag(np.square([*deviations, *[CONSTANT] * 3, *[DRIFTING] * 3]))
+    step, noise = (np.zeros((len(F), size + 6, size + 6)) for _ in range(2))
+    step[:, :size, :size], noise[:, :size, :size] = F, Q
+    step[:, size:, size:] = np.diag([1.0] * 3 + [kept] * 3)
+    noise[:, size:, size:] = np.diag([0.0] * 3 + [DRIFTING**2 * (1.0 - kept**2)] * 3)
+    system = Linearisation(step, noise, H, R, usable)
+    return riccati(system, measured(prior, system, 0))
 
 
 def redrawn(model: TwoGyro, exact: dict[str, np.ndarray], ride: Trajectory) -> dict[str, np.ndarray]:

@@ -83,3 +83,16 @@ def test_details_are_means_and_the_largest() -> None:
     (row,) = details(frame, "inclination", "up")
     assert (row["RMS"], row["largest"], row["NEES"]) == (1.0, 7.0, 2.0)
     assert list(is_measure(frame)) == [True, True, False, False, True, True]
+
+
+def test_details_state_where_a_consistent_filter_lies() -> None:
+    values = {"inclination": 1.0, "nees": 1.2, "nees degrees": 2.0, "nis": 0.5, "nis lower": 0.9, "nis upper": 1.1}
+    names = {"inclination": "up", "nees": "relative_orientation", "nees degrees": "relative_orientation"}
+    rows = [
+        ("one", f"ride-{n}", names.get(metric, "innovation"), metric, value, "1")
+        for n in range(10)
+        for metric, value in values.items()
+    ]
+    (row,) = details(pandas.DataFrame(rows, columns=list(COLUMNS)), "inclination", "up")
+    # chi-square of 20 degrees of freedom: 9.591 and 34.170 (tables)
+    assert (row["NEES 95 %"], row["NIS 95 %"]) == ("0.48 – 1.71", "0.90 – 1.10")
