@@ -80,6 +80,6 @@ def linear_system(
             Q[:, axis, axis] = (1.0 - kept**2) * stationary
             Q[:, axis + 3, axis + 3] = dt * noise["bias_random_walk"] ** 2
         variances += [stationary] * 3 + [noise["turn_on_bias"] ** 2] * 3
-    noise = np.broadcast_to(accelerometer["white_noise"] ** 2 / dt * np.eye(3), (ticks, 3, 3))
+    white = np.broadcast_to(accelerometer["white_noise"] ** 2 / dt * np.eye(3), (ticks, 3, 3))
     seen = np.isfinite(trajectory.measurements["imu/acc"])
-    return Linearisation(F, Q, H, noise, seen), np.diag(variances)
+    return Linearisation(F, Q, H, white, seen), np.diag(variances)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Any
@@ -244,22 +244,46 @@ def record_episodes(
     folder.mkdir(parents=True, exist_ok=True)
     paths = [episode_path(folder, env_id, index) for index in range(episodes)]
     seeds = child_seeds(seed, episodes)
+    jobs = [(env_id, options, episode_seed, path) for path, episode_seed in zip(paths, seeds, strict=True)]
+    return resumed(record_episode, check_same, jobs, processes, report)
+
+
+def resumed(
+    write: Callable[..., Path],
+    check: Callable[..., None],
+    jobs: Sequence[tuple[Any, ...]],
+    processes: int = 1,
+    report: Callable[[Path], None] | None = None,
+) -> list[Path]:
+    """Write the files of all jobs that are not there yet.
+
+    Args:
+        write: writes the file of a job, which appears whole or not at all, and returns its path.
+        check: raises ValueError if the file of a job that is there holds something else.
+        jobs: arguments of both; the last one is the path.
+        processes: how many files are written at a time.
+        report: called with the path of every finished file, also with those that were there.
+
+    Returns:
+        The paths, in the order of the jobs.
+    """
     missing = []
-    for path, episode_seed in zip(paths, seeds, strict=True):
-        if path.exists():
-            check_same(load_trajectory(path), env_id, options, episode_seed, path)
-            if report is not None:
-                report(path)
-        else:
-            missing.append((env_id, options, episode_seed, path))
-    for path in in_parallel(record_episode, missing, processes):
+    for job in jobs:
+        if not job[-1].exists():
+            missing.append(job)
+            continue
+        check(*job)
+        if report is not None:
+            report(job[-1])
+    for path in in_parallel(write, missing, processes):
         if report is not None:
             report(path)
-    return paths
+    return [job[-1] for job in jobs]
 
 
-def check_same(trajectory: Trajectory, env_id: str, options: Mapping[str, Any], seed: int, path: Path) -> None:
+def check_same(env_id: str, options: Mapping[str, Any], seed: int, path: Path) -> None:
     """Refuse to mix episodes of different origin in one folder."""
+    trajectory = load_trajectory(path)
     environment = trajectory.metadata.get("environment") or {}
     expected = {"environment": env_id, "seed": seed, **plain(options)}
     kwargs = environment.get("kwargs") or {}

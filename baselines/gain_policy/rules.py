@@ -66,17 +66,3 @@ def ruled(filter: KalmanFilter, gain: str, rule: Rule) -> AdaptiveEstimator:
         features = replace(features, smallest=part.lower)
     layers = ((np.array([[1.0, 0.0]]), np.zeros(1)),)
     return AdaptiveEstimator(filter, GainPolicy(filter_name(filter), (part,), features, layers))
-
-
-def doubting_level_ground(filter: KalmanFilter, rule: Rule | None = None) -> AdaptiveEstimator:
-    """A filter of rides that believes less in level ground while the bicycle pitches.
-
-    Args:
-        filter: one with a gain ``constraint`` (two gyroscopes, Σ1 with the constraint), or ``platform-gyro``.
-        rule: None for :class:`.PitchRateRule`.
-
-    Raises:
-        ValueError: a filter without such a gain.
-    """
-    gain = "constraint" if "constraint" in filter.gains else "measurement"
-    return ruled(filter, gain, rule or PitchRateRule())

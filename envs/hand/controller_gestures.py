@@ -176,11 +176,6 @@ def pointing_attitude(azimuth: np.ndarray, elevation: np.ndarray) -> np.ndarray:
     return rotation.from_euler_zyx(-azimuth, zero, elevation)
 
 
-def target_position(azimuth: np.ndarray, elevation: np.ndarray, distance: float = 10.0) -> np.ndarray:
-    """Target ``(..., 3)`` on a wall ``distance`` m north of the hand: d [tan ψ, 1, tan θ sec ψ] (5.50)."""
-    return distance * np.stack([np.tan(azimuth), np.ones_like(azimuth), np.tan(elevation) / np.cos(azimuth)], axis=-1)
-
-
 def shaken(generator: np.random.Generator, band: tuple[float, float], acceleration: float) -> Series:
     """A random position whose acceleration is evenly spread over ``band`` (Hz), of given rms a coordinate, m/s²."""
     position = Series.draw(generator, band, 3, components=30, slope=-2.0)

@@ -124,12 +124,6 @@ class Physics:
         self.clear_defaults(body)
         return int(body)
 
-    def set_mass(self, body: int, mass: float, moments: Vector) -> None:
-        """Change the base's mass (kg) and its moments ``(3,)`` about the principal axes it has (kg·m²)."""
-        pybullet.changeDynamics(
-            body, BASE, mass=float(mass), localInertiaDiagonal=floats(moments), physicsClientId=self.client
-        )
-
     def load_urdf(
         self,
         source: str | Path,

@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from ...filters.support.parallel import in_parallel
 from ..data.trajectory import load_trajectory
+from ..record import resumed
 from .recipe import Recipe
 from .registry import described_recipe
 
@@ -44,18 +44,14 @@ def record_recipe(
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     paths = [folder / f"{made.name}_{index:04d}.h5" for index in range(episodes)]
-    described, missing = made.describe(), []
-    for index, path in enumerate(paths):
-        if path.exists():
-            check_same(path, {"definition": described, "seed": seed, "index": index})
-            if report is not None:
-                report(path)
-        else:
-            missing.append((described, seed, index, path))
-    for path in in_parallel(record_one, missing, processes):
-        if report is not None:
-            report(path)
-    return paths
+    described = made.describe()
+    return resumed(
+        record_one,
+        check_same,
+        [(described, seed, index, path) for index, path in enumerate(paths)],
+        processes,
+        report,
+    )
 
 
 def record_one(described: Mapping[str, Any], seed: int, index: int, path: Path) -> Path:
@@ -63,14 +59,14 @@ def record_one(described: Mapping[str, Any], seed: int, index: int, path: Path) 
     return described_recipe(described).episode(seed, index, path.stem).save(path)
 
 
-def check_same(path: Path, origin: Mapping[str, Any]) -> None:
+def check_same(described: Mapping[str, Any], seed: int, index: int, path: Path) -> None:
     """Refuse to mix episodes of different origin in one folder.
 
     Raises:
         ValueError: the file holds another episode.
     """
     found = load_trajectory(path).metadata.get("recipe") or {}
-    for name in ("seed", "index", "definition"):
-        if found.get(name) != origin[name]:
+    for name, wanted in (("seed", seed), ("index", index), ("definition", described)):
+        if found.get(name) != wanted:
             what = "recipe" if name == "definition" else name
             raise ValueError(f"{path} holds an episode of another {what}; choose another folder")

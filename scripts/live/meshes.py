@@ -1,4 +1,4 @@
-"""Triangle meshes of simple solids, in NumPy alone."""
+"""Triangle meshes of simple solids and of the road under a bicycle, in NumPy alone."""
 
 from __future__ import annotations
 
@@ -15,6 +15,14 @@ Colour = tuple[float, float, float]
 SIDES = 14
 """Faces around a rod or a tyre."""
 Z = np.array([0.0, 0.0, 1.0])
+LEVEL = 0.02
+"""m: a path whose height varies less is drawn on the plane"""
+HALF_WIDTH = 0.6
+"""m: of the road"""
+SPACING = 0.08
+"""m between cross-sections of the road: a bump of 0.5 m has six"""
+BEYOND = 1.3
+"""m of road before the first and after the last place of the rear wheel: the front wheel needs them"""
 
 
 class Mesh(NamedTuple):
@@ -125,3 +133,48 @@ def volume(mesh: Mesh) -> float:
 
 def _triangles(squares: Sequence[tuple[int, int, int, int]]) -> np.ndarray:
     return np.array([triangle for a, b, c, d in squares for triangle in ((a, b, c), (a, c, d))])
+
+
+def is_hilly(path: np.ndarray) -> bool:
+    """Whether a path ``(n, 3)`` of the rear wheel's contact, m, leaves the plane."""
+    known = path[np.isfinite(path).all(axis=1)]
+    return bool(len(known) > 1 and np.ptp(known[:, 2]) > LEVEL)
+
+
+def road_mesh(path: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """A strip along a path with walls down to its lowest point.
+
+    Args:
+        path: ``(n, 3)`` places of the rear wheel's contact, m, world; NaN where unknown.
+
+    Returns:
+        Vertices ``(v, 3)``, m, and triangles ``(f, 3)``; empty where the bicycle did not move.
+    """
+    middle = sections(path[np.isfinite(path).all(axis=1)])
+    if len(middle) < 2:
+        return np.zeros((0, 3)), np.zeros((0, 3), int)
+    along = np.gradient(middle[:, :2], axis=0)
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    left = np.pad(HALF_WIDTH * np.stack([-along[:, 1], along[:, 0]], axis=1), ((0, 0), (0, 1)))
+    down = np.array([0.0, 0.0, 1.0]) * (middle[:, 2:] - middle[:, 2].min())
+    # across: foot of the left wall, left edge, right edge, foot of the right wall
+    vertices = np.stack([middle + left - down, middle + left, middle - left, middle - left - down], axis=1)
+    first = 4 * np.arange(len(middle) - 1)[:, None] + np.arange(3)
+    quads = np.stack([first, first + 1, first + 5, first + 4], axis=-1).reshape(-1, 4)
+    return vertices.reshape(-1, 3), np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
+
+
+def sections(path: np.ndarray) -> np.ndarray:
+    """Points ``(k, 3)`` of a path that are :data:`SPACING` apart or more, continued at both ends."""
+    kept = [0] if len(path) else []
+    for index in range(1, len(path)):
+        if np.linalg.norm(path[index, :2] - path[kept[-1], :2]) >= SPACING:
+            kept.append(index)
+    if len(kept) < 2:
+        return path[kept]
+    points = path[kept]
+    ends = []
+    for end, before in ((points[0], points[1]), (points[-1], points[-2])):
+        step = end - before
+        ends.append(end + BEYOND * np.append(step[:2] / np.linalg.norm(step[:2]), 0.0))
+    return np.concatenate([ends[:1], points, ends[1:]])

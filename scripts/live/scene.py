@@ -10,7 +10,7 @@ import numpy as np
 
 from ...filters.core import rotation
 from .curves import TRUTH
-from .meshes import Mesh, by_colour
+from .meshes import Mesh, by_colour, is_hilly, road_mesh
 from .motion import Motion
 
 if TYPE_CHECKING:
@@ -24,6 +24,9 @@ TRAIL_POINTS = 60
 TINT = 0.75
 """Share of its own colour in the colour of the bodies of an estimate."""
 FORCE_COLOUR = (200, 40, 120)
+ROAD_COLOUR = (168, 170, 172)
+ROAD_INTERVAL = 0.5
+"""s of motion after which a road that grows is drawn anew"""
 
 
 @dataclass(frozen=True)
@@ -137,6 +140,8 @@ class MotionScene:
             )
             for name in motion.arrows
         }
+        self._road_end = -np.inf
+        self._lowest: float | None = None
         server.initial_camera.look_at = (0.0, 0.0, 0.0)
         server.initial_camera.position = look.camera
         server.initial_camera.fov = 0.9
@@ -157,6 +162,19 @@ class MotionScene:
             receive_shadow=truth,
         )
 
+    def _lay_road(self, motion: Motion) -> None:
+        """The road so far, where the truth knows one that is not level."""
+        bicycle = motion.figures.get(TRUTH, {}).get("bicycle")
+        if bicycle is None or motion.time[-1] < self._road_end + ROAD_INTERVAL:
+            return
+        self._road_end = float(motion.time[-1])
+        if is_hilly(bicycle.position):
+            vertices, faces = road_mesh(bicycle.position)
+            self._lowest = float(vertices[:, 2].min())
+            self.server.scene.add_mesh_simple(
+                "/world/road", vertices, faces, color=ROAD_COLOUR, side="double", cast_shadow=False
+            )
+
     def show(self, motion: Motion, row: int, options: Options) -> None:
         """Put everything in its place.
 
@@ -172,7 +190,9 @@ class MotionScene:
         with self.server.atomic():
             self._world.wxyz = world
             self._world.position = -rotation.rotate(world, raised)
-            self._ground.position = (0.0, 0.0, float(focus[2]) + self.look.ground)
+            self._lay_road(motion)
+            level = float(focus[2]) + self.look.ground if self._lowest is None else self._lowest
+            self._ground.position = (0.0, 0.0, level)
             for label in self.labels:
                 self._show_figure(motion, row, label, options, shown, world)
             for name, handle in self._arrows.items():

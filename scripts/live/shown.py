@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ...baselines.gain_policy.adaptive import AdaptiveEstimator
 from ...baselines.registry import list_estimators, make_estimator
 from ...baselines.run import fitted, run_on
 from ...envs.data.trajectory import Trajectory
+from ...envs.gain_env import GainTuningEnv
+from ...filters.adaptation.gains import filter_name, gain_sizes
 from ...filters.bicycle.geometry import RiderGeometry
 from ...filters.core.estimator import Estimator
 from ...filters.core.model import equations_of
+from .curves import Curves
 from .motion import Block, Device, Motion, Rider, Subject, joined
 from .online import OnlineEstimator, Timed
 
@@ -116,7 +120,22 @@ def finished(trajectory: Trajectory, names: Sequence[str]) -> tuple[Subject, Mot
     if "orientation" not in truth and "up" in grid.quantities:
         truth["up"] = grid.truth_of("up")
     block = Block(grid.time, with_derived(truth, made), grid.measurements, poses)
-    return subject, subject.motion(block).rows(slice(None, None, drawn_stride(grid.dt)))
+    motion = subject.motion(block)
+    motion = replace(motion, curves=motion.curves | gain_curves(made, grid))
+    return subject, motion.rows(slice(None, None, drawn_stride(grid.dt)))
+
+
+def gain_curves(made: Mapping[str, Estimator[Any]], trajectory: Trajectory) -> Curves:
+    """The constants that policies and rules set, over time; see :data:`Curves`."""
+    found: Curves = {}
+    for label, estimator in made.items():
+        if isinstance(estimator, AdaptiveEstimator):
+            actions = estimator.run_with_actions(None, trajectory.measurements)[2]
+            model = estimator.filter.model
+            for gain, size in gain_sizes(model, estimator.tuned.gains(actions)).items():
+                name = model.gains[gain].parameter
+                found.setdefault(f"{name}, set while it runs", {})[label] = np.asarray(size, float)
+    return found
 
 
 @dataclass
@@ -217,3 +236,44 @@ class PlayedEnvironment:
             _, _, terminated, truncated, self._info = self.env.step(self.env.neutral_action)
             self.over = terminated or truncated
         return samples, {name: np.array([row[name] for row in rows]) for name in rows[0]} if rows else {}
+
+
+class PlayedTrajectory:
+    """A trajectory that is played like an environment, see :class:`PlayedEnvironment`."""
+
+    def __init__(self, trajectory: Trajectory) -> None:
+        self.trajectory, self._row = trajectory, 0
+
+    @property
+    def over(self) -> bool:
+        """Whether all samples were played."""
+        return self._row >= len(self.trajectory)
+
+    def block(self, until: float) -> tuple[list[Timed], dict[str, np.ndarray]]:
+        """Samples up to a time after the first one, s, and their truth."""
+        time, channels = self.trajectory.time, self.trajectory.measurements
+        rows = slice(self._row, int(np.searchsorted(time - time[0], until, side="right")))
+        self._row = max(self._row, rows.stop)
+        samples = [
+            Timed(float(time[row]), {name: values[row] for name, values in channels.items()}, False, False)
+            for row in range(rows.start, rows.stop)
+        ]
+        return samples, {name: values[rows] for name, values in self.trajectory.truth.items()} if samples else {}
+
+
+def tuned_episode(env: Any, seed: int) -> Trajectory | None:
+    """The motion of an episode of gain tuning; None of another environment."""
+    if not isinstance(env.unwrapped, GainTuningEnv):
+        return None
+    env.reset(seed=seed)
+    trajectory = env.unwrapped.trajectory.on_grid()
+    return trajectory.replace(metadata=trajectory.metadata | {"rate": 1.0 / trajectory.dt})
+
+
+def tuned_estimators(env: Any) -> tuple[str, ...]:
+    """The filter whose gains an environment tunes, and it with each policy or rule; none of another environment."""
+    if not isinstance(env.unwrapped, GainTuningEnv):
+        return ()
+    name = filter_name(env.unwrapped.tuned.kalman)
+    adaptive = [each for each, info in list_estimators().items() if info.kind == "adaptive"]
+    return (name, *(each for each in adaptive if each.split("+")[0] == name))

@@ -12,7 +12,7 @@ import time
 import webbrowser
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -199,6 +199,7 @@ def opened(args: Args, out: Output) -> Iterator[Opened]:
         yield whole(path.name, recording(args, out), args)
     elif args.live:
         env_id, env = environment(args)
+        args = with_tuned_filter(args, env)
         try:
             with fed(environment_blocks(env, args.seed), args) as found:
                 yield Opened(env_id, *found)
@@ -206,14 +207,15 @@ def opened(args: Args, out: Output) -> Iterator[Opened]:
             env.close()
     else:
         from ...envs.record import record
+        from .shown import tuned_episode
 
         env_id, env = environment(args)
         try:
             out.say(f"recording {env_id}, seed {args.seed} (--live shows it at once)")
-            trajectory = record(env, seed=args.seed, progress=True)
+            trajectory = tuned_episode(env, args.seed) or record(env, seed=args.seed, progress=True)
         finally:
             env.close()
-        yield whole(env_id, trajectory, args)
+        yield whole(env_id, trajectory, with_tuned_filter(args, env))
 
 
 def whole(title: str, trajectory: Trajectory, args: Args) -> Opened:
@@ -246,6 +248,13 @@ def environment(args: Args) -> tuple[str, Any]:
     except ValueError as reason:
         raise FileNotFoundError(2, f"no such file, and {reason}", args.source) from None
     return env_id, make_environment(env_id, **dict(option(text) for text in args.options))
+
+
+def with_tuned_filter(args: Args, env: Any) -> Args:
+    """The arguments with the estimators of an environment of gains, where none are named."""
+    from .shown import tuned_estimators
+
+    return args if args.estimators else replace(args, estimators=tuned_estimators(env))
 
 
 def chosen(args: Args, trajectory: Trajectory) -> tuple[str, ...]:
@@ -284,16 +293,18 @@ Blocks = Iterator["tuple[list[Timed], dict[str, Any], Trajectory | None]"]
 def environment_blocks(env: Any, seed: int) -> Blocks:
     """An environment in real time, as fast as it is simulated."""
     from ...envs.record import describe
-    from .shown import PlayedEnvironment
+    from .shown import PlayedEnvironment, PlayedTrajectory, tuned_episode
 
-    played = PlayedEnvironment(env, seed)
+    tuned = tuned_episode(env, seed)
+    played = PlayedEnvironment(env, seed) if tuned is None else PlayedTrajectory(tuned)
+    metadata = {**describe(env, seed), "rate": env.unwrapped.rate} if tuned is None else tuned.metadata
     begin, shown, kind = time.monotonic(), 0.0, None
     while not played.over:
         shown = min(time.monotonic() - begin, shown + AHEAD)
         samples, truth = played.block(shown)
         if samples and kind is None:
             first = {name: values[:1] for name, values in truth.items()}
-            kind = described(samples[0], first, {**describe(env, seed), "rate": env.unwrapped.rate})
+            kind = described(samples[0], first, metadata)
         yield samples, truth, kind
         if not samples:
             time.sleep(0.01)

@@ -114,6 +114,7 @@ def calibrate(args: Args, out: Output) -> tuple[CalibrationRecord, CalibrationRe
     if truth is not None and args.raw is not None:
         data.save(args.raw / f"{args.sensor}.csv")
         truth.save(args.raw / "true-calibration.json")
+        runs.nominal_calibration(array).save(args.raw / "data-sheet-calibration.json")
         out.say(f"simulated runs: {args.raw / f'{args.sensor}.csv'}")
     return found, truth
 

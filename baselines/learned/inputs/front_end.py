@@ -14,9 +14,9 @@ from typing import Any, NamedTuple, Protocol, Self
 import numpy as np
 
 from ....filters.core.backend import Array
-from ....filters.core.estimator import check_measurements, run_by_steps
+from ....filters.core.estimator import check_measurements
 from ....filters.core.kalman import KalmanFilter
-from ....filters.core.quantity import Channel, Estimate, Measurement
+from ....filters.core.quantity import Channel, Measurement
 from ....filters.registry import make
 
 
@@ -243,22 +243,3 @@ class RawChannels:
         length = max(1.0, round(self.interval / self.dt))
         features = np.concatenate([found.sums / np.maximum(found.known, 1.0), found.known / length], axis=-1)
         return Seen(features, due, {}, features[..., :0])
-
-
-def seen_by_steps(front_end: FrontEnd, measurements: Mapping[str, Any]) -> Seen:
-    """A front end run sample by sample, the reference of every faster ``run``."""
-
-    class Stepped:
-        channels, outputs, dt = front_end.channels, (), front_end.dt
-
-        def init(self, measurement: Measurement) -> Any:
-            return front_end.init(measurement)
-
-        def step(self, state: Any, measurement: Measurement) -> tuple[Any, Estimate]:
-            state, seen = front_end.step(state, measurement)
-            base = {f"base {name}": values for name, values in seen.base.items()}
-            return state, Estimate({"features": seen.features, "due": seen.due, "spread": seen.spread, **base})
-
-    pose = run_by_steps(Stepped(), measurements).pose  # type: ignore[arg-type]
-    base = {name.removeprefix("base "): values for name, values in pose.items() if name.startswith("base ")}
-    return Seen(pose["features"], pose["due"], base, pose["spread"])

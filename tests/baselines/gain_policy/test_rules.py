@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import poise
-from poise.baselines.gain_policy.rules import doubting_level_ground, ruled
+from poise.baselines.gain_policy.rules import ruled
 from poise.envs.bicycle.environment import RiderBicycleEnv
 from poise.envs.gain_episode import filter_for
 from poise.envs.gain_reward import true_values
@@ -34,7 +34,7 @@ def roll_error(estimator, ride):
 
 
 def test_the_gain_follows_the_peak_of_the_pitch_rate(ride):
-    estimator = doubting_level_ground(filter_for(LEVEL, ride))
+    estimator = ruled(filter_for(LEVEL, ride), "constraint", PitchRateRule())
     rates = ride.measurements["bicycle_imu/gyr"][:, 1]
     _, _, actions = estimator.run_with_actions(None, ride.measurements)
     peak, (part,) = 0.0, estimator.policy.ranges
@@ -50,7 +50,7 @@ def test_the_gain_follows_the_peak_of_the_pitch_rate(ride):
 def test_stepping_equals_running(ride):
     short = {name: values[:150] for name, values in ride.measurements.items()}
     for rule in (PitchRateRule(), InnovationRule()):
-        estimator = doubting_level_ground(filter_for(PLATFORM, ride), rule)
+        estimator = ruled(filter_for(PLATFORM, ride), "measurement", rule)
         stepped, roll = run_by_steps(estimator, short), estimator.outputs[0].name
         np.testing.assert_array_equal(stepped.pose[roll], estimator.run(short).pose[roll])
 
@@ -69,7 +69,9 @@ def test_on_a_ramp_the_rule_keeps_the_roll(ride):
     kalman = filter_for(LEVEL, ride)
     ruled_error, plain = (
         roll_error(estimator, ride)
-        for estimator in (doubting_level_ground(kalman), ruled(kalman, "constraint", PitchRateRule(threshold=100.0)))
+        for estimator in (
+            ruled(kalman, "constraint", rule) for rule in (PitchRateRule(), PitchRateRule(threshold=100.0))
+        )
     )
     assert ruled_error < 0.5 * plain
 

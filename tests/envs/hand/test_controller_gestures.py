@@ -18,7 +18,6 @@ from poise.envs.hand.controller_gestures import (
     Walk,
     pointing_attitude,
     pointing_direction,
-    target_position,
 )
 from poise.envs.hand.gestures import make_gesture
 from poise.envs.hand.planar_motion import planar_angle
@@ -107,9 +106,6 @@ def test_pointing_formulas_are_those_of_the_thesis():
     expected = (Rotation.from_euler("z", -psi) * Rotation.from_euler("x", theta)).as_matrix()
     np.testing.assert_allclose(matrix, expected, atol=1e-12)
     np.testing.assert_allclose(matrix[:, 1], pointing_direction(np.array(psi), np.array(theta)), atol=1e-12)
-    place = target_position(np.array(psi), np.array(theta))
-    np.testing.assert_allclose(place / np.linalg.norm(place), matrix[:, 1], atol=1e-12)
-    assert place[1] == 10.0
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2])

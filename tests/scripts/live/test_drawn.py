@@ -19,7 +19,7 @@ from poise.filters.core import metrics, rotation
 from poise.filters.core.quantity import GYROSCOPE_BIAS, UP
 from poise.scripts.live.curves import curves_of
 from poise.scripts.live.device import DeviceAttitude, VirtualController, device_meshes, inclined, planar_orientation
-from poise.scripts.live.meshes import ball, box, by_colour, rod, tyre, volume
+from poise.scripts.live.meshes import ball, box, by_colour, is_hilly, road_mesh, rod, tyre, volume
 from poise.scripts.live.rider import estimated_values, forces_on, rider_meshes, rider_poses
 
 RED, BLUE = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
@@ -194,3 +194,20 @@ def test_what_is_drawn_needs_neither_viser_nor_pybullet():
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert done.returncode == 2
     assert "pip install 'poise[view]'" in done.stderr
+
+
+def test_a_road_has_the_heights_of_the_ride() -> None:
+    """A hill of 1 m, met standing still at first; the mesh is a strip through the places with walls to its foot."""
+    x = np.concatenate([np.zeros(20), np.linspace(0.0, 20.0, 401)])
+    path = np.stack([x, np.zeros_like(x), 0.5 - 0.5 * np.cos(2.0 * np.pi * x / 20.0)], axis=1)
+    assert is_hilly(path)
+    assert not is_hilly(path * [1.0, 1.0, 0.01])
+    vertices, faces = road_mesh(path)
+    top = vertices[np.abs(vertices[:, 2]) > 1e-9]
+    assert vertices[:, 2].min() == pytest.approx(0.0)
+    np.testing.assert_allclose(np.abs(vertices[:, 1]), 0.6)
+    np.testing.assert_allclose(top[:, 2], 0.5 - 0.5 * np.cos(2.0 * np.pi * top[:, 0] / 20.0), atol=1e-9)
+    assert vertices[:, 0].min() == pytest.approx(-1.3)
+    assert faces.max() == len(vertices) - 1
+    standing, none = road_mesh(path[:20])
+    assert len(standing) == len(none) == 0

@@ -20,7 +20,15 @@ from poise.envs.data.trajectory import Trajectory
 from poise.scripts.live.motion import Device, Rider, joined
 from poise.scripts.live.online import Timed
 from poise.scripts.live.player import Player
-from poise.scripts.live.shown import PlayedEnvironment, finished, live_motion, usual_estimators
+from poise.scripts.live.shown import (
+    PlayedEnvironment,
+    PlayedTrajectory,
+    finished,
+    live_motion,
+    tuned_episode,
+    tuned_estimators,
+    usual_estimators,
+)
 from poise.scripts.main import main
 
 viser = pytest.importorskip("viser")
@@ -107,6 +115,31 @@ def test_motion_that_grows_equals_the_finished_one(motion):
     for title, curves in expected.curves.items():
         for label, values in curves.items():
             np.testing.assert_allclose(live.motion.curves[title][label], values, atol=1e-6)
+
+
+def test_an_environment_of_gains_shows_its_filter_and_what_sets_it():
+    env = gymnasium.make("poise/HandMotionGain-v0", duration=4.0)
+    try:
+        names, trajectory = tuned_estimators(env), tuned_episode(env, 3)
+        assert trajectory is not None
+        assert names[0] == "external-acceleration"
+        assert "external-acceleration+policy" in names
+        np.testing.assert_array_equal(
+            trajectory.measurements["imu/gyr"], env.unwrapped.trajectory.measurements["imu/gyr"]
+        )
+    finally:
+        env.close()
+    _, shown = finished(trajectory, names)
+    gains = shown.curves["accelerometer_noise, set while it runs"]
+    assert set(gains) == set(names[1:]), "the published filter sets nothing"
+    assert len(gains["external-acceleration+policy"]) == len(shown.time)
+    played, found = PlayedTrajectory(trajectory), []
+    for until in (0.0, 1.0, 100.0):
+        samples, truth = played.block(until)
+        found += samples
+        assert len(truth["orientation"]) == len(samples)
+    assert played.over
+    assert [each.time for each in found] == list(trajectory.time)
 
 
 def test_old_motion_is_forgotten(motion):

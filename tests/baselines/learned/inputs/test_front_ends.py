@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -10,12 +11,13 @@ import pytest
 
 from poise.baselines.learned.inputs.filter_bank import FilterBank
 from poise.baselines.learned.inputs.filter_features import FilterFeatures, standardisation
-from poise.baselines.learned.inputs.front_end import FrontEnd, RawChannels, interval_ends, seen_by_steps
+from poise.baselines.learned.inputs.front_end import FrontEnd, RawChannels, Seen, interval_ends
 from poise.baselines.learned.inputs.level_frame import LevelFrame
 from poise.envs.hand.sensing import simulate_hand
 from poise.filters.core import rotation
+from poise.filters.core.estimator import run_by_steps
 from poise.filters.core.model import equations_of
-from poise.filters.core.quantity import ACCELEROMETER, GYROSCOPE
+from poise.filters.core.quantity import ACCELEROMETER, GYROSCOPE, Estimate, Measurement
 from poise.filters.registry import make
 
 RATE = 137.0
@@ -36,6 +38,25 @@ def samples() -> dict[str, np.ndarray]:
     found["imu/acc"][100:140] = np.nan
     found["imu/gyr"][200:205] = np.nan
     return found
+
+
+def seen_by_steps(front_end: FrontEnd, measurements: Mapping[str, Any]) -> Seen:
+    """A front end run sample by sample, the reference of every faster ``run``."""
+
+    class Stepped:
+        channels, outputs, dt = front_end.channels, (), front_end.dt
+
+        def init(self, measurement: Measurement) -> Any:
+            return front_end.init(measurement)
+
+        def step(self, state: Any, measurement: Measurement) -> tuple[Any, Estimate]:
+            state, seen = front_end.step(state, measurement)
+            base = {f"base {name}": values for name, values in seen.base.items()}
+            return state, Estimate({"features": seen.features, "due": seen.due, "spread": seen.spread, **base})
+
+    pose = run_by_steps(Stepped(), measurements).pose  # type: ignore[arg-type]
+    base = {name.removeprefix("base "): values for name, values in pose.items() if name.startswith("base ")}
+    return Seen(pose["features"], pose["due"], base, pose["spread"])
 
 
 @pytest.mark.parametrize("name", ENDS)
