@@ -14,6 +14,7 @@ from ....filters.core import rotation
 from ..kit import Study
 from ..rides.saddle import saddle_statistics
 from .motion import motion_statistics
+from .pedalling import pedalling
 
 LEFT_OUT = ("rest", "planar-walk", "infinity")
 """Gestures without motion, or in a plane only"""
@@ -25,7 +26,8 @@ BANDWIDTH = 27.0
 """Hz: of rides, 0.45 of the recorded 60 Hz"""
 RIDE_RATE = 100.0
 """Hz"""
-CHANNELS = ("bicycle_imu/gyr", "bicycle_imu/acc", "trunk_imu/gyr", "trunk_imu/acc", "seat/load_cells")
+PLACES = ("trunk_imu", "head_imu", "bicycle_imu")
+CHANNELS = (*(f"{site}/{kind}" for site in PLACES for kind in ("gyr", "acc")), "seat/load_cells")
 SHOWN = ("gyr_rms", "gyr_f95", "gyr_f99", "gyr_sinusoids", "force_above_2", "force_above_10", "force_f95", "force_jerk")
 """Statistics of rides in a table"""
 SHOWN_OF_HANDS = (
@@ -73,9 +75,11 @@ def ride_statistics(scenario: str, subject: int, seed: int, duration: float, fid
     ride = record_once(env, seed)
     found = {
         f"{site}/{name}": value
-        for site in ("trunk_imu", "bicycle_imu")
+        for site in PLACES
         for name, value in motion_statistics(ride, site, bandwidth=BANDWIDTH).items()
     }
+    trunk = (ride.measurements[f"trunk_imu/{kind}"] for kind in ("gyr", "acc"))
+    found |= pedalling(*trunk, 1.0 / ride.dt, ride.truth["crank/rate"][:, 0])
     return found | saddle_statistics(ride.measurements["seat/load_cells"]) | control_statistics(ride)
 
 

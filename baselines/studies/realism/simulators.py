@@ -10,10 +10,11 @@ from ..kit import Study
 from ..report import Report
 from ..rides.saddle import saddle_rows, worst_of
 from ..rides.vibration import MEASURED, levels, vibration_checks
-from .environments import BANDWIDTH, GESTURE_RATE, GESTURE_TIME, SHOWN, SHOWN_OF_HANDS, gestures, medians, rides
+from .environments import BANDWIDTH, GESTURE_RATE, GESTURE_TIME, PLACES, SHOWN, SHOWN_OF_HANDS, gestures, medians, rides
 from .motion import UNITS, motion_statistics
+from .pedalling import BESIDE, WINDOW, pedalling, pedalling_row
 from .ranges import judged
-from .roles import Recorded
+from .roles import ROLES, Recorded
 
 BUMPY = ("bumps", "pitch")
 """Scenarios in which the wheels leave the ground, or the rider is thrown: their saddle is shown, not judged"""
@@ -56,18 +57,20 @@ def ride_motion(study: Study, report: Report, count: int, groups: Sequence[Recor
     each_scenario = max(2, count // 5)
     found = rides(study, list_scenarios(), each_scenario)
     middle = {name: medians(values) for name, values in found.items()}
-    for site in ("trunk_imu", "bicycle_imu"):
+    for site in PLACES:
         columns = titled(SHOWN)
         rows = [
             {"scenario": name} | {title: values[f"{site}/{statistic}"] for statistic, title in columns.items()}
             for name, values in middle.items()
         ]
-        recordings = recorded_rows(groups, ("chest", "head"), "scenario", columns) if site == "trunk_imu" else []
+        roles = [name for name, role in ROLES.items() if role.site == site]
+        recordings = recorded_rows(groups, roles, "scenario", columns)
         report.table(
             f"Motion at {site} by scenario",
             rows + recordings,
             f"Medians over {each_scenario} rides, up to {BANDWIDTH:g} Hz, ideal sensors, the trunk's on soft tissue.",
         )
+    shaken(report, found, groups)
     report.table(
         "Trunk, against what is believable",
         [
@@ -92,6 +95,21 @@ def ride_motion(study: Study, report: Report, count: int, groups: Sequence[Recor
             }
             for name, each in middle.items()
         ],
+    )
+
+
+def shaken(report: Report, found: Mapping[str, Sequence[Mapping[str, float]]], groups: Sequence[Recorded]) -> None:
+    """What pedalling does to the trunk in every ride straight on, above the chests of recorded riders."""
+    rows = [{"ride": f"straight, {index}"} | pedalling_row(each) for index, each in enumerate(found["straight"])]
+    for group in groups:
+        if group.role == "chest":
+            for each in group.load():
+                values = pedalling(each.measurements["imu/gyr"], each.measurements["imu/acc"], 1.0 / each.dt)
+                rows.append({"ride": f"recorded: {each.name}"} | pedalling_row(values))
+    report.table(
+        "Trunk at multiples of the cadence",
+        rows,
+        f"Medians over windows of {WINDOW:g} s, ±{BESIDE:g} Hz; recordings: the cadence with the strongest lines.",
     )
 
 
