@@ -29,10 +29,10 @@ RULED = {
     "mekf": ("innovation", "acceleration"),
 }
 """Filter → rules that set one of its gains."""
-POLICIES = ("external-acceleration", "bounded-motion", "two-gyro-level")
+POLICIES = ("external-acceleration", "two-gyro-level")
 """Filters with a shipped policy."""
-LOSING = frozenset({"bounded-motion+policy", "mekf+innovation", "mekf+acceleration"})
-"""Policies and rules that lose to the plain filter on recordings."""
+LOSING = frozenset({"mekf+innovation", "mekf+acceleration"})
+"""Rules that lose to the plain filter on recordings."""
 TRAINED: dict[str, Entry] = {
     **{
         f"{name}+policy": Entry(
@@ -42,7 +42,6 @@ TRAINED: dict[str, Entry] = {
             "adaptive",
             {"weights": f"{name.replace('-', '_')}_policy"},
             name,
-            experimental=f"{name}+policy" in LOSING,
         )
         for name in POLICIES
     },

@@ -39,7 +39,7 @@ from poise.scripts.main import main  # noqa: E402
 
 README = Path(__file__).resolve().parents[1] / "README.md"
 FAST = ("external-acceleration", "mahony", "tilt")
-SHIPPED = ("gru", "external-acceleration+policy", "bounded-motion+policy")
+SHIPPED = ("gru", "external-acceleration+policy")
 
 
 def sample(channel: str, size: int, length: int) -> np.ndarray:

@@ -31,7 +31,7 @@ TRAINING_MOTIONS = HandTrajectories(
     noise_scale=(0.1, 1.0),
     duration=60.0,
 )
-"""Smooth gestures: training data of ``bounded-motion+policy``."""
+"""Smooth gestures."""
 
 VARIED_MOTIONS = MixedMotions(
     (
@@ -46,7 +46,7 @@ VARIED_MOTIONS = MixedMotions(
         FLOWN_MOTIONS,
     )
 )
-"""Smooth gestures, devices of all grades in the hand and carried, and on things that travel: training data of the other
+"""Smooth gestures, devices of all grades in the hand and carried, and on things that travel: training data of the
 policies for one sensor."""
 
 AgentName = Literal["ppo", "recurrent-ppo", "sac", "td3", "analytic"]
@@ -174,9 +174,6 @@ def shipped_config(filter: str) -> TrainingConfig:
     simulation and loses on recordings. With an oracle over the whole box of actions the filter diverges in single
     motions.
     """
-    if filter == "bounded-motion":
-        # The bias gain is not tuned: motion that resembles a bias drift is more frequent than a real one.
-        return TrainingConfig(filter=filter, gains=("process", "velocity"), warm_start_centre=(0.0, 0.0))
     if filter in ("two-gyro-level", "platform-gyro"):
         gain = "constraint" if filter == "two-gyro-level" else "measurement"
         return TrainingConfig(

@@ -34,6 +34,8 @@ class Args:
     """simulated trajectories on which the best constants are searched"""
     points: int = 32
     """constant gains that the bounds choose from"""
+    ablation: bool = False
+    """also what each policy loses without a group of its observations, and with a gain that it leaves alone"""
     seed: int = 0
     """root seed of simulated trajectories, searches and intervals"""
     runs: Path = Path("runs")
@@ -44,11 +46,13 @@ class Args:
 
 def run(args: Args) -> int:
     """Print one table a set of trajectories, and leave the errors of all in a run folder."""
+    from ...baselines.gain_policy.compared.ablation import ablation
     from ...baselines.gain_policy.compared.contenders import contenders, rows_of
-    from ...baselines.gain_policy.compared.explained import gains_by_motion
+    from ...baselines.gain_policy.compared.explained import gains_by_motion, gains_figure
     from ...baselines.gain_policy.config import shipped_config
     from ...baselines.gain_policy.constant_gains import best_constant_gains
     from ...baselines.gain_policy.policy import GainPolicy
+    from ...baselines.plots import save
     from ...baselines.weights_io import list_weights
     from ...envs.gain_reward import scored_quantity
     from ...filters.adaptation.gains import tunable_filter
@@ -94,6 +98,13 @@ def run(args: Args) -> int:
             for name, policy in policies.items():
                 explained = gains_by_motion(tuned.kalman, policy, trajectories)
                 out.table(explained, f"Factors on the variances by {name}, geometric means of {group} seconds")
+                if args.ablation:
+                    rows = ablation(tuned.kalman, policy, trajectories, constant.action)
+                    out.table(rows, f"Error of {name} without parts of it on {group} trajectories, deg")
+        for name, policy in policies.items():
+            file = folder.figures / f"{name.replace(' ', '-')}.png"
+            save(gains_figure(tuned.kalman, policy, sets), file)
+            out.say(f"factors over the motion: {file}")
         folder.write_results(results(errors, sets, quantity))
         out.say(f"errors of every trajectory: {folder.folder / 'results.csv'}")
     return 0

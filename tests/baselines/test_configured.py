@@ -183,7 +183,7 @@ def test_equations_know_the_truth_of_their_own_quantities(ride):
 def test_equations_are_found_inside_an_estimator():
     assert type(equations_of(make_estimator("two-gyro"))).__name__ == "TwoGyro"
     assert equations_of(TwoGyro()) == TwoGyro()
-    adaptive = make_estimator("bounded-motion+policy")
+    adaptive = make_estimator("external-acceleration+policy")
     assert isinstance(adaptive, AdaptiveEstimator)
     assert equations_of(adaptive) is adaptive.filter.model
     vqf = object()

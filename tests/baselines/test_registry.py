@@ -39,7 +39,7 @@ def test_every_estimator_is_what_the_list_says(name):
 
 def test_what_loses_to_its_own_filter_is_listed_on_request_only():
     everything, usual = poise.list_estimators(experimental=True), poise.list_estimators()
-    assert everything["bounded-motion+policy"].experimental
+    assert everything["mekf+innovation"].experimental
     assert set(everything) - set(usual) == {name for name, info in everything.items() if info.experimental}
 
 

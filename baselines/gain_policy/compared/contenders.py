@@ -12,6 +12,7 @@ from ....envs.gain_episode import filter_for
 from ....filters.adaptation.multiple_model import bank_of
 from ....filters.adaptation.tuned import TunedFilter
 from ....filters.support.seeds import child_seed
+from ...registry import TRAINED, make_estimator
 from ...statistics import Interval, bootstrap_interval
 from ..constant_gains import constant_errors, policy_errors
 from ..policy import GainPolicy
@@ -26,6 +27,8 @@ BANK = ("process", "measurement", "constraint")
 """Gains in which the bank of tunings differs, as far as the filter has them; two at most."""
 REFERENCE = "best constant"
 """Contender that the others are compared with."""
+OTHERS = "best constant of the other trajectories"
+"""Contender of recordings: each is scored by the constants that are best on all others (leave one out)."""
 
 
 def applicable_rules(tuned: TunedFilter) -> tuple[str, ...]:
@@ -74,7 +77,7 @@ def contenders(
     found: dict[str, Any] = {"random gains": [], "published": tried[0], REFERENCE: tried[1]}
     if leave_out and len(trajectories) > 1:
         others = (tried.sum(axis=1, keepdims=True) - tried).argmin(axis=0)
-        found["best constant of the other trajectories"] = tried[others, np.arange(len(trajectories))]
+        found[OTHERS] = tried[others, np.arange(len(trajectories))]
     rng, random = np.random.default_rng(child_seed(seed, 1)), []
     rules: dict[str, list[float]] = {name: [] for name in applicable_rules(tuned)}
     mixed: list[float] = []
@@ -101,6 +104,19 @@ def contenders(
     for name, errors in rules.items():
         found["innovation-adaptive" if name == "innovation" else f"rule: {name}"] = errors
     found["multiple model"] = mixed
+    learned = f"{tuned.name}+noise"
+    if learned in TRAINED:
+        found["learned noises"] = [
+            pose_error(
+                tuned.kalman,
+                make_estimator(learned, metadata=trajectory.metadata, dt=trajectory.dt)
+                .run(trajectory.measurements)
+                .pose,
+                trajectory,
+                quantity,
+            )
+            for trajectory in trajectories
+        ]
     for name, policy in (policies or {}).items():
         found[name] = policy_errors(tuned.kalman, policy, trajectories, quantity)
     found["hindsight constant (knows the truth)"] = tried.min(axis=0)
@@ -122,10 +138,14 @@ def improvement(errors: np.ndarray, reference: np.ndarray, seed: int = 0) -> Int
 
 
 def rows_of(found: Mapping[str, np.ndarray]) -> list[dict[str, Any]]:
-    """Table of contenders: mean, median and largest error, deg, and the improvement over the best constants."""
+    """Table of contenders: mean, median and largest error, deg, and the improvement over the best constants.
+
+    The columns of what is saved compare with the constants of training trajectories and, where they are among the
+    contenders, with those of the other trajectories.
+    """
+    references = {"saved": REFERENCE} | ({"saved of the others'": OTHERS} if OTHERS in found else {})
     rows = []
     for name, errors in found.items():
-        interval = improvement(errors, found[REFERENCE])
         known = np.degrees(errors)
         rows.append(
             {
@@ -133,7 +153,13 @@ def rows_of(found: Mapping[str, np.ndarray]) -> list[dict[str, Any]]:
                 "mean": float(known.mean()),
                 "median": float(np.median(known)),
                 "largest": float(known.max()),
-                "saved": f"{100 * interval.value:.0f} % ({100 * interval.low:.0f} to {100 * interval.high:.0f})",
+                **{column: percent(improvement(errors, found[each])) for column, each in references.items()},
             }
         )
     return rows
+
+
+def percent(interval: Interval) -> str:
+    """``25 % (4 to 37)``."""
+    value, low, high = (round(100 * number) for number in interval)
+    return f"{value} % ({low} to {high})"

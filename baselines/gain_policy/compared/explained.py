@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,10 +14,15 @@ from ....filters.core.quantity import GRAVITY
 from ..adaptive import AdaptiveEstimator
 from ..policy import GainPolicy
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 WINDOW = 1.0
 """s over which motion and gains are averaged."""
 SHARES = 5
 """Parts of equal size that the windows are sorted into, by each number of the motion."""
+BINS = 12
+"""Likewise in the figure."""
 
 
 def motion_numbers(trajectory: Trajectory) -> dict[str, np.ndarray]:
@@ -37,10 +42,10 @@ def motion_numbers(trajectory: Trajectory) -> dict[str, np.ndarray]:
     return found
 
 
-def gains_by_motion(
+def windows_of(
     kalman: KalmanFilter, policy: GainPolicy, trajectories: Sequence[Trajectory]
-) -> list[dict[str, Any]]:
-    """Rows: for each gain and number of the motion, the factor on the variance where the number is small and large.
+) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
+    """Means over windows of :data:`WINDOW`: name → numbers of the motion ``(n,)``, and gain → log factors ``(n,)``.
 
     Args:
         kalman: the filter.
@@ -55,14 +60,28 @@ def gains_by_motion(
         span = max(1, round(WINDOW / trajectory.dt))
         count = len(trajectory) // span
         for name, values in motion_numbers(trajectory).items():
-            numbers.setdefault(name, []).append(np.nanmean(values[: count * span].reshape(count, span), axis=1))
+            windows = values[: count * span].reshape(count, span)
+            known = np.isfinite(windows)
+            sums = np.where(known, windows, 0.0).sum(axis=1)
+            means = np.divide(sums, known.sum(axis=1), out=np.full(count, np.nan), where=known.any(axis=1))
+            numbers.setdefault(name, []).append(means)
         for name, values in estimator.tuned.gains(actions).items():
             factors.setdefault(name, []).append(values[: count * span].reshape(count, span).mean(axis=1))
+    joined = [{name: np.concatenate(parts) for name, parts in each.items()} for each in (numbers, factors)]
+    return joined[0], joined[1]
+
+
+def gains_by_motion(
+    kalman: KalmanFilter, policy: GainPolicy, trajectories: Sequence[Trajectory]
+) -> list[dict[str, Any]]:
+    """Rows: for each gain and number of the motion, the factor on the variance where the number is small and large.
+
+    Arguments as of :func:`windows_of`.
+    """
+    numbers, factors = windows_of(kalman, policy, trajectories)
     rows = []
-    for gain, logs in factors.items():
-        log = np.concatenate(logs)
-        for name, parts in numbers.items():
-            number = np.concatenate(parts)
+    for gain, log in factors.items():
+        for name, number in numbers.items():
             known = np.isfinite(number)
             order = np.argsort(number[known], kind="stable")
             groups = np.array_split(order, SHARES)
@@ -81,3 +100,34 @@ def gains_by_motion(
                 }
             )
     return rows
+
+
+def gains_figure(kalman: KalmanFilter, policy: GainPolicy, sets: Mapping[str, Sequence[Trajectory]]) -> Figure:
+    """Factors on the variances over the numbers of the motion: medians and middle halves of the windows of each set.
+
+    Args:
+        kalman: the filter.
+        policy: sets its gains.
+        sets: name → trajectories with the same sensors.
+    """
+    from ...plots import legend_above, new_figure
+
+    found = {group: windows_of(kalman, policy, trajectories) for group, trajectories in sets.items()}
+    numbers, factors = next(iter(found.values()))
+    figure, axes = new_figure(3.2 * len(numbers), 1.6 + 1.7 * len(factors), rows=len(factors), columns=len(numbers))
+    panels = [(gain, name) for gain in factors for name in numbers]
+    for ax, (gain, name) in zip(axes, panels, strict=True):
+        for group, (moving, set_to) in found.items():
+            number, log = moving[name], set_to[gain]
+            order = np.argsort(np.where(np.isfinite(number), number, np.inf), kind="stable")
+            known = np.count_nonzero(np.isfinite(number))
+            parts = np.array_split(order[:known], min(BINS, known))
+            quartiles = np.exp([np.percentile(log[part], [25, 50, 75]) for part in parts])
+            middle = [np.median(number[part]) for part in parts]
+            (line,) = ax.plot(middle, quartiles[:, 1], label=group)
+            ax.fill_between(middle, quartiles[:, 0], quartiles[:, 2], color=line.get_color(), alpha=0.2, lw=0.0)
+        ax.set(xscale="log", yscale="log", ylabel=f"factor on {gain}")
+        if gain == list(factors)[-1]:
+            ax.set_xlabel(name)
+    legend_above(axes[0])
+    return figure

@@ -77,9 +77,8 @@ def test_what_does_not_fit_is_refused(tuned, tmp_path):
 def test_running_a_policy_needs_neither_torch_nor_stable_baselines():
     code = (
         "import sys, poise, numpy as np\n"
-        "for name in ('external-acceleration+policy', 'bounded-motion+policy'):\n"
-        "    estimator = poise.make_estimator(name, dt=0.01)\n"
-        "    poise.run(estimator, {'imu/gyr': np.zeros((50, 3)), 'imu/acc': np.tile([0, 0, 9.8], (50, 1))}, dt=0.01)\n"
+        "estimator = poise.make_estimator('external-acceleration+policy', dt=0.01)\n"
+        "poise.run(estimator, {'imu/gyr': np.zeros((50, 3)), 'imu/acc': np.tile([0, 0, 9.8], (50, 1))}, dt=0.01)\n"
         "print([name for name in ('torch', 'stable_baselines3', 'pybullet', 'pickle5') if name in sys.modules])"
     )
     out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout

@@ -73,7 +73,7 @@ def test_what_is_no_network_of_this_package_is_refused(tmp_path: Path) -> None:
     with pytest.raises(FileNotFoundError, match="no weights 'grue'"):
         export_onnx("grue", tmp_path / "a.onnx")
     with pytest.raises(ValueError, match="names no network"):
-        export_onnx("bounded_motion_policy", tmp_path / "a.onnx")
+        export_onnx("external_acceleration_policy", tmp_path / "a.onnx")
     foreign = save_weights(tmp_path / "foreign", {"a": np.ones(3)}, {"network": "torch"})
     with pytest.raises(ValueError, match="kind of network"):
         export_onnx(foreign, tmp_path / "a.onnx")

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from poise.baselines.gain_policy.compared.contenders import REFERENCE, contenders, improvement, rows_of
-from poise.baselines.gain_policy.compared.explained import gains_by_motion
+from poise.baselines.gain_policy.compared.contenders import OTHERS, REFERENCE, contenders, improvement, rows_of
+from poise.baselines.gain_policy.compared.explained import gains_by_motion, gains_figure
 from poise.baselines.gain_policy.compared.oracles import schedule_error, windowed_oracle
 from poise.baselines.gain_policy.constant_gains import constant_errors
 from poise.baselines.gain_policy.policy import GainPolicy
@@ -30,13 +30,15 @@ def found(motions):
 def test_contenders_are_measured_alike(found, motions):
     np.testing.assert_allclose(found["policy"], found["published"], rtol=1e-9)
     np.testing.assert_allclose(found[REFERENCE], constant_errors(TUNED, motions, np.array([0.3, 0.4])))
-    assert {"random gains", "innovation-adaptive", "rule: acceleration", "multiple model"} <= set(found)
+    assert {"random gains", "innovation-adaptive", "rule: acceleration", "multiple model", "learned noises"} <= set(
+        found
+    )
     assert all(errors.shape == (3,) and np.isfinite(errors).all() for errors in found.values())
 
 
 def test_bounds_are_bounds(found):
     hindsight = found["hindsight constant (knows the truth)"]
-    for name in ("published", REFERENCE, "best constant of the other trajectories"):
+    for name in ("published", REFERENCE, OTHERS):
         assert (hindsight <= found[name] + 1e-12).all()
     # on the same errors, the oracle of another draw is the oracle itself
     oracle = found["oracle of windows (knows the truth)"]
@@ -60,6 +62,8 @@ def test_what_is_saved_has_an_interval():
     rows = rows_of({REFERENCE: reference, "other": 0.5 * reference})
     assert rows[0]["saved"] == "0 % (0 to 0)"
     assert rows[1]["saved"] == "50 % (50 to 50)"
+    rows = rows_of({REFERENCE: reference, OTHERS: 0.5 * reference})
+    assert [row["saved of the others'"] for row in rows] == ["-100 % (-100 to -100)", "0 % (0 to 0)"]
 
 
 def test_a_policy_is_explained_by_its_factors(motions):
@@ -71,3 +75,12 @@ def test_a_policy_is_explained_by_its_factors(motions):
         wanted = largest if row["gain"] == "measurement" else 1.0
         assert row["factor here"] == pytest.approx(wanted)
         assert row["of the lowest fifth"] <= row["of the highest fifth"]
+
+
+def test_the_figure_shows_every_gain_over_every_number(motions):
+    constant = GainPolicy.constant(TUNED, np.array([0.0, 1.0]))
+    figure = gains_figure(TUNED.kalman, constant, {"one": motions, "two": motions[:2]})
+    assert len(figure.axes) == 4
+    line = figure.axes[2].lines[0]
+    np.testing.assert_allclose(line.get_ydata(), np.exp(TUNED.ranges[1].upper))
+    assert len(figure.axes[0].lines) == 2
