@@ -280,7 +280,7 @@ def train_analytically(
         generator.bit_generator.state = json.loads(state["generator"])
         told, least = state["told"], state["least"]
         if state["best"] is not None:
-            best = replace(GainPolicy.neutral(tuned), layers=[(weight, bias) for weight, bias in state["best"]])
+            best = replace(GainPolicy.neutral(tuned), layers=tuple((a, b) for a, b in state["best"]))
         for epoch, (cost, unseen_cost) in enumerate(told):
             if report is not None:
                 report(epoch, cost, unseen_cost)

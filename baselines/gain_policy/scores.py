@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from ...envs.data.trajectory import Trajectory
 from ...envs.gain_env import GainTuningEnv
 from ...envs.gain_episode import filter_for
 from ...envs.gain_reward import errors_of, true_values
@@ -15,6 +17,8 @@ from ...filters.support.names import look_up
 from ...filters.support.seeds import child_seed
 from .constant_gains import best_constant_gains, constant_errors
 
+REPLAY = "poise/ReplayGain-v0"
+"""Its episodes are recordings, so its scores depend on them."""
 EPISODES, POINTS, SEED = 24, 64, 0
 """Episodes of each split, constant actions that the oracle chooses from, and root seed of the shipped table."""
 
@@ -25,7 +29,7 @@ class ReferenceScores(NamedTuple):
     Attributes:
         random: uniform actions.
         neutral: the published gains.
-        constant: the best constant gains of other episodes.
+        constant: the best constant gains of other episodes; of recordings, those of all other recordings.
         oracle: the best of :data:`POINTS` constant actions on each episode, which needs the truth.
     """
 
@@ -41,18 +45,27 @@ SCORES: dict[str, ReferenceScores] = {
 }
 """Id with its default arguments → reference scores, as :func:`reference_scores` gives them."""
 
+RECORDED: dict[str, ReferenceScores] = {
+    "broad": ReferenceScores(random=4.05, neutral=4.046, constant=3.787, oracle=3.785),
+    "repoimu": ReferenceScores(random=1.405, neutral=1.404, constant=1.235, oracle=1.217),
+    "smartphones": ReferenceScores(random=2.635, neutral=2.637, constant=2.536, oracle=2.4),
+}
+"""Recordings that ``poise/ReplayGain-v0`` runs over → reference scores: 10 trials of BROAD, 4 of RepoIMU, 6 of carried
+phones, those of the other tables."""
 
-def normalized_score(identity: str, error: float) -> float:
+
+def normalized_score(identity: str, error: float, data: str | None = None) -> float:
     """Score of an agent: 0 as the published gains, 1 as the oracle; negative where it is worse than the former.
 
     Args:
         identity: of a gain environment with its default arguments.
         error: mean over test episodes (:func:`episodes_of`, split 1) of the root mean square error, deg.
+        data: of ``poise/ReplayGain-v0``: the recordings, a name in :data:`RECORDED`.
 
     Raises:
-        ValueError: an id without reference scores, or an error that is negative or not finite.
+        ValueError: an id or recordings without reference scores, or an error that is negative or not finite.
     """
-    scores = look_up("id", identity, SCORES)
+    scores = look_up("data set", data or "", RECORDED) if identity == REPLAY else look_up("id", identity, SCORES)
     if not 0.0 <= error < np.inf:
         raise ValueError(f"error must be 0 deg or more, got {error}")
     return (scores.neutral - error) / (scores.neutral - scores.oracle)
@@ -76,7 +89,13 @@ def episodes_of(identity: str, split: int, count: int = EPISODES, seed: int = SE
         env.close()
 
 
-def reference_scores(identity: str, count: int = EPISODES, points: int = POINTS, seed: int = SEED) -> ReferenceScores:
+def reference_scores(
+    identity: str,
+    count: int = EPISODES,
+    points: int = POINTS,
+    seed: int = SEED,
+    recordings: Sequence[Trajectory] | None = None,
+) -> ReferenceScores:
     """Compute the reference scores of a gain environment with its default arguments.
 
     Args:
@@ -84,15 +103,27 @@ def reference_scores(identity: str, count: int = EPISODES, points: int = POINTS,
         count: episodes of each split.
         points: constant actions of the search and of the oracle.
         seed: root seed.
+        recordings: of ``poise/ReplayGain-v0``, two or more: each is a test episode whose constants are the best of the
+            points on all others.
     """
     from scipy.signal import lfilter
 
     env: Any = make_environment(identity).unwrapped
     tuned, quantity = env.tuned, env.quantities[0].name
-    train, test = (episodes_of(identity, split, count, seed) for split in (0, 1))
-    found = best_constant_gains(tuned, train, quantity=quantity, samples=points, refinements=points // 2, seed=seed)
-    neutral, constant = (constant_errors(tuned, test, a, quantity) for a in (np.zeros(tuned.actions), found.action))
-    tried = [constant_errors(tuned, test, action, quantity) for action in found.tried[: points + 1]]
+    if recordings is None:
+        train, test = (episodes_of(identity, split, count, seed) for split in (0, 1))
+    else:
+        train = test = [each.on_grid() for each in recordings]
+    refinements = 0 if recordings is not None else points // 2
+    found = best_constant_gains(tuned, train, quantity=quantity, samples=points, refinements=refinements, seed=seed)
+    if recordings is None:
+        constant = constant_errors(tuned, test, found.action, quantity)
+        tried = np.stack([constant_errors(tuned, test, action, quantity) for action in found.tried[: points + 1]])
+    else:
+        tried = found.scores
+        others = (tried.sum(axis=1, keepdims=True) - tried).argmin(axis=0)
+        constant = tried[others, np.arange(len(test))]
+    neutral = tried[0]
     rng, random = np.random.default_rng(child_seed(seed, 2)), []
     for trajectory in test:
         kalman = filter_for(tuned.kalman, trajectory)

@@ -166,9 +166,10 @@ def bound(values: np.ndarray) -> str:
 
 def reference_table(identity: str) -> str | None:
     """Errors of reference policies in Markdown; None where an environment has none."""
-    from ...baselines.gain_policy.scores import SCORES, normalized_score
+    from ...baselines.gain_policy.scores import RECORDED, REPLAY, SCORES, normalized_score
 
-    if identity not in SCORES:
+    sets = dict(RECORDED) if identity == REPLAY else {None: SCORES[identity]} if identity in SCORES else {}
+    if not sets:
         return None
     meanings = {
         "random": "actions drawn evenly",
@@ -176,13 +177,17 @@ def reference_table(identity: str) -> str | None:
         "constant": "the best constant gains of the training episodes",
         "oracle": "the best constant gains of each test episode, chosen with the truth known",
     }
+    if identity == REPLAY:
+        meanings["constant"] = "the best constant gains of all other recordings"
     rows = [
-        {"policy": meaning, "error (deg)": getattr(SCORES[identity], name), "score": score}
+        {**({"data": data} if data else {}), "policy": meaning, "error (deg)": error, "score": score}
+        for data, scores in sets.items()
         for name, meaning in meanings.items()
-        for score in [round(normalized_score(identity, getattr(SCORES[identity], name)), 3)]
+        for error in [getattr(scores, name)]
+        for score in [round(normalized_score(identity, error, data), 3)]
     ]
     said = (
         "Mean over test episodes of the RMS error with the default arguments, and "
-        f'`poise.normalized_score("{identity}", error)`:'
+        f'`poise.normalized_score("{identity}", error{", data" if identity == REPLAY else ""})`:'
     )
     return f"{said}\n\n{markdown_table(rows)}"

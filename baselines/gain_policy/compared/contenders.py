@@ -12,7 +12,8 @@ from ....envs.gain_episode import filter_for
 from ....filters.adaptation.multiple_model import bank_of
 from ....filters.adaptation.tuned import TunedFilter
 from ....filters.support.seeds import child_seed
-from ...registry import TRAINED, make_estimator
+from ...registry import TRAINED
+from ...run import fitted, run_on
 from ...statistics import Interval, bootstrap_interval
 from ..constant_gains import constant_errors, policy_errors
 from ..policy import GainPolicy
@@ -106,16 +107,10 @@ def contenders(
     found["multiple model"] = mixed
     learned = f"{tuned.name}+noise"
     if learned in TRAINED:
+        poses = [run_on(fitted(learned, trajectory), trajectory).pose for trajectory in trajectories]
         found["learned noises"] = [
-            pose_error(
-                tuned.kalman,
-                make_estimator(learned, metadata=trajectory.metadata, dt=trajectory.dt)
-                .run(trajectory.measurements)
-                .pose,
-                trajectory,
-                quantity,
-            )
-            for trajectory in trajectories
+            pose_error(tuned.kalman, pose, trajectory, quantity)
+            for pose, trajectory in zip(poses, trajectories, strict=True)
         ]
     for name, policy in (policies or {}).items():
         found[name] = policy_errors(tuned.kalman, policy, trajectories, quantity)

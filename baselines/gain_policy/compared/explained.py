@@ -120,7 +120,7 @@ def gains_figure(kalman: KalmanFilter, policy: GainPolicy, sets: Mapping[str, Se
         for group, (moving, set_to) in found.items():
             number, log = moving[name], set_to[gain]
             order = np.argsort(np.where(np.isfinite(number), number, np.inf), kind="stable")
-            known = np.count_nonzero(np.isfinite(number))
+            known = int(np.count_nonzero(np.isfinite(number)))
             parts = np.array_split(order[:known], min(BINS, known))
             quartiles = np.exp([np.percentile(log[part], [25, 50, 75]) for part in parts])
             middle = [np.median(number[part]) for part in parts]

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 import poise
-from poise.baselines.gain_policy.scores import SCORES, episodes_of, reference_scores
+from poise.baselines.gain_policy.scores import RECORDED, REPLAY, SCORES, episodes_of, reference_scores
+from poise.envs.hand.trajectories import HandTrajectories
 
 HAND = "poise/HandMotionGain-v0"
 
@@ -27,6 +28,23 @@ def test_they_are_measured_on_episodes_of_their_own():
     wanted = plain[plain.metric == "inclination"].value.mean()
     assert scores.neutral == pytest.approx(wanted, abs=6e-4)
     assert scores.oracle <= scores.neutral
+
+
+def test_recordings_are_scored_by_the_constants_of_all_others():
+    recordings = HandTrajectories(duration=5.0).draw_many(2, 3)
+    scores = reference_scores(REPLAY, points=4, recordings=recordings)
+    assert scores.oracle <= min(scores.neutral, scores.constant)
+    for data, known in RECORDED.items():
+        assert poise.normalized_score(REPLAY, known.neutral, data) == 0.0
+        assert (
+            0.0
+            < poise.normalized_score(REPLAY, known.constant, data)
+            <= poise.normalized_score(REPLAY, known.oracle, data)
+        )
+    with pytest.raises(ValueError, match="unknown data set 'broaad', did you mean 'broad'"):
+        poise.normalized_score(REPLAY, 1.0, "broaad")
+    with pytest.raises(ValueError, match="unknown data set ''"):
+        poise.normalized_score(REPLAY, 1.0)
 
 
 def test_wrong_arguments_are_explained():
