@@ -18,9 +18,9 @@ from .report import Report
 
 TITLE = "Coverage"
 """Title of the table in every report, and name of its file ``tables/coverage.csv``."""
-REPRODUCED, DIFFERS, IMPOSSIBLE = "reproduced", "differs", "cannot be answered"
+REPRODUCED, CORRECTED, DIFFERS, IMPOSSIBLE = "reproduced", "reproduced as corrected", "differs", "cannot be answered"
 UNDECIDED, ABSENT = "undecided in this run", "not in this run"
-VERDICTS = (REPRODUCED, DIFFERS, IMPOSSIBLE, UNDECIDED, ABSENT)
+VERDICTS = (REPRODUCED, CORRECTED, DIFFERS, IMPOSSIBLE, UNDECIDED, ABSENT)
 COLUMNS = ("item", "content", "verdict", "what decides", "shown in")
 Decided = tuple[str, str]
 """Beginnings of the title of a table of claims and of a statement in it."""
@@ -38,6 +38,8 @@ class Item:
     """beginnings of titles of the report's entries that show it"""
     decided: tuple[Decided, ...] = ()
     """claims that say what the item says; it is reproduced if all hold"""
+    corrected: tuple[Decided, ...] = ()
+    """claims that say it of the corrected equations; if all hold, a misprint is all that is between work and run"""
     causes: tuple[Decided, ...] = ()
     """claims that explain a difference; those that hold are printed where the item differs"""
     because: str = ""
@@ -53,13 +55,19 @@ def verdict(item: Item, report: Report) -> dict[str, str]:
     titles = [entry.title for entry in report.entries]
     shown = [next((title for title in titles if title.startswith(start)), None) for start in item.shown]
     found = [claim for key in item.decided for claim in claims_of(report, key)]
-    missing = any(title is None for title in shown) or any(not claims_of(report, key) for key in item.decided)
+    missing = any(title is None for title in shown) or any(
+        not claims_of(report, key) for key in (*item.decided, *item.corrected)
+    )
     failed = [claim for claim in found if claim.holds is False]
     reasons = [item.because] if item.because else []
     if not (item.shown or item.decided):
         result = IMPOSSIBLE
+    elif missing and item.corrected:
+        result = ABSENT
     elif failed:
-        result = DIFFERS
+        mended = [claim for key in item.corrected for claim in claims_of(report, key)]
+        result = CORRECTED if mended and all(claim.holds for claim in mended) else DIFFERS
+        failed += mended
         causes = [claim for key in item.causes for claim in claims_of(report, key) if claim.holds]
         reasons = [*map(said, failed), *(f"because: {said(claim)}" for claim in causes), *reasons]
     elif missing:
@@ -121,6 +129,7 @@ def page(works: Mapping[str, Sequence[Mapping[str, Any]]], provenance: str) -> s
         "# Coverage of the five works",
         "Each table, figure and statement of the five works, with the verdict of a run.",
         "* *Reproduced*: the run shows it, and every claim that decides it holds.\n"
+        "* *Reproduced as corrected*: not with the equations as published, but with their misprints corrected.\n"
         "* *Differs*: a claim does not hold. Its number follows, then the cause, as a claim where a run measures it.\n"
         "* *Cannot be answered*: a simulator has no counterpart.",
         f"{len(every)} items: {counted(every)}. The page is written by `poise reproduce all --page FILE`.",

@@ -84,9 +84,17 @@ def with_band(
     ax.plot(time, np.stack([-band, band], axis=-1), color=color, linewidth=0.6, alpha=0.6)
 
 
-def errors_over_time(results: Sequence[Mapping[str, Any]], angle: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Time (s), and mean and standard deviation of an error over all rides (deg), as far as the shortest ride goes."""
-    curves = [each["over time"][angle] for each in results]
+def errors_over_time(
+    results: Sequence[Mapping[str, Any]], angle: str, method: str | None = None
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Time (s), and mean and standard deviation of an error over all rides (deg), as far as the shortest ride goes.
+
+    Args:
+        results: of :meth:`.RideStudy.run`.
+        angle: which.
+        method: which of those that were followed; None for the study's first.
+    """
+    curves = [each["over time"][method or next(iter(each["over time"]))][angle] for each in results]
     length = min(map(len, curves))
     values = np.array([curve[:length] for curve in curves])
     deviation = values.std(axis=0, ddof=1) if len(values) > 1 else np.full(length, np.nan)
@@ -122,3 +130,18 @@ def spread_claims(results: Sequence[Mapping[str, Any]], angles: Sequence[str], f
         Claim.every(f"{figure}: errors are around zero (mean below their standard deviation)", centred, 1.0, "of it"),
         Claim.every(f"{figure}: standard deviations do not grow from the first to the second half", growth, 1.5, "×"),
     ]
+
+
+def offset_shares(results: Sequence[Mapping[str, Any]], angles: Sequence[str], method: str) -> tuple[str, float, float]:
+    """The angle whose mean error is largest beside its deviation, and that mean (deg) of the first and of a method."""
+
+    def offset(angle: str, name: str | None = None) -> tuple[float, float]:
+        time, mean, deviation = errors_over_time(results, angle, name)
+        known = (time >= SETTLED) & np.isfinite(mean) & np.isfinite(deviation)
+        if not known.any():
+            return float("nan"), float("nan")
+        return float(abs(mean[known].mean())), float(np.sqrt(np.mean(deviation[known] ** 2)))
+
+    sizes = {angle: offset(angle) for angle in angles}
+    worst = max(sizes, key=lambda angle: np.nan_to_num(np.divide(*sizes[angle])))
+    return worst, sizes[worst][0], offset(worst, method)[0]

@@ -21,6 +21,7 @@ from .averages import circular_mean, largest, mean_of, mean_rms, rounded, window
 from .claims import Claim
 from .kit import Study, load_ride
 from .report import STD, Report
+from .yaw import yaw_claim, yaw_drift
 
 SETTLED = 10.0
 """s: errors count from here, when a filter has forgotten its start"""
@@ -83,6 +84,7 @@ class RideStudy:
         tabled: methods in that table.
         comparisons: what is claimed of every course.
         drawn: methods in the figure of a ride; the last sets the scale.
+        followed: further methods whose errors over time are kept, to find what the errors of the first come from.
         windows: time → named spans in which errors are averaged, ``settled`` among them.
         prepare: cuts or completes a ride before it is used.
         extra: further numbers of a ride, from the ride and the estimates of its variants; ``bound`` (angle → deg, RMS
@@ -105,6 +107,7 @@ class RideStudy:
     tabled: Sequence[str]
     comparisons: Sequence[Less]
     drawn: Sequence[str]
+    followed: Sequence[str] = ()
     sampled: str | None = None
     windows: Callable[[np.ndarray], dict[str, tuple[float, float]]] = whole_ride
     prepare: Callable[[Trajectory], Trajectory] | None = None
@@ -155,8 +158,9 @@ class RideStudy:
         Returns:
             ``name``, ``subject``, ``ended``, ``length`` (s); ``rms`` and ``peak`` (method → window → angle → deg) of
             variants, ablations and baselines; ``consistency`` (variant → statistic → value a degree of freedom);
-            ``nees`` of each angle that is a state, and ``over time``, its errors (deg) every :data:`SPACING` s, both of
-            the first variant; and what ``extra`` gives.
+            ``nees`` of each angle that is a state, of the first variant; ``over time``, errors (deg) every
+            :data:`SPACING` s of the first variant and of those that are ``followed``; ``yaw`` (:func:`.yaw_drift`);
+            and what ``extra`` gives.
         """
         truth, spans = self.truth(ride.truth), self.windows(ride.time)
         estimates = {name: self.estimate(ride, variant) for name, variant in self.variants.items()}
@@ -179,7 +183,11 @@ class RideStudy:
         }
         first = next(iter(self.variants))
         every = max(1, round(SPACING / ride.dt))
-        found["over time"] = {angle: error[::every].tolist() for angle, error in errors[first].items()}
+        found["over time"] = {
+            name: {angle: error[::every].tolist() for angle, error in errors[name].items()}
+            for name in (first, *self.followed)
+        }
+        found["yaw"] = yaw_drift(ride, estimates[first].pose["bicycle/roll"][:, 0])
         found["nees"] = {
             angle: self.normalised(ride, estimates[first], errors[first], [angle]) for angle in self.states
         }
@@ -294,7 +302,11 @@ class RideStudy:
         for name in self.checked:
             for statistic, value in mean_of(each["consistency"][name] for each in results).items():
                 found.append(Claim.within(f"{name}: {statistic} is right within a factor of two", value, 0.5, 2.0))
-        return found
+        bound = mean_of(each.get("bound", {}) for each in results)
+        shares = {angle: limit / ours[angle] for angle, limit in bound.items()}
+        if shares:
+            found.append(Claim.every("No error lies below its bound by more than 5 %", shares, 1.05, "of the error"))
+        return [*found, yaw_claim(results)]
 
     def results(self, results: Iterable[dict[str, Any]]) -> list[dict[str, Any]]:
         """Rows of ``results.csv``: RMS error of every method and angle on every ride."""

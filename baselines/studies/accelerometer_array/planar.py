@@ -244,6 +244,14 @@ def likenesses(rows: list[Row]) -> list[Claim]:
                 factor=0.5,
             ),
         ]
+    own, published = (
+        mean_of(rows, "rate", motion="infinity", method=method)
+        for method in (POSE, "complete pose, thesis, published H")
+    )
+    found.append(
+        Claim.less("infinity: with H as published, (3.45), ω is poor, above 0.3 rad/s", 0.3, published, "rad/s")
+    )
+    found.append(Claim.less("infinity: (3.45) is what makes it poor", own, published, "rad/s", factor=0.5))
     walk = {method: mean_of(rows, "rms", motion="planar-walk", method=method) for method in METHODS}
     averaged = walk["mean, literal"] / walk["tilt"]
     linear = max(values_of(rows, "largest", motion="planar-walk", method=LITERAL))

@@ -364,6 +364,7 @@ def _inclined(study: Study, report: Report, roots: list[int], duration: float) -
     pitch = {method: mean_of(steep, "pitch", method=method) for method in STEEP_METHODS}
     (closed, late), (opened, _), (_, first_order) = starts.values()
     beyond = 100.0 * shares["tilt sensor, beyond the arcsine"]
+    proposed = 100.0 * shares[f"{PROPOSED}, beyond the arctangent"]
     report.claims(
         "Chapter 5, beyond the figures: what holds here",
         [
@@ -371,6 +372,7 @@ def _inclined(study: Study, report: Report, roots: list[int], duration: float) -
             Claim.less("An open prior halves the error of a wrong start within 20 s", opened, closed, factor=0.5),
             Claim.less("A closed prior forgets it within 60 s (below 2°)", late, 2.0),
             Claim.less("In first order an open prior recovers too (below 2°)", first_order, 2.0),
+            Claim.less("(5.63): errors of pitch of the proposed method lie in the cone", proposed, 1.0, "% beyond"),
             Claim.within("(5.63) as arcsine bounds the tilt method's error of pitch", beyond, 0.0, 0.0, "% beyond"),
         ],
     )

@@ -13,6 +13,7 @@ from .calibration import calibration
 from .comparison import comparison
 from .experiment import experiment
 from .items import ITEMS
+from .orientation_bounds import orientation_bounds
 from .planar import planar
 from .planar_figures import planar_pictures
 from .rate import angular_rates
@@ -39,6 +40,7 @@ def reproduce(study: Study, report: Report) -> None:
     calibration(study, report)
     rate_table(study, report)
     experiment(study, report, spatial(study, report))
+    orientation_bounds(study, report)
     virtual(study, report)
     comparison(study, report)
     cover(report, ITEMS)

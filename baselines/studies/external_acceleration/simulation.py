@@ -30,6 +30,9 @@ MISALIGNMENT = np.radians(1.6)
 
 MODES: tuple[Literal[1, 2, 3], ...] = (1, 2, 3)
 
+SENSORS = "paper-hand"
+"""Preset of the simulated sensor."""
+
 RATE = 100.0
 """Samples a second, as in the paper."""
 
@@ -82,7 +85,7 @@ def simulate(
         gesture = replace(config, mean_acceleration=mean, peak_acceleration=peak).draw(motion, duration)
         times = np.arange(round(gesture.duration * RATE) + 1) / RATE
         bodies = gesture.sample(np.minimum(times, gesture.duration))
-        suite = imu_suite("paper-hand", RATE, sampling="instant")
+        suite = imu_suite(SENSORS, RATE, sampling="instant")
         suite.reset(noise)
         measurements = suite.simulate(bodies).measurements
         turn = mounting.normal(0.0, MISALIGNMENT, 3) if misalignment is None else np.array([*misalignment, 0.0])

@@ -11,7 +11,7 @@ from .items import ITEMS
 from .observability import observability
 from .offsets import offsets
 from .parameters import table_i
-from .rides import rides
+from .rides import lively, rides
 from .simulation import simulations
 
 
@@ -24,6 +24,7 @@ def reproduce(study: Study, report: Report) -> None:
     )
     table_i(report)
     rides(study, report)
+    lively(study, report)
     simulations(study, report)
     offsets(study, report)
     observability(study, report)

@@ -42,6 +42,7 @@ SETTINGS = {
     ),
 }
 """Settings of figure 4(c), which hold the paper's claim or not."""
+UNSEEN = "unobservable"
 Model = Literal["sigma1", "sigma2"]
 NAMES: dict[str, Model] = {"Σ2": "sigma2", "Σ1": "sigma1"}
 
@@ -194,9 +195,10 @@ def observability(study: Study, report: Report) -> None:
                 "rank": seen.rank(),
                 "other": other,
                 "of": equations.error_size,
-                "σ of φ without prior, deg": round(float(deviation), 2) if np.isfinite(deviation) else "unobservable",
+                "σ of φ without prior, deg": round(float(deviation), 2) if np.isfinite(deviation) else UNSEEN,
             }
         )
+    claims += rank_claims(rows)
     report.table(
         "Rank along a trajectory",
         rows,
@@ -209,3 +211,22 @@ def observability(study: Study, report: Report) -> None:
         "What the published gradients miss is a common rate about the vertical in both gyroscopes, δb_z^p = 1 with "
         "δb^h = R_PHᵀ [0, tan φ, 1], not the roll.",
     )
+
+
+def rank_claims(rows: Sequence[dict[str, Any]]) -> list[Claim]:
+    """What section IV-A says of Σ1, and of Σ2 with and without a yaw rate."""
+
+    def said(statement: str, model: str, start: str, whole: bool) -> Claim:
+        part = [row for row in rows if row["model"] == model and row["motion"].startswith(start)]
+        part = [row for row in part if whole or start or not row["motion"].startswith("nothing")]
+        unseen = [row["σ of φ without prior, deg"] == UNSEEN for row in part]
+        ranks = ", ".join(f"{row['rank']} of {row['of']}" for row in part)
+        holds = all(row["rank"] == row["of"] for row in part) if whole else all(unseen)
+        return Claim(statement, f"rank {ranks}", holds)
+
+    return [
+        said("Σ2 observes every state while body and yaw rate move", "Σ2", "moving body, varying", True),
+        said("Σ2 observes every state with a sinusoidal yaw rate", "Σ2", "moving body, sinusoidal", True),
+        said("Without a yaw rate Σ2 does not observe φ", "Σ2", "moving body, no yaw", False),
+        said("Σ1 never observes φ", "Σ1", "moving body", False),
+    ]

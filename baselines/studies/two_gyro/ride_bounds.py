@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from ....envs.data.trajectory import Trajectory
-from ....filters.analysis.bounds import Linearisation, linearise, measured, posterior_bound, riccati, with_gaps
+from ....filters.analysis.bounds import posterior_bound, with_gaps
+from ....filters.analysis.lasting_errors import Lasting, lasting_bound
 from ....filters.bicycle.geometry import RiderGeometry
 from ....filters.bicycle.two_gyro.filter import TwoGyro
-from ....filters.bicycle.two_gyro.kinematics import body_rate_matrix
 from ....filters.bicycle.two_gyro.truth import true_angles, true_states
 from ....filters.core import rotation
 from ....filters.core.kalman import KalmanFilter
@@ -48,7 +49,7 @@ def bounds_of_ride(study: RideStudy, ride: Trajectory) -> dict[str, Any]:
     states = true_states(orientations, model)
     covariances = {
         "white": posterior_bound(model, states, exact)[:, :4, :4],
-        "lasting": with_alignment(model, states, exact)[:, :4, :4],
+        "lasting": with_alignment(model, orientations, exact)[:, :4, :4],
     }
     mean = {
         name: np.mean(np.diagonal(P, axis1=1, axis2=2)[settled], axis=0) / DEG**2 for name, P in covariances.items()
@@ -76,25 +77,26 @@ def bounds_of_ride(study: RideStudy, ride: Trajectory) -> dict[str, Any]:
     }
 
 
-def with_alignment(model: TwoGyro, states: np.ndarray, exact: dict[str, np.ndarray]) -> np.ndarray:
-    """Bound ``(T, e + 6, e + 6)`` where the marker's alignment is unknown: a constant and a drifting rotation.
+def with_alignment(model: TwoGyro, truth: Mapping[str, np.ndarray], exact: dict[str, np.ndarray]) -> np.ndarray:
+    """Bound ``(T, e, e)`` where the marker's alignment is unknown: a constant and a drifting rotation.
 
-    A small rotation δ of the marker about the body's axes moves the measured angles by A(θ) δ, as (11) says of rates.
     θ is not known before the first frame, whose error it then shares.
     """
-    F, Q, H, R, usable = linearise(model, states, exact)
-    size, kept = model.error_size, np.exp(-model.dt / DRIFT_TIME)
-    A = body_rate_matrix(states[:, 1:4])
-    H = np.concatenate([H, A, A], axis=-1)
+    camera = CAMERA[0]
+    errors = (
+        Lasting((CONSTANT,) * 3, channel=camera, moved=turned),
+        Lasting((DRIFTING,) * 3, DRIFT_TIME, channel=camera, moved=turned),
+    )
     deviations = [model.roll_prior, *[WIDE] * 3, *[model.body_bias_prior] * 3]
     deviations += [model.platform_bias_prior] * model.platform_rates
-    prior = np.diag(np.square([*deviations, *[CONSTANT] * 3, *[DRIFTING] * 3]))
-    step, noise = (np.zeros((len(F), size + 6, size + 6)) for _ in range(2))
-    step[:, :size, :size], noise[:, :size, :size] = F, Q
-    step[:, size:, size:] = np.diag([1.0] * 3 + [kept] * 3)
-    noise[:, size:, size:] = np.diag([0.0] * 3 + [DRIFTING**2 * (1.0 - kept**2)] * 3)
-    system = Linearisation(step, noise, H, R, usable)
-    return riccati(system, measured(prior, system, 0))
+    return lasting_bound(
+        model, lambda _: true_states(truth, model), exact, errors, prior=np.diag(np.square(deviations))
+    )
+
+
+def turned(orientations: np.ndarray, error: np.ndarray) -> np.ndarray:
+    """Orientations of a marker that is turned by a small rotation about the body's axes."""
+    return rotation.multiply(orientations, rotation.exp(error))
 
 
 def redrawn(model: TwoGyro, exact: dict[str, np.ndarray], ride: Trajectory) -> dict[str, np.ndarray]:

@@ -181,6 +181,14 @@ def claims_of_motions(found: Mapping[Any, dict[str, Any]]) -> list[Claim]:
         )
         for motion, model in (*cases, ("circle", "sigma1"))
     ]
+    claims += [
+        Claim.less(
+            f"(23), {motion}: with the published step Σ2 converges to less than 0.5°",
+            late[motion, "sigma2", "euler"],
+            0.5,
+        )
+        for motion in ("circle", "sine")
+    ]
     for step in ("midpoint", "euler"):
         statement = f"circle: the error of sigma2 is as large as its covariance says, {step} step"
         claims.append(Claim.within(statement, found["circle", "sigma2", step]["ratio"], 0.8, 1.2))

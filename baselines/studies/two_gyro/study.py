@@ -6,6 +6,7 @@ from ..coverage import cover
 from ..kit import Study
 from ..report import Report
 from .bounds import bounds, observability
+from .exactness import exactness
 from .fixture import fixture
 from .items import ITEMS
 from .rides import rides
@@ -21,6 +22,7 @@ def reproduce(study: Study, report: Report) -> None:
         "is used instead is in the defaults of `two-gyro` and in the table of the simulated sensors."
     )
     bounds(study, report)
+    exactness(report)
     observability(study, report)
     simulations(study, report)
     ideal_consistency(study, report)

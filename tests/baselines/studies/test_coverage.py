@@ -51,12 +51,23 @@ def test_a_verdict_follows_from_entries_and_claims(report, item, expected, text)
 
 def test_a_difference_has_its_number_and_the_causes_that_hold(report):
     causes = (("What", "The camera"), ("What", "It is late"))
-    item = Item("Table I", "skill", ("Table I",), (("What", "It beats"),), causes, "the course is short")
+    item = Item("Table I", "skill", ("Table I",), (("What", "It beats"),), (), causes, "the course is short")
     row = verdict(item, report)
     assert row["what decides"] == (
         "It beats zero: 2 against 1 deg – does not hold; because: The camera is off: by 1 deg; the course is short"
     )
     assert row["shown in"] == "Table I, indoors; What"
+
+
+def test_what_is_right_once_it_is_corrected_is_told_from_a_difference(report):
+    published, mended = (("What", "It beats zero"),), (("What", "It does not drift"),)
+    row = verdict(Item("(3)", "equation", (), published, mended, because="a sign"), report)
+    assert row["verdict"] == "reproduced as corrected"
+    assert row["what decides"] == ("It beats zero: 2 against 1 deg – does not hold; It does not drift: 0.1 deg; a sign")
+    assert verdict(Item("(3)", "equation", (), published, published), report)["verdict"] == "differs"
+    assert verdict(Item("(3)", "equation", (), published, (("What", "Nobody"),)), report)["verdict"] == (
+        "not in this run"
+    )
 
 
 def test_an_item_that_nothing_answers_needs_a_reason():
@@ -81,7 +92,10 @@ def test_items_of_a_paper_are_told_apart(paper):
     names = [(item.label, item.content) for item in module.ITEMS]
     assert len(names) == len(set(names)) > 10
     assert all(
-        isinstance(start, str) for item in module.ITEMS for key in (*item.decided, *item.causes) for start in key
+        isinstance(start, str)
+        for item in module.ITEMS
+        for key in (*item.decided, *item.corrected, *item.causes)
+        for start in key
     )
 
 

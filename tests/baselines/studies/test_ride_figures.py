@@ -14,7 +14,10 @@ def rides(offset, growth=0.0):
     """Two rides of a minute with opposite errors around ``offset``, the first one longer."""
     time = SPACING * np.arange(round(60.0 / SPACING))
     size = 1.0 + growth * time / time[-1]
-    return [{"over time": {"φ": [*(offset + size), 9.0]}}, {"over time": {"φ": list(offset - size)}}]
+    return [
+        {"over time": {"filter": {"φ": [*(offset + size), 9.0]}}},
+        {"over time": {"filter": {"φ": list(offset - size)}}},
+    ]
 
 
 def test_mean_and_deviation_reach_to_the_shortest_ride():
@@ -33,7 +36,7 @@ def test_errors_around_zero_that_do_not_grow(offset, growth, holds):
 
 
 def test_rides_that_are_too_short_decide_nothing():
-    short = [{"over time": {"φ": [1.0] * 8}}] * 2
+    short = [{"over time": {"filter": {"φ": [1.0] * 8}}}] * 2
     assert [claim.holds for claim in spread_claims(short, ["φ"], "Figure 8")] == [None, None]
 
 

@@ -20,7 +20,7 @@ def test_an_unknown_alignment_leaves_theta_as_uncertain_as_it_is():
     # a turn would tell how the body stands to its axis
     ride = simulate(replace(MOTIONS["frozen"], yaw=Waves()), 10.0, 0.05)
     states = true_states(ride.truth, model)
-    lasting = np.sqrt(with_alignment(model, states, ride.measurements)[-1, 2, 2]) / DEG
+    lasting = np.sqrt(with_alignment(model, ride.truth, ride.measurements)[-1, 2, 2]) / DEG
     white = np.sqrt(posterior_bound(model, states, ride.measurements)[-1, 2, 2]) / DEG
     # nothing moves: the two errors of the marker stay in θ₂, constant and drifting one together
     assert lasting == pytest.approx(np.hypot(CONSTANT, DRIFTING) / DEG, rel=0.1)
