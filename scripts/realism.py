@@ -16,7 +16,7 @@ class Args:
     recordings: tuple[str, ...] = ()
     """recorded data as role=path, where path is a file or folder and role one of hand, carried, chest, head"""
     parts: tuple[str, ...] = ()
-    """parts of the report: gestures, rides, roads, sensors, and with recordings motion, ranks; all if none is named"""
+    """parts of the report: gestures, rides, steering, roads, sensors; with recordings motion, ranks (default: all)"""
     episodes: int = 60
     """simulated episodes of each recipe of hands"""
     rides: int = 20

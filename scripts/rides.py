@@ -32,6 +32,8 @@ class Args:
     """parent of the run folder"""
     checks: bool = False
     """instead of the table of rides, check the physics and compare filters of one IMU on some rides (minutes)"""
+    pilots: bool = False
+    """instead, how riders of all skills steer: preset riders, and ten random ones of each skill, in every scenario"""
     json: bool = False
     """print one JSON document instead of tables"""
 
@@ -45,7 +47,8 @@ def run(args: Args) -> int:
     for name in scenarios:
         scenario(name)
     settings = {name: getattr(args, name) for name in ("seed", "subjects", "duration", "processes")}
-    with studying("rides", args, settings, "poise rides --checks" if args.checks else "poise rides", 190) as (
+    kind = " --checks" if args.checks else " --pilots" if args.pilots else ""
+    with studying("rides", args, settings, f"poise rides{kind}", 190) as (
         study,
         out,
         report,
@@ -53,7 +56,7 @@ def run(args: Args) -> int:
         if args.checks:
             work.checks(study, report)
             return 0
-        found = work.rides(study, report, scenarios, args.fidelity)
+        found = (work.pilots if args.pilots else work.rides)(study, report, scenarios, args.fidelity)
         upright = sum(each["upright"] for each in found)
         out.say(f"{upright} of {len(found)} rides upright")
     return 0 if upright == len(found) else 1

@@ -41,6 +41,15 @@ DRIFT = (
     "data sheets state bias stabilities in run from 5 °/h and 13 µg (MTi-100, VN-100, ADIS16470) and none of consumer "
     "devices, which drift more: assumed up to 50 °/h and 400 µg"
 )
+TREADMILL = (
+    "a bicycle with sensors on a treadmill: steering grows by more than 500 % from 20 to 5 km/h and stays about the "
+    "same above 20; towed it is below 1 deg above 10 km/h, pedalled more (J. K. Moore, Human control of a bicycle, "
+    "UC Davis (2012), chapter Delft instrumented bicycle)"
+)
+PATH = "the largest lateral drift on a treadmill at 10 km/h was 35 cm (the same, chapter Motion capture)"
+LESS = "steering power falls with speed (S. M. Cain, J. A. Ashton-Miller, N. C. Perkins, PLoS ONE 11 (2016))"
+RATES = "95 % of all values that were measured on a treadmill lie within 30 deg/s (the same, chapter Davis bicycle)"
+TORQUE = "bound of this project for ordinary riding; no published table was found"
 BELIEVABLE = {
     "trunk gyroscope rms": Believable(20.0, 45.0, "deg/s", CHEST),
     "trunk gyroscope 95 % frequency": Believable(3.0, 10.0, "Hz", CHEST),
@@ -52,6 +61,13 @@ BELIEVABLE = {
     "bandwidth of vertical acceleration": Believable(*BANDWIDTH, "Hz", CARGO),
     "gyroscope Allan deviation": Believable(5.0, 50.0, "°/h", DRIFT),
     "accelerometer Allan deviation": Believable(10.0, 400.0, "µg", DRIFT),
+    "steering at 5 km/h, times that at 20": Believable(6.0, 12.0, "", TREADMILL),
+    "steering at 25 km/h, times that at 20": Believable(0.7, 1.3, "", TREADMILL),
+    "steering above 10 km/h": Believable(0.3, 2.0, "deg", TREADMILL),
+    "steer rate at 5 km/h, times that at 25": Believable(1.0, math.inf, "", LESS),
+    "roll rate std": Believable(0.2, 15.0, "deg/s", RATES),
+    "distance from the path": Believable(3.0, 25.0, "cm", PATH),
+    "torque, 99 %": Believable(-math.inf, 10.0, "N·m", TORQUE),
 }
 """Quantity → range."""
 

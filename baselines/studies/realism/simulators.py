@@ -9,6 +9,7 @@ from ....envs.sensors.allan import FLOOR_TIME, allan_floors
 from ..kit import Study
 from ..report import Report
 from ..rides.saddle import saddle_rows, worst_of
+from ..rides.steering import by_speed
 from ..rides.vibration import MEASURED, levels, vibration_checks
 from .environments import BANDWIDTH, GESTURE_RATE, GESTURE_TIME, PLACES, SHOWN, SHOWN_OF_HANDS, gestures, medians, rides
 from .motion import UNITS, motion_statistics
@@ -16,6 +17,15 @@ from .pedalling import BESIDE, WINDOW, pedalling, pedalling_row
 from .ranges import judged
 from .roles import ROLES, Recorded
 
+STEERING = {
+    "steer": ("steer std", "deg"),
+    "steer_rate": ("steer rate std", "deg/s"),
+    "roll": ("roll std", "deg"),
+    "roll_rate": ("roll rate std", "deg/s"),
+    "offset": ("path std", "cm"),
+    "torque_99": ("99 % of torque", "N·m"),
+}
+"""Statistic of a ride → heading and unit"""
 BUMPY = ("bumps", "pitch")
 """Scenarios in which the wheels leave the ground, or the rider is thrown: their saddle is shown, not judged"""
 
@@ -129,6 +139,37 @@ def saddle(report: Report, found: Mapping[str, Sequence[Mapping[str, float]]]) -
         ends = {f"{name}, {end} %": worst_of(firm[name], f"{axis}_{end}") for name in firm for end in (5, 95)}
         rows.append(judged(f"centre of pressure {axis}", ends))
     report.table("Saddle, against what is believable", rows)
+
+
+def steering(study: Study, report: Report, count: int) -> None:
+    """Steering, roll, path and torque by speed, mild riders on a straight."""
+    found = by_speed(study, count)
+    report.table(
+        "Steering by speed",
+        [
+            {"speed km/h": f"{speed:g}"} | {f"{title} {unit}": each[name] for name, (title, unit) in STEERING.items()}
+            for speed, each in found.items()
+        ],
+        f"Means over {count} lumped rides of a minute, skilled pilot, mild style, even straight.",
+    )
+    steer = {speed: each["steer"] for speed, each in found.items()}
+    paths = {f"{speed:g} km/h": each["offset"] for speed, each in found.items()}
+    fast = {f"{speed:g} km/h": value for speed, value in steer.items() if speed > 10.0}
+    report.table(
+        "Steering, against what is believable",
+        [
+            judged("steering at 5 km/h, times that at 20", {"skilled": steer[5.0] / steer[20.0]}),
+            judged("steering at 25 km/h, times that at 20", {"skilled": steer[25.0] / steer[20.0]}),
+            judged("steering above 10 km/h", fast),
+            judged(
+                "steer rate at 5 km/h, times that at 25",
+                {"skilled": found[5.0]["steer_rate"] / found[25.0]["steer_rate"]},
+            ),
+            judged("roll rate std", {f"{speed:g} km/h": each["roll_rate"] for speed, each in found.items()}),
+            judged("distance from the path", paths),
+            judged("torque, 99 %", {f"{speed:g} km/h": each["torque_99"] for speed, each in found.items()}),
+        ],
+    )
 
 
 def roads(report: Report) -> None:

@@ -18,7 +18,7 @@ from .figures import spectra
 from .motion import SHARE_OF_RATE, UNITS
 from .ranks import agreement, inclination_errors, installed, matrix, simulated_errors
 from .roles import ROLES, Recorded, by_recipe
-from .simulators import hand_motion, ride_motion, roads, sensors
+from .simulators import hand_motion, ride_motion, roads, sensors, steering
 
 CONTAINED = (
     f"Every recording is compared at 0.45 of its own sampling rate; inside is between {LOW:g} and {HIGH:g} % of the "
@@ -126,6 +126,7 @@ Part = Callable[[Study, Report, Settings, Sequence[Recorded]], None]
 PARTS: Mapping[str, Part] = {
     "gestures": lambda study, report, settings, groups: hand_motion(study, report, settings.episodes, groups),
     "rides": lambda study, report, settings, groups: ride_motion(study, report, settings.rides, groups),
+    "steering": lambda study, report, settings, groups: steering(study, report, max(2, settings.rides // 4)),
     "roads": lambda study, report, settings, groups: roads(report),
     "sensors": lambda study, report, settings, groups: sensors(report),
     "motion": containment,

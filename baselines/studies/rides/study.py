@@ -18,6 +18,7 @@ from .plots import example_ride, ride_signals
 from .reports import comparison
 from .saddle import ACROSS, ALONG, PULL, saddle_rows
 from .statistics import KINDS, UNITS, ride
+from .steering import SETTLED, long_rides, steering_rows
 from .vibration import levels, vibration_checks
 
 SHOWN = {
@@ -78,6 +79,17 @@ def draw(
     ride = example_ride(scenario, subject, seeds[scenario, subject], seconds, fidelity)
     title = f"{scenario}, subject {subject}: {seconds:g} s"
     report.figure("signals", ride_signals(ride, title), title)
+
+
+def pilots(study: Study, report: Report, scenarios: Sequence[str], fidelity: str) -> list[dict[str, Any]]:
+    """How riders of every skill steer, and whether they stay up."""
+    found = long_rides(study, scenarios, fidelity)
+    report.table(
+        f"{len(found)} rides of {study.duration:g} s by pilots of all skills, {fidelity} rider",
+        list(steering_rows(found)),
+        f"Means over rides, torques the largest of all; after {SETTLED:g} s.",
+    )
+    return found
 
 
 def checks(study: Study, report: Report) -> None:

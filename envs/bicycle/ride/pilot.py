@@ -20,8 +20,11 @@ class PilotParameters:
     """A human control model of steering.
 
     Noise of a sense is white; its level is the standard deviation of the mean over one second. Delays and muscles are
-    published. Levels and weights are choices of this project: riders stay up, and steering grows towards low speeds,
-    though less than published (three times from 20 to 5 km/h, where measurements have six).
+    published. Levels and weights are choices of this project, made on rides with seeds below 5: riders stay up, and steering grows
+    more than six times from 20 to 5 km/h, as measured (``poise realism --parts steering``). What an error of a sense
+    does to the steering depends on the speed: an error of roll or roll rate is answered by a steering angle that grows
+    with about the inverse square of the speed, one of steering or heading by the same at any speed. Balance therefore
+    has to be the least exact sense, and the path must not be followed more closely the faster the bicycle is.
 
     Raises:
         ValueError: a number that is negative or not finite, a delay, frequency or torque that is zero, or senses of
@@ -34,7 +37,9 @@ class PilotParameters:
     visual_delay: float
     """s: of roll angle, heading and distance from the path"""
     roll_rate_noise: float
-    """rad/s"""
+    """rad/s; a tilt of 0.5 deg within a second is at the threshold of perception in the dark (K. Suri, T. K. Clark,
+    Human vestibular perceptual thresholds for pitch tilt are slightly worse than for roll tilt across a range of
+    frequencies, Exp. Brain Res. 238 (2020)); riders also see"""
     steer_noise: float
     """rad"""
     steer_rate_noise: float
@@ -52,16 +57,17 @@ class PilotParameters:
     effort: float
     """cost of a squared N·m, in place of that of :class:`.ControlSettings`: high for those who steer reluctantly"""
     care: float
-    """1: factor on the costs of heading and distance from the path"""
+    """1: factor on the costs of heading and distance from the path; riders on a treadmill who keep their heading and
+    balance drift by some decimetres (J. K. Moore, Human control of a bicycle, dissertation, UC Davis (2012))"""
     muscle_frequency: float = 30.0
     """rad/s: natural frequency of arms and muscles (Hess et al. 2012)"""
     muscle_damping: float = 0.7
     """1: damping ratio of the same (Hess et al. 2012: 0.707)"""
-    arm_damping: float = 2.0
-    """N·m·s/rad: of arms that hold the bar, without delay (round figure of this project)"""
-    largest_torque: float = 25.0
-    """N·m, approached softly: usual torques stay below 10, but a full rider's arms must also move against the damping
-    of their joints when a fall is near"""
+    arm_damping: float = 4.0
+    """N·m·s/rad: of arms that hold the bar, without delay (round figure of this project): what unsteady hands and a
+    swaying trunk do to the bar at high speed"""
+    largest_torque: float = 10.0
+    """N·m, approached softly: of the muscles, to which the damping of the arms adds"""
     sway: float = 2.0
     """N·m: standard deviation of the roll moment that the internal model expects from body and wind"""
     sway_time: float = 0.5
@@ -84,19 +90,19 @@ class PilotParameters:
 def _skill(
     name: str, delays: tuple[float, float], noise: float, motor: float, effort: float, care: float
 ) -> PilotParameters:
-    """A rider whose senses are ``noise`` times as noisy as those of the skilled one."""
+    """A rider whose senses are ``noise`` times as noisy as those of the skilled one, and hands as well."""
     degree = math.radians(1.0)
     return PilotParameters(
         name,
         *delays,
-        roll_rate_noise=0.06 * noise * degree,
-        steer_noise=0.06 * noise * degree,
-        steer_rate_noise=0.3 * noise * degree,
-        roll_noise=0.06 * noise * degree,
-        heading_noise=0.15 * noise * degree,
-        offset_noise=0.015 * noise,
+        roll_rate_noise=0.14 * noise * degree,
+        steer_noise=0.02 * noise * degree,
+        steer_rate_noise=0.08 * noise * degree,
+        roll_noise=0.1 * noise * degree,
+        heading_noise=0.06 * noise * degree,
+        offset_noise=0.0075 * noise,
         motor_noise=motor,
-        tremor=0.05 * noise,
+        tremor=0.025 * noise,
         effort=effort,
         care=care,
     )
@@ -105,9 +111,9 @@ def _skill(
 PILOTS = {
     pilot.name: pilot
     for pilot in (
-        _skill("expert", (0.10, 0.15), 0.3, 0.03, 0.05, 1.0),
-        _skill("skilled", (0.11, 0.18), 0.5, 0.04, 0.05, 0.7),
-        _skill("novice", (0.12, 0.20), 0.6, 0.06, 0.05, 0.5),
+        _skill("expert", (0.10, 0.15), 0.6, 0.03, 0.05, 0.5),
+        _skill("skilled", (0.11, 0.18), 1.0, 0.04, 0.05, 0.3),
+        _skill("novice", (0.12, 0.20), 1.3, 0.06, 0.05, 0.2),
     )
 }
 """Human pilots by name, from the most to the least skilled."""
