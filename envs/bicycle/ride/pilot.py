@@ -63,11 +63,12 @@ class PilotParameters:
     """rad/s: natural frequency of arms and muscles (Hess et al. 2012)"""
     muscle_damping: float = 0.7
     """1: damping ratio of the same (Hess et al. 2012: 0.707)"""
-    arm_damping: float = 4.0
+    arm_damping: float = 3.0
     """N·m·s/rad: of arms that hold the bar, without delay (round figure of this project): what unsteady hands and a
     swaying trunk do to the bar at high speed"""
-    largest_torque: float = 10.0
-    """N·m, approached softly: of the muscles, to which the damping of the arms adds"""
+    largest_torque: float = 20.0
+    """N·m, approached softly: a reserve for recoveries, above all at walking pace, where a full rider's arms must move
+    fast against the damping of their joints; ordinary riding takes less than 10"""
     sway: float = 2.0
     """N·m: standard deviation of the roll moment that the internal model expects from body and wind"""
     sway_time: float = 0.5
@@ -95,10 +96,10 @@ def _skill(
     return PilotParameters(
         name,
         *delays,
-        roll_rate_noise=0.14 * noise * degree,
+        roll_rate_noise=0.12 * noise * degree,
         steer_noise=0.02 * noise * degree,
         steer_rate_noise=0.08 * noise * degree,
-        roll_noise=0.1 * noise * degree,
+        roll_noise=0.08 * noise * degree,
         heading_noise=0.06 * noise * degree,
         offset_noise=0.0075 * noise,
         motor_noise=motor,
@@ -113,7 +114,7 @@ PILOTS = {
     for pilot in (
         _skill("expert", (0.10, 0.15), 0.6, 0.03, 0.05, 0.5),
         _skill("skilled", (0.11, 0.18), 1.0, 0.04, 0.05, 0.3),
-        _skill("novice", (0.12, 0.20), 1.3, 0.06, 0.05, 0.2),
+        _skill("novice", (0.12, 0.20), 1.15, 0.06, 0.05, 0.2),
     )
 }
 """Human pilots by name, from the most to the least skilled."""
