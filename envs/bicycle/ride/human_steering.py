@@ -24,6 +24,10 @@ from .steering import (
 
 STATES = 12
 """size of the state of the internal model"""
+ATTENTIVE = 1.4
+"""m/s: below, at walking pace, riders attend to balance alone, and the noise of their senses falls with the speed. In
+the optimal control model noise is the inverse of the attention (Kleinman et al. 1970); the speed is a choice of this
+project"""
 CHANNELS = (2, 1, 3, 0, 4, 5)
 """state that each sense reads: roll rate, steer, steer rate (fast); roll, heading, offset (visual)"""
 
@@ -185,8 +189,9 @@ def steer_humanly(  # type: ignore[no-untyped-def]
     curvature, offset, heading = follow(points, now, memory)
     readings[:-1] = readings[1:]
     felt = (now.roll_rate, -now.steer, -now.steer_rate, now.roll, -heading, -offset)
+    heed = min(1.0, max(LOWEST_SPEED, now.speed) / ATTENTIVE)
     for sense in range(6):
-        readings[-1, sense] = felt[sense] + person.sigma[sense] * noise[sense]
+        readings[-1, sense] = felt[sense] + heed * person.sigma[sense] * noise[sense]
     # filter and predict, between two speeds of the table
     first, second, expected, later = np.empty(STATES), np.empty(STATES), np.empty(STATES), np.empty(STATES)
     estimate(low, state, inputs, readings, first, expected)

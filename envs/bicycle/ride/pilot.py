@@ -96,10 +96,10 @@ def _skill(
     return PilotParameters(
         name,
         *delays,
-        roll_rate_noise=0.12 * noise * degree,
+        roll_rate_noise=0.14 * noise * degree,
         steer_noise=0.02 * noise * degree,
         steer_rate_noise=0.08 * noise * degree,
-        roll_noise=0.08 * noise * degree,
+        roll_noise=0.1 * noise * degree,
         heading_noise=0.06 * noise * degree,
         offset_noise=0.0075 * noise,
         motor_noise=motor,
