@@ -11,14 +11,14 @@ from ....filters.core import rotation
 from ....filters.core.estimator import run
 from ....filters.core.metrics import DEGREES
 from ....filters.imu.external_acceleration import ExternalAcceleration
-from ...plots import new_figure
+from ...plots import TRUTH_COLOR, legend_above, new_figure
 from ...registry import make_estimator
 from .simulation import MODES, RATE, Trial, estimate, reference, simulate
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-OURS, TRUE, BAND = "#1f5fa8", "#c2571a", "#b08d1a"
+OURS, TRUE, BAND = "#1f5fa8", TRUTH_COLOR, "#b08d1a"
 GRAVITY = ExternalAcceleration().gravity
 
 
@@ -39,9 +39,9 @@ def seconds(trial: Trial) -> np.ndarray:
 
 
 def beside(ax: Any, time: np.ndarray, ours: np.ndarray, true: np.ndarray, label: str) -> None:
-    """An estimate (solid) and its reference (dashed)."""
-    ax.plot(time, ours, color=OURS, linewidth=0.9)
-    ax.plot(time, true, color=TRUE, linewidth=0.9, linestyle="--")
+    """An estimate or its error (solid, above) and the reference (dashed)."""
+    ax.plot(time, true, color=TRUE, linewidth=1.1, linestyle="--", label="reference")
+    ax.plot(time, ours, color=OURS, linewidth=0.8, label="estimate")
     ax.set_ylabel(label, fontsize=8.5)
 
 
@@ -93,7 +93,8 @@ def figure_4(seed: int) -> Figure:
         for axis in range(3):
             ours, true_a = pose["external_acceleration"][:, 0, axis], reference(trial)[:, 0, axis]
             beside(axes[3 * (2 + axis) + column], time, ours, true_a, f"a_{'xyz'[axis]}, m/s²")
-        axes[column].set_title(f"mode {mode}", fontsize=10)
+        axes[column].set_title(f"mode {mode}", fontsize=10, loc="left")
+        legend_above(axes[column])
         axes[12 + column].set_xlabel("time, s")
     return figure
 
@@ -125,7 +126,8 @@ def truth_figure(seed: int) -> Figure:
             beside(ax, time, np.linalg.norm(found, axis=-1), np.linalg.norm(true, axis=-1), label)
             color = OURS if mode == 1 else BAND
             axes[4 + column].plot(time, np.linalg.norm(found - true, axis=-1), color=color, linewidth=0.8)
-        axes[column].set_title(f"test {test}", fontsize=10)
+        axes[column].set_title(f"test {test}", fontsize=10, loc="left")
+        legend_above(axes[column])
         axes[4 + column].set(xlabel="time, s", ylabel="‖error‖, m/s²")
     return figure
 
@@ -161,7 +163,8 @@ def figure_7(seed: int) -> Figure:
         for row, (name, up) in enumerate(curves):
             ax = axes[2 * row + column]
             beside(ax, seconds(trial), angles(up)[0], angles(trial.up)[0], f"{name}\nroll, deg")
-        axes[column].set_title(f"test {'AB'[column]}", fontsize=10)
+        axes[column].set_title(f"test {'AB'[column]}", fontsize=10, loc="left")
+        legend_above(axes[column])
         axes[4 + column].set_xlabel("time, s")
     return figure
 
