@@ -156,11 +156,12 @@ class Model(Equations):
         """The state ``x`` corrected by the error ``dx``: a sum, unless the state holds rotations."""
         return x + dx
 
-    def fitted(self, nis: Callable[[Self], Any]) -> Self:
+    def fitted(self, measurements: Measurement, nis: Callable[[Model, Measurement], Any]) -> Self:
         """The same equations with constants that a whole recording tells, for smoothing it; as given here.
 
         Args:
-            nis: equations → normalised innovations squared ``(T, *batch)`` of the recording.
+            measurements: the recording, channel → ``(T, *batch, size)``.
+            nis: equations and samples → normalised innovations squared ``(T, *batch)`` of these.
         """
         return self
 

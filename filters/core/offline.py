@@ -9,6 +9,7 @@ from typing import Any, NoReturn
 from .backend import is_torch
 from .estimator import Enclosing, Estimator
 from .kalman import KalmanFilter
+from .model import Model
 from .quantity import Estimate, Measurement
 
 SUFFIX = " (offline)"
@@ -44,8 +45,11 @@ class Offline(Enclosing):
         smoother: Any = self.filter
         if isinstance(smoother, KalmanFilter) and not any(is_torch(array) for array in measurements.values()):
             causal = replace(smoother, keep_covariance=False)
-            model = smoother.model.fitted(lambda model: replace(causal, model=model).run(measurements).nis)
-            smoother = replace(smoother, model=model)
+
+            def nis(model: Model, samples: Measurement) -> Any:
+                return replace(causal, model=model).run(samples).nis
+
+            smoother = replace(smoother, model=smoother.model.fitted(measurements, nis))
         estimate: Estimate = smoother.smooth(measurements)
         return estimate
 

@@ -32,7 +32,7 @@ violates the assumption and appears as growing innovations.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -57,7 +57,7 @@ from ..core.quantity import (
 )
 from ..core.rotation import level, normalize, up_in_body
 from .magnetic_heading import MagneticHeading
-from .relative_delay import STEP, relative_delay
+from .relative_delay import STEP, merged, relative_delay
 from .strapdown import (
     accelerated,
     advance,
@@ -183,12 +183,17 @@ class BoundedMotion(Model):
             "external_acceleration": x[..., 10:13],
         }
 
-    def fitted(self, nis: Callable[[Self], Any]) -> Self:
-        """The delay of the accelerometer by :func:`.relative_delay`, unless one was given."""
+    def fitted(self, measurements: Measurement, nis: Callable[[Model, Measurement], Any]) -> Self:
+        """The delay of the accelerometer by :func:`.relative_delay`, unless one was given; six axes tell it."""
         if self.accelerometer_lag != 0.0:
             return self
-        before, now, after = (np.asarray(nis(replace(self, accelerometer_lag=lag))) for lag in (-STEP, 0.0, STEP))
-        return replace(self, accelerometer_lag=relative_delay(before, now, after, self.dt))
+        samples, dt = merged(measurements, self.correction_interval, self.dt)
+        constants = {each.name: getattr(self, each.name) for each in fields(BoundedMotion)}
+        model = BoundedMotion(**constants | {"dt": dt})
+        before, now, after = (
+            np.asarray(nis(replace(model, accelerometer_lag=lag), samples)) for lag in (-STEP, 0.0, STEP)
+        )
+        return replace(self, accelerometer_lag=relative_delay(before, now, after, dt))
 
     def _external(self, q: Array, f: Array) -> Array:
         return f - expand(self.gravity, 1) * up_in_body(q)

@@ -8,11 +8,13 @@ import numpy as np
 import pytest
 
 from poise.envs.hand.sensing import simulate_hand
-from poise.filters.core import metrics
+from poise.filters.core import metrics, rotation
 from poise.filters.core.kalman import KalmanFilter
+from poise.filters.core.model import Model
 from poise.filters.core.offline import Offline
+from poise.filters.core.quantity import Measurement
 from poise.filters.imu.bounded_motion import BoundedMotion
-from poise.filters.imu.relative_delay import LARGEST, PRIOR, SECTION, STEP, relative_delay
+from poise.filters.imu.relative_delay import LARGEST, LONGEST, PRIOR, SECTION, STEP, merged, relative_delay
 
 DT = 0.01
 LENGTH = 10 * round(SECTION / DT)
@@ -58,13 +60,44 @@ def test_a_late_accelerometer_is_found_and_smoothing_gains_by_it() -> None:
     data = {"imu/gyr": np.asarray(hand.measurements["imu/gyr"]), "imu/acc": force}
     model = BoundedMotion(dt=hand.dt)
 
-    def nis(equations: BoundedMotion) -> np.ndarray:
-        return np.asarray(KalmanFilter(equations).run(data).nis)
+    def nis(equations: Model, samples: Measurement) -> np.ndarray:
+        return np.asarray(KalmanFilter(equations).run(samples).nis)
 
     def error(estimate: object) -> float:
         return float(np.sqrt(np.mean(metrics.direction_error(estimate.pose["up"], hand.truth["up"])[500:] ** 2)))
 
-    assert model.fitted(nis).accelerometer_lag == pytest.approx(late, abs=1e-3)
+    assert model.fitted(data, nis).accelerometer_lag == pytest.approx(late, abs=1e-3)
     assert error(Offline(KalmanFilter(model)).run(data)) < 0.8 * error(KalmanFilter(model).smooth(data))
     chosen = replace(model, accelerometer_lag=1e-3)
-    assert chosen.fitted(nis) is chosen
+    assert chosen.fitted(data, nis) is chosen
+
+
+def test_merged_samples_turn_into_the_same_velocity_as_those_that_they_were() -> None:
+    hand = simulate_hand("severe", 1, rate=300.0, duration=10.0)
+    data = {name: np.asarray(hand.measurements[name]) for name in ("imu/gyr", "imu/acc")}
+    samples, interval = merged(data, 0.0175, hand.dt)
+    assert interval == pytest.approx(5.0 * hand.dt)
+
+    def velocity(part: dict[str, np.ndarray], dt: float) -> np.ndarray:
+        turns = rotation.exp(dt * part["imu/gyr"])
+        half = rotation.exp(0.5 * dt * part["imu/gyr"])
+        q, v = np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(3)
+        for turn, middle, force in zip(turns, half, part["imu/acc"], strict=True):
+            v = v + dt * rotation.rotate(rotation.multiply(q, middle), force)
+            q = rotation.multiply(q, turn)
+        return v
+
+    whole = {name: values[: 5 * len(samples["imu/gyr"])] for name, values in data.items()}
+    assert np.abs(velocity(samples, interval) - velocity(whole, hand.dt)).max() < 0.1
+
+
+def test_long_recordings_are_looked_at_where_they_are_lively_and_zeros_are_no_samples() -> None:
+    count = round((LONGEST + 60.0) / DT)
+    data = {"imu/gyr": np.full((count, 3), 0.01), "imu/acc": np.tile([0.0, 0.0, 9.81], (count, 1))}
+    data["imu/gyr"][-1000:] = [3.0, 0.0, 0.0]
+    data["imu/acc"][-2] = 0.0
+    samples, interval = merged(data, 0.0, DT)
+    assert interval == DT
+    assert len(samples["imu/gyr"]) == round(LONGEST / DT)
+    assert samples["imu/gyr"][-1].tolist() == [3.0, 0.0, 0.0]
+    assert np.isnan(samples["imu/acc"][-2]).all()
