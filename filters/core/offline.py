@@ -44,7 +44,7 @@ class Offline(Enclosing):
         """
         smoother: Any = self.filter
         if isinstance(smoother, KalmanFilter) and not any(is_torch(array) for array in measurements.values()):
-            causal = replace(smoother, keep_covariance=False)
+            causal = replace(smoother, keep_covariance=False, restart=False)
 
             def nis(model: Model, samples: Measurement) -> Any:
                 return replace(causal, model=model).run(samples).nis

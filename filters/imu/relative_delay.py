@@ -15,8 +15,8 @@ The filter that gives the innovations runs on samples merged to its own correcti
 liveliest :data:`LONGEST` seconds, so that the search costs a third of the smoothing or less.
 
 A delay is believed as far as it is more certain than what was known before, zero ± ``PRIOR``. One beyond ``LARGEST`` is
-not a delay: something else, such as a wrong scale, makes the innovations smaller there. Both bounds are those of filters
-inside of sensors. The register maps of InvenSense's MPU-6050 (RM-MPU-6000A, registers 26) and MPU-9250 (RM-MPU-9250A,
+not a delay: something else, such as a wrong scale, makes the innovations smaller there. Both bounds are those of the
+filters inside of sensors. The register maps of the MPU-6050 (RM-MPU-6000A, register 26) and MPU-9250 (RM-MPU-9250A,
 registers 26 and 29) list the delays of both sensors for each of seven bandwidths: at the same setting they differ by
 0.8 ms rms and 1.0 ms at most, at settings next to each other between 20 and 100 Hz by 5 ms at most.
 """
