@@ -15,6 +15,35 @@ from .text import is_text, read_text
 NPY, ZIP, PARQUET, MATLAB = b"\x93NUMPY", b"PK\x03\x04", b"PAR1", b"MATLAB"
 
 
+OTHERS: dict[bytes, str] = {
+    b"\x1f\x8b": "is compressed (gzip); unpack it first",
+    b"BZh": "is compressed (bzip2); unpack it first",
+    b"\xfd7zXZ": "is compressed (xz); unpack it first",
+    b"\x28\xb5\x2f\xfd": "is compressed (zstd); unpack it first",
+    b"7z\xbc\xaf": "is a 7z archive; unpack it first",
+    b"Rar!": "is a RAR archive; unpack it first",
+    b"\xd0\xcf\x11\xe0": "is an old spreadsheet (xls); save its table as CSV",
+    b"%PDF": "is a PDF; export the data as CSV",
+    b"SQLite format 3": "is an SQLite data base; export the table as CSV (sqlite3 -csv FILE 'select …')",
+    b"#ROSBAG": "is a ROS bag; export its topic sensor_msgs/Imu as CSV (rostopic echo -b FILE -p TOPIC)",
+    b"\x89MCAP": "is an MCAP file; export its topic sensor_msgs/Imu as CSV",
+    b"ULog": "is a PX4 log; convert it by ulog2csv and load …_sensor_combined_0.csv",
+    b"H Product:Blackbox": "is a Betaflight log; convert it by blackbox_decode",
+}
+"""First bytes of files of other kinds → what such a file is and how its data come out."""
+INSIDE: dict[tuple[int, bytes], str] = {
+    (8, b".FIT"): "is a Garmin FIT file; convert it by FitCSVTool",
+    (4, b"ftyp"): "is a video (MP4); export its motion data (GPMF) as CSV",
+}
+"""The same further inside: place and bytes."""
+
+
+def other_kind(head: bytes) -> str | None:
+    """What a file of another kind is, and what to do; None of unknown ones."""
+    told = next((text for start, text in OTHERS.items() if head.startswith(start)), None)
+    return told or next((text for (at, sign), text in INSIDE.items() if head[at:].startswith(sign)), None)
+
+
 def read_table(path: Path) -> Table:
     """Read the table of a file, whose kind is told by its content.
 
@@ -34,7 +63,13 @@ def read_table(path: Path) -> Table:
         return as_table(read_hdf5(path, hdf5_arrays), "HDF5 file")
     if head.startswith(MATLAB):
         return as_table(load_mat(path), "MATLAB file")
+    other = other_kind(head)
+    if other is not None:
+        raise ValueError(f"it {other}")
     if is_text(head):
+        if head.lstrip()[:1] in (b"{", b"[", b"<"):
+            kind = "XML" if head.lstrip()[:1] == b"<" else "JSON"
+            raise ValueError(f"it is {kind}; save its samples as a table, such as CSV, one row a sample")
         return read_text(path)
     raise ValueError("it is empty" if not head else "it is neither a text nor a NumPy, MATLAB, HDF5 or Parquet file")
 

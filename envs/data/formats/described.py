@@ -13,10 +13,19 @@ import numpy as np
 
 from ....filters.core import rotation
 from ..trajectory import Trajectory
-from .mapping import RecordingMap, Reference, apply_map, as_columns
-from .names import Group, counter_column, groups, time_column
+from .mapping import RecordingMap, Reference, apply_map, as_columns, finite
+from .names import Group, counter_column, groups, is_ros, time_column
 from .table import UNITS, Table, factor, plain
 
+RATES = ("Update Rate", "Sample Rate", "Sampling Rate", "OutputRate", "Rate", "Frequency", "Sampling Frequency")
+RATES += ("Sample Frequency", "Sampling Interval", "Sample Interval", "Sampling Period", "Sample Period")
+"""Keys of a header for the sampling rate."""
+APPS = {
+    ("gFx", "wx"): {"acc": ("gFx gFy gFz", "g"), "gyr": ("wx wy wz", "rad/s"), "mag": ("Bx By Bz", "uT")},
+}
+"""First names of tables without units (Physics Toolbox) → kind → its columns and their unit."""
+ROS_UNITS = {"gyr": "rad/s", "acc": "m/s^2"}
+"""Of ``sensor_msgs/Imu``."""
 SATURATED = 0.002
 """Part of samples at the largest magnitude of an axis beyond which an accelerometer is saturated."""
 FITS = 12.0
@@ -26,6 +35,7 @@ FITS = 12.0
 def mapping_of(table: Table, details: dict[str, object] | None = None) -> RecordingMap:
     """The mapping that the names and the units of a table tell, as far as they do."""
     found = groups(table)
+    ros = is_ros(table)
     sensors = list(dict.fromkeys(group.sensor for group in found if group.kind in ("gyr", "acc")))
     columns: dict[str, list[str]] = {}
     units: dict[str, str] = {}
@@ -37,19 +47,25 @@ def mapping_of(table: Table, details: dict[str, object] | None = None) -> Record
             if candidates:
                 chosen = best_range(table, candidates)
                 columns[f"{label}/{kind}"] = chosen.columns
-                if chosen.unit:
-                    units[f"{label}/{kind}"] = chosen.unit
+                unit = chosen.unit or (ROS_UNITS[kind] if ros and kind in ROS_UNITS else "")
+                if unit:
+                    units[f"{label}/{kind}"] = unit
         onboard = [group for group in found if group.kind in ("quaternion", "matrix") and group.sensor == sensor]
         if len(sensors) == 1 and not onboard:
             onboard = [group for group in found if group.kind in ("quaternion", "matrix")]
         if onboard:
             references.append(Reference(tuple(onboard[0].columns), role="onboard", sensor=label))
+    for names, kinds in APPS.items():
+        if names in table:
+            known = {kind: (each.split(), unit) for kind, (each, unit) in kinds.items() if each.split() in table}
+            columns = {f"imu/{kind}": chosen for kind, (chosen, _) in known.items()}
+            units = {f"imu/{kind}": unit for kind, (_, unit) in known.items()}
     # Names of Apple's Core Motion: g, and -1 g on an axis that points up.
     apple = any(name.startswith(("accelerometerAcceleration", "motionRotationRate")) for name in table.arrays)
     time = time_column(table)
     if time is not None and plain(time) in UNITS["time"] and time not in table.units:
         units["time"] = plain(time)
-    rate = table.rate_in_header("Update Rate", "Sample Rate", "Sampling Rate", "OutputRate", "Rate", "Frequency")
+    rate = table.rate_in_header(*RATES)
     return RecordingMap(
         columns,
         units,
@@ -65,7 +81,7 @@ def mapping_of(table: Table, details: dict[str, object] | None = None) -> Record
 def best_range(table: Table, candidates: list[Group]) -> Group:
     """Of several sensors of one kind the first (the one of low noise) that does not saturate."""
     for group in candidates:
-        values = np.abs(table.matrix(group.columns))
+        values = np.abs(finite(table.matrix(group.columns)))
         largest = np.nanmax(values, axis=0)
         if np.all(np.nanmean(values >= largest - 1e-9 * largest, axis=0) < SATURATED) or len(candidates) == 1:
             return group
@@ -97,21 +113,21 @@ def load_described(path: Path, table: Table, name: str) -> list[Trajectory]:
 def with_checked_orientation(trajectory: Trajectory) -> Trajectory:
     """The trajectory with its onboard orientation as one of the sensor in a world whose z axis is up.
 
-    Devices differ in what their quaternion turns into what. The accelerometer tells: of the quaternion, its conjugate
-    and both in a world whose z axis points down, the one whose vertical is nearest to the specific force is taken, if
-    the one as written does not fit. ``metadata["onboard_orientation"]`` says which.
+    Devices differ in what their quaternion turns into what, and in its order where the names do not tell. The
+    accelerometer does: of the quaternion, its conjugate, both in a world whose z axis points down, and the same with
+    the scalar last, the one whose vertical is nearest to the specific force is taken, if the one as written does not
+    fit. ``metadata["onboard_orientation"]`` says which.
     """
     key = "imu/onboard_orientation"
     if key not in trajectory.measurements or "imu/acc" not in trajectory.measurements:
         return trajectory
-    q, acc = trajectory.measurements[key], trajectory.measurements["imu/acc"]
+    acc = trajectory.measurements["imu/acc"]
     flip = np.array([0.0, 1.0, 0.0, 0.0])
-    variants = {
-        "as written": q,
-        "conjugate": rotation.conjugate(q),
-        "as written, z down": rotation.multiply(flip, q),
-        "conjugate, z down": rotation.multiply(flip, rotation.conjugate(q)),
-    }
+    variants = {}
+    written = trajectory.measurements[key]
+    for order, q in (("", written), ("scalar last, ", rotation.from_xyzw(written))):
+        for sense, turn in (("as written", q), ("conjugate", rotation.conjugate(q))):
+            variants[f"{order}{sense}"], variants[f"{order}{sense}, z down"] = turn, rotation.multiply(flip, turn)
     angles = {name: typical_angle(rotation.up_in_body(values), acc) for name, values in variants.items()}
     best = min(angles, key=lambda name: angles[name])
     # Where several fit alike, as with a sensor that lies level, what is written stands.
@@ -120,6 +136,12 @@ def with_checked_orientation(trajectory: Trajectory) -> Trajectory:
         warnings.warn(
             f"{trajectory.name}: the device's orientation is {angles['as written']:.0f}° from gravity as written and "
             f"{angles[best]:.1f}° as {chosen}, which is taken; or is the accelerometer's sign reversed?",
+            stacklevel=2,
+        )
+    elif np.isfinite(angles[best]) and angles[chosen] > 2.0 * FITS:
+        warnings.warn(
+            f"{trajectory.name}: the device's orientation is typically {angles[chosen]:.0f}° from gravity in every "
+            "order and sense; is it of another sensor, or in other axes?",
             stacklevel=2,
         )
     return trajectory.replace(

@@ -20,6 +20,7 @@ from ..trajectory import Trajectory
 from .arrays import read_table
 from .described import with_checked_orientation
 from .head import Head
+from .mapping import unit_quaternions
 from .names import AXES, groups, time_column, words
 from .stamps import Stamps, as_seconds
 from .streams import Stream, joined
@@ -27,9 +28,15 @@ from .table import STANDARD_GRAVITY, Table, factor
 
 SUFFIXES = (".csv", ".txt", ".tsv")
 PREFERRED = {
-    "gyr": ("gyroscope calibrated", "gyroscope", "gyroscope uncalibrated", "gyro"),
-    "acc": ("total acceleration", "accelerometer calibrated", "accelerometer", "accelerometer uncalibrated"),
-    "mag": ("magnetometer calibrated", "magnetometer", "magnetometer uncalibrated"),
+    "gyr": ("gyroscope calibrated", "gyroscope", "gyroscope uncalibrated", "gyro", "angular velocity"),
+    "acc": (
+        "total acceleration",
+        "accelerometer calibrated",
+        "accelerometer",
+        "accelerometer uncalibrated",
+        "acceleration",
+    ),
+    "mag": ("magnetometer calibrated", "magnetometer", "magnetometer uncalibrated", "magnetic field"),
     "orientation": ("rotation vector", "orientation", "attitude", "quaternion"),
     "gravity": ("gravity",),
 }
@@ -51,6 +58,9 @@ class File:
 
 def stem_words(path: Path) -> str:
     """Words of a file's name: ``GyroscopeUncalibrated.csv`` → gyroscope uncalibrated."""
+    metawear = re.search(r"_([A-Za-z]+)_[\d.]+Hz", path.stem)
+    if metawear:
+        return metawear[1].lower()
     return " ".join(word for word in words(path.stem) if not word.isdigit())
 
 
@@ -139,13 +149,6 @@ def quaternion(file: File) -> np.ndarray | None:
     by_axis = {(words(name) or [""])[0]: name for name in table.arrays}
     by_axis |= {words(name)[-1]: name for name in table.arrays if len(words(name)) > 1 and words(name)[-1] in "wxyz"}
     return table.matrix([by_axis[axis] for axis in "wxyz"]) if set("wxyz") <= set(by_axis) else None
-
-
-def unit_quaternions(values: np.ndarray) -> np.ndarray:
-    """Quaternions of unit length, NaN where they have none."""
-    with np.errstate(invalid="ignore", divide="ignore"):
-        length = rotation.norm(values)
-        return np.where(np.abs(length - 1.0) < 0.1, values / length, np.nan)
 
 
 def x_io_streams(inertial: Path, files: dict[str, Path]) -> tuple[dict[str, Stream], dict[str, Any]]:

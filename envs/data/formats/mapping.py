@@ -34,6 +34,8 @@ FRAMES = {
     "y-up": (np.sqrt(0.5), np.sqrt(0.5), 0.0, 0.0),
 }
 """World axes of a reference → quaternion to east, north, up."""
+CODES = (99.0, 888.0, 999.0, 8888.0, 9999.0, 32767.0, 32768.0, 65535.0, 99999.0, 999999.0, 9999999.0)
+"""Magnitudes that loggers write where there is no value."""
 
 
 @dataclass(frozen=True)
@@ -93,9 +95,7 @@ class Reference:
             q = rotation.from_euler_zyx(yaw, pitch, roll)
         else:
             raise ValueError(f"reference columns must be four, nine or three, got {values.shape[1]}")
-        length = rotation.norm(q)
-        with np.errstate(invalid="ignore", divide="ignore"):
-            q = np.where(np.abs(length - 1.0) < 0.1, q / length, np.nan)
+        q = unit_quaternions(q, f"reference {self.columns}")
         q = rotation.conjugate(q) if self.conjugate else q
         return rotation.multiply(np.array(FRAMES[self.frame]), q) if self.frame != "enu" else q
 
@@ -275,8 +275,9 @@ def channel(table: Table, mapping: RecordingMap, sensor: str, kind: str, names: 
     values = table.matrix(columns)
     if kind in SIZES and values.shape[1] != SIZES[kind]:
         raise ValueError(f"columns[{kind!r}] must be {SIZES[kind]} columns, got {values.shape[1]}: {columns}")
-    if np.isinf(values).any():
-        values = np.where(np.isfinite(values), values, np.nan)
+    values = finite(values)
+    if kind in SIZES:
+        values = without_codes(values, kind)
     if kind in SIZES and not isinstance(columns, str) and len(set(columns)) < len(columns):
         raise ValueError(f"columns[{kind!r}] must be different columns, got {columns}")
     given = first_of(mapping.units, sensor, kind)
@@ -290,6 +291,47 @@ def channel(table: Table, mapping: RecordingMap, sensor: str, kind: str, names: 
     if not np.isin(sign, (-1.0, 1.0)).all() or sign.ndim > 1 or sign.size not in (1, values.shape[1]):
         raise ValueError(f"signs[{kind!r}] must be 1 or -1, for all axes or one an axis, got {given_sign!r}")
     return values * (scale * sign), SI.get(kind, unit or "?")
+
+
+def finite(values: np.ndarray) -> np.ndarray:
+    """Values with NaN for what is infinite."""
+    return values if not np.isinf(values).any() else np.where(np.isfinite(values), values, np.nan)
+
+
+def without_codes(values: np.ndarray, kind: str) -> np.ndarray:
+    """Samples ``(N, 3)`` as written, with NaN for the codes of loggers for no value, with a warning.
+
+    A code on all axes is one for certain; on one axis it is, if the axis has fractions otherwise.
+    """
+    code = np.isin(np.abs(values), CODES)
+    fractions = np.isfinite(values) & (values != np.rint(values))
+    found = code.all(axis=1) | (code & (fractions.mean(axis=0) > 0.5)).any(axis=1)
+    if not found.any():
+        return values
+    warnings.warn(
+        f"{kind}: {int(found.sum())} samples hold {values[code & found[:, None]][0]:g}, which loggers write for no "
+        "value; they count as missing",
+        stacklevel=4,
+    )
+    return np.where(found[:, None], np.nan, values)
+
+
+def unit_quaternions(q: np.ndarray, what: str = "quaternions") -> np.ndarray:
+    """Quaternions ``(N, 4)`` of unit length, NaN where they have none; whole numbers of one length are scaled.
+
+    Warns:
+        UserWarning: their usual length is not one.
+    """
+    length = rotation.norm(q)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        known = length[np.isfinite(length) & (length > 0.0)]
+        usual = float(np.median(known)) if len(known) else 1.0
+        if not 0.9 < usual < 1.1:
+            alike = float(np.mean(np.abs(known / usual - 1.0) < 0.02)) > 0.9
+            told = "and are divided by it" if alike else "so that none of them is an orientation"
+            warnings.warn(f"{what} are usually {usual:.5g} long, not 1, {told}", stacklevel=4)
+            q, length = (q / usual, length / usual) if alike else (q, length)
+        return np.where(np.abs(length - 1.0) < 0.1, q / length, np.nan)
 
 
 def first_of(given: Mapping[str, Any], sensor: str, kind: str) -> Any:
@@ -313,7 +355,11 @@ def recording_time(table: Table, mapping: RecordingMap) -> tuple[np.ndarray, dic
     if mapping.time is not None:
         name = str(mapping.time)
         unit = mapping.units.get("time") or table.units.get(name, "")
-        stamps = as_seconds(table.column(name), unit, name)
+        values = table.column(name)
+        rest = fraction_column(name, table)
+        if rest is not None:
+            values, unit = values.astype(np.int64) * 10**9 + table.column(rest).astype(np.int64), "ns"
+        stamps = as_seconds(values, unit, name)
         check_labels(table, stamps.elapsed)
         return stamps.elapsed, details | {"clock_start": stamps.first}
     if mapping.rate is None:
@@ -322,3 +368,9 @@ def recording_time(table: Table, mapping: RecordingMap) -> tuple[np.ndarray, dic
         stamps = as_seconds(table.column(mapping.counter), "s", mapping.counter)
         return stamps.elapsed / mapping.rate, details | {"clock_start": stamps.first}
     return np.arange(length) / mapping.rate, details
+
+
+def fraction_column(name: str, table: Table) -> str | None:
+    """The column of nanoseconds beside one of whole seconds (ROS's ``stamp.secs`` and ``stamp.nsecs``), or None."""
+    stem = re.sub(r"secs?$", "", name)
+    return next((rest for end in ("nanosec", "nsecs", "nsec", "nanosecs") if (rest := stem + end) in table), None)

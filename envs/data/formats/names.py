@@ -15,14 +15,41 @@ FILLERS |= {"element", "measured", "rate", "velocity", "vel", "signal", "body", 
 FILLERS |= {"uncalibrated"}
 GRAVITY_FREE = {"free", "linear", "user", "lin", "gravity", "increment", "global", "world"}
 KINDS = {
-    "gyr": {"gyr", "gyro", "gyros", "gyroscope", "gyroscopes", "omega", "angvel", "angrate", "rotationrate", "w", "g"},
+    "gyr": {
+        "gyr",
+        "gyro",
+        "gyros",
+        "gyroscope",
+        "gyroscopes",
+        "omega",
+        "angvel",
+        "angrate",
+        "rotationrate",
+        "as",
+        "w",
+        "g",
+    },
     "acc": {"acc", "accel", "accelerometer", "accelerometers", "acceleration", "accelerations", "a", "specific"},
-    "mag": {"mag", "magn", "magneto", "magnetometer", "magnetometers", "magnetic", "m", "mf"},
+    "mag": {"mag", "magn", "magneto", "magnetometer", "magnetometers", "magnetic", "m", "mf", "h"},
     "quaternion": {"q", "quat", "quats", "quaternion", "orientation", "attitude", "rotation", "ori"},
     "matrix": {"mat", "matrix", "dcm", "rotmat"},
 }
 """Kind → words that name it; single letters count only right before an axis."""
-TIME = {"time", "timestamp", "timestamps", "t", "seconds", "sampletimefine", "datetime", "epoch", "clock", "ts"}
+TIME = {
+    "time",
+    "timestamp",
+    "timestamps",
+    "t",
+    "seconds",
+    "sampletimefine",
+    "datetime",
+    "epoch",
+    "epoc",
+    "clock",
+    "ts",
+    "cts",
+    "stamp",
+}
 COUNTER = {"packetcounter", "counter", "sample", "samplenumber", "index", "frame", "packet", "samples", "n"}
 AXES = {"x": 0, "y": 1, "z": 2}
 QUATERNION = {"w": 0, "scalar": 0, "x": 1, "y": 2, "z": 3, "0": 0, "1": 1, "2": 2, "3": 3, "4": 4}
@@ -50,11 +77,17 @@ def classify(name: str) -> tuple[str, str, str, str] | None:
     match = re.match(r"^(.*?)mat(?:rix)?\[(\d)\]\[(\d)\]$", name.strip(), re.IGNORECASE)
     if match:
         return match[1].strip("_./ "), "matrix", "", f"{match[2]}{match[3]}"
-    if len(parts) == 1 and re.fullmatch(r"(gyr|gyro|acc|accel|mag|quat|[wagmq])[xyzw0-3]", parts[0]):
+    if len(parts) == 1 and re.fullmatch(r"(gyr|gyro|acc|accel|mag|quat|[wagmqh])[xyzw0-3]", parts[0]):
         parts = [parts[0][:-1], parts[0][-1]]
+    numbered = re.fullmatch(r"(gyr|gyro|acc|accel|mag)_?([xyz])_?(\d+)", name.strip(), re.IGNORECASE)
+    if numbered:
+        return numbered[3], next(kind for kind in KINDS if numbered[1].lower() in KINDS[kind]), "", numbered[2].lower()
     if len(parts) >= 1 and len(parts[-1]) > 1 and re.fullmatch(r"(gyr|gyro|acc|accel|mag|quat)[xyzw0-3]", parts[-1]):
         parts = [*parts[:-1], parts[-1][:-1], parts[-1][-1]]
     where = next((i for i, word in enumerate(parts) if word in QUATERNION and i == len(parts) - 1), None)
+    letters = [i for i, word in enumerate(parts) if word in AXES]
+    if where is not None and parts[where].isdigit() and len(letters) == 1 and letters[0] == where - 1:
+        where = letters[0]  # of ``ACC.X 1`` the letter is the axis
     if where is None:
         where = next((i for i, word in enumerate(parts) if word in QUATERNION and not word.isdigit()), None)
     if where is None or len(parts) < 2 or GRAVITY_FREE & set(parts) or "inc" in parts:
@@ -77,7 +110,7 @@ def classify(name: str) -> tuple[str, str, str, str] | None:
 def groups(table: Table) -> list[Group]:
     """Complete groups of columns that the names of a table tell."""
     found: dict[tuple[str, str, str], dict[str, str]] = {}
-    ros = any("angular_velocity" in name for name in table.arrays)
+    ros = is_ros(table)
     for name, values in table.arrays.items():
         if values.ndim == 2 and values.shape[1] in (3, 4, 9):
             whole = classify(f"{name} x") if values.shape[1] == 3 else classify(f"{name} w")
@@ -101,6 +134,11 @@ def groups(table: Table) -> list[Group]:
             label = spelled(columns[0], sensor)
             result.append(Group(label, kind, variant, columns, units.pop() if len(units) == 1 else ""))
     return result
+
+
+def is_ros(table: Table) -> bool:
+    """Whether the columns are the fields of ROS's message ``sensor_msgs/Imu``."""
+    return all(any(part in name for name in table.arrays) for part in ("angular_velocity.", "linear_acceleration."))
 
 
 def add_unnamed_quaternions(table: Table, found: dict[tuple[str, str, str], dict[str, str]]) -> None:
@@ -154,8 +192,9 @@ def time_column(table: Table) -> str | None:
         return 2 if said and {"time", "timestamp"} & set(words(name)) else int(bool(TIME & set(words(name))))
 
     named = [name for name, values in table.arrays.items() if values.ndim == 1 and len(values) == len(table)]
-    named = [name for name in named if "utc" not in words(name) and rank(name) > 0]
-    return max(named, key=rank, default=None)
+    known = [name for name in named if "utc" not in words(name) and rank(name) > 0]
+    timed = [name for name in named if plain(table.units.get(name, "")) in UNITS["time"]]
+    return max(known, key=rank, default=timed[0] if timed else None)
 
 
 def counter_column(table: Table) -> str | None:

@@ -18,10 +18,28 @@ CALENDAR = r"(\d{4}([-/.]\d\d[-/.]\d\d|\d{4})|\d\d?[-/. ](\d\d?|[a-z]{3,9})[-/. 
 DATE = re.compile(rf"({CALENDAR}(T|_|,?\s+))?{CLOCK}\s*(Z|UTC|GMT|[-+]\d\d:?\d\d)?", re.IGNORECASE)
 """A date with a time, or a time of the day of 24 or twice 12 hours; with a time zone or without."""
 DAY = 86_400
-WRAPS = (2**8, 2**16, 2**24, 2**32, 10**6, 60 * 10**6, DAY * 10**3, DAY * 10**6, DAY * 10**9)
+WRAPS = (
+    100,
+    2**8,
+    1000,
+    2**10,
+    2**12,
+    10**4,
+    2**16,
+    10**5,
+    2**24,
+    2**32,
+    10**6,
+    60 * 10**6,
+    DAY * 10**3,
+    DAY * 10**6,
+    DAY * 10**9,
+)
 """Ends of counters after which they start again at 0; a time of the day does at midnight."""
 FURTHEST_BACK = 2.5
 """Intervals by which rows may be out of order."""
+EPOCHS = {1.0: (3e8, 4e9), 1e-3: (3e11, 4e12), 1e-6: (3e14, 4e15), 1e-7: (1.2e17, 1.5e17), 1e-9: (3e17, 4e18)}
+"""s per unit → stamps in that unit since 1970 (since 1601 in 100 ns, as Windows counts) of the years 1980 to 2090."""
 PLAUSIBLE = (2e-4, 0.2)
 """s; an interval in these bounds tells the unit of stamps without one: they are a thousand times apart."""
 
@@ -74,7 +92,7 @@ def as_seconds(stamps: np.ndarray, unit: str, name: str = "time") -> Stamps:
             f"column {name} must increase, got {stamps[row]} in row {row} after {stamps[row - 1]}: a clock that was "
             "set back, or several recordings in one file"
         )
-    scale = factor("time", unit) if unit else likely_unit(elapsed, name)
+    scale = factor("time", unit) if unit else likely_unit(elapsed, name, float(values[0]))
     return Stamps(elapsed * scale, values[0].item(), scale)
 
 
@@ -92,12 +110,15 @@ def unwrapped(steps: np.ndarray, values: np.ndarray) -> np.ndarray:
     return steps
 
 
-def likely_unit(elapsed: np.ndarray, name: str) -> float:
-    """Seconds per unit of stamps whose header names none."""
+def likely_unit(elapsed: np.ndarray, name: str, first: float = 0.0) -> float:
+    """Seconds per unit of stamps whose header names none: that of a calendar, or of a plausible interval."""
     steps = np.diff(elapsed)
     usual = float(np.median(steps[steps > 0.0])) if (steps > 0.0).any() else 0.0
     if PLAUSIBLE[0] <= usual < PLAUSIBLE[1] or usual == 0.0:
         return 1.0
+    for scale, (earliest, latest) in EPOCHS.items():
+        if earliest < first < latest and PLAUSIBLE[0] <= usual * scale < PLAUSIBLE[1]:
+            return scale
     for unit in ("ms", "us", "ns"):
         scale = UNITS["time"][unit]
         if PLAUSIBLE[0] <= usual * scale < PLAUSIBLE[1] and usual != 1.0:

@@ -12,6 +12,7 @@ from ....filters.support.names import unknown
 
 UNIT = re.compile(r"^(?P<name>.*?)[\s_]*(\((?P<a>(?:[^()]|\([^()]*\))*)\)|\[(?P<b>[^\[\]]*)\])$")
 SPELLED = {"deg_s": "deg/s", "degs": "deg/s", "dps": "deg/s", "mdps": "mdps", "rad_s": "rad/s", "rads": "rad/s"}
+SPELLED |= {"deg/s": "deg/s", "rad/s": "rad/s", "m/s/s": "m/s/s", "m/s2": "m/s2", "t": "T", "s": "s", "rad": "rad/s"}
 SPELLED |= {
     "m_s2": "m/s2",
     "ms2": "m/s2",
@@ -22,8 +23,10 @@ SPELLED |= {
     "nt": "nT",
     "gauss": "gauss",
 }
-"""Units within names of columns, ``gyr_x_dps`` or ``acc_mps2_x``, which cannot hold a stroke."""
-SUFFIX = re.compile(rf"^(?P<name>\w*?[a-z])_(?P<unit>{'|'.join(SPELLED)})(?P<axis>_[xyz])?$", re.IGNORECASE)
+"""Units within names of columns, ``gyr_x_dps`` or ``acc_mps2_x``."""
+ONLY_OF = {"g": "acc", "t": "^m", "s": "^time", "rad": "^gyr"}
+"""Short ones that are units only within names that match."""
+SUFFIX = re.compile(rf"^(?P<name>\w*?[a-z])_(?P<unit>{'|'.join(SPELLED)})(?P<axis>_[xyz]|\[\d\])?$", re.IGNORECASE)
 STANDARD_GRAVITY = 9.80665
 
 
@@ -35,18 +38,28 @@ UNITS = {
     "gyr": _spellings(
         {
             1.0: "rad/s rads^-1 rad/sec radians/s radians/sec rads-1 rad*s^-1",
-            np.pi / 180: "deg/s °/s dps degs^-1 degree/s degrees/s deg/sec degs-1 degrees/sec º/s",
-            np.pi / 180e3: "mdps mdeg/s",
+            np.pi / 180: "deg/s °/s dps degs^-1 degree/s degrees/s deg/sec degs-1 degrees/sec º/s ˚/s d/s",
+            np.pi / 180e2: "cdeg/s",
+            np.pi / 180e3: "mdps mdeg/s millideg/s millidegrees/s",
+            np.pi / (180.0 * 60.0): "deg/min °/min",
+            np.pi / (180.0 * 3600.0): "deg/h deg/hr °/h",
             1e-3: "mrad/s",
+            1e-6: "urad/s µrad/s",
             2.0 * np.pi: "rev/s rps turn/s turns/s",
             np.pi / 30.0: "rpm rev/min r/min",
         }
     ),
     "acc": _spellings(
         {
-            1.0: "m/s^2 m/s2 m/s² m/(s^2) ms^-2 ms-2 mps2 m/s/s m/sec^2 m*s^-2 m/s**2 meters/second^2",
-            STANDARD_GRAVITY: "g g0 gs gee G",
+            1.0: "m/s^2 m/s2 m/s² m/(s^2) ms^-2 ms-2 mps2 m/s/s m/sec^2 m*s^-2 m/s**2 meters/second^2 n/kg",
+            STANDARD_GRAVITY: "g g0 gs gee gn g-force gforce",
             STANDARD_GRAVITY / 1000.0: "mg milli-g",
+            STANDARD_GRAVITY / 1e6: "ug µg",
+            0.1: "dm/s^2 dm/s2 dm/s²",
+            0.01: "cm/s^2 cm/s2 cm/s² gal",
+            0.001: "mm/s^2 mm/s2 mm/s²",
+            1e-5: "mgal",
+            0.3048: "ft/s^2 ft/s2 ft/s²",
         }
     ),
     "mag": _spellings(
@@ -71,8 +84,15 @@ OTHER_UNITS = {"c", "degc", "°c", "kpa", "hpa", "pa", "mv", "v", "%", "m", "mm"
 
 
 def plain(unit: str) -> str:
-    """A unit as the table of units spells it."""
-    return re.sub(r"[\s·]+", "", unit).lower().replace("−", "-")
+    """A unit as the table of units spells it: ``deg.s⁻¹``, ``radians per second`` and the like by their short forms."""
+    simple = re.sub(r"[\s·]+", "", unit).lower()
+    if simple in KNOWN_UNITS or simple in OTHER_UNITS:
+        return simple
+    short = unit.lower().replace("−", "-").replace("⁻¹", "-1").replace("⁻²", "-2").replace("μ", "µ")
+    short = re.sub(r"(?<=[a-z°])\s*[.*·]\s*(?=[a-z])|\s+", " ", short)
+    short = re.sub(r"\bper\b", "/", short)
+    short = re.sub(r"\bseconds?\b(?! ?squared)", "s", short) if "/" in short else short
+    return re.sub(r"\s+", "", short)
 
 
 def factor(kind: str, unit: str) -> float:
@@ -96,8 +116,11 @@ def split_unit(name: str) -> tuple[str, str]:
     """
     match = UNIT.match(name.strip())
     suffix = SUFFIX.match(name.strip())
-    if match is None and suffix is not None and (suffix["unit"].lower() != "g" or "acc" in suffix["name"].lower()):
-        return f"{suffix['name']}{suffix['axis'] or ''}", SPELLED[suffix["unit"].lower()]
+    indexed = match is None or bool(match["b"] and match["b"].isdigit())
+    if indexed and suffix is not None:
+        unit = suffix["unit"].lower()
+        if re.search(ONLY_OF.get(unit, ""), suffix["name"], re.IGNORECASE):
+            return f"{suffix['name']}{suffix['axis'] or ''}", SPELLED[unit]
     if match is None:
         stem, said, unit = name.strip().rpartition(" in ")
         if said and plain(unit) in UNITS["time"]:
@@ -192,10 +215,13 @@ class Table:
         return None
 
     def rate_in_header(self, *keys: str) -> float | None:
-        """A sampling rate in Hz that the preamble names, or None."""
+        """A sampling rate in Hz that the preamble names, itself or by an interval (``10 ms``), or None."""
         text = self.value_of(*keys)
-        number = None if text is None else re.search(r"\d+(?:[.,]\d+)?", text)
-        return float(number[0].replace(",", ".")) if number and float(number[0].replace(",", ".")) > 0.0 else None
+        number = None if text is None else re.search(r"(\d+(?:[.,]\d+)?)\s*(k?hz|m?s\b)?", text, re.IGNORECASE)
+        if number is None or float(number[1].replace(",", ".")) <= 0.0:
+            return None
+        value, unit = float(number[1].replace(",", ".")), (number[2] or "").lower()
+        return {"khz": 1e3 * value, "ms": 1e3 / value, "s": 1.0 / value}.get(unit, value)
 
     def renamed(self, spelling: Callable[[str], str]) -> Table:
         """The table with other names of columns."""

@@ -23,11 +23,34 @@ from .table import Table, split_unit, units_row
 if TYPE_CHECKING:
     import pandas
 
-MISSING = ("", "nan", "na", "n/a", "null", "none", "-", "--", "#n/a", "nil", "missing")
-NUMBER = re.compile(r"[-+]?(\d+[.,]?\d*|[.,]\d+)([eE][-+]?\d+)?|[-+]?(inf|infinity)", re.IGNORECASE)
+MISSING = ("", "-", "--", "---", "…", "...", "?", "*", "na", "n/a", "n.a.", "null", "<null>", "none", "nil", "missing")
+MISSING += ("undef", "undefined", "void", "nat", "<na>", "nan", "-nan", "nan(ind)", "-nan(ind)", "nan(snan)", "1.#qnan")
+MISSING += (
+    "-1.#qnan",
+    "1.#ind",
+    "-1.#ind",
+    "1.#inf",
+    "-1.#inf",
+    "1.#snan",
+    "#n/a",
+    "#na",
+    "#value!",
+    "#div/0!",
+    "#num!",
+)
+MISSING += ("#name?", "#ref!", "#null!")
+"""Texts for no value, in lower case: of languages, databases, C libraries and spreadsheets."""
+NUMBER = re.compile(r"[-+]?(\d+[.,]?\d*|[.,]\d+)([eEdD][-+]?\d+)?|[-+]?(inf|infinity)", re.IGNORECASE)
+GROUPED = re.compile(r"[-+]?\d{1,3}('\d{3})+([.,]\d*)?|[-+]?\d{1,3}(,\d{3})*\.\d*|[-+]?\d{1,3}(\.\d{3})*,\d*")
+"""Digits in groups of thousands, where the decimal mark is another one."""
+ALIKE = str.maketrans({"\u2212": "-", "\u00a0": " ", "\u202f": " ", "\u2009": " ", "\ufeff": None})
+"""Signs and spaces of typesetters → those of numbers."""
 COMMENT = ("#", "//", "%")
 DELIMITERS = (",", ";", "\t", "|", " ")
-SENSOR = re.compile(r"(^|[\W_])(id|sensor|device|node|imu|mac|address)s?([\W_]*(id|no|number|name))?$", re.IGNORECASE)
+SENSOR = re.compile(
+    r"(^|[\W_])(id|sensor|device|node|imu|mac|address|type|kind|channel|topic|stream)s?([\W_]*(id|no|number|name))?$",
+    re.IGNORECASE,
+)
 OFTEN, MOST_SENSORS = 0.3, 64
 """Share of rows whose label is not that of the row before, and different ones, where labels name sensors."""
 SAMPLE = 400
@@ -39,17 +62,28 @@ def decode(content: bytes) -> str:
     """Text of a file with line feeds only."""
     if content.startswith((b"\xff\xfe", b"\xfe\xff")):
         text = content.decode("utf-16", errors="replace")
+    elif wide(content):
+        text = content.decode(wide(content), errors="replace")
     else:
         try:
             text = content.decode("utf-8-sig")
         except UnicodeDecodeError:
             text = content.decode("cp1252", errors="replace")
-    return text.replace("\r\n", "\n").replace("\r", "\n")
+    return text.translate(ALIKE).replace("\r\n", "\n").replace("\r", "\n")
+
+
+def wide(content: bytes) -> str:
+    """The encoding of a text of two bytes a letter without byte order mark; empty of others."""
+    head = content[:4096]
+    for first, encoding in ((1, "utf-16-le"), (0, "utf-16-be")):
+        if len(head) > 16 and head[first::2].count(0) > 0.95 * (len(head) // 2) and head[1 - first :: 2].count(0) == 0:
+            return encoding
+    return ""
 
 
 def is_text(head: bytes) -> bool:
     """Whether the first bytes of a file are those of a text."""
-    if head.startswith((b"\xff\xfe", b"\xfe\xff")):
+    if head.startswith((b"\xff\xfe", b"\xfe\xff")) or wide(head):
         return True
     printable = sum(byte >= 32 or byte in (9, 10, 13) for byte in head)
     return bool(head) and b"\0" not in head and printable > 0.97 * len(head)
@@ -60,7 +94,10 @@ def fields_of(line: str, delimiter: str) -> list[str]:
     if delimiter == " ":
         return line.split()
     if '"' in line:
-        return [field.strip() for field in next(csv.reader([line], delimiter=delimiter, skipinitialspace=True), [])]
+        try:
+            return [field.strip() for field in next(csv.reader([line], delimiter=delimiter, skipinitialspace=True), [])]
+        except csv.Error:  # one line of a megabyte, as of JSON
+            pass
     return [field.strip() for field in line.split(delimiter)]
 
 
@@ -79,6 +116,11 @@ def numbers(line: str, delimiter: str) -> int:
     content = [field for field in fields_of(line, delimiter) if field.lower() not in MISSING]
     found = sum(is_value(field) for field in content)
     return found if 2 * found >= len(content) else 0
+
+
+def cells(line: str, delimiter: str) -> int:
+    """How many fields are numbers, dates or texts for missing values."""
+    return sum(field != "" and is_value(field) for field in fields_of(line, delimiter))
 
 
 def guess_delimiter(lines: list[str]) -> str | None:
@@ -118,7 +160,7 @@ def table_of(text: str, name: str) -> Table:
             if numbers(line, delimiter)
             and not line.lstrip().startswith(COMMENT)
             and all(numbers(after, delimiter) or not after.strip() for after in lines[number + 1 : number + 3])
-            and numbers(line, delimiter) > 0.3 * numbers(lines[min(number + 5, len(lines) - 1)], delimiter)
+            and cells(line, delimiter) > 0.3 * cells(lines[min(number + 5, len(lines) - 1)], delimiter)
         ),
         None,
     )
@@ -247,7 +289,7 @@ def header_lines(above: list[str], delimiter: str, width: int) -> list[tuple[int
 def names_and_units(heads: list[list[str]], width: int) -> tuple[list[str], dict[str, str]]:
     """Unique column names, and the units by name, of the lines of a header."""
     rows = [list(head) for head in heads]
-    unit_line: list[str] = rows.pop() if len(rows) > 1 and units_row(rows[-1]) else [""] * width
+    unit_line = [re.sub(r"^[(\[](.*)[)\]]$", r"\1", cell) for cell in rows.pop()] if units_below(rows) else [""] * width
     if len(rows) > 1 and any(not cell for cell in rows[0][1:]):
         # A line of groups over a line of axes: the group's name stands over its first column.
         group = ""
@@ -267,6 +309,11 @@ def names_and_units(heads: list[list[str]], width: int) -> tuple[list[str], dict
     return names, units
 
 
+def units_below(rows: list[list[str]]) -> bool:
+    """Whether the last line of a header holds units."""
+    return len(rows) > 1 and units_row(rows[-1])
+
+
 def numeric(column: pandas.Series) -> tuple[np.ndarray | None, tuple[int, str] | None]:
     """Numbers of a column (None for texts), and row and content of the first cell that is none."""
     import pandas
@@ -278,9 +325,23 @@ def numeric(column: pandas.Series) -> tuple[np.ndarray | None, tuple[int, str] |
     values = pandas.to_numeric(texts, errors="coerce")
     if values[filled].isna().any():
         values = pandas.to_numeric(texts.str.replace(",", ".", regex=False), errors="coerce")
+    if values[filled].isna().any():
+        values = pandas.to_numeric(spelled_out(texts, filled), errors="coerce")
     wrong = filled & values.isna()
     if not filled.any() or wrong.sum() > 0.5 * filled.sum():
         first = str(texts[filled].iloc[0]) if filled.any() else ""
         return (nanoseconds(texts), None) if DATE.fullmatch(first) else (None, None)
     row = int(np.flatnonzero(wrong)[0]) if wrong.any() else None
     return values.to_numpy(dtype=float), None if row is None else (row, str(texts.iloc[row]))
+
+
+def spelled_out(texts: pandas.Series, filled: pandas.Series) -> pandas.Series:
+    """Numbers as Python writes them, of those with a Fortran exponent or with digits in groups of thousands."""
+    texts = texts.str.replace(r"(?<=\d)[dD](?=[-+]?\d)", "e", regex=True)
+    if not texts[filled].str.fullmatch(GROUPED).all():
+        return texts
+    for group, decimal in ((",", "."), (".", ",")):
+        marks = texts[filled].str.rfind(group), texts[filled].str.rfind(decimal)
+        if (marks[1] >= 0).all() and (marks[0] < marks[1]).all():
+            return texts.str.replace(f"[{group}']", "", regex=True).str.replace(decimal, ".", regex=False)
+    return texts.str.replace("'", "", regex=False)
