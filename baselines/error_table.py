@@ -75,7 +75,7 @@ def summary(table: pandas.DataFrame, metric: str = "inclination", groups: Mappin
     """Means over trajectories as a wide table: one row per estimator, one column per group, best estimators first.
 
     Estimators that have no estimate for some of the samples, or could not be run on some trajectories, come after
-    those that have: their mean is over other, often easier, samples. The column ``valid`` then tells the share.
+    those that have: their mean is over other, often easier, samples. The column ``valid`` then holds the share.
 
     Args:
         table: from :func:`poise.evaluate`, with one quantity that has this metric.

@@ -65,10 +65,10 @@ def evaluate(
 
     Args:
         estimators: names (see :func:`poise.list_estimators`), estimators, or a mapping label → name or estimator.
-            Each runs at the clock of each trajectory (:func:`poise.run`); those that are named are configured with the
+            Each runs at the clock of each trajectory (:func:`poise.run`); those given by name are configured with the
             rider, bicycle or device that its metadata describe.
         trajectories: trajectories, or paths of recordings. Recordings of one name get the part of their path that
-            tells them apart.
+            distinguishes them.
         reference: what replaces a missing truth: an estimator, ``"onboard"`` for the
             orientation that the device computed, or ``"auto"`` for ``mekf-9`` or ``bounded-motion``, depending on the
             channels. Such rows name it in ``metric`` (``inclination to mekf-9``): they show agreement, not

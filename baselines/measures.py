@@ -1,4 +1,4 @@
-"""What one run tells beyond its RMS error: largest error, settling, drift, ratio to a bound, consistency."""
+"""Measures of one run beyond its RMS error: largest error, settling, drift, ratio to a bound, consistency."""
 
 from __future__ import annotations
 

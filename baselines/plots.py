@@ -183,10 +183,10 @@ def error_curves(
         kind = kinds.get(label, "")
         style = styles[used.get(kind, 0) % len(styles)]
         used[kind] = used.get(kind, 0) + 1
-        per_tick = error(UP, with_up(estimate.pose)[UP.name], truth) * DEGREES
-        usual.append(float(np.nanquantile(per_tick, 0.995)) if np.isfinite(per_tick).any() else 0.0)
+        degrees = error(UP, with_up(estimate.pose)[UP.name], truth) * DEGREES
+        usual.append(float(np.nanquantile(degrees, 0.995)) if np.isfinite(degrees).any() else 0.0)
         colour = COLOURS.get(kind, COLOURS["baseline"])
-        errors.plot(time, per_tick, color=colour, linestyle=style, linewidth=0.9, label=label)
+        errors.plot(time, degrees, color=colour, linestyle=style, linewidth=0.9, label=label)
     errors.set_ylabel("inclination error, deg")
     errors.set_xlabel("time, s")
     # The better half sets the scale, so that one diverging estimator does not hide the others.
@@ -238,7 +238,7 @@ def angle_curves(trajectories: Mapping[str, Trajectory], estimates: Mapping[str,
             spans.setdefault(angle, []).extend(span)
     for ax, angle in zip(axes, shown, strict=True):
         low, high = min(spans[angle]), max(spans[angle])
-        # Bands that leave the picture tell enough there; the angles set the scale.
+        # The angles set the scale; wider bands are cut.
         ax.set_ylim(low - 0.1 * (high - low) - 1.0, high + 0.1 * (high - low) + 1.0)
     axes[-1].set_xlabel("time, s")
     handles = dict(zip(*axes[0].get_legend_handles_labels()[::-1], strict=True))

@@ -35,8 +35,8 @@ def run(
     their interval must be given.
 
     Args:
-        estimator: a name (see :func:`poise.list_estimators`), or an estimator. One that is only named is configured
-            for the trajectory (rider, bicycle, array), where its metadata say.
+        estimator: a name (see :func:`poise.list_estimators`), or an estimator. One given by name is configured for
+            the trajectory (rider, bicycle, array) where its metadata describe these.
         data: a trajectory, or channel name → ``(T, *batch, size)``, NaN where a channel has no valid sample.
         dt: sampling interval, s; needed with arrays. With a trajectory it may only confirm the trajectory's.
         grid: return the estimate on the uniform grid, gaps included, instead of at the trajectory's samples.
@@ -126,7 +126,7 @@ def same_interval(one: float, other: float) -> bool:
 
 
 def fitted(estimator: str | Estimator[Any], trajectory: Trajectory) -> Estimator[Any]:
-    """An estimator at the trajectory's sampling interval; one that is only named is configured for it."""
+    """An estimator at the trajectory's sampling interval; one given by name is configured for it."""
     if isinstance(estimator, str):
         return make_estimator(estimator, dt=trajectory.dt, metadata=trajectory.metadata)
     return estimator if abs(estimator.dt - trajectory.dt) <= 1e-6 * trajectory.dt else estimator.with_dt(trajectory.dt)

@@ -91,7 +91,7 @@ def bootstrap_interval(
         draws: how many.
         level: probability that the interval covers.
         tasks_too: whether the tasks are drawn too, the same for all arrays: what other trajectories would have shown.
-            Without, the interval says what other training seeds would have.
+            Without, the interval covers other training seeds.
 
     Raises:
         ValueError: ``draws`` or ``level`` is out of its range.

@@ -237,7 +237,7 @@ class PoseEnv(DrawnEnv):
         return {name: values[self._row] for name, values in self._block.measurements.items()}
 
     def _look_at(self, block: Block) -> None:
-        """Go on with another block."""
+        """Continue with another block."""
         self._block, self._row = block, 0
         self._seen: Observation = self.suite.observations(block.measurements, len(block.time))
 

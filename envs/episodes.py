@@ -58,7 +58,7 @@ class EpisodeStore:
         return self._kept[key]
 
     def path(self, key: tuple[int, ...]) -> Path | None:
-        """File of an episode; None if the settings cannot be told exactly."""
+        """File of an episode; None if the settings have no exact JSON form."""
         if self._settings is None:
             return None
         digest = hashlib.sha256(json.dumps([self._settings, key]).encode()).hexdigest()[:24]
@@ -89,7 +89,7 @@ class EpisodeStore:
 
 
 def exact(value: Any) -> Any:
-    """A value as JSON that tells it apart from every other one.
+    """A value as JSON that no other value has.
 
     Raises:
         TypeError: it has no such form.

@@ -21,7 +21,7 @@ from .gain_episode import PRIVILEGED, GainEpisode
 from .gain_reward import GainReward, RewardKind, errors_of, scored_quantities
 
 Drawn = tuple[Hashable, Callable[[], Trajectory]]
-"""What tells a trajectory from every other one (None: it is never drawn again), and what makes it."""
+"""Key that identifies a trajectory (None: it is never drawn again), and the function that makes it."""
 KEPT = 16
 """episodes that an environment keeps in memory"""
 
@@ -45,7 +45,7 @@ class GainTuningEnv(DrawnEnv):
         error_scale: deg; errors far above it count by their logarithm in relative rewards.
         smoothing: s; the gains follow the actions with this time constant, so that the noise of an agent's exploration
             changes them by a sensible factor; 0: at once.
-        privileged: whether observations end with what only the truth tells, for the critic of a training.
+        privileged: whether observations end with privileged information from the truth, for the critic of a training.
         render_mode: ``human`` (a window), ``rgb_array`` or None.
 
     Raises:

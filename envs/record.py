@@ -181,7 +181,7 @@ def describe(env: Any, seed: int | None) -> dict[str, Any]:
 
 
 def plain(value: Any) -> Any:
-    """``value`` as JSON knows it; what JSON does not know becomes its ``repr``."""
+    """``value`` in JSON's types; any other value becomes its ``repr``."""
     if isinstance(value, np.ndarray | np.generic):
         return plain(value.tolist())
     if dataclasses.is_dataclass(value) and not isinstance(value, type):

@@ -115,7 +115,7 @@ def tasks_of(args: Args, recorded: list[Trajectory]) -> tuple[list[Task], list[s
     from ..baselines.comparison.tasks import hand_tasks, imu_ride_tasks, recording_tasks
 
     channels = list(dict.fromkeys([*HAND_CHANNELS, *(name for each in recorded for name in each.measurements)]))
-    contenders(args.estimators, channels)  # an unknown name is told before anything is simulated
+    contenders(args.estimators, channels)  # an unknown name is refused before anything is simulated
     tasks = hand_tasks(args.seed, args.episodes, sensors=args.sensors)
     tasks += imu_ride_tasks(args.seed) if args.rides else []
     tasks += recording_tasks(recorded)

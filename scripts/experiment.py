@@ -210,11 +210,7 @@ def versions(packages: Sequence[str] = PACKAGES) -> dict[str, Any]:
         "python": platform.python_version(),
         "platform": platform.platform(),
         "processors": processors(),
-        "poise": {
-            "version": package_version("poise"),
-            "code": code_version(),
-            **git_state(ROOT),
-        },
+        "poise": {"version": package_version("poise"), "code": code_version(), **git_state(ROOT)},
         "packages": {name: package_version(name) for name in packages},
     }
 

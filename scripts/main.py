@@ -150,7 +150,7 @@ def run(name: str, words: Sequence[str]) -> int:
 
 
 def unboxed(complaint: str) -> str:
-    """What a parser says in a box of several lines, as one line."""
+    """A parser's message in a box of several lines, as one line."""
     frame = str.maketrans(dict.fromkeys("─╭╮╰╯│┌┐└┘", " "))
     lines = [line.translate(frame).strip() for line in complaint.splitlines()]
     content = [line for line in lines if line]

@@ -72,7 +72,7 @@ def wide_tables(table: pandas.DataFrame, groups: Mapping[str, str] | None = None
     tables = {}
     for title, metric, part in parts(table):
         wide = summary(part, metric, groups)
-        if len(wide.columns.drop(["valid"], errors="ignore")) == 2:  # of a single group the mean says it all again
+        if len(wide.columns.drop(["valid"], errors="ignore")) == 2:  # of one group the mean repeats its column
             wide = wide.drop(columns="mean")
         tables[title] = [
             {"estimator": name, "kind": kinds.get(str(name), "–"), **{str(key): value for key, value in row.items()}}

@@ -1,9 +1,18 @@
-"""The picture of the architecture page is that of the package's imports."""
+"""The architecture page: its picture is that of the package's imports, and a sample passes the files that it names."""
 
 import importlib.util
+import re
+import sys
 from pathlib import Path
+from types import FrameType
+
+from poise.baselines.evaluation import evaluate
+from poise.baselines.plots import rms_bars, save
+from poise.envs.hand.environment import HandMotionEnv
+from poise.envs.record import record_once
 
 ROOT = Path(__file__).resolve().parents[1]
+PAGE = ROOT / "docs" / "architecture.md"
 
 
 def test_the_picture_is_drawn_from_the_imports() -> None:
@@ -15,3 +24,22 @@ def test_the_picture_is_drawn_from_the_imports() -> None:
     drawn = module.draw()
     assert module.SHIPPED.read_text(encoding="utf-8") == drawn, "python docs/draw_layers.py draws it anew"
     assert drawn.count("<rect") == len(module.edges()) + 1
+
+
+def test_a_sample_passes_the_files_of_the_page(tmp_path: Path) -> None:
+    section = PAGE.read_text(encoding="utf-8").split("## The path of a sample")[1].split("## ")[0]
+    named = re.findall(r"^\| `(\S+\.py)` \|", section, flags=re.MULTILINE)
+    entered: set[str] = set()
+
+    def note(frame: FrameType, event: str, _: object) -> None:
+        entered.add(frame.f_code.co_filename)
+
+    sys.setprofile(note)
+    try:
+        episode = record_once(HandMotionEnv("fast", "dynamic", duration=1.0), 0)
+        table = evaluate(["external-acceleration"], [episode], check=False)
+        save(rms_bars(table, {}, "inclination", "hand"), tmp_path / "bars.png")
+    finally:
+        sys.setprofile(None)
+    assert 10 <= len(named) <= 15
+    assert [name for name in named if str(ROOT / name) not in entered] == []

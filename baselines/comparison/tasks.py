@@ -159,7 +159,7 @@ def run_task(
     found: dict[str, Any] = {"groups": {one.name: str(one.metadata.get("group") or one.name) for one in trajectories}}
     settings = {"offline": offline, "reference": reference, "detailed": True, **task.settings}
     try:
-        # kept with the results: whoever puts them together tells them, also after an interruption
+        # kept with the results, and issued when these are collected, also after an interruption
         with warnings.catch_warnings(record=True) as told:
             warnings.simplefilter("always")
             table = evaluate(contenders(names, channels), trajectories, **settings)

@@ -204,7 +204,7 @@ def config_of(agent: AgentName, config: TrainingConfig) -> TrainingConfig:
 
     Recurrent PPO walks through its memory decision by decision, so it takes few long rollouts; SAC and TD3 take few
     episodes at a time, since each of them waits for the gradient steps. The exact gradient needs no warm start, and
-    learns the motions by heart with larger networks.
+    memorises the motions with larger networks.
     """
     if agent == "ppo":
         return replace(config, agent=agent)

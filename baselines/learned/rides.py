@@ -2,7 +2,7 @@
 
 Most of what such a network corrects is constant in a ride and differs from ride to ride: alignment, zeros, lengths of
 limbs. So every ride is used several times, each with another draw of errors and half of them with left and right
-exchanged; without that, networks learn the few draws by heart.
+exchanged; without that, networks memorise the few draws.
 """
 
 from __future__ import annotations

@@ -26,14 +26,7 @@ FAMILIES: dict[str, tuple[str, ...]] = {
         "force-inertial-integration",
         "whole-body-integration",
     ),
-    "arrays": (
-        "array-orientation",
-        "array-rate",
-        "marins",
-        "planar-orientation",
-        "planar-pose",
-        "planar-mean",
-    ),
+    "arrays": ("array-orientation", "array-rate", "marins", "planar-orientation", "planar-pose", "planar-mean"),
 }
 """Part of ``poise speed`` → estimators; those that the registry lacks are left out."""
 

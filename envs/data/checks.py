@@ -78,9 +78,9 @@ def columns(argument: str, arrays: Mapping[str, Any], length: int) -> dict[str, 
         if array.ndim != 2 or array.shape[0] != length or array.shape[1] == 0:
             raise ValueError(f"{argument}[{name!r}] must have shape ({length}, size), got {array.shape}")
         if np.isinf(array).any():
-            tick = first(np.isinf(array).any(axis=1))
+            sample = first(np.isinf(array).any(axis=1))
             raise ValueError(
-                f"{argument}[{name!r}] must be finite, or NaN where unknown; it is infinite at sample {tick}"
+                f"{argument}[{name!r}] must be finite, or NaN where unknown; it is infinite at sample {sample}"
             )
         checked[name] = array
     return checked

@@ -130,11 +130,11 @@ def fill_short_gaps(values: np.ndarray, longest: float) -> np.ndarray:
     present = np.flatnonzero(np.isfinite(values).all(axis=1))
     if len(present) < 2:
         return values
-    ticks = np.arange(len(values))
-    right = np.clip(np.searchsorted(present, ticks), 1, len(present) - 1)
+    samples = np.arange(len(values))
+    right = np.clip(np.searchsorted(present, samples), 1, len(present) - 1)
     before, after = present[right - 1], present[right]
-    short = (after - before <= longest + 1e-6) & (ticks > before) & (ticks < after)
-    weight = ((ticks - before) / (after - before))[:, None]
+    short = (after - before <= longest + 1e-6) & (samples > before) & (samples < after)
+    weight = ((samples - before) / (after - before))[:, None]
     return np.where(short[:, None], values[before] + weight * (values[after] - values[before]), values)
 
 

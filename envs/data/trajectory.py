@@ -43,11 +43,11 @@ class Trajectory:
     Attributes:
         time: ``(T,)`` s, the stamps as recorded, not decreasing: they may jitter, have gaps, and be shared by the
             samples of a packet. Estimators run on :meth:`on_grid`.
-        measurements: channel name (``place/kind``) → ``(T, size)``; NaN where a channel has no valid sample.
+        measurements: channel name (``site/kind``) → ``(T, size)``; NaN where a channel has no valid sample.
         truth: quantity name → ``(T, size)``; NaN where unknown; may be empty.
         mask: ``(T,)`` bool, evaluation mask; all samples by default.
         metadata: JSON-able description: name, environment, sensors, seed, version, rate, source, licence, …;
-            ``nominal_rate`` in Hz is the device's own statement and decides the grid of irregular stamps.
+            ``nominal_rate`` is the rate in Hz that the device states; it decides the grid of irregular stamps.
 
     Raises:
         ValueError: an argument has the wrong shape or type, time decreases or stands still, there is no sample or no
@@ -70,8 +70,8 @@ class Trajectory:
             )
         backwards = np.diff(time) < 0.0 if time[-1] > time[0] else np.diff(time) <= 0.0
         if backwards.any():
-            tick = first(backwards) + 1
-            raise ValueError(f"time must increase, got {time[tick]} s at sample {tick} after {time[tick - 1]} s")
+            sample = first(backwards) + 1
+            raise ValueError(f"time must increase, got {time[sample]} s at sample {sample} after {time[sample - 1]} s")
         measurements = columns("measurements", self.measurements, len(time))
         if not measurements:
             raise ValueError("measurements must hold at least one channel, got none")
@@ -139,7 +139,7 @@ class Trajectory:
         An exact grid is returned as it is.
 
         Raises:
-            ValueError: no sampling rate explains the stamps, or the rate is none of an inertial sensor: the message
+            ValueError: no sampling rate explains the stamps, or the rate is not one of an inertial sensor: the message
                 names the unit that time seems to have.
         """
         if len(self) == 1:
@@ -183,8 +183,8 @@ class Trajectory:
     def interpolated(self, longest: float = 0.05) -> Trajectory:
         """The trajectory on its grid, with short gaps of gyroscopes and accelerometers filled by lines.
 
-        This looks ahead, so it is for work offline: a held rate integrates to an error in every gap. Filled samples are
-        not scored, and ``metadata["interpolated"]`` says how many there are.
+        This looks ahead, so it is for offline work: a zero-order hold of the rate adds an error of attitude in every
+        gap. Filled samples are not scored, and ``metadata["interpolated"]`` says how many there are.
 
         Args:
             longest: s between the samples on both sides of a gap.
@@ -224,7 +224,7 @@ class Trajectory:
 
     @property
     def quantities(self) -> tuple[str, ...]:
-        """Names that :meth:`truth_of` answers."""
+        """Names that :meth:`truth_of` accepts."""
         derived = [name for name in DERIVED_FROM_ORIENTATION if "orientation" in self.truth and name not in self.truth]
         return (*self.truth, *derived)
 
@@ -232,7 +232,7 @@ class Trajectory:
         """The truth ``(T, size)`` of a quantity, derived from the orientation where only that is known.
 
         Raises:
-            ValueError: the trajectory does not know it.
+            ValueError: the trajectory has no such truth.
         """
         if quantity in self.truth:
             return self.truth[quantity]
@@ -243,13 +243,13 @@ class Trajectory:
     def __len__(self) -> int:
         return len(self.time)
 
-    def __getitem__(self, ticks: slice) -> Trajectory:
+    def __getitem__(self, part: slice) -> Trajectory:
         """The part ``trajectory[a:b]``; time is not shifted."""
-        if not isinstance(ticks, slice) or ticks.step not in (None, 1):
-            raise ValueError(f"a trajectory is cut by [a:b] in steps of one, got [{ticks}]; resample to thin it out")
-        if len(self.time[ticks]) == 0:
-            raise ValueError(f"{ticks} leaves no sample of the {len(self)} of {self.name}")
-        return self._rows(ticks)
+        if not isinstance(part, slice) or part.step not in (None, 1):
+            raise ValueError(f"a trajectory is cut by [a:b] in steps of one, got [{part}]; resample to thin it out")
+        if len(self.time[part]) == 0:
+            raise ValueError(f"{part} leaves no sample of the {len(self)} of {self.name}")
+        return self._rows(part)
 
     def __repr__(self) -> str:
         known = f", truth {', '.join(self.truth)}" if self.truth else ""

@@ -7,7 +7,7 @@ L3G4200D), whose tolerances are our choice.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -33,13 +33,11 @@ GYROSCOPE_RANGE = 32767
 MAGNETOMETER_SCALE = 1.0 / 300.0
 """of a unit field, per count"""
 
-ACCELEROMETER_MOUNTINGS = (
-    *(("+z", "+x"), ("-z", "-x")),
-    *(("+x", "+y"), ("-x", "-y")),
-    *(("+y", "+z"), ("-y", "-z")),
-)
+ACCELEROMETER_MOUNTINGS = (*(("+z", "+x"), ("-z", "-x")), *(("+x", "+y"), ("-x", "-y")), *(("+y", "+z"), ("-y", "-z")))
 """(up, out): each axis outwards, inwards, upright and upside down."""
 GYROSCOPE_MOUNTINGS = (("+x", "+y"), ("+y", "+z"), ("+z", "+x"))
+ONE_AXIS = AccelerometerArray(((0.0, 0.0, 0.0),), ((0.0, 0.0, 1.0),))
+"""An accelerometer that no reading is taken of."""
 
 
 def nominal_calibration(array: AccelerometerArray) -> CalibrationRecord:
@@ -93,73 +91,45 @@ def counts(channel: ChannelCalibration, readings: np.ndarray, largest: float = m
 
 
 def accelerometer_runs(
-    array: AccelerometerArray,
-    truth: CalibrationRecord,
-    seed: int,
-    *,
-    hold: float = 10.0,
-    offset: float = 0.1,
-    preset: str = "array-data-sheet",
-    mountings: Sequence[tuple[str, str]] = ACCELEROMETER_MOUNTINGS,
+    array: AccelerometerArray, truth: CalibrationRecord, seed: int, *, hold: float = 10.0
 ) -> RateTableData:
     """Runs for every axis: 80 to 800 °/s where it points outwards, back where it points inwards, and upright.
+
+    The reference point of the array is 0.1 m from the axis of the table.
 
     Args:
         array: the device, as it is built.
         truth: its calibration.
         seed: of motion and noise.
         hold: time at each rate, s.
-        offset: distance of the array's reference point from the axis of the table, m.
-        preset: noise.
-        mountings: (up, out) of the runs.
     """
-    device = HandDevice(array.name, _spatial(array), preset, gyroscope=False, magnetometer=False)
+    device = HandDevice(array.name, _spatial(array), "array-data-sheet", gyroscope=False, magnetometer=False)
     channel = truth.channels[accelerometer_channel(array)]
-    runs = []
-    for child, (up, out) in zip(np.random.SeedSequence(seed).spawn(len(mountings)), mountings, strict=True):
-        rates = UPWARDS if out.startswith("+") else DOWNWARDS
-        readings = _run(device, rates, up, out, hold, offset, child)
-        raw = counts(channel, readings[2], ACCELEROMETER_RANGE)
-        runs.append(_data(readings, up, out, raw))
-    return _joined(runs)
+    tables = {
+        (up, out): RateTable(UPWARDS if out.startswith("+") else DOWNWARDS, hold, offset=(0.1, 0.0, 0.0))
+        for up, out in ACCELEROMETER_MOUNTINGS
+    }
+    return _runs(device, tables, seed, lambda read: counts(channel, read["array/acc"], ACCELEROMETER_RANGE))
 
 
-def gyroscope_runs(
-    truth: CalibrationRecord,
-    seed: int,
-    *,
-    hold: float = 10.0,
-    preset: str = "array-data-sheet",
-    mountings: Sequence[tuple[str, str]] = GYROSCOPE_MOUNTINGS,
-) -> RateTableData:
+def gyroscope_runs(truth: CalibrationRecord, seed: int, *, hold: float = 10.0) -> RateTableData:
     """Runs for every axis: −325 to 350 °/s by 25, of which the largest saturate; arguments as for accelerometers."""
-    one_axis = AccelerometerArray(((0.0, 0.0, 0.0),), ((0.0, 0.0, 1.0),))
-    device = HandDevice("gyroscope", one_axis, preset, magnetometer=False)
-    runs = []
-    for child, (up, out) in zip(np.random.SeedSequence(seed).spawn(len(mountings)), mountings, strict=True):
-        readings = _run(device, BOTH_WAYS, up, out, hold, 0.0, child)
-        runs.append(_data(readings, up, out, counts(truth.channels["imu/gyr"], readings[3], GYROSCOPE_RANGE)))
-    return _joined(runs)
+    device = HandDevice("gyroscope", ONE_AXIS, "array-data-sheet", magnetometer=False)
+    channel, table = truth.channels["imu/gyr"], RateTable(BOTH_WAYS, hold, offset=(0.0, 0.0, 0.0))
+    tables = dict.fromkeys(GYROSCOPE_MOUNTINGS, table)
+    return _runs(device, tables, seed, lambda read: counts(channel, read["imu/gyr"], GYROSCOPE_RANGE))
 
 
-def magnetometer_run(
-    truth: CalibrationRecord, seed: int, *, duration: float = 60.0, rate: float = 50.0, reference_error: float = 0.002
-) -> MagnetometerData:
-    """The device rotated by hand through all attitudes, with reference attitudes of a tracker.
+def magnetometer_run(truth: CalibrationRecord, seed: int, *, duration: float = 60.0) -> MagnetometerData:
+    """The device of this calibration rotated by hand through all attitudes, at 50 Hz for ``duration`` s.
 
-    Args:
-        truth: calibration of the device.
-        seed: of motion and noise.
-        duration: s.
-        rate: Hz.
-        reference_error: standard deviation of the reference attitude, rad about each axis.
+    The reference attitudes are those of a tracker, with an error of 0.002 rad about each axis.
     """
-    one_axis = AccelerometerArray(((0.0, 0.0, 0.0),), ((0.0, 0.0, 1.0),))
-    device = HandDevice("magnetometer", one_axis, "array-data-sheet", gyroscope=False)
+    device = HandDevice("magnetometer", ONE_AXIS, "array-data-sheet", gyroscope=False)
     motion, reference = np.random.SeedSequence(seed).spawn(2)
-    trajectory = simulate_hand("mixed", int(motion.generate_state(1)[0]), rate=rate, duration=duration, device=device)
+    trajectory = simulate_hand("mixed", int(motion.generate_state(1)[0]), rate=50.0, duration=duration, device=device)
     unit = trajectory.measurements["imu/mag"] / np.linalg.norm(magnetic_field())
-    error = np.random.default_rng(reference).normal(0.0, reference_error, (len(unit), 3))
+    error = np.random.default_rng(reference).normal(0.0, 0.002, (len(unit), 3))
     attitude = rotation.multiply(trajectory.truth["orientation"], rotation.exp(error))
     return MagnetometerData(trajectory.time, counts(truth.channels["imu/mag"], unit), attitude)
 
@@ -170,35 +140,32 @@ def _spatial(array: AccelerometerArray) -> AccelerometerArray:
     return AccelerometerArray(np.pad(array.r, padding).tolist(), spatial_axes(array).tolist(), array.name)
 
 
-def _run(
+def _runs(
     device: HandDevice,
-    rates: tuple[float, ...],
-    up: str,
-    out: str,
-    hold: float,
-    offset: float,
-    seed: np.random.SeedSequence,
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Time, rate of the table, readings of the array and of the gyroscope, while the rate is constant."""
-    attitude = rotation.from_matrix(mounting_matrix(up, out))
-    table = RateTable(rates=rates, hold=hold, attitude=tuple(attitude.tolist()), offset=(offset, 0.0, 0.0))
-    trajectory = simulate_hand(table, int(seed.generate_state(1)[0]), device=device)
-    gesture = table.draw(np.random.default_rng(0))
-    step = np.searchsorted(gesture.starts, trajectory.time, "right") - 1
-    steady = (step >= 0) & (trajectory.time > gesture.starts[np.maximum(step, 0)] + table.ramp + 0.05)
-    readings = trajectory.measurements
-    gyroscope = readings.get("imu/gyr", np.zeros((len(steady), 3)))
-    return trajectory.time[steady], gesture.rates[step[steady]], readings["array/acc"][steady], gyroscope[steady]
+    tables: Mapping[tuple[str, str], RateTable],
+    seed: int,
+    raw: Callable[[Mapping[str, np.ndarray]], np.ndarray],
+) -> RateTableData:
+    """Runs of a device mounted (up, out) on a table, one below the other, a minute apart, without the changes of rate.
 
-
-def _data(readings: tuple[np.ndarray, ...], up: str, out: str, raw: np.ndarray) -> RateTableData:
-    length = len(raw)
-    return RateTableData(readings[0], np.full(length, up), np.full(length, out), readings[1], raw)
-
-
-def _joined(runs: list[RateTableData]) -> RateTableData:
-    """One session: the device is remounted within a minute."""
-    data = runs[0]
-    for run in runs[1:]:
-        data = data.joined(replace(run, time=run.time + data.time[-1] + 60.0))
+    Args:
+        device: what is mounted.
+        tables: mounting → rates of the run.
+        seed: of motion and noise.
+        raw: channel → readings ``(n, size)`` to raw ones.
+    """
+    data: RateTableData | None = None
+    for child, ((up, out), table) in zip(np.random.SeedSequence(seed).spawn(len(tables)), tables.items(), strict=True):
+        table = replace(table, attitude=tuple(rotation.from_matrix(mounting_matrix(up, out)).tolist()))
+        run = simulate_hand(table, int(child.generate_state(1)[0]), device=device)
+        gesture = table.draw(np.random.default_rng(0))
+        step = np.searchsorted(gesture.starts, run.time, "right") - 1
+        steady = (step >= 0) & (run.time > gesture.starts[np.maximum(step, 0)] + table.ramp + 0.05)
+        time, readings = run.time[steady], {name: values[steady] for name, values in run.measurements.items()}
+        mounted = (np.full(len(time), each) for each in (up, out))
+        if data is not None:
+            time = time + data.time[-1] + 60.0
+        one = RateTableData(time, *mounted, gesture.rates[step[steady]], raw(readings))
+        data = one if data is None else data.joined(one)
+    assert data is not None
     return data

@@ -29,7 +29,7 @@ RIDDEN = tuple(name for name, bicycle in BICYCLES.items() if bicycle.drive is no
 
 @dataclass(frozen=True)
 class RideSensors(Checked):
-    """Devices of a ride, and what filters are told of the rider."""
+    """Devices of a ride, and the rider data that filters are configured with."""
 
     devices: tuple[str, ...] = ("paper", "xsens-mtw-awinda", "bosch-bmi160", "st-lsm6dsox")
     """``paper`` or names of sensor presets, drawn evenly: the inertial sensors"""

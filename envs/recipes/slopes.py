@@ -42,7 +42,7 @@ def sloped(ride: Trajectory, generator: np.random.Generator) -> Trajectory:
         ValueError: the ride lacks the orientation of a bicycle.
     """
     if "bicycle/orientation" not in ride.truth:
-        raise ValueError(f"{ride.name} must tell bicycle/orientation, its truth is {sorted(ride.truth)}")
+        raise ValueError(f"{ride.name} needs the truth bicycle/orientation, it has {sorted(ride.truth)}")
     dt, forward = ride.dt, rotation.rotate(ride.truth["bicycle/orientation"], np.array([1.0, 0.0, 0.0]))
     across = np.stack([-forward[:, 1], forward[:, 0], 0.0 * forward[:, 0]], axis=-1)
     across = across / np.linalg.norm(across, axis=-1, keepdims=True)

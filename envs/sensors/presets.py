@@ -82,12 +82,7 @@ def device(
     models, assumed = {kind: pair[0] for kind, pair in filled.items()}, {kind: pair[1] for kind, pair in filled.items()}
     source = f"{source}; what it does not state as of {grade.name} grade"
     return SensorPreset(
-        name,
-        source,
-        models["gyroscope"],
-        models["accelerometer"],
-        models.get("magnetometer"),
-        assumed=assumed,
+        name, source, models["gyroscope"], models["accelerometer"], models.get("magnetometer"), assumed=assumed
     )
 
 
@@ -152,11 +147,7 @@ PRESETS = (
         "Analog Devices ADIS16470 data sheet, typical: 8 °/h, 0.008 °/s/√Hz, 13 µg, velocity random walk "
         "0.037 m/s/√h, 16-bit registers of 0.1 °/s and 1.25 mg; no magnetometer",
         model(
-            8.0 * DEG_PER_HOUR,
-            white_noise=0.008 * DEG,
-            resolution=0.1 * DEG,
-            bandwidth=550.0,
-            full_scale=2000.0 * DEG,
+            8.0 * DEG_PER_HOUR, white_noise=0.008 * DEG, resolution=0.1 * DEG, bandwidth=550.0, full_scale=2000.0 * DEG
         ),
         model(13.0 * MICRO_G, white_noise=0.037 / 60.0, resolution=1.25e-3 * G, bandwidth=600.0, full_scale=40.0 * G),
     ),

@@ -123,11 +123,7 @@ class SensorSuite(Sensing):
         self._step = 0
 
     def simulate(
-        self,
-        bodies: Bodies,
-        surroundings: Any = None,
-        before: Bodies | None = None,
-        reference: Placement | None = None,
+        self, bodies: Bodies, surroundings: Any = None, before: Bodies | None = None, reference: Placement | None = None
     ) -> Sensed:
         """Measure at the next T time steps.
 

@@ -83,7 +83,7 @@ class MultipleModel(Enclosing):
 
     @cached_property
     def equations(self) -> DifferentiableEquations:
-        """The compiled filter that tells log det S."""
+        """The compiled filter with log det S as an output."""
         key = (structure_of(self.filter.model), self.gains)
         if key not in _EQUATIONS:
             _EQUATIONS[key] = DifferentiableEquations(replace(self.filter, restart=False), self.gains)
@@ -153,10 +153,7 @@ class MultipleModel(Enclosing):
 
 
 def bank_of(
-    filter: KalmanFilter,
-    gains: Sequence[str] | None = None,
-    levels: Sequence[float] = LEVELS,
-    stay: float = 10.0,
+    filter: KalmanFilter, gains: Sequence[str] | None = None, levels: Sequence[float] = LEVELS, stay: float = 10.0
 ) -> MultipleModel:
     """A bank of all combinations of some levels of the gains.
 

@@ -23,16 +23,7 @@ from ..core.quantity import Estimate
 from .features import InnovationFeatures
 from .time_scales import FeatureMemory, Features
 
-TYPICAL = {
-    "rad/s": 1.0,
-    "rad": 1.0,
-    "m/s²": 10.0,
-    "m/s": 5.0,
-    "m": 1.0,
-    "N": 300.0,
-    "N·m": 30.0,
-    "N m": 30.0,
-}
+TYPICAL = {"rad/s": 1.0, "rad": 1.0, "m/s²": 10.0, "m/s": 5.0, "m": 1.0, "N": 300.0, "N·m": 30.0, "N m": 30.0}
 """Unit of a channel → size of its numbers on a bicycle; 1 for all others"""
 VARIATION = 0.1
 """standard deviation that maps to 0, in units of :data:`TYPICAL`"""
@@ -103,7 +94,7 @@ class NamedFeatures(Features):
         weight = np.where(there, known, 1.0)
         mean, square = total / weight, squares / weight
         variance = square - mean * mean
-        # Rows tell their NIS, of which the mean is a part; channels how much they vary.
+        # Of rows the NIS, of which the mean is a part; of channels the variation.
         size = np.concatenate([square[..., : self.rows], variance[..., self.rows :] / VARIATION**2], axis=-1)
         logarithm = np.where(there, 0.5 * np.log10(np.fmax(size, FLOOR**2)), 0.0)
         features = np.concatenate([logarithm, mean], axis=-1).reshape(*batch, -1)

@@ -125,7 +125,7 @@ class GuardedInnovationRule(InnovationRule):
     """The larger of :class:`InnovationRule`'s λ and :class:`PitchRateRule`'s.
 
     Innovations of the pseudo-measurement grow where the roll is wrong as well as where the road is not level; on bumps
-    they are small again before the pitching ends. The pitch rate tells the two apart.
+    they are small again before the pitching ends. The pitch rate distinguishes the two.
 
     Attributes:
         pitching: the rule for the pitch rate; its λ is added to the published constant, not to the λ of the

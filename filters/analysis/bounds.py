@@ -72,9 +72,9 @@ def linearise(model: Model, states: np.ndarray, measurements: Mapping[str, Any])
     _, F, Q = model.predict(states[:-1], now, before)
     r, H, R = model.residual(states, split(samples, model.channels))
     usable = np.isfinite(r) & np.isfinite(H).all(-1) & np.isfinite(np.linalg.diagonal(R))
-    ticks, e, m = len(samples), model.error_size, model.residual_size
-    F, Q = (np.broadcast_to(part, (ticks - 1, e, e)) for part in (F, Q))
-    return Linearisation(F, Q, np.broadcast_to(H, (ticks, m, e)), np.broadcast_to(R, (ticks, m, m)), usable)
+    steps, e, m = len(samples), model.error_size, model.residual_size
+    F, Q = (np.broadcast_to(part, (steps - 1, e, e)) for part in (F, Q))
+    return Linearisation(F, Q, np.broadcast_to(H, (steps, m, e)), np.broadcast_to(R, (steps, m, m)), usable)
 
 
 def samples_of(model: Model, measurements: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray]:

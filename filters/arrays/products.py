@@ -40,10 +40,4 @@ def centripetal(position: Array) -> Array:
     """Σᵀ ``(..., 3, 6)`` of a position ``(..., 3)`` in m: Σᵀ ξ = ω × (ω × r)."""
     x, y, z = position[..., 0], position[..., 1], position[..., 2]
     zero = 0.0 * x
-    return rows(
-        [
-            [zero, -x, -x, zero, z, y],
-            [-y, zero, -y, z, zero, x],
-            [-z, -z, zero, y, x, zero],
-        ]
-    )
+    return rows([[zero, -x, -x, zero, z, y], [-y, zero, -y, z, zero, x], [-z, -z, zero, y, x, zero]])

@@ -38,14 +38,7 @@ from ..core.matrices import block_matrix, covariance_of, diagonal_matrix, identi
 from ..core.model import Gain, Model, check_positive
 from ..core.quantity import GRAVITY, Channel, Measurement, Quantity
 from ..core.rotation import cross, level, normalize, roll_pitch, rotate, rotate_back, skew, to_matrix, up_in_body
-from ..imu.strapdown import (
-    accelerated,
-    advance,
-    clipped_inflation,
-    corrected,
-    process_noise,
-    transition,
-)
+from ..imu.strapdown import accelerated, advance, clipped_inflation, corrected, process_noise, transition
 from .geometry import RiderEquations, RiderGeometry
 
 COUNTS = 1024

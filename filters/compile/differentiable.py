@@ -332,9 +332,7 @@ class DifferentiableEquations:
         gx, gP, found = np.array(x), np.array(P), np.zeros((*Z.shape[:2], len(self.gains)))
         given = [np.ascontiguousarray(part, dtype=float) for part in (poses, covariances, nis, logarithms)]
         compile_now(
-            self.module.back,
-            (Z, table, *records, *given, gx, gP, found),
-            f"{type(self.model).__name__} (derivatives)",
+            self.module.back, (Z, table, *records, *given, gx, gP, found), f"{type(self.model).__name__} (derivatives)"
         )
         for index, (gain, column) in enumerate(zip(self.scaled, self.columns, strict=True)):
             values = table[:, :, column]

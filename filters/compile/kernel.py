@@ -53,7 +53,7 @@ def zeros(rows, columns):  # type: ignore[no-untyped-def]
 
 @jit
 def scratch(n, e, m, d, p):  # type: ignore[no-untyped-def]
-    """Memory of a run, reused at every tick: vectors, matrices of states and of rows, the rows that were used.
+    """Memory of a run, reused at every time step: vectors, matrices of states and of rows, the rows that were used.
 
     For n states, e error states, m rows, d numbers a sample and p parameters: current, present, before, x1, x0, r, dx,
     grown; P0, F, Q, work; H, R, S, HP, K; rows.
@@ -99,7 +99,7 @@ def begin(x0, P0, factor, x, P):  # type: ignore[no-untyped-def]
 
 @jit
 def keep(started, P, pose, covariances, t, b):  # type: ignore[no-untyped-def]
-    """Write the covariance of a tick, if covariances are kept; before the start that and the pose are NaN."""
+    """Write the covariance of a time step, if covariances are kept; before the start that and the pose are NaN."""
     if not started:
         fill(pose, np.nan)
     if covariances.shape[0] > 0:

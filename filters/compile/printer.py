@@ -40,7 +40,7 @@ starts = np.array({starts})
 
 @jit
 def run(x, P, held, age, monitor, started, Z, parameters, restart, poses, covariances, whites, nis):
-    # All ticks of all sequences of a batch; the state, x to started, is changed in place.
+    # All time steps of all sequences of a batch; the state, x to started, is changed in place.
     sizes = x.shape[1], P.shape[1], whites.shape[2], Z.shape[2], parameters.shape[2]
     vectors, square, measured, rows = scratch(*sizes)
     current, present, before, x1, x0, r, dx, grown = vectors
@@ -249,10 +249,7 @@ def _recursion(traced: Equations, tape: Tape, names: list[str]) -> tuple[dict[st
         memory, posed = tape.inputs("memory", MEMORY), tape.inputs("posed", sum(part.size for part in traced.outputs))
         of_rate, of_force = (age[i : i + 1] for i in map(channels.index, (GYROSCOPE.name, ACCELEROMETER.name)))
         functions["reject(z, memory, age)"] = ("z",), lambda: without_impacts(places, z, memory, of_force)
-        functions["realign(current, memory, p)"] = (
-            ("current",),
-            lambda: realigned(places, current, memory, traced.dt),
-        )
+        functions["realign(current, memory, p)"] = (("current",), lambda: realigned(places, current, memory, traced.dt))
         functions["watch(memory, present, z, posed, age, p)"] = (
             ("memory",),
             lambda: watch(memory, inputs_of(traced, places, present, z, posed, of_rate)),

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..core.model import Equations, parameters_of, structure_of
 from ..core.quantity import Estimate, Measurement
-from ..core.sampling import FilterState, Gains, empty_state, join, per_tick_gains
+from ..core.sampling import FilterState, Gains, empty_state, gains_over_time, join
 from ..support.parallel import processors
 from .cache import compile_now, load
 from .printer import UntraceableError, print_model
@@ -67,7 +67,7 @@ class CompiledEquations:
         base = np.array([*parameters_of(model).values()])
         if not gains:
             return base[None, None]
-        factors = {name: np.asarray(array) for name, array in per_tick_gains(gains, length).items()}
+        factors = {name: np.asarray(array) for name, array in gains_over_time(gains, length).items()}
         wide = any(array.ndim > 1 for array in factors.values())
         count = math.prod(batch) if wide else 1
         table = np.broadcast_to(base, (length, count, base.size)).copy()
@@ -175,12 +175,7 @@ class CompiledEquations:
         return self._estimate(model, shaped[0], shaped[1] if keep_covariance else None, *shaped[2:])
 
     def _execute(
-        self,
-        states: list[np.ndarray],
-        Z: np.ndarray,
-        parameters: np.ndarray,
-        restart: bool,
-        outs: list[np.ndarray],
+        self, states: list[np.ndarray], Z: np.ndarray, parameters: np.ndarray, restart: bool, outs: list[np.ndarray]
     ) -> None:
         """Call the kernel, in threads for large batches; sequences are independent, so the results are the same."""
         threads = min(processors(), Z.shape[1])

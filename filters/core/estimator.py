@@ -53,7 +53,7 @@ class Estimator(Protocol[S]):
 
 @dataclass(frozen=True)
 class Enclosing:
-    """Base class of estimators that run another one in their own way: its interval, channels and outputs are theirs.
+    """Base class of estimators that wrap another one and keep its sampling interval, channels and outputs.
 
     Attributes:
         filter: the other estimator.

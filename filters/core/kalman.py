@@ -20,7 +20,7 @@ from .sampling import FilterState, Gains, check_gains, scaled
 
 @dataclass(frozen=True)
 class KalmanFilter(Recursion):
-    """A model's equations made an estimator.
+    """Extended Kalman filter with the equations of a model.
 
     Attributes:
         model: the equations and their parameters.
@@ -40,7 +40,7 @@ class KalmanFilter(Recursion):
         return self.keep_covariance
 
     def smooth(self, measurements: Mapping[str, Any], gains: Gains | None = None) -> Estimate:
-        """Estimates of a whole sequence in the light of all its samples: fixed-interval (error-state RTS) smoothing.
+        """Estimates of a sequence from all of its samples: fixed-interval (error-state RTS) smoothing.
 
         After H. E. Rauch, F. Tung, C. T. Striebel, "Maximum likelihood estimates of linear dynamic systems", AIAA
         Journal 3(8), 1965, on the error state. Exact for linear models, first-order for others. Missing samples are

@@ -255,6 +255,6 @@ def score(quantity: Quantity, estimate: Array, truth: Array, mask: Any = None) -
     check_size(quantity, estimate, truth)
     table: dict[str, tuple[float, str]] = {}
     for metric in metrics_of(quantity):
-        per_tick = metric.error(estimate, truth)
-        table[metric.name] = (float(rms(per_tick, mask, axis=None)) * metric.scale, metric.unit)
-    return table | {"valid": (valid_fraction(per_tick, mask), "1")}
+        errors = metric.error(estimate, truth)
+        table[metric.name] = (float(rms(errors, mask, axis=None)) * metric.scale, metric.unit)
+    return table | {"valid": (valid_fraction(errors, mask), "1")}

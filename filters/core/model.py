@@ -52,7 +52,8 @@ class Equations:
 
     Measurements arrive as channel → ``(*batch, size)``. ``predict`` sees each channel's last sample (zeros if
     there was none yet), ``prior`` too (NaN if there was none); ``residual`` and ``finish`` see NaN where this time step
-    brought none.
+    has none.
+
     A float parameter may be an array ``(*batch,)``: use :func:`.expand` where it scales a matrix.
 
     Attributes of the class: ``channels``, what is read; ``outputs``, the quantities of ``pose``; ``state_size`` n, the
@@ -88,7 +89,7 @@ class Equations:
         return x
 
     def pose(self, x: Array) -> dict[str, Array]:
-        """The quantities that the state tells."""
+        """The output quantities of a state."""
         raise NotImplementedError
 
     def with_dt(self, dt: float) -> Self:
@@ -100,7 +101,7 @@ class Equations:
         """The parameters that a recording's metadata determine, by field: of the person, the vehicle or the device.
 
         Raises:
-            ValueError: the metadata describe something that cannot be.
+            ValueError: the metadata describe something that is not physically possible.
         """
         return {}
 
@@ -116,7 +117,7 @@ class Equations:
         )
 
     def limited(self, gains: dict[str, Any]) -> dict[str, Any]:
-        """Log factors ``(*batch,)`` by gain, lowered where together they would make a filter unsafe; as given here."""
+        """Log factors ``(*batch,)`` by gain, lowered where all together make a filter unsafe; by default as given."""
         return gains
 
     def truth(self, truth: Mapping[str, Any]) -> dict[str, Any]:
@@ -157,7 +158,7 @@ class Model(Equations):
         return x + dx
 
     def fitted(self, measurements: Measurement, nis: Callable[[Model, Measurement], Any]) -> Self:
-        """The same equations with constants that a whole recording tells, for smoothing it; as given here.
+        """The same equations with constants estimated from a whole recording, for smoothing it; unchanged by default.
 
         Args:
             measurements: the recording, channel → ``(T, *batch, size)``.

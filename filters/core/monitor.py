@@ -164,7 +164,7 @@ class Places:
 def places_of(model: Equations) -> Places | None:
     """Where a recursion finds what the monitor needs; None for a model that cannot be watched.
 
-    It can if it reads one inertial sensor and tells the vertical.
+    It can if it reads one inertial sensor and estimates the inclination.
     """
     samples, pose = starts_of(model.channels), starts_of(model.outputs)
     heading = MAGNETOMETER.name in samples and "orientation" in pose

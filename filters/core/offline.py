@@ -40,7 +40,7 @@ class Offline(Enclosing):
     def run(self, measurements: Mapping[str, Any]) -> Estimate:
         """Smoothed estimates of a whole sequence, ``(T, *batch, size)`` in and out.
 
-        Constants of the model that the recording itself tells (:meth:`.Model.fitted`) are found first.
+        Constants of the model are first estimated from the recording itself where possible (:meth:`.Model.fitted`).
         """
         smoother: Any = self.filter
         if isinstance(smoother, KalmanFilter) and not any(is_torch(array) for array in measurements.values()):

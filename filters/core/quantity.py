@@ -1,7 +1,7 @@
 """Channels (measured), quantities (estimated) and estimates.
 
 A measurement is a mapping from channel name to array ``(..., size)``. ``NaN`` means: no valid sample at this time step.
-Names are ``place/kind`` (``imu/gyr``, ``bicycle_imu/acc``); the axes are those of the sensor.
+Names are ``site/kind`` (``imu/gyr``, ``bicycle_imu/acc``); the axes are those of the sensor.
 """
 
 from __future__ import annotations
@@ -47,17 +47,17 @@ class Channel:
 
     @property
     def limit(self) -> float:
-        """Largest absolute value that a sensor can have measured; what is beyond counts as no sample."""
+        """Largest absolute value that a sensor can have measured; a larger value counts as missing."""
         return LIMITS.get(self.unit, LARGEST_NUMBER)
 
     @property
     def is_vector(self) -> bool:
-        """Whether the numbers are coordinates of one vector or rotation: one without the others is no sample."""
+        """Whether the numbers are coordinates of one vector or rotation: one without the others counts as missing."""
         return (self.kind in ("gyr", "acc", "mag") and self.size == 3) or self.has_direction
 
     @property
     def has_direction(self) -> bool:
-        """Whether the direction of the vector is what counts: zeros, which have none, are no sample."""
+        """Whether the direction of the vector is used: zeros, which have none, count as missing."""
         return (self.kind in ("acc", "mag") and self.size == 3) or (self.kind == "orientation" and self.size == 4)
 
 

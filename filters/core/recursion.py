@@ -37,9 +37,9 @@ from .sampling import (
     check_gains,
     empty_state,
     filled,
+    gains_over_time,
     hold,
     join,
-    per_tick_gains,
     scaled,
     split,
 )
@@ -144,7 +144,7 @@ class Recursion:
             if form:
                 return form.run(self.model, state, arrays, gains, self.restart, self._keeps_covariance)
             step = self._step_each
-        factors, estimates = per_tick_gains(gains, length), []
+        factors, estimates = gains_over_time(gains, length), []
         for t in range(length):
             now = {name: factor[t] for name, factor in factors.items()}
             state, estimate = step(state, {name: array[t] for name, array in arrays.items()}, now)

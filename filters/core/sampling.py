@@ -24,7 +24,7 @@ class FilterState(NamedTuple):
         covariance: ``(*batch, e, e)`` of the error state; e is 0 for an observer.
         held: ``(*batch, d)`` last finite sample of every channel element, NaN if there was none.
         age: ``(*batch, channels)`` s since the last complete sample of each channel.
-        monitor: ``(*batch, w)`` memory of :func:`.monitor.watch`; w is 0 where nothing is watched.
+        monitor: ``(*batch, w)`` memory of :func:`.monitor.watch`; w is 0 without a monitor.
         started: ``(*batch,)`` bool.
     """
 
@@ -71,7 +71,7 @@ def filled(sample: Array) -> Array:
 
 
 def zeros(like: Array, *shape: int) -> Array:
-    """Fresh zeros ``(*batch, *shape)`` for samples ``like`` ``(*batch, d)``."""
+    """New zeros ``(*batch, *shape)`` for samples ``like`` ``(*batch, d)``."""
     xp, batch = namespace(like), tuple(like.shape[:-1])
     zero = xp.reshape(xp.zeros_like(like[..., :1]), (*batch, *(1,) * len(shape)))
     array = xp.broadcast_to(zero, (*batch, *shape))
@@ -110,7 +110,7 @@ def check_gains(known: Mapping[str, Gain], gains: Gains | None, owner: str) -> N
         raise ValueError(f"unknown gains {unknown}; {owner} has {sorted(known)}")
 
 
-def per_tick_gains(gains: Gains | None, length: int) -> dict[str, Any]:
+def gains_over_time(gains: Gains | None, length: int) -> dict[str, Any]:
     """Gains as arrays with a time axis of ``length``.
 
     Raises:

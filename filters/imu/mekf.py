@@ -147,5 +147,5 @@ class MEKF9(MagneticHeading, MEKF):
     state_size: ClassVar[int] = 9
     residual_size: ClassVar[int] = 4
     gains: ClassVar[dict[str, Gain]] = MEKF.gains | {
-        "heading": Gain("magnetometer_noise", description="variance σ_m² of the magnetic heading"),
+        "heading": Gain("magnetometer_noise", description="variance σ_m² of the magnetic heading")
     }

@@ -50,11 +50,7 @@ def transition(q: Array, force: Array, dt: Any, felt: Array, kept: Array) -> Arr
     unit = identity(3, q)
     none = 0.0 * unit
     return block_matrix(
-        [
-            [unit, -dt * to_matrix(q), none],
-            [none, unit, none],
-            [-felt * dt * skew(force), none, kept * unit],
-        ]
+        [[unit, -dt * to_matrix(q), none], [none, unit, none], [-felt * dt * skew(force), none, kept * unit]]
     )
 
 

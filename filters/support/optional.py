@@ -11,7 +11,7 @@ EXTRAS: dict[str, frozenset[str]] = {
     "rl": frozenset({"stable_baselines3", "sb3_contrib", "optuna", "torch", "tensorboard", "onnx", "onnxruntime"}),
     "compare": frozenset({"ahrs", "imufusion", "vqf"}),
     "parquet": frozenset({"pyarrow"}),
-    "view": frozenset({"viser", "plotly"}),
+    "view": frozenset({"viser", "plotly", "trimesh"}),
     "exchange": frozenset({"minari"}),
     "cluster": frozenset({"dask", "ray"}),
 }

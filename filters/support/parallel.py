@@ -15,7 +15,7 @@ BACKENDS = ("loky", "dask", "ray")
 
 
 def processors() -> int:
-    """Processors of this process's affinity mask, fewer if ``OMP_NUM_THREADS`` or ``NUMBA_NUM_THREADS`` says so."""
+    """Processors of this process's affinity mask, fewer if ``OMP_NUM_THREADS`` or ``NUMBA_NUM_THREADS`` is set."""
     count = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     for name in ("OMP_NUM_THREADS", "NUMBA_NUM_THREADS"):
         value = os.environ.get(name, "").split(",")[0].strip()

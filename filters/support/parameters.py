@@ -47,7 +47,7 @@ def check_parameters(maker: Callable[..., Any], given: Mapping[str, Any]) -> Non
 
 
 def arguments_of(maker: Callable[..., Any], args: Sequence[Any], kwargs: Mapping[str, Any]) -> dict[str, Any]:
-    """Name → value of the arguments of a call; none if they do not fit, which Python itself then says.
+    """Name → value of the arguments of a call; empty if they do not fit, which Python itself then reports.
 
     Args:
         maker: function whose first parameter is ``self``.

@@ -1,20 +1,23 @@
-"""Triangle meshes of simple solids and of the road under a bicycle, in NumPy alone."""
+"""Triangle meshes of simple solids (trimesh, which the viewer's server brings) and of the road under a bicycle."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...filters.core import rotation
+from ...filters.support.optional import extra
+
+with extra("view"):
+    import trimesh
+    from trimesh import creation
 
 Colour = tuple[float, float, float]
 """Red, green, blue from 0 to 1."""
+Point = Sequence[float] | np.ndarray
 SIDES = 14
 """Faces around a rod or a tyre."""
-Z = np.array([0.0, 0.0, 1.0])
 LEVEL = 0.02
 """m: a path whose height varies less is drawn on the plane"""
 HALF_WIDTH = 0.6
@@ -39,77 +42,31 @@ class Mesh(NamedTuple):
     colour: Colour
 
 
-def box(centre: Sequence[float] | np.ndarray, sides: Sequence[float] | np.ndarray, colour: Colour) -> Mesh:
-    """A box with its sides (m) along the axes."""
-    corners = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
-    squares = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
-    return Mesh(np.asarray(centre, float) + corners * np.asarray(sides, float), _triangles(squares), colour)
+def box(centre: Point, sides: Point, colour: Colour) -> Mesh:
+    """A block with edges along the axes; ``sides`` are its whole lengths, m."""
+    return _placed(creation.box(sides), centre, colour)
 
 
-def rod(
-    start: Sequence[float] | np.ndarray,
-    end: Sequence[float] | np.ndarray,
-    radius: float,
-    colour: Colour,
-    end_radius: float | None = None,
-) -> Mesh:
-    """A cylinder between two points (m), or a cone's part where the radius at the end differs."""
-    start, end = np.asarray(start, float), np.asarray(end, float)
-    along = rotation.normalize(end - start)
-    side = np.cross(along, Z if abs(along[2]) < 0.9 else np.array([1.0, 0.0, 0.0]))
-    side = rotation.normalize(side)
-    angles = np.linspace(0.0, 2.0 * math.pi, SIDES, endpoint=False)[:, None]
-    ring = np.cos(angles) * side + np.sin(angles) * np.cross(along, side)
-    last = radius if end_radius is None else end_radius
-    vertices = np.concatenate([start + radius * ring, end + last * ring, start[None], end[None]])
-    around = [(i, (i + 1) % SIDES) for i in range(SIDES)]
-    squares = [(i, j, j + SIDES, i + SIDES) for i, j in around]
-    caps = [(2 * SIDES, j, i) for i, j in around] + [(2 * SIDES + 1, i + SIDES, j + SIDES) for i, j in around]
-    return Mesh(vertices, np.concatenate([_triangles(squares), np.array(caps)]), colour)
+def rod(start: Point, end: Point, radius: float, colour: Colour, end_radius: float | None = None) -> Mesh:
+    """A round rod, or a cone that ends with another radius, m."""
+    along = np.subtract(end, start)
+    length = float(np.linalg.norm(along))
+    outline = [(0.0, 0.0), (radius, 0.0), (radius if end_radius is None else end_radius, length), (0.0, length)]
+    made = creation.revolve(outline, sections=SIDES)
+    made.apply_transform(trimesh.geometry.align_vectors([0.0, 0.0, 1.0], along))
+    return _placed(made, start, colour)
 
 
-def ball(centre: Sequence[float] | np.ndarray, radius: float, colour: Colour, rings: int = 9) -> Mesh:
-    """A sphere (m)."""
-    heights = np.linspace(-0.5 * math.pi, 0.5 * math.pi, rings)
-    around = np.linspace(0.0, 2.0 * math.pi, SIDES, endpoint=False)
-    unit = np.array(
-        [[math.cos(h) * math.cos(a), math.cos(h) * math.sin(a), math.sin(h)] for h in heights for a in around]
-    )
-    squares = [
-        (SIDES * r + i, SIDES * r + (i + 1) % SIDES, SIDES * (r + 1) + (i + 1) % SIDES, SIDES * (r + 1) + i)
-        for r in range(rings - 1)
-        for i in range(SIDES)
-    ]
-    return Mesh(np.asarray(centre, float) + radius * unit, _triangles(squares), colour)
+def ball(centre: Point, radius: float, colour: Colour, rings: int = 9) -> Mesh:
+    """A sphere."""
+    return _placed(creation.uv_sphere(radius=radius, count=[rings, SIDES]), centre, colour)
 
 
-def tyre(radius: float, tube: float, colour: Colour, segments: int = 36) -> Mesh:
+def tyre(radius: float, tube: float, colour: Colour) -> Mesh:
     """A ring about the y axis: ``radius`` to its outside, ``tube`` of its cross-section, m."""
-    turn = np.linspace(0.0, 2.0 * math.pi, segments, endpoint=False)
-    across = np.linspace(0.0, 2.0 * math.pi, SIDES, endpoint=False)
-    middle = radius - tube
-    vertices = np.array(
-        [
-            [
-                (middle + tube * math.cos(b)) * math.cos(a),
-                tube * math.sin(b),
-                (middle + tube * math.cos(b)) * math.sin(a),
-            ]
-            for a in turn
-            for b in across
-        ]
-    )
-    squares = [
-        (
-            SIDES * i + j,
-            SIDES * i + (j + 1) % SIDES,
-            SIDES * ((i + 1) % segments) + (j + 1) % SIDES,
-            SIDES * ((i + 1) % segments) + j,
-        )
-        for i in range(segments)
-        for j in range(SIDES)
-    ]
-    return Mesh(vertices, _triangles(squares), colour)
+    made = creation.torus(radius - tube, tube, major_sections=36, minor_sections=SIDES)
+    made.apply_transform(trimesh.geometry.align_vectors([0.0, 0.0, 1.0], [0.0, 1.0, 0.0]))
+    return _placed(made, np.zeros(3), colour)
 
 
 def by_colour(meshes: Iterable[Mesh]) -> list[Mesh]:
@@ -117,22 +74,10 @@ def by_colour(meshes: Iterable[Mesh]) -> list[Mesh]:
     groups: dict[Colour, list[Mesh]] = {}
     for mesh in meshes:
         groups.setdefault(mesh.colour, []).append(mesh)
-    joined = []
-    for colour, group in groups.items():
-        starts = np.cumsum([0, *(len(mesh.vertices) for mesh in group)])
-        faces = [mesh.faces + start for mesh, start in zip(group, starts, strict=False)]
-        joined.append(Mesh(np.concatenate([mesh.vertices for mesh in group]), np.concatenate(faces), colour))
-    return joined
-
-
-def volume(mesh: Mesh) -> float:
-    """Enclosed volume, m³; positive if all faces look outwards."""
-    a, b, c = (mesh.vertices[mesh.faces[:, i]] for i in range(3))
-    return float(np.sum(a * np.cross(b, c)) / 6.0)
-
-
-def _triangles(squares: Sequence[tuple[int, int, int, int]]) -> np.ndarray:
-    return np.array([triangle for a, b, c, d in squares for triangle in ((a, b, c), (a, c, d))])
+    return [
+        Mesh(*trimesh.util.append_faces([each.vertices for each in group], [each.faces for each in group]), colour)
+        for colour, group in groups.items()
+    ]
 
 
 def is_hilly(path: np.ndarray) -> bool:
@@ -178,3 +123,7 @@ def sections(path: np.ndarray) -> np.ndarray:
         step = end - before
         ends.append(end + BEYOND * np.append(step[:2] / np.linalg.norm(step[:2]), 0.0))
     return np.concatenate([ends[:1], points, ends[1:]])
+
+
+def _placed(made: Any, centre: Point, colour: Colour) -> Mesh:
+    return Mesh(np.asarray(made.vertices) + np.asarray(centre, float), np.asarray(made.faces), colour)

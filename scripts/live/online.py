@@ -90,7 +90,7 @@ class StreamClock:
             return
         stamps = np.array([sample.time for sample in waiting], float)
         if len(stamps) < 2 or stamps[-1] == stamps[0]:
-            raise ValueError(f"{len(stamps)} samples at {stamps[0]:g} s tell no sampling rate: name it by --rate in Hz")
+            raise ValueError(f"{len(stamps)} samples at {stamps[0]:g} s give no sampling rate: add --rate in Hz")
         self.dt = fit_clock(stamps).interval
         for sample in waiting:
             yield from self._place(sample)

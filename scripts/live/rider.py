@@ -136,14 +136,7 @@ def _bicycle_meshes(g: RiderGeometry) -> dict[str, list[Mesh]]:
         crank.append(box((sign * g.crank_length, sign * g.pedal_offset, 0.0), (0.09, 0.09, 0.02), RUBBER))
     flat = np.array([0.0, 0.0, 0.006])
     disk = [rod(-flat, flat, 0.2, DISK), rod((0.12, 0.0, 0.0), (0.12, 0.0, 0.014), 0.035, PAINT)]
-    return {
-        "bicycle": frame,
-        "front": front,
-        "rear_wheel": wheel,
-        "front_wheel": wheel,
-        "crank": crank,
-        "disk": disk,
-    }
+    return {"bicycle": frame, "front": front, "rear_wheel": wheel, "front_wheel": wheel, "crank": crank, "disk": disk}
 
 
 def rider_poses(geometry: RiderGeometry, values: Values) -> Poses:

@@ -11,7 +11,7 @@ import threading
 import time
 import webbrowser
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -197,24 +197,18 @@ def opened(args: Args, out: Output) -> Iterator[Opened]:
             yield Opened("samples", *found)
     elif path.exists():
         yield whole(path.name, recording(args, out), args)
-    elif args.live:
-        env_id, env = environment(args)
-        args = with_tuned_filter(args, env)
-        try:
-            with fed(environment_blocks(env, args.seed), args) as found:
-                yield Opened(env_id, *found)
-        finally:
-            env.close()
     else:
-        from ...envs.record import record
-        from .shown import tuned_episode
-
         env_id, env = environment(args)
-        try:
+        with closing(env):
+            if args.live:
+                with fed(environment_blocks(env, args.seed), with_tuned_filter(args, env)) as found:
+                    yield Opened(env_id, *found)
+                return
+            from ...envs.record import record
+            from .shown import tuned_episode
+
             out.say(f"recording {env_id}, seed {args.seed} (--live shows it at once)")
             trajectory = tuned_episode(env, args.seed) or record(env, seed=args.seed, progress=True)
-        finally:
-            env.close()
         yield whole(env_id, trajectory, with_tuned_filter(args, env))
 
 

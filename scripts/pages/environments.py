@@ -85,7 +85,7 @@ def page(identity: str) -> str:
 def sections_of(kind: type) -> Iterator[tuple[str, str]]:
     """Headings and texts of a docstring in Markdown; the text before the first heading has none.
 
-    Of the arguments only what is said besides their list remains (see :func:`arguments_of`).
+    Of the section on arguments only the text besides their list remains (see :func:`arguments_of`).
     """
     text = inspect.getdoc(kind) or ""
     first, *others = re.split(r"^## +(.+)$", text, flags=re.MULTILINE)

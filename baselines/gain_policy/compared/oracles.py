@@ -25,11 +25,7 @@ Quantities = str | Sequence[str] | None
 
 
 def windowed_oracle(
-    tuned: TunedFilter,
-    trajectory: Trajectory,
-    actions: np.ndarray,
-    window: float = 1.0,
-    quantity: Quantities = None,
+    tuned: TunedFilter, trajectory: Trajectory, actions: np.ndarray, window: float = 1.0, quantity: Quantities = None
 ) -> np.ndarray:
     """The schedule ``(T, k)`` that takes in each window the action of least mean square error there, window by window.
 

@@ -51,7 +51,7 @@ class GainExternalAcceleration(ExternalAcceleration):
     """of the correction of the inclination"""
 
     gains: ClassVar[dict[str, Gain]] = ExternalAcceleration.gains | {
-        "attitude-gain": Gain("attitude_share", 1.0, description="factor on the gain of the inclination"),
+        "attitude-gain": Gain("attitude_share", 1.0, description="factor on the gain of the inclination")
     }
 
     def retract(self, x: Array, dx: Array) -> Array:

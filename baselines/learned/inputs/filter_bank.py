@@ -26,10 +26,7 @@ from .front_end import Seen
 from .gravity_aligned_frame import SCALARS, VECTORS
 from .level_frame import LevelFrame, LevelState
 
-TUNINGS = (
-    *((0.1, 1.0), (0.3, 1.0), (0.3, 5.0), (1.0, 0.5)),
-    *((1.0, 4.0), (3.0, 1.0), (3.0, 4.0)),
-)
+TUNINGS = (*((0.1, 1.0), (0.3, 1.0), (0.3, 5.0), (1.0, 0.5)), *((1.0, 4.0), (3.0, 1.0), (3.0, 4.0)))
 """Factors on the deviations σ_g of the gyroscope and σ_V of the velocity of bounded-motion, one pair a candidate. They
 surround the published pair as far as recordings of hands, phones and a drone prefer one of them."""
 VELOCITY = 1

@@ -182,12 +182,7 @@ class TorchNetwork:
     kind: ClassVar[str] = "torch"
 
     def __init__(
-        self,
-        module: nn.Module,
-        features: int,
-        outputs: int,
-        context: int = 1,
-        standardised: Standardised | None = None,
+        self, module: nn.Module, features: int, outputs: int, context: int = 1, standardised: Standardised | None = None
     ) -> None:
         if context < 1:
             raise ValueError(f"context must be at least 1, got {context}")

@@ -12,14 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from .parameters import (
-    BENCHMARK,
-    MOUNTAIN_BIKE,
-    BicycleParameters,
-    DriveParameters,
-    RigidPart,
-    WheelParameters,
-)
+from .parameters import BENCHMARK, MOUNTAIN_BIKE, BicycleParameters, DriveParameters, RigidPart, WheelParameters
 
 MEASURED = "Moore et al. 2010 ({0}); contact points of the rider, crank, gears, tyres and resistances are round figures"
 

@@ -22,18 +22,7 @@ from ..frame.parameters import AIR_DENSITY, BicycleParameters
 from ..frame.whipple import WhippleModel, whipple_model
 from .preview import PREVIEW_BIN, PREVIEW_BINS, speed_limits
 from .regulator import lateral_model, preview_regulator, sampled
-from .steering import (
-    COASTING,
-    DISTANCE,
-    DRIVE,
-    LOWEST_SPEED,
-    MEMORY,
-    OFFSET,
-    TARGET,
-    TORQUE,
-    Piloted,
-    steer_exactly,
-)
+from .steering import COASTING, DISTANCE, DRIVE, LOWEST_SPEED, MEMORY, OFFSET, TARGET, TORQUE, Piloted, steer_exactly
 
 POSITIVE = ("effort", "largest_torque", "largest_drive", "largest_power", "lateral_acceleration", "braking", "rate")
 """settings that must not be zero"""

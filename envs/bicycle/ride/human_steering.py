@@ -9,18 +9,7 @@ import numpy as np
 
 from ....filters.compile.cache import jit
 from .preview import PREVIEW_BINS
-from .steering import (
-    DRIVE,
-    LOWEST_SPEED,
-    OFFSET_INTEGRAL,
-    TORQUE,
-    Moving,
-    ahead,
-    drive,
-    follow,
-    piloted_of,
-    turning,
-)
+from .steering import DRIVE, LOWEST_SPEED, OFFSET_INTEGRAL, TORQUE, Moving, ahead, drive, follow, piloted_of, turning
 
 STATES = 12
 """size of the state of the internal model"""

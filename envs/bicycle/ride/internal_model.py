@@ -214,11 +214,7 @@ def _noise(pilot: PilotParameters, step: float) -> np.ndarray:
 
 
 def _command_gains(
-    A: np.ndarray,
-    B: np.ndarray,
-    pilot: PilotParameters,
-    costs: tuple[float, ...],
-    step: float,
+    A: np.ndarray, B: np.ndarray, pilot: PilotParameters, costs: tuple[float, ...], step: float
 ) -> np.ndarray:
     """Regulator on the state and the integral of the offset, relative to those of the steady turn."""
     size = STATES + 1

@@ -170,13 +170,7 @@ class RideRecorder:
         )
 
     def _solve(
-        self,
-        name: str,
-        steer: np.ndarray,
-        crank: np.ndarray,
-        trunk: np.ndarray,
-        swivel: np.ndarray,
-        pelvis: np.ndarray,
+        self, name: str, steer: np.ndarray, crank: np.ndarray, trunk: np.ndarray, swivel: np.ndarray, pelvis: np.ndarray
     ) -> LimbPosture:
         """Posture of a limb by inverse kinematics; ``pelvis``: its displacement ``(n, 3)``."""
         posture, side = self.ride.rider.posture, name[4:]

@@ -184,8 +184,4 @@ def trunk_support(reach: Reach, left: Force, right: Force, flexion: float, lean:
     mz = x * (left[1] + right[1]) - y * (left[0] - right[0])
     cf, sf, cl, sl = math.cos(flexion), math.sin(flexion), math.cos(lean), math.sin(lean)
     weight = reach.trunk_moment
-    return (
-        my - weight * sf * cl,
-        cf * mx - sf * mz - weight * sl * cf,
-        sf * cl * mx - sl * my + cf * cl * mz,
-    )
+    return (my - weight * sf * cl, cf * mx - sf * mz - weight * sl * cf, sf * cl * mx - sl * my + cf * cl * mz)

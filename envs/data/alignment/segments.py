@@ -72,12 +72,7 @@ class SegmentAlignment:
 
 
 def align_segment(
-    trajectory: Trajectory,
-    rest: tuple[float, float],
-    movement: tuple[float, float],
-    axis: str,
-    *,
-    site: str = "imu",
+    trajectory: Trajectory, rest: tuple[float, float], movement: tuple[float, float], axis: str, *, site: str = "imu"
 ) -> SegmentAlignment:
     """Find the mounting of a sensor.
 

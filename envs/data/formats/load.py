@@ -15,15 +15,7 @@ from ..reference_clock import measured
 from ..storage import FORMAT, is_trajectory_file
 from ..trajectory import Trajectory, load_trajectory
 from .arrays import PARQUET, read_table
-from .benchmarks import (
-    is_archive,
-    is_euroc,
-    is_repoimu,
-    load_archive,
-    load_euroc,
-    load_phone,
-    load_repoimu,
-)
+from .benchmarks import is_archive, is_euroc, is_repoimu, load_archive, load_euroc, load_phone, load_repoimu
 from .broad import is_broad, load_broad
 from .described import complete, load_described, mapping_of, with_checked_orientation
 from .dot import is_dot, load_dot

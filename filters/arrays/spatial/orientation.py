@@ -230,7 +230,7 @@ class ArrayOrientation(ArrayEquations, Model):
         # F (5.28), (5.29): Φ on the diagonal and ∂q_i⁺/∂ω = Δt [q_i]× for each row; α stays, ω gains Δt α
         F = block_matrix(
             [[*(back if row == column else none for column in range(3)), none, lever[row]] for row in range(3)]
-            + [[none, none, none, unit, none], [none, none, none, dt2 * unit, unit]],
+            + [[none, none, none, unit, none], [none, none, none, dt2 * unit, unit]]
         )
         # V = J σ_γ² Jᵀ with J = [0 0 0 Δt ½Δt²]ᵀ: white jerk γ drives α and ω
         power = expand(self.jerk_std**2, 2) * unit

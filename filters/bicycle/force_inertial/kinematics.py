@@ -154,11 +154,7 @@ def gyroscope_accelerations(
         - c_t * rate.theta * rate.phi_h
     ) / s_t
     return Accelerations(
-        lean,
-        turn_y - c_h * rate.phi_h * rate.psi - s_h * yaw,
-        turn_h[0],
-        c_a * turn_b[0] + s_a * turn_b[2],
-        yaw,
+        lean, turn_y - c_h * rate.phi_h * rate.psi - s_h * yaw, turn_h[0], c_a * turn_b[0] + s_a * turn_b[2], yaw
     )
 
 

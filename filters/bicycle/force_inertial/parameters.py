@@ -314,10 +314,7 @@ def resting_leg(geometry: RiderGeometry, crank: np.ndarray, gravity: float = GRA
     arms = np.stack([pedal - knee, pedal - hip], axis=1)
     cross = np.stack([-arms[..., 1], arms[..., 0]], axis=-1)
     known = np.stack(
-        [
-            shank_weight * (shank - knee)[:, 0],
-            thigh_weight * (thigh - hip)[:, 0] + shank_weight * (shank - hip)[:, 0],
-        ],
+        [shank_weight * (shank - knee)[:, 0], thigh_weight * (thigh - hip)[:, 0] + shank_weight * (shank - hip)[:, 0]],
         axis=-1,
     )
     return Leg(pedal, centre, np.linalg.solve(cross, known[..., None])[..., 0])

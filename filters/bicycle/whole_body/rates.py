@@ -47,11 +47,7 @@ def zxy_rates(angles: Array, child: Array, parent: Array) -> Rates:
     m, p = s1 * parent[..., 0] - c1 * parent[..., 1], c1 * parent[..., 0] + s1 * parent[..., 1]
     rates = xp.stack([k / c2 - m * t2 - parent[..., 2], n - p, child[..., 1] - t2 * k + m / c2], axis=-1)
     by_angles = rows(
-        [
-            [-p * t2, k * t2 / c2 - m / (c2 * c2), -n / c2],
-            [m, 0.0, k],
-            [p / c2, -k / (c2 * c2) + m * t2 / c2, t2 * n],
-        ]
+        [[-p * t2, k * t2 / c2 - m / (c2 * c2), -n / c2], [m, 0.0, k], [p / c2, -k / (c2 * c2) + m * t2 / c2, t2 * n]]
     )
     by_child = rows([[-s3 / c2, 0.0, c3 / c2], [c3, 0.0, s3], [t2 * s3, 1.0, -t2 * c3]])
     by_parent = rows([[-t2 * s1, t2 * c1, -1.0], [-c1, -s1, 0.0], [s1 / c2, -c1 / c2, 0.0]])
@@ -69,11 +65,7 @@ def yxy_rates(angles: Array, child: Array, parent: Array) -> Rates:
     m, p = s1 * parent[..., 0] + c1 * parent[..., 2], c1 * parent[..., 0] - s1 * parent[..., 2]
     rates = xp.stack([k / s2 + m * cot - parent[..., 1], n - p, child[..., 1] - k * cot - m / s2], axis=-1)
     by_angles = rows(
-        [
-            [p * cot, -(k * c2 + m) / (s2 * s2), n / s2],
-            [m, 0.0, -k],
-            [-p / s2, (k + m * c2) / (s2 * s2), -n * cot],
-        ]
+        [[p * cot, -(k * c2 + m) / (s2 * s2), n / s2], [m, 0.0, -k], [-p / s2, (k + m * c2) / (s2 * s2), -n * cot]]
     )
     by_child = rows([[s3 / s2, 0.0, -c3 / s2], [c3, 0.0, s3], [-s3 * cot, 1.0, c3 * cot]])
     by_parent = rows([[cot * s1, -1.0, cot * c1], [-c1, 0.0, s1], [-s1 / s2, 0.0, -c1 / s2]])

@@ -58,5 +58,5 @@ def test_ground_begins_level_and_is_the_same_for_the_same_seed():
 
 def test_a_trajectory_without_a_bicycle_is_refused():
     motion = ride().replace(truth={"trunk/orientation": np.tile([1.0, 0.0, 0.0, 0.0], (T, 1))})
-    with pytest.raises(ValueError, match="must tell bicycle/orientation"):
+    with pytest.raises(ValueError, match="needs the truth bicycle/orientation"):
         sloped(motion, np.random.default_rng(0))

@@ -19,7 +19,7 @@ from poise.filters.core import metrics, rotation
 from poise.filters.core.quantity import GYROSCOPE_BIAS, UP
 from poise.scripts.live.curves import curves_of
 from poise.scripts.live.device import DeviceAttitude, VirtualController, device_meshes, inclined, planar_orientation
-from poise.scripts.live.meshes import ball, box, by_colour, is_hilly, road_mesh, rod, tyre, volume
+from poise.scripts.live.meshes import Mesh, ball, box, by_colour, is_hilly, road_mesh, rod, tyre
 from poise.scripts.live.rider import estimated_values, forces_on, rider_meshes, rider_poses
 
 RED, BLUE = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
@@ -32,6 +32,12 @@ def ride() -> Trajectory:
         return poise.record(env, seed=1)
     finally:
         env.close()
+
+
+def volume(mesh: Mesh) -> float:
+    """Enclosed volume, m³; positive if all faces look outwards."""
+    a, b, c = (mesh.vertices[mesh.faces[:, i]] for i in range(3))
+    return float(np.sum(a * np.cross(b, c)) / 6.0)
 
 
 @pytest.mark.parametrize(
