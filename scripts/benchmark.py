@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -169,8 +168,7 @@ def show_data_sets(suites: dict[str, Results], args: Args, folder: Run, out: Out
             sections[title] = markdown_table(rows, ["estimator", *names])
             out.table(rows, title, columns=["estimator", *names])
     if args.save is not None:
-        source = json.loads((folder.folder / "versions.json").read_text(encoding="utf-8"))
-        source = {key: source[key] for key in ("poise", "python", "packages")} | {"seed": args.seed}
+        source = {key: folder.versions[key] for key in ("poise", "python", "packages")} | {"seed": args.seed}
         out.say(f"results: {write_json(args.save, {'source': source, 'recordings': results}, indent=None)}")
     return sections
 
@@ -257,7 +255,7 @@ def write_page(suites: dict[str, Results], tables: dict[str, list[dict[str, Any]
     from ..filters.support.optional import MissingExtraError
     from .report import kinds_of
 
-    state = json.loads((folder.folder / "versions.json").read_text(encoding="utf-8"))
+    state = folder.versions
     about = {"command": f"poise {folder.command}", "seed": folder.seed, "poise": state["poise"]["version"]}
     about |= {"commit": state["poise"].get("commit"), "Python": state["python"], **state["packages"]}
     labels = {name for results in suites.values() for name in results.table["estimator"]}

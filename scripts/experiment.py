@@ -72,6 +72,11 @@ class Run:
         return self.folder / "figures"
 
     @property
+    def versions(self) -> dict[str, Any]:
+        """Python, platform, poise and packages that the run was made with."""
+        return json.loads((self.folder / "versions.json").read_text(encoding="utf-8"))
+
+    @property
     def results(self) -> Path:
         """Path of the table of results."""
         return self.folder / "results.csv"

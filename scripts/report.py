@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import statistics
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
@@ -233,7 +232,7 @@ def draw_example(
 
 def provenance(run: Run) -> str:
     """What a report depends on: command, seed, versions."""
-    state = json.loads((run.folder / "versions.json").read_text(encoding="utf-8"))
+    state = run.versions
     packages = ", ".join(f"{name} {version}" for name, version in state["packages"].items() if version)
     lines = [
         f"- command: `poise {run.command}`, arguments in `args.json`, root seed {run.seed}",

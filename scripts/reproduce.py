@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import tyro
 
-from .experiment import Run, command_line, open_run
+from .experiment import Run, command_line, open_run, write_json
 from .main import run_command
 from .output import Output
 
@@ -106,9 +106,7 @@ def run_every(args: Args, settings: dict[str, Any]) -> int:
 
 def made_with(run: Run) -> str:
     """Lines of a page that is kept: version, commit and packages that a run was made with, and no machine."""
-    import json
-
-    state = json.loads((run.folder / "versions.json").read_text(encoding="utf-8"))
+    state = run.versions
     commit = f", commit {state['poise']['commit'][:12]}" if "commit" in state["poise"] else ""
     changed = " with changes" if state["poise"].get("changed") else ""
     packages = ", ".join(f"{name} {version}" for name, version in state["packages"].items() if version)
@@ -127,8 +125,7 @@ def one_study(paper: str, settings: dict[str, Any], run: Run) -> str:
     if is_kept(done, key):
         return paper
     folder.figures.mkdir(parents=True, exist_ok=True)
-    versions = (run.folder / "versions.json").read_text(encoding="utf-8")
-    (folder.folder / "versions.json").write_text(versions, encoding="utf-8")
+    write_json(folder.folder / "versions.json", run.versions)
     report = Report(folder.folder)
     find_paper(paper)(Study(folder.folder.resolve(), **settings), report)
     folder.write_results(report.results)

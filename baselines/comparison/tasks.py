@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 import time
 import warnings
@@ -12,10 +11,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ...envs.data.trajectory import Trajectory
-from ...filters.support.files import write_json
 from ...filters.support.parallel import in_parallel
+from ...filters.support.resume import is_kept, keep, kept
 from ...filters.support.seeds import child_seeds
-from ...filters.support.version import code_version
 from ..evaluation import evaluate
 from ..scoring import COLUMNS, has_truth
 from .data_sets import GESTURES, RIDES, contenders, hand_episode, ride_imus
@@ -136,17 +134,12 @@ def run_tasks(
     jobs = [
         (task, folder / task.file, tuple(names), tuple(channels), offline, reference)
         for task in tasks
-        if not is_done(folder / task.file)
+        if not is_kept(folder / task.file, {})
     ]
     for _ in in_parallel(run_task, jobs, processes, label="compare", unit="task"):
         pass
     suites = dict.fromkeys(task.suite for task in tasks)
     return {suite: collected([folder / task.file for task in tasks if task.suite == suite]) for suite in suites}
-
-
-def is_done(path: Path) -> bool:
-    """Whether a task has results of this version of the code."""
-    return path.exists() and json.loads(path.read_text(encoding="utf-8"))["code"] == code_version()
 
 
 def run_task(
@@ -175,8 +168,7 @@ def run_task(
             "recordings": results_of(known, table, task.suffix),
         }
     found["seconds"] = {"trajectories": made - started, "estimators": time.perf_counter() - made}
-    found["code"] = code_version()
-    return write_json(path, found, indent=None)
+    return keep(path, {}, found, allow_nan=False)
 
 
 def collected(files: Sequence[Path]) -> Results:
@@ -187,7 +179,7 @@ def collected(files: Sequence[Path]) -> Results:
     """
     from ..error_table import ErrorTable
 
-    parts = [json.loads(file.read_text(encoding="utf-8")) for file in files]
+    parts = [kept(file) for file in files]
     for text in dict.fromkeys(text for part in parts for text in part.get("warnings", [])):
         warnings.warn(text, stacklevel=3)
     rows = [[float("nan") if cell is None else cell for cell in row] for part in parts for row in part["rows"]]
