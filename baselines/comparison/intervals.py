@@ -1,4 +1,4 @@
-"""How sure a comparison is: bootstrap intervals over trajectories, paired differences, ranks, regressions."""
+"""Uncertainty of a comparison: bootstrap intervals over trajectories, paired differences, ranks, regressions."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Training data of a network: what a front end sees, and what the network should say, for many sequences."""
+"""Training data of a network: inputs from a front end and targets, for many sequences."""
 
 from __future__ import annotations
 

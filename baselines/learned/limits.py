@@ -1,4 +1,4 @@
-"""Where a trained network stops holding, in words for its card."""
+"""Limits within which a trained network is valid, in words for its card."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a policy learned: its gains where the motion is slow, fast, turning, pitching or shaking."""
+"""Gains that a policy has learned to set where the motion is slow, fast, turning, pitching or shaking."""
 
 from __future__ import annotations
 

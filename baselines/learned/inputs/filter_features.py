@@ -1,4 +1,4 @@
-"""Front end of a network that corrects any Kalman filter: what it estimates, how certain it is, what surprised it."""
+"""Front end of a network that corrects any Kalman filter: its estimate, covariance and innovations."""
 
 from __future__ import annotations
 

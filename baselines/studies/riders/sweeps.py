@@ -1,4 +1,4 @@
-"""Where networks stop holding: errors of filters and networks as conditions leave those of the training."""
+"""Limits of networks: errors of filters and networks as conditions leave those of the training."""
 
 from __future__ import annotations
 
