@@ -48,11 +48,7 @@ def run(args: Args) -> int:
         scenario(name)
     settings = {name: getattr(args, name) for name in ("seed", "subjects", "duration", "processes")}
     kind = " --checks" if args.checks else " --pilots" if args.pilots else ""
-    with studying("rides", args, settings, f"poise rides{kind}", 190) as (
-        study,
-        out,
-        report,
-    ):
+    with studying("rides", args, settings, f"poise rides{kind}", 190) as (study, out, report):
         if args.checks:
             work.checks(study, report)
             return 0

@@ -17,13 +17,7 @@ GESTURES = ("slow", "fast", "severe", "mixed")
 RIDES = ("outdoor", "slalom", "bumps")
 """Scenarios of the simulated rides."""
 
-DATA_SETS = {
-    "broad": "BROAD",
-    "repoimu": "RepoIMU",
-    "smartphones": "phones",
-    "senslogs": "phones",
-    "euroc": "EuRoC",
-}
+DATA_SETS = {"broad": "BROAD", "repoimu": "RepoIMU", "smartphones": "phones", "senslogs": "phones", "euroc": "EuRoC"}
 """Format, or folder of archives, in lower case → data set."""
 
 NORTH = ("BROAD", "simulated hand")

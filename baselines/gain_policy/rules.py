@@ -8,13 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...filters.adaptation.gains import filter_name, gain_ranges
-from ...filters.adaptation.rules import (
-    AccelerationRule,
-    GuardedInnovationRule,
-    InnovationRule,
-    PitchRateRule,
-    Rule,
-)
+from ...filters.adaptation.rules import AccelerationRule, GuardedInnovationRule, InnovationRule, PitchRateRule, Rule
 from ...filters.core.kalman import KalmanFilter
 from ...filters.registry import make
 from ...filters.support.names import look_up

@@ -194,11 +194,7 @@ def spin_momentum(motion: CentreMotion, moments: np.ndarray) -> np.ndarray:
 
 
 def connect_points(
-    physics: Physics,
-    parent: tuple[int, int],
-    parent_point: Vector,
-    child: tuple[int, int],
-    child_point: Vector,
+    physics: Physics, parent: tuple[int, int], parent_point: Vector, child: tuple[int, int], child_point: Vector
 ) -> int:
     """Hold two points of two links together.
 

@@ -86,12 +86,7 @@ class Physics:
         )
 
     def create_body(
-        self,
-        mass: float,
-        inertia: Vector,
-        *,
-        centre_of_mass: Vector = (0.0, 0.0, 0.0),
-        visual: int = -1,
+        self, mass: float, inertia: Vector, *, centre_of_mass: Vector = (0.0, 0.0, 0.0), visual: int = -1
     ) -> int:
         """Create a free rigid body without any damping, body frame at the origin.
 
@@ -124,13 +119,7 @@ class Physics:
         self.clear_defaults(body)
         return int(body)
 
-    def load_urdf(
-        self,
-        source: str | Path,
-        *,
-        position: Vector = (0.0, 0.0, 0.0),
-        fixed: bool = False,
-    ) -> int:
+    def load_urdf(self, source: str | Path, *, position: Vector = (0.0, 0.0, 0.0), fixed: bool = False) -> int:
         """Load a multibody with the inertias of its description, without dampings and motors.
 
         Args:

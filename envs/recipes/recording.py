@@ -46,11 +46,7 @@ def record_recipe(
     paths = [folder / f"{made.name}_{index:04d}.h5" for index in range(episodes)]
     described = made.describe()
     return resumed(
-        record_one,
-        check_same,
-        [(described, seed, index, path) for index, path in enumerate(paths)],
-        processes,
-        report,
+        record_one, check_same, [(described, seed, index, path) for index, path in enumerate(paths)], processes, report
     )
 
 

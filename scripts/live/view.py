@@ -101,14 +101,7 @@ def run(args: Args) -> int:
                 f"{title} has neither a true attitude nor an estimate of one; name --estimators that fit to it"
             )
         viewer = Viewer(
-            subject,
-            motion,
-            title,
-            host=args.host,
-            port=args.port,
-            live=newer is not None,
-            addable=addable,
-            more=more,
+            subject, motion, title, host=args.host, port=args.port, live=newer is not None, addable=addable, more=more
         )
         try:
             # without truth there is nothing in the middle that the others could be compared with

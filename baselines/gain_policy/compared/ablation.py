@@ -97,10 +97,6 @@ def ablation(
     for name, other in changed.items():
         errors = whole if other is policy else policy_errors(kalman, other, trajectories)
         rows.append(
-            {
-                "without": name,
-                "mean": float(np.degrees(errors.mean())),
-                "saved": percent(improvement(errors, whole)),
-            }
+            {"without": name, "mean": float(np.degrees(errors.mean())), "saved": percent(improvement(errors, whole))}
         )
     return rows

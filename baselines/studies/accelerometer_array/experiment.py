@@ -53,12 +53,7 @@ FIRST = {"controller": PROPOSED, "octa": WITHOUT_GYROSCOPE}
 """Device → the proposed method as the thesis uses it there"""
 METHODS = {
     "controller": ("integration", "tilt sensor", "Marins, σ_q = 0.5", PROPOSED),
-    "octa": (
-        "integration of the array's rate",
-        "tilt sensor",
-        "Marins, σ_q = 0.3, array's rate",
-        WITHOUT_GYROSCOPE,
-    ),
+    "octa": ("integration of the array's rate", "tilt sensor", "Marins, σ_q = 0.3, array's rate", WITHOUT_GYROSCOPE),
 }
 """Device → methods of its figures; the last is the proposed one"""
 MORE: dict[str, tuple[str, ...]] = {"controller": (), "octa": (WITH_GYROSCOPE,)}

@@ -224,18 +224,8 @@ def likenesses(rows: list[Row]) -> list[Claim]:
         returning = mean_of(rows, "rate", motion=motion, method=RETURNING)
         found += [
             Claim.within(f"Figure {figure}: integration drifts by tens of degrees in 100 s", drift, 20.0, 90.0, "deg"),
-            Claim.less(
-                f"Figure {figure}: the tilt angle is five times as wrong",
-                extended,
-                tilt,
-                factor=0.2,
-            ),
-            Claim.less(
-                f"{motion}: the complete pose estimates ω poorly, above 0.3 rad/s",
-                0.3,
-                rate,
-                "rad/s",
-            ),
+            Claim.less(f"Figure {figure}: the tilt angle is five times as wrong", extended, tilt, factor=0.2),
+            Claim.less(f"{motion}: the complete pose estimates ω poorly, above 0.3 rad/s", 0.3, rate, "rad/s"),
             Claim.less(
                 f"{motion}: it does so because its acceleration does not return to zero",
                 returning,

@@ -193,12 +193,7 @@ def rate_table(study: Study, report: Report) -> None:
             Claim.less("Figure 4.9: noise and digits alone leave less than half", left, 0.7, "m/s²", factor=0.5),
             Claim.less("Figure 4.9: of that the nonlinearity makes more than half", left, curved, "m/s²", factor=0.5),
             Claim.less("Figure 4.14: noise and digits alone leave less than half", turning, 2.8, "°/s", factor=0.5),
-            Claim.less(
-                "Figure 4.16: the lines of two places differ by less than 40 digits",
-                places,
-                40.0,
-                "digits",
-            ),
+            Claim.less("Figure 4.16: the lines of two places differ by less than 40 digits", places, 40.0, "digits"),
             Claim.less("Figure 4.19: the lines back and forth differ by at most 40 digits", ways, 40.0, "digits"),
         ],
     )

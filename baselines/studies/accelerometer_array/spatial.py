@@ -77,12 +77,7 @@ METHODS: dict[str, dict[str, dict[str, Any]]] = {
 """Device → name in tables → parameters of :class:`.Marins` (names that begin so) or :class:`.ArrayOrientation`. OCTA is
 simulated with a gyroscope beside it, which only the first methods read; *array's rate* takes the place of a gyroscope
 for others (the weighted method of chapter 2)."""
-QUICK_OCTA = (
-    WITH_GYROSCOPE,
-    WITHOUT_GYROSCOPE,
-    "integration of the array's rate",
-    "Marins, σ_q = 0.01, array's rate",
-)
+QUICK_OCTA = (WITH_GYROSCOPE, WITHOUT_GYROSCOPE, "integration of the array's rate", "Marins, σ_q = 0.01, array's rate")
 STEEP_METHODS = (PROPOSED, "Marins, σ_q = 0.5", "Marins, σ_q = 0.01")
 PUBLISHED = {
     ("controller", PROPOSED): "within ±3",

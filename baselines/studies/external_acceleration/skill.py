@@ -59,10 +59,7 @@ def lasting_bounds(trial: Trial) -> list[float]:
     for k in range(trial.up.shape[1]):
         samples = {name: values[:, k] for name, values in trial.measurements.items()}
         model = ExternalAcceleration(
-            dt=1.0 / RATE,
-            mode=2,
-            gyroscope_sample="previous",
-            gyroscope_noise=gyroscope.white_noise * RATE**0.5,
+            dt=1.0 / RATE, mode=2, gyroscope_sample="previous", gyroscope_noise=gyroscope.white_noise * RATE**0.5
         )
         x = np.zeros((len(trial.up), 7))
         x[:, :3] = trial.up[:, k]

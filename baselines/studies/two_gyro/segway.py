@@ -68,10 +68,7 @@ def outcome(motion: str, seed: int) -> dict[str, dict[str, float]]:
         ride, error, estimate = run(motion, model, seed)
         late = ride.time >= LATE
         variance = estimate.covariance[late, :1, :1]
-        found[name] = {
-            "χ": rms(error[late]),
-            "NEES": float(np.mean(nees(error[late, None] * DEG, variance))),
-        }
+        found[name] = {"χ": rms(error[late]), "NEES": float(np.mean(nees(error[late, None] * DEG, variance)))}
     equations = replace(filter_of(Errors(), DT), platform="segway", integration="midpoint")
     ideal = simulate(RIDES[motion], DURATION, DT)
     bound = posterior_bound(equations, true_states(ideal.truth, equations), ideal.measurements)[:, 0, 0]

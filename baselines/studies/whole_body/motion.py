@@ -139,13 +139,7 @@ class ExactRide:
                 raise ValueError(f"the {side} hand is out of reach in this motion: {reach:.3f} of the straight arm")
             outward = np.array([0.0, 0.0, -SIGNS[side]])
             frame, _ = limb_frame(
-                root,
-                link.hand(side, steer),
-                link.upper_arm,
-                link.forearm,
-                outward,
-                "arm",
-                f[f"arm_{side}"](t),
+                root, link.hand(side, steer), link.upper_arm, link.forearm, outward, "arm", f[f"arm_{side}"](t)
             )
             x[..., arm : arm + 3] = shoulder_angles(R, frame)
             hip, out = link.point(link.hip, side, steer) + 0.0 * steer, np.array([1.0, 0.0, 0.0])

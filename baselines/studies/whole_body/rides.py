@@ -151,12 +151,7 @@ RIDES = RideStudy(
         Less("Figure 6: integrated θ2 is more than twice as wrong", "θ2", "filter", "integration", 0.5, "second half"),
         Less("Trusting C3 and C7 ten times more lowers the error of θ3", "θ3", "swivel 0.3", "filter"),
         Less("The paper's seat torque lowers the error of θ2", "θ2", "seat_share 1", "filter"),
-        Less(
-            "The paper's seat torque lowers the error of θ2 if the seat carries the trunk",
-            "θ2",
-            SEATED,
-            "filter",
-        ),
+        Less("The paper's seat torque lowers the error of θ2 if the seat carries the trunk", "θ2", SEATED, "filter"),
         Less("The published forms double the error of φ", "φ", "filter", "published forms", 0.5),
         Less("The published forms are as good in φ", "φ", "published forms", "filter", 1.1),
         Less("The published forms are as good in β", "βr", "published forms", "filter", 1.1),

@@ -139,10 +139,7 @@ def start_scores(seed: int, offset: float, kind: str) -> dict[str, float]:
     apart = RIDES.errors(found, reference)
     largest = np.max([np.abs(apart[angle]) for angle in STATES], axis=0)
     late = np.flatnonzero(largest > FORGOTTEN)
-    return {
-        "settled": float(ride.time[late[-1] + 1]) if late.size else 0.0,
-        "at the end": float(largest[-500:].max()),
-    }
+    return {"settled": float(ride.time[late[-1] + 1]) if late.size else 0.0, "at the end": float(largest[-500:].max())}
 
 
 def bump_scores(seed: int) -> dict[str, dict[str, float]]:

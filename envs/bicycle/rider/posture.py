@@ -230,9 +230,7 @@ def sit(bicycle: BicycleParameters, body: RiderBody) -> Posture:
     forearm, shank = body.segment("forearm"), body.segment("shank")
     foot = ANKLE_TO_PEDAL * scale
     leg = Limb(
-        body.segment("thigh").length,
-        (foot * math.sin(ANKLE_ANGLE), -shank.length - foot * math.cos(ANKLE_ANGLE)),
-        1.0,
+        body.segment("thigh").length, (foot * math.sin(ANKLE_ANGLE), -shank.length - foot * math.cos(ANKLE_ANGLE)), 1.0
     )
     arm = Limb(body.segment("upper_arm").length, (0.0, -forearm.length), -1.0)
     axle = np.array(bicycle.drive.axle)

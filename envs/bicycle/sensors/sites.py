@@ -81,11 +81,7 @@ class SensorSites:
         return asdict(self)
 
 
-def sensor_sites(
-    posture: Posture,
-    *,
-    viewpoints: Sequence[Vector3] = (CAMERA_SITE,) * 3,
-) -> SensorSites:
+def sensor_sites(posture: Posture, *, viewpoints: Sequence[Vector3] = (CAMERA_SITE,) * 3) -> SensorSites:
     """Sensor sites on a person fitted to a bicycle.
 
     Args:
