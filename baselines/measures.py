@@ -21,7 +21,7 @@ SETTLED = 3.0
 """An estimate has settled when its error stays below this multiple of its RMS over the last half."""
 OF_ERROR = ("p95", "largest", "settling", "drift", "over bound")
 """Endings of the metric of a row: ``inclination largest``."""
-MEASURES = (*OF_ERROR, "nees", "nees degrees", "nis lower", "nis upper")
+MEASURES = (*OF_ERROR, "nees", "nees degrees", "nis lower", "nis upper", "coverage of 90 %")
 """All; those of consistency stand alone."""
 
 

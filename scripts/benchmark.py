@@ -26,9 +26,10 @@ STEPS = 100
 class Args:
     """Arguments of ``poise benchmark``."""
 
-    suite: Literal["all", "rider"] = "all"
-    """all: estimators on simulated motion and recordings; rider: the papers' filters of rider and bicycle beside
-    networks that correct them and what a network should beat, on riders, scenarios and styles kept from training"""
+    suite: Literal["all", "hand", "rider"] = "all"
+    """hand: estimators of one IMU on simulated motion of a hand-held device and on recordings; rider: the papers'
+    filters of rider and bicycle beside networks that correct them and what a network should beat, on riders, scenarios
+    and styles kept from training; all: both, and the inclination of an IMU on the bicycle and on the rider's trunk"""
     seed: int = 0
     """root seed of motions and sensor errors"""
     episodes: int = 3
@@ -45,14 +46,13 @@ class Args:
     """run the smoother of every estimator that has one as well"""
     trials: int = 5
     """trials of each test of the external-acceleration paper; 0 leaves them out"""
-    rides: bool = True
-    """whether to simulate rides of a bicycle too, and estimate the inclination of its and the rider's IMU"""
     baseline: Path | None = None
     """results.csv of an earlier run: errors that grew by more than 2 % are listed, and the exit status is 1"""
     save: Path | None = None
     """file for the errors of all recordings and simulations, from which `poise recommend` reads"""
     quick: bool = False
-    """of the rider suite: two rides of each group, few training rides of the references"""
+    """one episode of each gesture, one scenario of single IMUs, one trial of each test, and of the rider suite one ride
+    of each group without the references that learn"""
     sweep: bool = False
     """of the rider suite: instead of the tables, vary sensor grade, gaps, mounting, measured geometry and rate"""
     processes: int = 2
@@ -67,67 +67,85 @@ class Args:
 
 def run(args: Args) -> int:
     """Simulate, load, estimate, compare."""
-    if args.suite == "rider":
-        from .comparison.riders import riders
-
-        return riders(args)
     from ..baselines.comparison.tasks import run_tasks
+    from .comparison.riders import rider_settings, rider_sweeps, rider_tables
     from .experiment import open_run
     from .recordings.load import load_all, passed_over_text, plain_warnings
     from .report import provenance
 
+    riders = None if args.suite == "hand" else rider_settings(args.estimators, args.seed, quick=args.quick)
+    if args.suite == "rider" and (riders is None or args.recordings):
+        wrong = f"--estimators {' '.join(args.estimators)}" if riders is None else "--recordings"
+        raise ValueError(f"{wrong} has nothing for --suite rider, which compares the filters of the papers on riders")
+    if args.sweep and args.suite != "rider":
+        raise ValueError(f"--sweep belongs to --suite rider, not {args.suite}")
     before = None if args.baseline is None else load_baseline(args.baseline)
     with plain_warnings(), Output("benchmark", args) as out:
         recorded, passed_over = load_all(args.recordings) if args.recordings else ([], [])
         tasks, channels = tasks_of(args, recorded)
         folder = open_run("benchmark", args, may_differ=("baseline", "save"))
-        out.say(f"{len(tasks)} tasks; an interrupted run continues with --resume {folder.folder}")
-        suites = run_tasks(
-            *(tasks, folder.folder / "tasks", args.estimators, channels),
-            processes=args.processes,
-            offline=args.offline,
-            reference=args.reference,
-        )
-        table = all_rows(suites)
-        folder.write_results(table)
+        out.say(f"an interrupted run continues with --resume {folder.folder}")
+        if args.sweep:
+            assert riders is not None
+            swept = rider_sweeps(riders, args, folder, out) | {"Provenance": provenance(folder)}
+            out.report(folder.write_report("poise benchmark --suite rider --sweep", swept))
+            return 0
+        suites: dict[str, Results] = {}
+        if tasks:
+            suites = run_tasks(
+                *(tasks, folder.folder / "tasks", args.estimators, channels),
+                processes=args.processes,
+                offline=args.offline,
+                reference=args.reference,
+            )
         sections: dict[str, str] = {}
+        ridden = None if riders is None else rider_tables(riders, args, folder, out)
+        table = all_rows(suites, [] if ridden is None else ridden.rows)
+        folder.write_results(table)
         for suite, results in suites.items():
             sections |= show_suite(suite, results, [task for task in tasks if task.suite == suite], args, folder, out)
         sections |= show_data_sets(suites, args, folder, out)
-        if args.trials:
-            sections |= show_paper(args.trials, out)
+        if args.trials and tasks:
+            sections |= show_paper(1 if args.quick else args.trials, out)
+        if ridden is not None:
+            sections |= ridden.sections
+            suites |= ridden.suites
         grown = [] if before is None else show_regressions(table, before, sections, out)
         if passed_over:
             sections["Passed over"] = passed_over_text(passed_over, most=1000)
             out.say(f"passed over:\n{passed_over_text(passed_over)}")
-        costs = show_costs(args, channels, sections, out)
+        more = {"Cost of an update": show_costs(args, channels, sections, out)} if tasks else {}
         sections["Provenance"] = provenance(folder)
-        write_page(suites, {"Cost of an update": costs} | ({REGRESSIONS: grown} if grown else {}), folder, out)
+        write_page(suites, more | ({REGRESSIONS: grown} if grown else {}), folder, out)
         out.report(folder.write_report("poise benchmark", sections))
     return 1 if grown else 0
 
 
 def tasks_of(args: Args, recorded: list[Trajectory]) -> tuple[list[Task], list[str]]:
     """What is to be done, and the channels that estimators may read."""
-    from ..baselines.comparison.data_sets import HAND_CHANNELS, contenders, with_other_clocks
+    from ..baselines.comparison.data_sets import HAND_CHANNELS, RIDES, contenders, with_other_clocks
     from ..baselines.comparison.recommendation import CORRECTED
     from ..baselines.comparison.tasks import hand_tasks, imu_ride_tasks, recording_tasks
 
     channels = list(dict.fromkeys([*HAND_CHANNELS, *(name for each in recorded for name in each.measurements)]))
     contenders(args.estimators, channels)  # an unknown name is refused before anything is simulated
-    tasks = hand_tasks(args.seed, args.episodes, sensors=args.sensors)
-    tasks += imu_ride_tasks(args.seed) if args.rides else []
+    if args.suite == "rider":
+        return [], channels
+    tasks = hand_tasks(args.seed, 1 if args.quick else args.episodes, sensors=args.sensors)
+    if args.suite == "all":
+        tasks += imu_ride_tasks(args.seed, RIDES[:1] if args.quick else RIDES)
     tasks += recording_tasks(recorded)
     again = {"settings": {"reference_clock": "corrected", "check": False}, "suffix": CORRECTED}
     tasks += recording_tasks(with_other_clocks(recorded), "recordings, clock corrected", **again)
     return tasks, channels
 
 
-def all_rows(suites: dict[str, Results]) -> pandas.DataFrame:
-    """All results with their suite, in the order of the suites."""
+def all_rows(suites: dict[str, Results], more: list[dict[str, Any]]) -> pandas.DataFrame:
+    """All results with their suite, in the order of the suites, and more rows of the same columns."""
     import pandas
 
-    return pandas.concat([results.table.assign(suite=suite) for suite, results in suites.items()], ignore_index=True)
+    tables = [results.table.assign(suite=suite) for suite, results in suites.items()]
+    return pandas.concat([*tables, *([pandas.DataFrame(more)] if more else [])], ignore_index=True)
 
 
 def show_suite(suite: str, results: Results, tasks: list[Task], args: Args, folder: Run, out: Output) -> dict[str, str]:

@@ -1,14 +1,18 @@
 """Examples in the documents run; tables and links in them are true."""
 
+import importlib
 import re
+import shlex
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+import tyro
 
 from poise.envs.sensors.kinds import KINDS
 from poise.scripts.list import LISTS, PLACED
+from poise.scripts.main import COMMANDS, without_backend
 
 from .envs.data.formats.examples import write_examples
 
@@ -37,6 +41,23 @@ def test_examples_run(path, code, tmp_path, monkeypatch):
     exec(compile(code, "example", "exec"), {"__name__": "example"})
     for name in set(KINDS) - set(kinds):  # registered by the example, nobody else's business
         del KINDS[name]
+
+
+def commands(path):
+    """Words of every ``poise …`` in the blocks of a page, without comments, redirections and placeholders."""
+    for block in re.findall(r"```\w*\n(.*?)```", path.read_text(encoding="utf-8"), re.DOTALL):
+        for line in block.replace("\\\n", " ").splitlines():
+            found = re.match(r"\s*(?:[\w-]+ \| )?poise ([a-z].*)$", line)
+            if found:
+                words = shlex.split(re.sub(r"\$\w+", "0", re.split(r"\s#|\s[|>]\s", found[1])[0]))
+                yield [word for word in without_backend(words)[0] if word != "…"]
+
+
+@pytest.mark.parametrize("path", DOCUMENTS, ids=lambda path: path.name)
+def test_commands_have_the_options_that_they_show(path):
+    for name, *words in commands(path):
+        module = importlib.import_module(COMMANDS[name].module, "poise.scripts")
+        tyro.cli(module.Args, args=words)  # leaves the process if it does not understand
 
 
 @pytest.mark.parametrize("path", DOCUMENTS, ids=lambda path: path.name)

@@ -2,54 +2,70 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..output import Output
 
 if TYPE_CHECKING:
+    from ...baselines.comparison.tasks import Results
     from ...baselines.studies.riders.suite import RiderSuite
     from ..experiment import Run
 
+SUITE = "riders"
+"""Name in ``results.csv``."""
 
-def riders(args: Any) -> int:
-    """Tables or sweeps of the rider suite."""
+
+class RiderPart(NamedTuple):
+    """What the suite adds to a report.
+
+    Attributes:
+        rows: of ``results.csv``.
+        sections: heading → Markdown.
+        suites: title → results, for the page.
+    """
+
+    rows: list[dict[str, Any]]
+    sections: dict[str, str]
+    suites: dict[str, Results]
+
+
+def rider_settings(estimators: Sequence[str], seed: int, *, quick: bool) -> RiderSuite | None:
+    """Settings of the suite for the estimators that are named, all if none; None if none of them is of a paper."""
     from ...baselines.studies.riders.suite import PAPERS, RiderSuite
-    from ..experiment import start_run
-    from ..report import provenance
 
-    wanted = tuple(paper for paper in PAPERS if not args.estimators or paper in args.estimators)
-    settings = RiderSuite(wanted, seed=args.seed)
-    if args.quick:
-        settings = RiderSuite(wanted, rides=2, draws=1, training=6, seed=args.seed)
-    with Output("benchmark", args) as out:
-        folder = start_run("benchmark", args, args.seed, args.runs)
-        sections = (rider_sweeps if args.sweep else rider_tables)(settings, args, folder, out)
-        sections["Provenance"] = provenance(folder)
-        out.report(folder.write_report("poise benchmark --suite rider", sections))
-    return 0
+    wanted = tuple(paper for paper in PAPERS if not estimators or paper in estimators)
+    if not wanted:
+        return None
+    return RiderSuite(wanted, rides=1, draws=1, training=0, seed=seed) if quick else RiderSuite(wanted, seed=seed)
 
 
-def rider_tables(settings: RiderSuite, args: Any, folder: Run, out: Output) -> dict[str, str]:
-    """Errors, each angle, consistency: printed, written, and as sections of the report."""
+def rider_tables(settings: RiderSuite, args: Any, folder: Run, out: Output) -> RiderPart:
+    """Errors, each angle, bounds, consistency: printed, and as parts of the report."""
+    from ...baselines.comparison.tasks import Results
+    from ...baselines.error_table import ErrorTable
+    from ...baselines.scoring import COLUMNS
     from ...baselines.studies.riders import suite, tables
     from ...filters.support.rows import markdown_table
 
-    out.say(f"references learn from {settings.training} rides; rides are simulated once and kept")
-    learnt = suite.learnt_by(settings, quick=args.quick)
-    found = suite.compare(settings, learnt, processes=args.processes, progress=True)
-    rows = sorted((row for one in found for row in one), key=lambda row: (row.group, row.ride, row.draw))
-    folder.write_results(tables.results(rows))
+    learning = f"; references learn from {settings.training} others" if settings.training else ""
+    out.say(f"riders: {settings.rides} rides of each group{learning}; rides are simulated once and kept")
+    rows = suite.compare(settings, folder.folder / "tasks", processes=args.processes, progress=True)
     sections = {}
     for paper in settings.papers:
         for title, table in (
             ("mean over angles, RMS in deg [95 % over riders]", tables.error_table(rows, paper)),
             ("each angle, RMS in deg (unseen riders / other scenarios / aggressive riders)",
              tables.angle_table(rows, paper)),
+            ("RMS error in multiples of the posterior bound, mean over angles", tables.bound_table(rows, paper)),
             ("NEES of an angle, share of errors in the stated 90 %", tables.consistency_table(rows, paper)),
         ):  # fmt: skip
             out.table(table, f"{paper}: {title}")
             sections[f"{paper}: {title}"] = markdown_table(table)
-    return sections
+    means = [mean for paper in settings.papers for mean in tables.ride_means(rows, paper)]
+    groups = {trajectory: trajectory.split(":")[0] for _, trajectory, *_ in means}
+    page = Results(ErrorTable(means, columns=list(COLUMNS)), groups, [])
+    return RiderPart([{"suite": SUITE, **row} for row in tables.results(rows)], sections, {SUITE: page})
 
 
 def rider_sweeps(settings: RiderSuite, args: Any, folder: Run, out: Output) -> dict[str, str]:

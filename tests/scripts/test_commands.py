@@ -91,7 +91,7 @@ def test_evaluate_prints_tables_and_leaves_a_run(episodes, tmp_path, capsys):
 
 def test_benchmark_compares_and_reports(episodes, tmp_path, capsys):
     estimators = ["--estimators", "external-acceleration", "mekf-9", "tilt"]
-    words = ["benchmark", "--episodes", "1", "--trials", "1", "--no-rides", "--runs", str(tmp_path), *estimators]
+    words = ["benchmark", "--quick", "--suite", "hand", "--runs", str(tmp_path), *estimators]
     assert main([*words, "--recordings", str(episodes / "hand_motion_0000.h5"), "--json"]) == 0
     captured = capsys.readouterr()
     (folder,) = (tmp_path / "benchmark").iterdir()
@@ -126,3 +126,17 @@ def test_benchmark_compares_and_reports(episodes, tmp_path, capsys):
     better.to_csv(tmp_path / "better.csv", index=False)
     assert main([*again, "--baseline", str(tmp_path / "better.csv")]) == 1
     assert "grew by more than 2 %" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--suite", "rider", "--estimators", "mekf"], "--estimators mekf has nothing for --suite rider"),
+        (["--suite", "rider", "--recordings", "some.csv"], "--recordings has nothing for --suite rider"),
+        (["--sweep"], "--sweep belongs to --suite rider, not all"),
+    ],
+)
+def test_a_benchmark_of_nothing_is_refused(words, said, tmp_path, capsys):
+    assert main(["benchmark", *words, "--runs", str(tmp_path)]) == 2
+    assert said in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())

@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ....envs.data.trajectory import Trajectory
+from ....envs.recipes.rides import ride as simulated
 from ....filters.core import rotation
 from ....filters.registry import FILTERS, make
 from ....filters.support.parallel import in_parallel
+from ....filters.support.resume import is_kept, keep, kept
 from ...learned.presets import PRESETS, seeds_of
 from ...learned.rides import UNSEEN, unseen_rides
 from ...registry import TRAINED, make_estimator
+from .bounds import angle_bounds
 from .errors import Errors, angle_names, angles_of, errors_of, score, truth_of
 from .learnt import Learnt, learn
 from .references import moving_averages
@@ -48,14 +52,14 @@ class RiderSuite:
     draws: int = 2
     """of devices and measured geometry on each"""
     training: int = 24
-    """rides from which references learn"""
+    """rides from which references learn; 0 leaves those out"""
     seed: int = 0
     """root seed: that with which the networks were trained, so that test riders are others"""
 
     def __post_init__(self) -> None:
-        for name in ("rides", "draws", "training"):
-            if getattr(self, name) < 1:
-                raise ValueError(f"{name} must be at least 1, got {getattr(self, name)}")
+        for name, least in (("rides", 1), ("draws", 1), ("training", 0)):
+            if getattr(self, name) < least:
+                raise ValueError(f"{name} must be at least {least}, got {getattr(self, name)}")
         unknown = sorted(set(self.papers) - set(PAPERS))
         if unknown or not self.papers:
             raise ValueError(f"papers must be some of {list(PAPERS)}, got {list(self.papers)}")
@@ -74,6 +78,8 @@ class Row:
     """deg, root mean square error of each"""
     nees: float
     coverage: float
+    over_bound: float
+    """mean over the angles of the error in multiples of the posterior bound (:func:`.angle_bounds`)"""
 
     @property
     def mean(self) -> float:
@@ -88,28 +94,35 @@ def estimators_of(paper: str) -> list[str]:
     return [name for name in own if name in FILTERS] + [name for name in networks if name in TRAINED]
 
 
-def all_errors(paper: str, learnt: Learnt, ride: Trajectory, scored: np.ndarray) -> dict[str, Errors]:
+def all_errors(paper: str, learnt: Learnt | None, ride: Trajectory, scored: np.ndarray) -> dict[str, Errors]:
     """Label → errors of every method on a drawn ride at the samples that count ``(T,)``."""
+    published = estimated(paper, ride, scored)
+    odometry: Any = make(ROLL_ONLY, dt=ride.dt, metadata=ride.metadata)
+    roll = np.full(published.values.shape, np.nan)
+    roll[:, :1] = (odometry.run(ride.measurements).pose["bicycle/roll"] - ride.truth["bicycle/roll"])[scored]
+    found = {paper: published} if learnt is None else references(paper, learnt, ride, scored, published)
+    found[ROLL_ONLY] = Errors(wrapped(roll))
+    found |= {name: estimated(name, ride, scored) for name in estimators_of(paper) if name != paper}
+    return found | {f"{paper}, {ORACLE}": Errors(published.values - published.values.mean(axis=0))}
+
+
+def references(
+    paper: str, learnt: Learnt, ride: Trajectory, scored: np.ndarray, published: Errors
+) -> dict[str, Errors]:
+    """Label → errors of what learnt from training rides, beside those of the published filter."""
     outputs = learnt.head.outputs
     truth = angles_of(outputs, truth_of(make(paper), ride))
-    published = estimated(paper, ride, scored)
     front_end = learnt.front_end.with_dt(ride.dt).configured(ride.metadata)
     seen = front_end.run({c.name: ride.measurements[c.name] for c in front_end.channels})
     due = seen.due == 1.0
     corrected = angles_of(outputs, seen.base)[due] + learnt.ridge.predict(moving_averages(seen.features[due]))
-    odometry: Any = make(ROLL_ONLY, dt=ride.dt, metadata=ride.metadata)
-    roll = np.full((int(scored.sum()), learnt.head.size), np.nan)
-    roll[:, :1] = (odometry.run(ride.measurements).pose["bicycle/roll"] - ride.truth["bicycle/roll"])[scored]
-    found = {
+    return {
         MEAN: Errors(wrapped(learnt.mean - truth[scored])),
         paper: published,
         BIAS: Errors(wrapped(published.values - learnt.bias)),
         RIDGE: Errors(wrapped((corrected - truth[due])[scored[due]])),
         f"{paper} ({TUNED})": estimated(paper, ride, scored, **learnt.tuned),
-        ROLL_ONLY: Errors(wrapped(roll)),
     }
-    found |= {name: estimated(name, ride, scored) for name in estimators_of(paper) if name != paper}
-    return found | {f"{paper}, {ORACLE}": Errors(published.values - published.values.mean(axis=0))}
 
 
 def estimated(name: str, ride: Trajectory, scored: np.ndarray, **parameters: Any) -> Errors:
@@ -131,17 +144,21 @@ def scored_samples(ride: Trajectory, interval: float = 0.04) -> np.ndarray:
     return np.asarray(ride.mask & interval_ends(0, len(ride), ride.dt, interval))
 
 
-def ride_rows(settings: RiderSuite, learnt: dict[str, Learnt], group: str, index: int) -> list[Row]:
+def ride_rows(settings: RiderSuite, learnt: Mapping[str, Learnt], group: str, index: int) -> list[Row]:
     """Scores of all methods on all draws of one ride; for parallel processes."""
     source = replace(training_rides(settings), rides=index + 1, draws=settings.draws)
     rows: list[Row] = []
+    bounds: dict[str, np.ndarray] = {}
     for _, draw, ride in unseen_rides(source, seeds_of(settings.seed)[3], group, index):
         ride, scored = ride.on_grid(), scored_samples(ride)
         for paper in settings.papers:
-            for label, errors in all_errors(paper, learnt[paper], ride, scored).items():
+            if paper not in bounds:  # the same, nearly, for all draws of one ride
+                bounds[paper] = angle_bounds(paper, ride, scored)
+            for label, errors in all_errors(paper, learnt.get(paper), ride, scored).items():
                 found = score(errors)
                 angles = tuple(float(angle) for angle in found.angles)
-                rows.append(Row(paper, label, group, index, draw, angles, found.nees, found.coverage))
+                ratio = float(np.nanmean(found.angles / bounds[paper]))
+                rows.append(Row(paper, label, group, index, draw, angles, found.nees, found.coverage, ratio))
     return rows
 
 
@@ -152,20 +169,57 @@ def training_rides(settings: RiderSuite) -> Any:
     return source
 
 
-def learnt_by(settings: RiderSuite, *, quick: bool = False) -> dict[str, Learnt]:
-    """What the references of each paper learn."""
+def learnt_by(settings: RiderSuite, *, processes: int = 1, progress: bool = False) -> dict[str, Learnt]:
+    """What the references of each paper learn; nothing without training rides."""
+    if not settings.training:
+        return {}
     source = replace(training_rides(settings), rides=settings.training, draws=settings.draws)
-    seed, effort = seeds_of(settings.seed)[0], {"samples": 8, "refinements": 8} if quick else {}
-    starts = {paper: PRESETS[f"{paper}+network"].filter or paper for paper in settings.papers}
-    return {paper: learn(paper, starts[paper], source, seed, **effort) for paper in settings.papers}
+    seed = seeds_of(settings.seed)[0]
+    label = "ride" if progress else ""
+    for _ in in_parallel(simulate, [(source, seed, index) for index in range(source.rides)], processes, label=label):
+        pass
+    jobs = [(paper, PRESETS[f"{paper}+network"].filter or paper, source, seed) for paper in settings.papers]
+    return dict(in_parallel(learn_named, jobs, processes, label="learn" if progress else ""))
 
 
-def compare(
-    settings: RiderSuite, learnt: dict[str, Learnt], *, processes: int = 1, progress: bool = False
-) -> Iterator[list[Row]]:
-    """Rows of one ride after the other, in any order."""
-    jobs = [(settings, learnt, group, index) for group in UNSEEN for index in range(settings.rides)]
-    yield from in_parallel(ride_rows, jobs, processes, label="compare" if progress else "", unit="ride")
+def simulate(source: Any, seed: int, index: int) -> int:
+    """Ride once, into the cache; for parallel processes."""
+    simulated(source, seed, index)
+    return index
+
+
+def learn_named(paper: str, start: str, source: Any, seed: int) -> tuple[str, Learnt]:
+    """The paper, and what its references learn; for parallel processes."""
+    return paper, learn(paper, start, source, seed)
+
+
+def compare(settings: RiderSuite, folder: Path, *, processes: int = 1, progress: bool = False) -> list[Row]:
+    """All rows, of groups and rides in their order. Rides whose rows are in the folder already are not ridden again.
+
+    Args:
+        settings: of the comparison.
+        folder: of one file a ride, which appears whole or not at all.
+        processes: how many run at a time; the rows do not depend on it, nor on an interruption.
+        progress: show bars.
+    """
+    rides = [(group, index) for group in UNSEEN for index in range(settings.rides)]
+    files = {each: folder / f"riders_{each[0].replace(' ', '_')}_{each[1]}.json" for each in rides}
+    # how many rides there are changes none of them
+    keys = {each: {**asdict(settings), "rides": 0, "group": each[0], "index": each[1]} for each in rides}
+    missing = [each for each in rides if not is_kept(files[each], keys[each])]
+    if missing:
+        learnt = learnt_by(settings, processes=processes, progress=progress)
+        jobs = [(settings, learnt, *each, files[each], keys[each]) for each in missing]
+        for _ in in_parallel(keep_ride, jobs, processes, label="compare" if progress else "", unit="ride"):
+            pass
+    return [Row(**{**row, "angles": tuple(row["angles"])}) for each in rides for row in kept(files[each])]
+
+
+def keep_ride(
+    settings: RiderSuite, learnt: Mapping[str, Learnt], group: str, index: int, path: Path, key: Mapping[str, Any]
+) -> Path:
+    """Write the rows of one ride; for parallel processes."""
+    return keep(path, key, [asdict(row) for row in ride_rows(settings, learnt, group, index)])
 
 
 def names_of(paper: str) -> list[str]:

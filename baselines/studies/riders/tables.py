@@ -22,14 +22,37 @@ def by_method(rows: Iterable[Row], paper: str) -> dict[str, dict[str, list[Row]]
 
 
 def results(rows: Iterable[Row]) -> list[dict[str, Any]]:
-    """One number a row, as run folders keep them."""
+    """One number a row, as run folders keep them: each angle, and the mean over angles with its measures."""
     found = []
     for row in rows:
         named = {"estimator": row.method, "trajectory": f"{row.group}:{row.ride}-{row.draw}"}
         for name, angle in zip(names_of(row.paper), row.angles, strict=True):
             found.append({**named, "quantity": f"{row.paper}/{name}", "metric": "angle", "value": angle, "unit": "deg"})
-        for metric, value in (("nees", row.nees), ("coverage of 90 %", row.coverage)):
-            found.append({**named, "quantity": row.paper, "metric": metric, "value": value, "unit": "1"})
+        for metric, value, unit in measures(row):
+            found.append({**named, "quantity": row.paper, "metric": metric, "value": value, "unit": unit})
+    return found
+
+
+def measures(row: Row) -> list[tuple[str, float, str]]:
+    """Metric, value and unit of what is told of all angles together."""
+    return [
+        ("angle", row.mean, "deg"),
+        ("angle over bound", row.over_bound, "1"),
+        ("nees", row.nees, "1"),
+        ("coverage of 90 %", row.coverage, "1"),
+    ]
+
+
+def ride_means(rows: Iterable[Row], paper: str) -> list[tuple[str, str, str, str, float, str]]:
+    """Means over the draws of each ride, as rows of :func:`poise.evaluate`, of what estimates all angles of a paper."""
+    found = []
+    for method, groups in by_method(rows, paper).items():
+        for group, own in groups.items() if method != ROLL_ONLY else ():
+            for ride in sorted({row.ride for row in own}):
+                draws = [measures(row) for row in own if row.ride == ride]
+                for metric, _, unit in draws[0]:
+                    value = float(np.mean([value for draw in draws for name, value, _ in draw if name == metric]))
+                    found.append((method, f"{group}:{ride}", paper, metric, value, unit))
     return found
 
 
@@ -78,3 +101,11 @@ def consistency_table(rows: Sequence[Row], paper: str) -> list[dict[str, str]]:
             cells[group] = f"{nees:.2f}, {100.0 * covered:.0f} %"
         table.append(cells)
     return table
+
+
+def bound_table(rows: Sequence[Row], paper: str) -> list[dict[str, Any]]:
+    """Method × group: errors in multiples of the posterior bound, mean over angles, draws and riders."""
+    return [
+        {"method": method} | {group: float(np.mean([row.over_bound for row in own])) for group, own in groups.items()}
+        for method, groups in by_method(rows, paper).items()
+    ]

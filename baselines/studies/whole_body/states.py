@@ -51,7 +51,7 @@ def true_states(
         measurements: channel → samples of the filter's channels; the last valid sample stands for a missing one.
         truth: true angles under the environment's names.
     """
-    held = {name: _held(values) for name, values in measurements.items()}
+    held = {name: held_samples(values) for name, values in measurements.items()}
     angles = true_angles_state(truth)
     x = np.zeros((len(angles), model.state_size))
     x[:, :ERROR_SIZE] = angles
@@ -62,7 +62,7 @@ def true_states(
     return x
 
 
-def _held(values: np.ndarray) -> np.ndarray:
+def held_samples(values: np.ndarray) -> np.ndarray:
     """Samples ``(T, size)`` with the last valid row, at the start the first one, where one is missing."""
     valid = np.isfinite(values).all(axis=-1)
     index = np.maximum.accumulate(np.where(valid, np.arange(len(values)), 0))

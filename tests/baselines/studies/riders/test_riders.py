@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -114,14 +115,19 @@ def test_settings_that_cannot_be_are_refused() -> None:
 
 
 @pytest.mark.slow
-def test_the_comparison_of_one_paper(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_comparison_of_one_paper(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     source = RideSource(2, 1, 12.0, {**QUICK, "styles": ["mild"]})
     monkeypatch.setitem(PRESETS, "two-gyro+network", replace(PRESETS["two-gyro+network"], rides=source))
     monkeypatch.setattr("poise.baselines.learned.rides.UNSEEN", {group: {} for group in UNSEEN})
     settings = suite.RiderSuite(("two-gyro",), rides=2, draws=1, training=2)
     monkeypatch.setattr(suite, "ROLL_ONLY", "two-gyro-integration")
-    learnt = suite.learnt_by(settings, quick=True)
-    rows = [row for one in suite.compare(settings, learnt) for row in one]
+    rows = suite.compare(settings, tmp_path)
+    files = sorted(tmp_path.iterdir())
+    assert len(files) == 2 * len(UNSEEN)
+    files[1].unlink()
+    before = files[0].stat().st_mtime_ns
+    assert str(suite.compare(settings, tmp_path)) == str(rows), "an interrupted comparison ends with the same rows"
+    assert files[0].stat().st_mtime_ns == before
     found = {cells["method"]: cells for cells in tables.error_table(rows, "two-gyro")}
     assert {"two-gyro", "two-gyro+network", suite.MEAN, suite.RIDGE, suite.BIAS} <= set(found)
     assert all(float(cells["unseen riders"].split()[0]) > 0.0 for cells in found.values())
@@ -130,4 +136,11 @@ def test_the_comparison_of_one_paper(monkeypatch: pytest.MonkeyPatch) -> None:
     assert oracle <= published
     consistent = {cells["method"] for cells in tables.consistency_table(rows, "two-gyro")}
     assert {"two-gyro", "two-gyro+network"} <= consistent
-    assert len(tables.results(rows)) == len(rows) * 6
+    assert len(tables.results(rows)) == len(rows) * 8
+    ratios = {cells["method"]: cells["unseen riders"] for cells in tables.bound_table(rows, "two-gyro")}
+    assert ratios["two-gyro"] > 1.0
+    means = tables.ride_means(rows, "two-gyro")
+    assert {row[3] for row in means} == {"angle", "angle over bound", "nees", "coverage of 90 %"}
+    quick = suite.compare(replace(settings, training=0), tmp_path)
+    assert {row.method for row in quick} < {row.method for row in rows}
+    assert suite.MEAN not in {row.method for row in quick}
