@@ -33,7 +33,7 @@ $(STAMP): pyproject.toml constraints.txt
 	@touch $@
 
 benchmark: $(STAMP) ## compare all estimators on all environments, quick form; options in ARGS="…"
-	$(BIN)/poise benchmark $(ARGS)
+	$(BIN)/poise benchmark --quick $(ARGS)
 
 speed: $(STAMP) ## steps a second of environments and estimators; options in ARGS="…"
 	$(BIN)/poise speed $(ARGS)

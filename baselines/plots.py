@@ -17,13 +17,18 @@ if TYPE_CHECKING:
     import pandas
     from matplotlib.figure import Figure
 
+BLUE, VERMILION, GREEN, PINK, AMBER, SKY, GREY = PALETTE = (
+    *("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"),
+    "#4d4d4d",
+)
+"""Colours of estimates, told apart by colour-blind people too: M. Okabe, K. Ito, "Color Universal Design", 2008."""
 COLOURS = {
-    "filter": "#1f5fa8",
-    "baseline": "#6d737c",
-    "learned": "#c2571a",
-    "adaptive": "#2c8c5a",
-    "offline": "#9467bd",
-    "external": "#b08d1a",
+    "filter": BLUE,
+    "baseline": GREY,
+    "learned": VERMILION,
+    "adaptive": GREEN,
+    "offline": PINK,
+    "external": AMBER,
 }
 """Kind of estimator → colour."""
 

@@ -10,13 +10,14 @@ PAGE = """<!DOCTYPE html>
 body { font: 15px/1.45 system-ui, sans-serif; margin: 0 auto; max-width: 1180px; padding: 1rem 1.5rem; color: #1c1c1c; }
 h1 { font-size: 1.6rem; margin-bottom: .2rem; }
 h2 { font-size: 1.15rem; margin-top: 2.4rem; border-top: 1px solid #ddd; padding-top: 1rem; }
-nav { columns: 3; margin: 1rem 0; }
+nav { columns: 16rem 3; margin: 1rem 0; }
 nav a { display: block; color: #1f5f99; text-decoration: none; }
 .tools { position: sticky; top: 0; background: #fffffff2; padding: .5rem 0; z-index: 5; border-bottom: 1px solid #ddd; }
 .tools label { margin-right: .8rem; white-space: nowrap; }
 .dot { display: inline-block; width: .7em; height: .7em; border-radius: 50%; margin-right: .35em; }
 .scroll { overflow-x: auto; }
 table { border-collapse: collapse; font-variant-numeric: tabular-nums; font-size: .87rem; }
+th:focus-visible, summary:focus-visible, a:focus-visible { outline: 2px solid #0072b2; outline-offset: -2px; }
 th { cursor: pointer; text-align: right; padding: .3rem .55rem; border-bottom: 2px solid #999; white-space: nowrap; }
 th[data-order]::after { content: " ▲"; } th[data-order="down"]::after { content: " ▼"; }
 td { text-align: right; padding: .2rem .55rem; border-bottom: 1px solid #eee; white-space: nowrap; }
@@ -29,7 +30,7 @@ summary { cursor: pointer; margin: .6rem 0; color: #1f5f99; }
 </head>
 <body>
 <h1>%%title%%</h1>
-<nav></nav>
+<nav aria-label="Sections"></nav>
 <div class="tools"><label>Filter <input id="filter" type="search" placeholder="name of an estimator"></label>
 <span id="kinds"></span></div>
 <main></main>
@@ -51,9 +52,11 @@ const shown = value => value === null || value === undefined ? "–" : typeof va
 const hidden = new Set();
 const rows = [];
 
-function drawTable(parent, table) {
+function drawTable(parent, table, title) {
   const scroll = make("div", parent, null, {className: "scroll"});
   const element = make("table", scroll);
+  scroll.tabIndex = 0;
+  element.setAttribute("aria-label", title);
   const head = make("tr", make("thead", element));
   const body = make("tbody", element);
   const kind = table.columns.indexOf("kind"), name = table.columns.indexOf("estimator");
@@ -72,11 +75,18 @@ function drawTable(parent, table) {
     rows.push({element: row, name: name >= 0 ? String(cells[name]) : null, kind: kind >= 0 ? cells[kind] : null});
   }
   table.columns.forEach((column, index) => {
-    const th = make("th", head, column, {className: numeric[index] ? "" : "text", title: data.foot[column] || ""});
+    const th = make("th", head, column, {className: numeric[index] ? "" : "text", title: data.foot[column] || "",
+      scope: "col", tabIndex: 0});
+    th.onkeydown = event => {
+      if (event.key !== "Enter" && event.key !== " ") return;
+      event.preventDefault();
+      th.onclick();
+    };
     th.onclick = () => {
       const down = th.dataset.order === "up";
-      head.querySelectorAll("th").forEach(other => delete other.dataset.order);
+      head.querySelectorAll("th").forEach(other => { delete other.dataset.order; other.removeAttribute("aria-sort"); });
       th.dataset.order = down ? "down" : "up";
+      th.setAttribute("aria-sort", down ? "descending" : "ascending");
       const missing = down ? -Infinity : Infinity;
       const key = row => row.cells_[index] === null ? missing : row.cells_[index];
       const sorted = [...body.rows].sort((a, b) =>
@@ -101,7 +111,7 @@ const pending = [];
 data.sections.forEach((section, number) => {
   make("h2", main, section.title, {id: "section-" + number});
   make("a", nav, section.title, {href: "#section-" + number});
-  section.tables.forEach(table => drawTable(main, table));
+  section.tables.forEach(table => drawTable(main, table, section.title));
   section.plots.forEach((plot, index) => {
     const details = make("details", main, null, {open: index === 0});
     make("summary", details, plot.layout.title);

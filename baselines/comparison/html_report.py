@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from .tasks import Results
 
-OTHER = "#444444"
+OTHER = "#8c8c8c"
 """Colour of what has no kind."""
 FOOT = {
     "mean": "RMS error over the evaluation mask, mean over trajectories",
@@ -145,7 +145,8 @@ def interval_plot(rows: Sequence[Mapping[str, Any]], unit: str) -> dict[str, Any
         "marker": {"size": 9, "color": [colour_of(row["kind"]) for row in worst_first]},
         "hovertemplate": "%{y}: %{x:.3f}<extra></extra>",
     }
-    layout = {"title": f"mean and 95 % interval, {unit}", "xaxis": {"type": "log"}, "height": 120 + 22 * len(rows)}
+    axis = {"type": "log", "title": {"text": f"RMS error, {unit}"}}
+    layout = {"title": f"mean and 95 % interval, {unit}", "xaxis": axis, "height": 120 + 22 * len(rows)}
     return {"data": [trace], "layout": layout}
 
 
@@ -164,7 +165,8 @@ def trajectory_plot(errors: pandas.DataFrame, kinds: Mapping[str, str], unit: st
         }
         for number, name in enumerate(order)
     ]
-    layout = {"title": f"error of every trajectory, {unit}", "yaxis": {"type": "log"}, "height": 420}
+    axis = {"type": "log", "title": {"text": f"RMS error, {unit}"}}
+    layout = {"title": f"error of every trajectory, {unit}", "yaxis": axis, "height": 420}
     return {"data": traces, "layout": layout}
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...envs.data.trajectory import Trajectory
 from ...filters.core.quantity import Estimate
-from ..plots import TRUTH_COLOR, legend_above, new_figure
+from ..plots import AMBER, BLUE, GREEN, TRUTH_COLOR, VERMILION, legend_above, new_figure
 from .claims import Claim
 from .report import Report
 from .ride_study import SETTLED, SPACING, RideStudy
@@ -19,7 +19,7 @@ from .signals import DEG
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-DRAWN = ("#2c8c5a", "#c2571a", "#b08d1a", "#1f5fa8")
+DRAWN = (GREEN, VERMILION, AMBER, BLUE)
 """Colours of the methods of a figure; the last is that of the study's filter, the one before that of integration."""
 
 

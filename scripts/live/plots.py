@@ -7,15 +7,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...baselines.plots import PALETTE
 from ...filters.support.optional import extra
 from .curves import TRUTH
 
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure
 
-COLOURS = ((31, 95, 168), (217, 95, 2), (27, 158, 119), (150, 80, 170), (200, 160, 20), (190, 50, 90), (110, 110, 110))
+COLOURS = tuple((int(each[1:3], 16), int(each[3:5], 16), int(each[5:], 16)) for each in PALETTE)
 """Red, green, blue of estimates, in the order in which they are named."""
-TRUTH_COLOUR = (20, 20, 20)
+TRUTH_COLOUR = (0, 0, 0)
+"""As in figures."""
 POINTS = 600
 """Samples of a curve that are drawn."""
 MARGIN = {"l": 46, "r": 10, "t": 8, "b": 36}

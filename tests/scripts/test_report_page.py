@@ -50,7 +50,9 @@ def test_page_works_in_a_browser(tmp_path: Path) -> None:
         assert names.all_inner_texts() == ["bounded-motion", "vqf", "tilt"]
         heading = page.locator("th", has_text="mean")
         heading.click()
-        heading.click()
+        heading.press("Enter")
+        assert heading.get_attribute("aria-sort") == "descending"
+        assert page.locator(".xtitle").first.text_content() == "RMS error, deg"
         assert names.all_inner_texts() == ["tilt", "vqf", "bounded-motion"]
         page.fill("#filter", "vq tilt")
         assert names.all_inner_texts() == ["tilt", "vqf"]

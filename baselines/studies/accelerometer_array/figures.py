@@ -11,10 +11,10 @@ from ....envs.data.trajectory import Trajectory
 from ....envs.sensors.ideal import STANDARD_GRAVITY
 from ....filters.arrays.spatial.pointing import pointing_angles
 from ....filters.core import rotation
-from ...plots import TRUTH_COLOR, legend_above, new_figure
+from ...plots import AMBER, BLUE, GREEN, GREY, PINK, SKY, TRUTH_COLOR, VERMILION, legend_above, new_figure
 from ..report import Report
 
-LINES = ("#1f5fa8", "#c2571a", "#2c8c5a", "#b08d1a", "#7a4fa3", "#6d737c", "#b03060")
+LINES = (BLUE, VERMILION, GREEN, AMBER, PINK, GREY, SKY)
 NUMBERS = {"controller": ("5.6 and 5.7", "5.8"), "octa": ("5.9 and 5.10", "5.11")}
 """Device → numbers of its figures: errors over time, path"""
 
@@ -62,7 +62,7 @@ def pointing_figures(report: Report, device: str, curves: dict[str, Any]) -> Non
     time = curves["time"]
     for row, (angle, true) in enumerate((("pitch", curves["pitch"]), ("azimuth", curves["azimuth"]))):
         top, below = axes[2 * row], axes[2 * row + 1]
-        top.plot(time, true, color="black", linewidth=1.0, label="true")
+        top.plot(time, true, color=TRUTH_COLOR, linewidth=1.0, label="true")
         top.plot(time, curves["found"][row], color=LINES[0], linewidth=1.0, linestyle="--", label="proposed")
         top.set_ylabel(f"{angle}, °")
         drawn = list(zip(LINES, curves["errors"].items(), strict=False))
@@ -84,7 +84,7 @@ def pointing_figures(report: Report, device: str, curves: dict[str, Any]) -> Non
     figure, (ax,) = new_figure(5.0, 4.6)
     limit = math.degrees(math.pi / 4.0)
     ax.plot([-limit, limit, limit, -limit, -limit], [-limit, -limit, limit, limit, -limit], "k:", linewidth=0.8)
-    ax.plot(curves["azimuth"], curves["pitch"], color="black", linewidth=0.9, label="true")
+    ax.plot(curves["azimuth"], curves["pitch"], color=TRUTH_COLOR, linewidth=0.9, label="true")
     ax.plot(curves["found"][1], curves["found"][0], color=LINES[0], linewidth=0.9, linestyle="--", label="proposed")
     ax.set_xlabel("azimuth, °")
     ax.set_ylabel("pitch, °")

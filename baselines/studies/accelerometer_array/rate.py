@@ -18,7 +18,7 @@ from ....filters.arrays.rate import ANGULAR_RATE, ArrayRate
 from ....filters.core import metrics
 from ....filters.core.estimator import run
 from ....filters.core.observer import Observer
-from ...plots import new_figure
+from ...plots import BLUE, TRUTH_COLOR, new_figure
 from ..claims import Claim
 from ..kit import Study
 from ..report import OVER_MOTIONS, Report
@@ -249,7 +249,7 @@ def draw(report: Report, curves: dict[str, Any]) -> None:
     """Angular rates and weights over ten seconds."""
     figure, (top, below) = new_figure(7.5, 4.6, 2)
     time = curves["time"]
-    top.plot(time, curves["true"], color="black", linewidth=2.2, alpha=0.6, label="true")
+    top.plot(time, curves["true"], color=TRUTH_COLOR, linewidth=2.2, alpha=0.6, label="true")
     for name, values in curves.items():
         if name not in ("time", "true", "weight"):
             top.plot(time, values, linewidth=0.8, label=name)
@@ -257,7 +257,7 @@ def draw(report: Report, curves: dict[str, Any]) -> None:
     top.set_ylim(-limit, limit)
     top.set_ylabel("ω_x, rad/s")
     figure.legend(*top.get_legend_handles_labels(), fontsize=7.5, ncols=3, loc="outside lower center")
-    below.plot(time, curves["weight"], color="#1f5fa8", linewidth=0.8)
+    below.plot(time, curves["weight"], color=BLUE, linewidth=0.8)
     below.set_ylabel("weight w_x")
     below.set_ylim(0.0, 1.05)
     below.set_xlabel("time, s")

@@ -11,14 +11,14 @@ from ....filters.core import rotation
 from ....filters.core.estimator import run
 from ....filters.core.metrics import DEGREES
 from ....filters.imu.external_acceleration import ExternalAcceleration
-from ...plots import TRUTH_COLOR, legend_above, new_figure
+from ...plots import AMBER, BLUE, TRUTH_COLOR, legend_above, new_figure
 from ...registry import make_estimator
 from .simulation import MODES, RATE, Trial, estimate, reference, simulate
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-OURS, TRUE, BAND = "#1f5fa8", TRUTH_COLOR, "#b08d1a"
+OURS, TRUE, BAND = BLUE, TRUTH_COLOR, AMBER
 GRAVITY = ExternalAcceleration().gravity
 
 

@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...plots import legend_above, new_figure
+from ...plots import AMBER, BLUE, GREEN, PINK, SKY, VERMILION, legend_above, new_figure
 from .containment import DRAWN, HIGH, LOW, Summary
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 UNITS = {"gyr": "angular rate, (rad/s)²/Hz", "acc": "acceleration, (m/s²)²/Hz", "force": "specific force, (m/s²)²/Hz"}
-COLOURS = ("#c2571a", "#2c8c5a", "#7b4fa3", "#b08d1a", "#b33951")
+COLOURS = (VERMILION, GREEN, PINK, AMBER, SKY)
 
 
 def spectra(simulated: Sequence[Summary], recorded: Mapping[str, Sequence[Summary]], title: str = "") -> Figure:
@@ -37,8 +37,8 @@ def spectra(simulated: Sequence[Summary], recorded: Mapping[str, Sequence[Summar
             low, median, high = np.nanpercentile(densities, [LOW, 50.0, HIGH], axis=0)
         there = np.isfinite(median)
         name = f"simulated, {LOW:g} to {HIGH:g} % of {len(simulated)}"
-        ax.fill_between(middle[there], low[there], high[there], color="#1f5fa8", alpha=0.18, linewidth=0, label=name)
-        ax.plot(middle[there], median[there], color="#1f5fa8", linewidth=1.4, label="median")
+        ax.fill_between(middle[there], low[there], high[there], color=BLUE, alpha=0.18, linewidth=0, label=name)
+        ax.plot(middle[there], median[there], color=BLUE, linewidth=1.4, label="median")
         for index, (group, summaries) in enumerate(recorded.items()):
             for number, each in enumerate(summaries):
                 density = np.array(each.spectra[signal], dtype=float)

@@ -11,7 +11,7 @@ import numpy as np
 from ....filters.analysis.bounds import posterior_bound
 from ....filters.analysis.observability import trajectory_observability
 from ....filters.bicycle.two_gyro.truth import true_states
-from ...plots import legend_above, new_figure
+from ...plots import BLUE, GREEN, GREY, VERMILION, legend_above, new_figure
 from ..claims import Claim
 from ..kit import Study
 from ..report import Report
@@ -136,7 +136,7 @@ def constant_rates() -> tuple[list[dict[str, Any]], list[Claim]]:
 def figure_4(curves: dict[str, np.ndarray]) -> Any:
     """Three panels as in the paper, logarithmic."""
     figure, axes = new_figure(7.5, 8.0, 3)
-    colours = ("#1f5fa8", "#c2571a", "#2c8c5a", "#6d737c")
+    colours = (BLUE, VERMILION, GREEN, GREY)
     time = DT * np.arange(len(curves["(a) Σ2"]))
     for ax, case, title in zip(
         axes[:2], ("(a)", "(b)"), ("(a) yaw rate 20 sin(0.1 π t) °/s", "(b) no yaw rate"), strict=True

@@ -11,7 +11,7 @@ import numpy as np
 from ....envs.data.trajectory import Trajectory
 from ....filters.bicycle.geometry import RiderGeometry
 from ....filters.bicycle.whole_body.linkage import true_angles
-from ...plots import new_spatial_figure
+from ...plots import BLUE, TRUTH_COLOR, new_spatial_figure
 from ..claims import Claim
 from ..report import Report
 from ..ride_study import SETTLED, RideStudy
@@ -20,7 +20,7 @@ from .skeleton import skeleton
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-TRUE, FOUND = "#1f5fa8", "#c2571a"
+TRUE, FOUND = TRUTH_COLOR, BLUE
 SNAPSHOTS, APART = 5, 0.5
 """snapshots of figure 7, and s between them, as in the paper"""
 FILM, FRAME = 4.0, 0.1
