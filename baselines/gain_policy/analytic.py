@@ -3,8 +3,9 @@
 A policy gradient estimates from noisy rollouts how an action changes the errors that follow. In simulation all of that
 is known: the derivative of every estimate with respect to every gain, computed backwards in time by the compiled
 filter (:mod:`poise.filters.compile.differentiable`). What is minimised is what PPO is rewarded for, the logarithmic
-error of an episode relative to that of the reference gains (:class:`poise.envs.gain_reward.GainReward`). The way of
-an action through the next observations is neglected; observations are recorded anew after every pass.
+error of an episode relative to that of the published gains (:class:`poise.envs.gain_reward.GainReward`): where those
+are good, a policy must not be worse. The way of an action through the next observations is neglected; observations are
+recorded anew after every pass.
 """
 
 from __future__ import annotations
@@ -230,7 +231,7 @@ def train_analytically(
     error_scale: float = 5.0,
     seed: int = 0,
     quantity: str | None = None,
-    noise: float = 0.2,
+    noise: float = 0.6,
     validation: Sequence[Trajectory] = (),
     report: Callable[[int, float, float], None] | None = None,
     save: Callable[[dict[str, Any]], None] | None = None,
@@ -241,7 +242,7 @@ def train_analytically(
     Args:
         tuned: the filter with its actions and features.
         trajectories: simulated, with truth.
-        start: constant action ``(k,)``: first action, and the reference of the cost.
+        start: constant action ``(k,)`` that the network begins with.
         epochs: passes over the trajectories.
         learning_rate: of Adam; falls to zero along a cosine.
         net_arch: units of the hidden layers.
@@ -258,7 +259,7 @@ def train_analytically(
     """
     reward = GainReward("relative", error_scale=np.radians(error_scale))
     costs = Costs(tuned, reward, quantity)
-    sets, unseen = (costs.episodes(some, np.asarray(start, float)) for some in (trajectories, validation))
+    sets, unseen = (costs.episodes(some, np.zeros(tuned.actions)) for some in (trajectories, validation))
     generator = np.random.default_rng(seed)
     best, least, told = None, np.inf, []
     if state is None:
