@@ -58,14 +58,7 @@ from ..core.quantity import (
 from ..core.rotation import level, normalize, up_in_body
 from .magnetic_heading import MagneticHeading
 from .relative_delay import STEP, merged, relative_delay
-from .strapdown import (
-    accelerated,
-    advance,
-    clipped_inflation,
-    corrected,
-    process_noise,
-    transition,
-)
+from .strapdown import accelerated, advance, clipped_inflation, corrected, process_noise, transition
 
 
 @dataclass(frozen=True)
@@ -224,5 +217,5 @@ class BoundedMotion9(MagneticHeading, BoundedMotion):
     state_size: ClassVar[int] = 17
     residual_size: ClassVar[int] = 4
     gains: ClassVar[dict[str, Gain]] = BoundedMotion.gains | {
-        "heading": Gain("magnetometer_noise", description="variance σ_m² of the magnetic heading"),
+        "heading": Gain("magnetometer_noise", description="variance σ_m² of the magnetic heading")
     }

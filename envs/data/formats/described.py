@@ -20,9 +20,7 @@ from .table import UNITS, Table, factor, plain
 RATES = ("Update Rate", "Sample Rate", "Sampling Rate", "OutputRate", "Rate", "Frequency", "Sampling Frequency")
 RATES += ("Sample Frequency", "Sampling Interval", "Sample Interval", "Sampling Period", "Sample Period")
 """Keys of a header for the sampling rate."""
-APPS = {
-    ("gFx", "wx"): {"acc": ("gFx gFy gFz", "g"), "gyr": ("wx wy wz", "rad/s"), "mag": ("Bx By Bz", "uT")},
-}
+APPS = {("gFx", "wx"): {"acc": ("gFx gFy gFz", "g"), "gyr": ("wx wy wz", "rad/s"), "mag": ("Bx By Bz", "uT")}}
 """First names of tables without units (Physics Toolbox) → kind → its columns and their unit."""
 ROS_UNITS = {"gyr": "rad/s", "acc": "m/s^2"}
 """Of ``sensor_msgs/Imu``."""

@@ -228,10 +228,7 @@ def specific_force(candidates: list[File], gravity: list[File], origin: float | 
         pull, _ = vector(down)
         scale = STANDARD_GRAVITY if float(np.nanmedian(np.linalg.norm(pull, axis=1))) < 3.0 else 1.0
         at = joined(
-            {
-                "imu/gyr": Stream(motion.stamps.since(origin), values),
-                "imu/acc": Stream(down.stamps.since(origin), pull),
-            }
+            {"imu/gyr": Stream(motion.stamps.since(origin), values), "imu/acc": Stream(down.stamps.since(origin), pull)}
         )
         sign = -1 if ios or scale != 1.0 else 1
         return Stream(at[0], sign * scale * (at[1]["imu/gyr"] + at[1]["imu/acc"])), sign
