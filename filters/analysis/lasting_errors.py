@@ -1,7 +1,7 @@
-r"""Posterior bounds with sensor errors that last: biases, misalignment, and outputs that are off for seconds.
+r"""Posterior bounds with time-correlated errors: biases, misalignment, and outputs that are wrong for seconds.
 
-A white bound of a filter whose errors last is too small where they dominate, and beside the filter's own, inflated
-noises it is too large. Here every lasting error has further states s: a constant, a first-order Gauss–Markov process,
+The bound for white noise is too small where time-correlated errors dominate, and with the filter's own, inflated
+noises it is too large. Here every such error has further states s: a constant, a first-order Gauss–Markov process,
 or a second-order one, s = [b ḃ], with the frequency ω and the damping ζ of a movement:
 
     [δx s]ᵀ(k+1) = [F −∂f/∂b; 0 φ] [δx s]ᵀ(k) + noise,   r = H δx + (∂r/∂b) b + white noise
@@ -38,7 +38,7 @@ def added(values: np.ndarray, error: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Lasting:
-    """Errors that last.
+    """Time-correlated errors.
 
     Attributes:
         std: ``(k,)`` standard deviations, of as many independent components.
@@ -86,7 +86,7 @@ def lasting_bound(
         model: the equations, with the true white noises of the sensors.
         states: from samples to true states; the error state is a difference of their first e elements.
         measurements: channel → ``(T, size)``; NaN where there is no sample.
-        errors: what lasts.
+        errors: the time-correlated ones.
         white: ``(m, m)`` covariance of the outputs' white noise; None for that of the model.
         prior: ``(e, e)`` covariance before the first sample, which then is a measurement too; None for the model's own
             covariance after it.

@@ -19,7 +19,7 @@ GYROSCOPES = {
 }
 """Channel → device whose white noise and bias it has"""
 CALM = 1e-4
-"""rad/s², m/s²: stationary deviation of accelerations that are no states of the bound; what they add to the outputs is
+"""rad/s², m/s²: stationary deviation of accelerations outside the states of the bound; what they add to the outputs is
 among the errors of the outputs"""
 
 

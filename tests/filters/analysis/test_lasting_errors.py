@@ -1,4 +1,4 @@
-"""Bounds with errors that last: equal to plain ones without such errors, and to closed forms where there are any."""
+"""Bounds with time-correlated errors: equal to plain ones without such errors, and to closed forms where any exist."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def test_errors_of_no_size_change_nothing_and_a_gyroscope_bias_is_the_models_own
     none = [Lasting((0.0,) * 3, channel="trunk_imu/gyr"), Lasting((0.0,), frequency=2.0, rows=np.eye(3)[:, :1])]
     np.testing.assert_allclose(lasting_bound(model, lambda _: x, ride.measurements, none), plain, atol=1e-12)
 
-    # a constant bias of the body's gyroscope, as an error that lasts instead of a state (axes: x, −y, −z)
+    # a constant bias of the body's gyroscope, as a time-correlated error instead of a state (axes: x, −y, −z)
     size = 0.3 * DEG
     known = filter_of(Errors(bias=1e-9, bias_drift=1e-12), 0.02)
     state = filter_of(Errors(bias=size, bias_drift=1e-12, bias_time=1e9), 0.02)
