@@ -21,6 +21,8 @@ extensions = [
 exclude_patterns = ["gallery/GALLERY_HEADER.rst"]
 html_theme = "furo"
 html_title = "poise: pose from inertial sensors"
+html_static_path = ["_static"]
+html_css_files = ["wide.css"]
 
 myst_enable_extensions = ["dollarmath", "colon_fence"]
 myst_heading_anchors = 3

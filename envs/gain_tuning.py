@@ -34,16 +34,16 @@ class HandMotionGainEnv(GainTuningEnv):
     ## Action space
 
     ``Box(-1, 1, (k,), float32)``, one number for each gain; 0 is the published tuning exactly, and between 0 and ±1
-    the logarithm of the constant is changed linearly, variances by up to 10^±1.5.
+    the logarithm of the constant is changed linearly, variances by a factor of 10^1.5 at most.
 
     | filter | gains (constant that is scaled) |
     |---|---|
     | ``external-acceleration`` | ``measurement`` (σ_A); where named, ``process`` (σ_G), ``c_a`` (10⁻³ to 0.5) |
     | ``bounded-motion`` | ``process`` (σ_g), ``bias`` (σ_b), ``velocity`` (σ_V) |
 
-    c_a is never so large that a gyroscope error of 1 °/s could lock the filter out (:mod:`.gains`). It is acted on only
-    where ``gains`` names it, since almost every change of it does harm, and so is σ_G, since the ratio to σ_A is what
-    counts. The gains follow the actions with the time constant
+    c_a is never so large that a gyroscope error of 1 °/s could lock the filter out
+    (:mod:`poise.filters.adaptation.gains`). It is acted on only where ``gains`` names it, since almost every change of
+    it does harm; so is σ_G, since its ratio to σ_A is what counts. The gains follow the actions with the time constant
     ``smoothing``, so that noise of unit variance in single decisions changes them by a few tenths of a decade only.
 
     ## Observation space
