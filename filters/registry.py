@@ -144,6 +144,11 @@ FILTERS: dict[str, Entry] = {
         "for bodies that accelerate but stay in one place: velocity near zero as pseudo-measurement",
         HERE,
     ),
+    "bounded-motion-rest": Entry(
+        ".imu.rest:RestingBoundedMotion",
+        "bounded-motion, the bias of the gyroscope measured whenever the device lies still",
+        HERE,
+    ),
     "bounded-motion-9": Entry(".imu.bounded_motion:BoundedMotion9", WITH_HEADING, HERE),
     "array-orientation": Entry(
         SPATIAL, 'orientation from an accelerometer array; array="controller", "octa" or your own', HE

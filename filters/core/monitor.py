@@ -13,9 +13,10 @@ good. The heading is watched until it has been confirmed once; after that the fi
 estimator decides. The inclination of a method without covariance is watched until then, too: what it makes of its drift
 later is its own.
 
-Two rules need no patience. An average of a few samples that the next one contradicts, or one of less than a second that
-a sample contradicts which points the other way, starts anew with that sample, and so does the estimator, until a start
-has been confirmed. And a force that no motion explains (:func:`without_impacts`) counts as missing for a moment.
+Two rules need no patience. An average of a few samples that the next one contradicts starts anew with that sample, and
+so does the estimator, until a start has been confirmed. After these few a sample that points elsewhere decides
+nothing: a hand that is flung up and checked feels forces from any direction. And a force that no motion explains
+(:func:`without_impacts`) counts as missing for a moment.
 """
 
 from __future__ import annotations
@@ -49,9 +50,9 @@ GYROSCOPE_GAP = 0.1
 """s without a gyroscope after which averaging begins anew."""
 SHORTEST_FORCE, SHORTEST_FIELD = 0.2, 0.9
 """Least length of an average, in root mean squares of its samples."""
-LARGEST_CHANGE, LARGEST_CHANGE_EARLY = math.radians(30.0), math.radians(120.0)
-"""Angle between an average and the next sample beyond which they contradict each other: while one sample or less than
-:data:`FEW` have been averaged, and until :data:`SETTLED`."""
+LARGEST_CHANGE = math.radians(30.0)
+"""Angle between an average and the next sample beyond which they contradict each other, while one sample or less than
+:data:`FEW` have been averaged."""
 FEW = 0.05
 """s"""
 IMPACT, IMPACT_SHARE = 300.0, 10.0
@@ -96,11 +97,12 @@ def watch(memory: Array, inputs: Array) -> Array:
         mean, square = rotate_back(turn, part[..., :3]), part[..., 3:4]
         time = xp.where(broken, zero, part[..., 4:5])
         few = xp.logical_or(xp.less(time, 1.5 * dt), xp.less(time, FEW))
-        least = xp.where(few, zero + math.cos(LARGEST_CHANGE), zero + math.cos(LARGEST_CHANGE_EARLY))
         lengths = xp.sqrt(xp.sum(mean * mean, axis=-1) * xp.sum(sample * sample, axis=-1) + 1e-30)[..., None]
-        contrary = xp.logical_and(there, xp.less(xp.sum(mean * sample, axis=-1)[..., None], least * lengths))
-        early = xp.logical_and(xp.greater(time, 0.0), xp.less(time, SETTLED))
-        contrary = xp.logical_and(contrary, xp.logical_and(early, unconfirmed))
+        contrary = xp.logical_and(
+            there, xp.less(xp.sum(mean * sample, axis=-1)[..., None], math.cos(LARGEST_CHANGE) * lengths)
+        )
+        begun = xp.logical_and(xp.greater(time, 0.0), few)
+        contrary = xp.logical_and(contrary, xp.logical_and(begun, unconfirmed))
         time = xp.where(contrary, zero, time)
         longer = time + dt
         share = xp.where(there, dt / xp.where(xp.greater(longer, AVERAGED), zero + AVERAGED, longer), zero)
