@@ -134,7 +134,7 @@ const kinds = document.getElementById("kinds");
   const box = make("input", label, null, {type: "checkbox", checked: true});
   const dot = make("span", label, null, {className: "dot"});
   dot.style.background = data.colours[kind] || data.colours["–"];
-  label.append(kind);
+  label.append(kind === "–" ? "other" : kind);
   box.onchange = () => { box.checked ? hidden.delete(kind) : hidden.add(kind); filterRows(); };
 });
 document.getElementById("filter").oninput = filterRows;

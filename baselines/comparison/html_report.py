@@ -117,14 +117,23 @@ def shown_row(row: Mapping[str, Any], more: Mapping[str, Any]) -> dict[str, Any]
 
 
 def table_of(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Rows as columns and cells."""
-    columns = list(dict.fromkeys(name for row in rows for name in row))
+    """Rows as columns and cells; columns in which nothing is known are left out."""
+    names = dict.fromkeys(name for row in rows for name in row)
+    columns = [
+        name for name in names if any(row.get(name, "–") not in ("–", None) and row[name] == row[name] for row in rows)
+    ]
     return {"columns": columns, "rows": [[row.get(name) for name in columns] for row in rows]}
 
 
 def colour_of(kind: str) -> str:
     """Colour of the marks of a kind."""
     return COLOURS.get(kind, OTHER)
+
+
+def log_axis(unit: str) -> dict[str, Any]:
+    """A logarithmic axis of errors whose ticks show the errors themselves."""
+    ticks = [digit * 10.0**power for power in range(-4, 5) for digit in (1, 2, 5)]
+    return {"type": "log", "title": {"text": f"RMS error, {unit}"}, "tickvals": ticks}
 
 
 def interval_plot(rows: Sequence[Mapping[str, Any]], unit: str) -> dict[str, Any]:
@@ -145,7 +154,7 @@ def interval_plot(rows: Sequence[Mapping[str, Any]], unit: str) -> dict[str, Any
         "marker": {"size": 9, "color": [colour_of(row["kind"]) for row in worst_first]},
         "hovertemplate": "%{y}: %{x:.3f}<extra></extra>",
     }
-    axis = {"type": "log", "title": {"text": f"RMS error, {unit}"}}
+    axis = log_axis(unit)
     layout = {"title": f"mean and 95 % interval, {unit}", "xaxis": axis, "height": 120 + 22 * len(rows)}
     return {"data": [trace], "layout": layout}
 
@@ -165,7 +174,7 @@ def trajectory_plot(errors: pandas.DataFrame, kinds: Mapping[str, str], unit: st
         }
         for number, name in enumerate(order)
     ]
-    axis = {"type": "log", "title": {"text": f"RMS error, {unit}"}}
+    axis = log_axis(unit)
     layout = {"title": f"error of every trajectory, {unit}", "yaxis": axis, "height": 420}
     return {"data": traces, "layout": layout}
 

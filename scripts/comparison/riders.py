@@ -47,6 +47,7 @@ def rider_tables(settings: RiderSuite, args: Any, folder: Run, out: Output) -> R
     from ...baselines.scoring import COLUMNS
     from ...baselines.studies.riders import suite, tables
     from ...filters.support.rows import markdown_table
+    from ..report import MOST_COLUMNS
 
     learning = f"; references learn from {settings.training} others" if settings.training else ""
     out.say(f"riders: {settings.rides} rides of each group{learning}; rides are simulated once and kept")
@@ -60,7 +61,11 @@ def rider_tables(settings: RiderSuite, args: Any, folder: Run, out: Output) -> R
             ("RMS error in multiples of the posterior bound, mean over angles", tables.bound_table(rows, paper)),
             ("NEES of an angle, share of errors in the stated 90 %", tables.consistency_table(rows, paper)),
         ):  # fmt: skip
-            out.table(table, f"{paper}: {title}")
+            # twenty angles fit into the report, not into a terminal
+            if len(table[0]) <= MOST_COLUMNS:
+                out.table(table, f"{paper}: {title}")
+            else:
+                out.rows(table, f"{paper}: {title}")
             sections[f"{paper}: {title}"] = markdown_table(table)
     means = [mean for paper in settings.papers for mean in tables.ride_means(rows, paper)]
     groups = {trajectory: trajectory.split(":")[0] for _, trajectory, *_ in means}

@@ -62,11 +62,16 @@ def riders(rows: Sequence[Row]) -> np.ndarray:
     return np.array([[np.mean([row.mean for row in rows if row.ride == ride]) for ride in rides]])
 
 
+def told(method: str) -> str:
+    """Name of a method in tables of means."""
+    return f"{method} (roll alone)" if method == ROLL_ONLY else method
+
+
 def error_table(rows: Sequence[Row], paper: str) -> list[dict[str, str]]:
     """Method × group: mean of the RMS errors over angles, draws and riders, deg, with 95 % interval over riders."""
     table = []
     for method, groups in by_method(rows, paper).items():
-        cells = {"method": f"{method} (roll alone)" if method == ROLL_ONLY else method}
+        cells = {"method": told(method)}
         for group, own in groups.items():
             found = bootstrap_interval(lambda scores: float(scores.mean()), riders(own), tasks_too=True)
             cells[group] = f"{found.value:.2f} [{found.low:.2f}, {found.high:.2f}]"
@@ -105,7 +110,8 @@ def consistency_table(rows: Sequence[Row], paper: str) -> list[dict[str, str]]:
 
 def bound_table(rows: Sequence[Row], paper: str) -> list[dict[str, Any]]:
     """Method × group: errors in multiples of the posterior bound, mean over angles, draws and riders."""
-    return [
-        {"method": method} | {group: float(np.mean([row.over_bound for row in own])) for group, own in groups.items()}
-        for method, groups in by_method(rows, paper).items()
-    ]
+    table = []
+    for method, groups in by_method(rows, paper).items():
+        ratios = {group: float(np.mean([row.over_bound for row in own])) for group, own in groups.items()}
+        table.append({"method": told(method), **ratios})
+    return table
