@@ -68,6 +68,7 @@ def test_it_finds_gains_that_were_wrong_and_repeats_bit_by_bit(motions):
             np.zeros(2),
             epochs=6,
             learning_rate=2e-2,
+            noise=0.2,
             report=lambda _, cost, unseen: costs.append(cost),
         )
         for _ in range(2)
