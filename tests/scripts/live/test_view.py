@@ -29,6 +29,7 @@ from poise.scripts.live.shown import (
     tuned_estimators,
     usual_estimators,
 )
+from poise.scripts.live.view import environment_blocks
 from poise.scripts.main import main
 
 viser = pytest.importorskip("viser")
@@ -140,6 +141,23 @@ def test_an_environment_of_gains_shows_its_filter_and_what_sets_it():
         assert len(truth["orientation"]) == len(samples)
     assert played.over
     assert [each.time for each in found] == list(trajectory.time)
+
+
+def test_an_environment_of_gains_is_shown_live():
+    env = gymnasium.make("poise/HandMotionGain-v0", duration=2.0)
+    try:
+        blocks = environment_blocks(env, 3)
+        samples, truth, kind = next(block for block in blocks if block[0])
+    finally:
+        env.close()
+    assert kind is not None
+    assert kind.dt == pytest.approx(0.01)
+    assert set(kind.measurements) == set(samples[0].measurement)
+    assert len(truth["orientation"]) == len(samples)
+    live = live_motion(("external-acceleration",), kind, kind.dt)
+    live.add(samples, truth)
+    assert live.motion is not None
+    assert list(live.motion.figures) == ["truth", "external-acceleration"]
 
 
 def test_old_motion_is_forgotten(motion):
