@@ -50,7 +50,8 @@ class Args:
     """who sets the gains while the filter runs: ppo, recurrent-ppo, sac, td3, or a network trained by the exact
     gradient (analytic); or the best constant gains, by an even search (constant) or by Optuna"""
     preset: Literal["quick", "shipped"] = "quick"
-    """quick: a minute or two, as a test; shipped: the training of the weights in the package"""
+    """quick: a minute or two, as a test; shipped: as long as the trainings of the weights in
+    the package, whose cards name the commit that repeats them"""
     seed: int = 0
     """root seed of motions, sensors and training"""
     steps: int | None = None
