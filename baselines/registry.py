@@ -31,8 +31,8 @@ RULED = {
 """Filter → rules that set one of its gains."""
 POLICIES = ("external-acceleration", "two-gyro-level")
 """Filters with a shipped policy."""
-LOSING = frozenset({"mekf+innovation", "mekf+acceleration"})
-"""Rules that lose to the plain filter on recordings."""
+LOSING = frozenset({"mekf+innovation", "mekf+acceleration", "external-acceleration+noise"})
+"""Rules and networks that lose to the plain filter on most sets of recordings."""
 TRAINED: dict[str, Entry] = {
     **{
         f"{name}+policy": Entry(
@@ -110,6 +110,7 @@ TRAINED: dict[str, Entry] = {
             "learned",
             {"weights": f"{name}_noise"},
             name,
+            experimental=f"{name}+noise" in LOSING,
         )
         for name in ("external-acceleration", "mekf", "two-gyro-level")
     },
