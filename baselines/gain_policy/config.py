@@ -174,7 +174,7 @@ class TrainingConfig:
 
 
 def shipped_config(filter: str) -> TrainingConfig:
-    """The configuration that the shipped weights of a filter were trained with, or that of any other filter.
+    """The configuration of a filter with ``--preset shipped``; cards say how and at which commit weights were trained.
 
     They begin from the oracle warm start. From the best constant gains, the same number of steps gains little in
     simulation and loses on recordings. With an oracle over the whole box of actions the filter diverges in single
