@@ -30,7 +30,8 @@ if TYPE_CHECKING:
     from .baselines.run import run, smooth
     from .envs.data.calibration.records import apply_calibration, load_calibration
     from .envs.data.formats.load import load_recording, load_recordings
-    from .envs.data.plausibility import Finding, check_recording
+    from .envs.data.plausibility import check_recording
+    from .envs.data.readings import Finding
     from .envs.data.trajectory import Trajectory
     from .envs.exchange.minari_data import from_minari, to_minari
     from .envs.record import record
@@ -67,7 +68,7 @@ _HOMES = {
     "Estimate": ".filters.core.quantity",
     "Estimator": ".filters.core.estimator",
     "EstimatorInfo": ".baselines.registry",
-    "Finding": ".envs.data.plausibility",
+    "Finding": ".envs.data.readings",
     "SensorKind": ".envs.sensors.kinds",
     "Trajectory": ".envs.data.trajectory",
     "apply_calibration": ".envs.data.calibration.records",

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ..envs.data.glitches import without_glitches
 from ..envs.data.trajectory import Trajectory
 from ..filters.core.estimator import Estimator
 from ..filters.core.estimator import run as run_sequence
@@ -31,7 +32,8 @@ def run(
     """Run an estimator over a recording.
 
     With a trajectory, the estimator runs on the uniform grid behind the time stamps. Gaps are missing samples, for
-    which it only predicts, and an estimator with another sampling interval is adjusted. Arrays have no time stamps, so
+    which it only predicts, and so are glitches (:mod:`poise.envs.data.glitches`); an estimator with another sampling
+    interval is adjusted. Arrays have no time stamps, so
     their interval must be given.
 
     Args:
@@ -133,8 +135,8 @@ def fitted(estimator: str | Estimator[Any], trajectory: Trajectory) -> Estimator
 
 
 def run_on(estimator: Estimator[Any], trajectory: Trajectory) -> Estimate:
-    """Run an estimator over a trajectory that is on its grid already."""
-    estimate = run_sequence(estimator, trajectory.measurements)
+    """Run an estimator over a trajectory that is on its grid already, without glitches."""
+    estimate = run_sequence(estimator, without_glitches(trajectory))
     return estimate._replace(time=trajectory.time, layout=layout_of(estimator))
 
 

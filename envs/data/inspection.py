@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from .plausibility import clipped_share, sites, vectors
+from .plausibility import sites, vectors
+from .readings import clipped_share
 from .trajectory import Trajectory
 
 REST_WINDOW = 1.0

@@ -8,13 +8,12 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
 from ...filters.core import rotation
 from .rate_consistency import RateConsistency, rate_consistency
+from .readings import Finding, check_alive, plausible_samples
 from .trajectory import Trajectory
 
 GRAVITY = 9.80665
@@ -42,34 +41,15 @@ FASTEST_TURN = 70.0
 """rad/s (4,000 °/s): the largest range of the gyroscopes in use."""
 LARGEST_BIAS = 0.12
 """rad/s (7 °/s): beyond what uncalibrated consumer gyroscopes show at rest."""
-LONGEST_ABSENCE = 0.3
-"""Share of a recording: a longer stretch without rates makes most of an estimate a guess."""
+NORMALISED = 1e-4
+"""Standard deviation of the length of a specific force, as a share, below which it is none."""
+QUIET_FORCE, LARGEST_SCALE = 0.3, 0.06
+"""m/s² of scatter up to which an accelerometer is quiet, and by which share of gravity it may be wrong then: twice what
+uncalibrated consumer accelerometers show."""
+LEANING, STILL = 0.2, 0.05
+"""rad by which a specific force must lean so that a gyroscope shows it, and which share of that is no rotation."""
 REST_WINDOW = 100
 """Samples; the quietest such window is taken for rest."""
-
-Severity = Literal["note", "warning"]
-
-
-@dataclass(frozen=True)
-class Finding:
-    """One finding about a recording.
-
-    Attributes:
-        severity: ``warning`` if estimates will be wrong, else ``note``.
-        channel: affected channel, ``time``, or quantity of the truth.
-        what: what was found, with the number.
-        cause: the likely cause.
-        remedy: what to do about it.
-    """
-
-    severity: Severity
-    channel: str
-    what: str
-    cause: str
-    remedy: str
-
-    def __str__(self) -> str:
-        return f"{self.channel}: {self.what}; likely cause: {self.cause}. {self.remedy}"
 
 
 def check_recording(trajectory: Trajectory) -> list[Finding]:
@@ -148,11 +128,12 @@ def check_clock(trajectory: Trajectory) -> Iterator[Finding]:
 
 def check_site(trajectory: Trajectory, site: str, wrong_clock: bool) -> list[Finding]:
     """All checks of one sensor."""
-    gyr, acc, mag = (vectors(trajectory, f"{site}/{kind}") for kind in ("gyr", "acc", "mag"))
+    recorded = {kind: vectors(trajectory, f"{site}/{kind}") for kind in ("gyr", "acc", "mag")}
     findings: list[Finding] = []
-    for kind, values in (("gyr", gyr), ("acc", acc), ("mag", mag)):
+    for kind, values in recorded.items():
         if values is not None:
-            findings += check_alive(f"{site}/{kind}", values)
+            findings += check_alive(f"{site}/{kind}", values, trajectory.dt if not wrong_clock else None)
+    gyr, acc, mag = (None if values is None else plausible_samples(kind, values) for kind, values in recorded.items())
     dead = {finding.channel for finding in findings if finding.severity == "warning"}
     if acc is not None and f"{site}/acc" not in dead:
         findings += check_force(f"{site}/acc", acc)
@@ -168,53 +149,20 @@ def check_site(trajectory: Trajectory, site: str, wrong_clock: bool) -> list[Fin
     return findings
 
 
-def check_alive(channel: str, values: np.ndarray) -> Iterator[Finding]:
-    """Zeros, constants, clipping, absent samples."""
-    present = np.isfinite(values).all(axis=1)
-    if not present.any():
-        yield Finding("warning", channel, "no sample at all", "a channel that was not recorded", "Leave it out.")
-        return
-    samples = values[present]
-    longest = float(np.diff(np.flatnonzero(np.concatenate([[True], present, [True]]))).max() - 1) / len(present)
-    if channel.endswith("gyr") and longest > LONGEST_ABSENCE:
-        what = f"{100 * longest:.0f} % of the samples are missing in one stretch"
-        remedy = "Cut the recording, or choose another channel: without rates nothing follows a rotation."
-        yield Finding("warning", channel, what, "a gyroscope that failed or was switched off", remedy)
-    zero = float(np.mean(~samples.any(axis=1)))
-    still = len(samples) > 20 and bool((samples == samples[0]).all())
-    what = f"{100 * zero:.0f} % of the samples are 0, 0, 0"
-    if zero > 0.5:
-        yield Finding("warning", channel, what, "a sensor that was absent or off", "Leave the channel out.")
-    elif still:
-        remedy = "Leave the channel out."
-        yield Finding("warning", channel, f"always {samples[0].tolist()}", "a sensor that is off or stuck", remedy)
-    elif zero > 0.01 and not channel.endswith("gyr"):
-        yield Finding("note", channel, what, "drop-outs written as zeros", "They are treated as missing samples.")
-    else:
-        clipped = clipped_share(samples)
-        if clipped > 1e-3:
-            what = f"{100 * clipped:.1f} % of the samples stand at the extreme value {np.abs(samples).max():.4g}"
-            yield Finding("note", channel, what, "saturation of the sensor", "Choose a larger range of the sensor.")
-
-
-def clipped_share(samples: np.ndarray) -> float:
-    """Share of samples with a component at the largest magnitude of all, in runs of three or more."""
-    largest = np.abs(samples).max()
-    at_limit = np.abs(samples) >= (1.0 - 1e-4) * largest
-    runs = at_limit[2:] & at_limit[1:-1] & at_limit[:-2] & (samples[2:] != 0.0)
-    return float(runs.any(axis=1).mean()) if len(runs) else 0.0
-
-
 def check_force(channel: str, acc: np.ndarray) -> Iterator[Finding]:
     """Unit of the accelerometer, and whether gravity is in it."""
     samples = acc[np.isfinite(acc).all(axis=1) & acc.any(axis=1)]
     length = np.linalg.norm(samples, axis=1)
     usual = float(np.median(length))
+    if len(length) > REST_WINDOW and float(length.std()) < NORMALISED * usual and not (samples == samples[0]).all():
+        what, remedy = f"every sample is {usual:.4g} long", "Export the specific force itself."
+        yield Finding("warning", channel, what, "directions of length one instead of measurements", remedy)
+    rest = quietest(samples)
     if PLAUSIBLE_FORCE[0] <= usual <= PLAUSIBLE_FORCE[1]:
+        yield from check_scale(channel, rest)
         return
     what = f"median length {usual:.4g} m/s²"
     # Where the sensor is quiet it reads gravity, in whatever unit; without gravity it reads next to nothing.
-    rest = quietest(samples)
     quiet = usual if rest is None else float(np.linalg.norm(rest.mean(axis=0)))
     unit = min(FORCE_UNITS, key=lambda name: abs(np.log(usual / FORCE_UNITS[name])))
     apart = max(abs(np.log(value / FORCE_UNITS[unit])) if value > 0.0 else np.inf for value in (usual, quiet))
@@ -227,6 +175,17 @@ def check_force(channel: str, acc: np.ndarray) -> Iterator[Finding]:
     else:
         remedy = "Calibrate the sensor, or convert to m/s²."
         yield Finding("warning", channel, what, "a scale error, or a unit other than m/s²", remedy)
+
+
+def check_scale(channel: str, rest: np.ndarray | None) -> Iterator[Finding]:
+    """Scale of an accelerometer in m/s² where it is quiet."""
+    if rest is None or float(rest.std(axis=0).max()) > QUIET_FORCE:
+        return
+    at_rest = float(np.linalg.norm(rest.mean(axis=0)))
+    if abs(at_rest / GRAVITY - 1.0) > LARGEST_SCALE:
+        what = f"{at_rest:.4g} m/s² where it is quiet"
+        remedy = "Calibrate the sensor (poise calibrate), or check its range."
+        yield Finding("warning", channel, what, "a scale error, or a bias of the accelerometer", remedy)
 
 
 def check_field(channel: str, mag: np.ndarray) -> Iterator[Finding]:
@@ -253,6 +212,12 @@ def check_rates(
         if one is not None:
             found[name] = one
     yield from check_conjugate(trajectory, gyr, found)
+    turned = 0.0 if "accelerometer" not in found else found["accelerometer"].at_rest
+    if turned > LEANING and 3.0 * fastest < STILL * turned:
+        what = f"rates of {fastest:.2g} rad/s at most, while the specific force leans by {turned:.2g} rad within 3 s"
+        remedy = "Check the unit, and which column holds the rates."
+        yield Finding("warning", channel, what, "a gyroscope that is off, or rates that were scaled down", remedy)
+        return
     decided = {name: one for name, one in found.items() if one.explains} or found
     units = {name: one.other_unit for name, one in decided.items() if one.other_unit is not None}
     if units:

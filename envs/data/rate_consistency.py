@@ -27,6 +27,7 @@ CLEARLY = 0.6
 """A hypothesis is preferred to the data as given if it leaves less than this share."""
 
 SCALES: dict[str, float] = {
+    "rad/s that were converted from deg/s once too often": 180.0 / np.pi,
     "rev/s": 2.0 * np.pi,
     "half rad/s (another full scale than assumed)": 2.0,
     "rad/s": 1.0,

@@ -161,7 +161,7 @@ class Trajectory:
         mask = np.zeros(length, bool)
         mask[clock.index] = kept.mask
         found = {"missing": clock.missing, "jitter": clock.jitter, "packets": clock.packets}
-        if clock.packets > 0.01 * len(self):
+        if clock.packets > 0.01 * len(self) or float(np.mean(np.diff(kept.time) == 0.0)) > 0.1:
             warnings.warn(
                 f"{self.name}: {clock.packets} time stamps are shared by several samples; these are spread over the "
                 f"interval before the stamp, {1.0 / clock.interval:.4g} Hz",

@@ -1,0 +1,152 @@
+"""Plausibility of the readings of one channel: dead, stuck, copied, repeated, saturated or wrapped samples."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from ...filters.core.estimator import without_impossible
+from ...filters.core.quantity import ACCELEROMETER, GYROSCOPE, MAGNETOMETER
+
+CHANNELS = {"gyr": GYROSCOPE, "acc": ACCELEROMETER, "mag": MAGNETOMETER}
+LONGEST_ABSENCE = 0.3
+"""Share of a recording: a longer stretch without rates makes most of an estimate a guess."""
+HELD = 0.5
+"""s for which no sensor in use gives one sample again and again."""
+RARELY = 0.05
+"""Share of samples that repeat the one before, up to which a sensor shows noise."""
+OVERFLOW = 0.8
+"""Share of the largest reading beyond which a jump to the other sign is the overflow of a counter."""
+CLIPPED, OFTEN_CLIPPED = 1e-3, 5e-3
+"""Share of saturated samples that is told, and of which a gyroscope's rotation is lost."""
+
+Severity = Literal["note", "warning"]
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One finding about a recording.
+
+    Attributes:
+        severity: ``warning`` if estimates will be wrong, else ``note``.
+        channel: affected channel, ``time``, or quantity of the truth.
+        what: what was found, with the number.
+        cause: the likely cause.
+        remedy: what to do about it.
+    """
+
+    severity: Severity
+    channel: str
+    what: str
+    cause: str
+    remedy: str
+
+    def __str__(self) -> str:
+        return f"{self.channel}: {self.what}; likely cause: {self.cause}. {self.remedy}"
+
+
+def plausible_samples(kind: str, values: np.ndarray) -> np.ndarray:
+    """Samples ``(T, 3)`` with NaN for what no sensor of a kind can have measured."""
+    return np.asarray(without_impossible(CHANNELS[kind], values))
+
+
+def check_alive(channel: str, values: np.ndarray, dt: float | None = None) -> Iterator[Finding]:
+    """Zeros, constants, copies, repeats, clipping, overflow, absent and impossible samples.
+
+    Args:
+        channel: ``site/gyr`` and so on.
+        values: ``(T, 3)``.
+        dt: s between samples; None where it is unknown.
+    """
+    present = np.isfinite(values).all(axis=1)
+    if not present.any():
+        yield Finding("warning", channel, "no sample at all", "a channel that was not recorded", "Leave it out.")
+        return
+    samples = values[present]
+    longest = float(np.diff(np.flatnonzero(np.concatenate([[True], present, [True]]))).max() - 1) / len(present)
+    if channel.endswith("gyr") and longest > LONGEST_ABSENCE:
+        what = f"{100 * longest:.0f} % of the samples are missing in one stretch"
+        remedy = "Cut the recording, or choose another channel: without rates nothing follows a rotation."
+        yield Finding("warning", channel, what, "a gyroscope that failed or was switched off", remedy)
+    zero = float(np.mean(~samples.any(axis=1)))
+    still = len(samples) > 20 and bool((samples == samples[0]).all())
+    what = f"{100 * zero:.0f} % of the samples are 0, 0, 0"
+    if zero > 0.5:
+        yield Finding("warning", channel, what, "a sensor that was absent or off", "Leave the channel out.")
+        return
+    if still:
+        remedy = "Leave the channel out."
+        yield Finding("warning", channel, f"always {samples[0].tolist()}", "a sensor that is off or stuck", remedy)
+        return
+    if zero > 0.01 and not channel.endswith("gyr"):
+        yield Finding("note", channel, what, "drop-outs written as zeros", "They are treated as missing samples.")
+    limit = CHANNELS[channel.rpartition("/")[2]].limit
+    impossible = (np.abs(samples) > limit).any(axis=1)
+    if impossible.any():
+        code = f"{samples[impossible][0][np.abs(samples[impossible][0]) > limit][0]:g}"
+        what = f"{100 * impossible.mean():.2g} % of the samples are beyond any sensor's range ({code} …)"
+        yield Finding("note", channel, what, "codes for no value", "They are treated as missing samples.")
+    yield from check_axes_alive(channel, samples[~impossible])
+    yield from check_repeats(channel, values, dt)
+    yield from check_range(channel, samples[~impossible])
+
+
+def check_axes_alive(channel: str, samples: np.ndarray) -> Iterator[Finding]:
+    """Axes that never change or that equal another, while the others move."""
+    if len(samples) <= 20:
+        return
+    dead = (samples == samples[0]).all(axis=0)
+    for axis in np.flatnonzero(dead):
+        what = f"axis {'xyz'[axis]} is always {samples[0, axis]:g}"
+        yield Finding("warning", channel, what, "an axis that is off or stuck", "Leave the channel out.")
+    for one, other in ((0, 1), (0, 2), (1, 2)):
+        equal = np.array_equal(np.abs(samples[:, one]), np.abs(samples[:, other]))
+        if equal and not dead[one]:
+            what = f"axes {'xyz'[one]} and {'xyz'[other]} are the same"
+            yield Finding("warning", channel, what, "a column that was named twice", "Name three different columns.")
+
+
+def check_repeats(channel: str, values: np.ndarray, dt: float | None) -> Iterator[Finding]:
+    """Long runs of one sample in a channel whose samples differ otherwise."""
+    repeats = np.append(False, (values[1:] == values[:-1]).all(axis=1) & values[1:].any(axis=1))
+    runs = np.diff(np.flatnonzero(~np.append(repeats, False)))
+    if dt is None or not len(runs) or float(runs.max()) * dt < HELD or runs.max() < 10:
+        return
+    long = runs * dt >= HELD
+    if float((runs[~long] - 1).sum()) > RARELY * len(values):
+        return
+    start = int(np.flatnonzero(~np.append(repeats, False))[int(np.argmax(runs))])
+    what = f"one sample again and again, for {runs.max() * dt:.1f} s from sample {start}"
+    cause = "a recorder that repeats the last sample where none came"
+    yield Finding("warning", channel, what, cause, "Replace the repeated samples by NaN.")
+
+
+def check_range(channel: str, samples: np.ndarray) -> Iterator[Finding]:
+    """Saturation, and counters that overflow."""
+    if len(samples) < 3:
+        return
+    clipped = clipped_share(samples)
+    if clipped > CLIPPED:
+        what = f"{100 * clipped:.1f} % of the samples stand at the extreme value {np.abs(samples).max():.4g}"
+        lost = channel.endswith("gyr") and clipped > OFTEN_CLIPPED
+        severity: Severity = "warning" if lost else "note"
+        remedy = "Choose a larger range of the sensor; metadata['full_scale'] tells estimators of it."
+        yield Finding(severity, channel, what, "saturation of the sensor", remedy)
+    limit = OVERFLOW * np.abs(samples).max(axis=0)
+    before, after = samples[:-1], samples[1:]
+    jumps = int((((before > limit) & (after < -limit)) | ((before < -limit) & (after > limit))).sum())
+    if jumps >= 3:
+        what = f"{jumps} jumps from one end of the range to the other"
+        remedy = "Choose a larger range of the sensor, or read the counts as signed numbers."
+        yield Finding("warning", channel, what, "numbers that overflow", remedy)
+
+
+def clipped_share(samples: np.ndarray) -> float:
+    """Share of samples with a component at the largest magnitude of all, in runs of three or more."""
+    largest = np.abs(samples).max()
+    at_limit = np.abs(samples) >= (1.0 - 1e-4) * largest
+    runs = at_limit[2:] & at_limit[1:-1] & at_limit[:-2] & (samples[2:] != 0.0)
+    return float(runs.any(axis=1).mean()) if len(runs) else 0.0
