@@ -8,12 +8,13 @@ from typing import Literal
 
 import numpy as np
 
-from ...filters.core.estimator import without_impossible
 from ...filters.core.quantity import ACCELEROMETER, GYROSCOPE, MAGNETOMETER
 
 CHANNELS = {"gyr": GYROSCOPE, "acc": ACCELEROMETER, "mag": MAGNETOMETER}
 LONGEST_ABSENCE = 0.3
 """Share of a recording: a longer stretch without rates makes most of an estimate a guess."""
+MOST_CODES = 3
+"""Magnitudes of codes for no value in one channel."""
 HELD = 0.5
 """s for which no sensor in use gives one sample again and again."""
 RARELY = 0.05
@@ -48,9 +49,20 @@ class Finding:
         return f"{self.channel}: {self.what}; likely cause: {self.cause}. {self.remedy}"
 
 
+def codes(kind: str, values: np.ndarray) -> np.ndarray:
+    """Samples ``(T,)`` bool of ``(T, 3)`` that stand for no value: beyond any sensor's range, of few magnitudes.
+
+    Samples beyond it of many magnitudes are of another unit.
+    """
+    beyond = np.abs(values) > CHANNELS[kind].limit
+    found = beyond.any(axis=1)
+    return found if len(np.unique(np.abs(values[beyond]))) <= MOST_CODES else np.zeros(len(values), bool)
+
+
 def plausible_samples(kind: str, values: np.ndarray) -> np.ndarray:
-    """Samples ``(T, 3)`` with NaN for what no sensor of a kind can have measured."""
-    return np.asarray(without_impossible(CHANNELS[kind], values))
+    """Samples ``(T, 3)`` with NaN for codes and, of an accelerometer or magnetometer, for zeros."""
+    found = np.where(codes(kind, values)[:, None], np.nan, values)
+    return found if kind == "gyr" else np.where(found.any(axis=1, keepdims=True), found, np.nan)
 
 
 def check_alive(channel: str, values: np.ndarray, dt: float | None = None) -> Iterator[Finding]:
@@ -83,11 +95,9 @@ def check_alive(channel: str, values: np.ndarray, dt: float | None = None) -> It
         return
     if zero > 0.01 and not channel.endswith("gyr"):
         yield Finding("note", channel, what, "drop-outs written as zeros", "They are treated as missing samples.")
-    limit = CHANNELS[channel.rpartition("/")[2]].limit
-    impossible = (np.abs(samples) > limit).any(axis=1)
+    impossible = codes(channel.rpartition("/")[2], samples)
     if impossible.any():
-        code = f"{samples[impossible][0][np.abs(samples[impossible][0]) > limit][0]:g}"
-        what = f"{100 * impossible.mean():.2g} % of the samples are beyond any sensor's range ({code} …)"
+        what = f"{100 * impossible.mean():.2g} % of the samples reach {np.abs(samples[impossible]).max():g}"
         yield Finding("note", channel, what, "codes for no value", "They are treated as missing samples.")
     yield from check_axes_alive(channel, samples[~impossible])
     yield from check_repeats(channel, values, dt)

@@ -1,0 +1,68 @@
+"""Readings of one channel that cannot be what a sensor measures: each kind is named, clean recordings are silent."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from poise.envs.data.plausibility import check_recording
+from poise.envs.data.trajectory import Trajectory
+from poise.envs.hand.sensing import simulate_hand
+
+KNOWN = simulate_hand("mixed", seed=11, duration=12.0)
+GYR, ACC = (np.asarray(KNOWN.measurements[f"imu/{kind}"]) for kind in ("gyr", "acc"))
+
+
+def with_axis(values: np.ndarray, axis: int, column: np.ndarray | float) -> np.ndarray:
+    changed = values.copy()
+    changed[:, axis] = column
+    return changed
+
+
+def held(values: np.ndarray) -> np.ndarray:
+    changed = values.copy()
+    changed[400:600] = changed[400]
+    return changed
+
+
+def wrapped(values: np.ndarray, limit: float) -> np.ndarray:
+    return (values + limit) % (2.0 * limit) - limit
+
+
+def recording(**channels: np.ndarray) -> Trajectory:
+    return KNOWN.replace(measurements=KNOWN.measurements | {f"imu/{kind}": v for kind, v in channels.items()}, truth={})
+
+
+@pytest.mark.parametrize(
+    ("made", "channel", "words"),
+    [
+        (lambda: recording(gyr=with_axis(GYR, 1, 0.0)), "imu/gyr", "axis y is always 0"),
+        (lambda: recording(acc=with_axis(ACC, 2, 9.81)), "imu/acc", "axis z is always 9.81"),
+        (lambda: recording(acc=with_axis(ACC, 1, ACC[:, 0])), "imu/acc", "axes x and y are the same"),
+        (lambda: recording(gyr=held(GYR), acc=held(ACC)), "imu/gyr", "again and again, for 2.0 s from sample 400"),
+        (lambda: recording(gyr=wrapped(GYR, 1.0)), "imu/gyr", "overflow"),
+        (lambda: recording(gyr=np.clip(GYR, -1.0, 1.0)), "imu/gyr", "saturation"),
+        (lambda: recording(acc=9.81 * ACC / np.linalg.norm(ACC, axis=1, keepdims=True)), "imu/acc", "length one"),
+        (lambda: recording(acc=0.8 * ACC), "imu/acc", "scale error"),
+        (lambda: recording(gyr=np.radians(GYR)), "imu/gyr", "once too often"),
+        (lambda: recording(gyr=1e-4 * np.random.default_rng(0).standard_normal(GYR.shape)), "imu/gyr", "leans by"),
+    ],
+)
+def test_each_kind_is_named(made: Callable[[], Trajectory], channel: str, words: str) -> None:
+    told = [str(each) for each in check_recording(made()) if each.channel == channel and each.severity == "warning"]
+    assert any(words in text for text in told), told
+
+
+def test_codes_for_no_value_do_not_hide_what_is_right() -> None:
+    coded = GYR.copy()
+    coded[::40] = -9999.0
+    findings = check_recording(recording(gyr=coded))
+    assert [each.severity for each in findings] == ["note"], findings
+    assert "9999" in findings[0].what
+
+
+@pytest.mark.parametrize("gesture", ["slow", "severe", "carried-walking"])
+def test_clean_recordings_are_silent(gesture: str) -> None:
+    assert check_recording(simulate_hand(gesture, seed=2, duration=20.0)) == []
