@@ -47,7 +47,7 @@ QUIET_FORCE, LARGEST_SCALE = 0.3, 0.06
 """m/s² of scatter up to which an accelerometer is quiet, and by which share of gravity it may be wrong then: twice what
 uncalibrated consumer accelerometers show."""
 LEANING, STILL = 0.2, 0.05
-"""rad by which a specific force must lean so that a gyroscope shows it, and which share of that is no rotation."""
+"""rad by which a specific force must lean for a gyroscope to show it; below which share of that it shows none."""
 REST_WINDOW = 100
 """Samples; the quietest such window is taken for rest."""
 
