@@ -149,9 +149,9 @@ PRESETS: dict[str, Preset] = {
         fit=FitConfig(epochs=6),
     ),
     "bounded-motion+network": Preset(
-        "bounded-motion in eight tunings, weighed by a recurrent network",
+        "bounded-motion-rest in eight tunings, weighed by a recurrent network",
         {"hand-held-prompt": 200, "carried-prompt": 70},
-        filter="bounded-motion",
+        filter="bounded-motion-rest",
         bank=True,
         units=48,
         noise=0.05,

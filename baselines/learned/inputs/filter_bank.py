@@ -2,9 +2,9 @@
 
 How far a gyroscope and how far a bound on the velocity can be trusted depends on the device and on the motion: a
 running phone has a velocity, a fast rotation shows the scale errors of the gyroscope. No constants serve all. Here the
-filter runs with its published constants and, beside it, a form of it with other gains on the same samples. The
-inclinations that these find are **candidates**: tilts of the published filter's level frame. What the network sees of
-them, and of the motion in that frame, does not change with the heading, which is arbitrary.
+filter runs with its published constants and, beside them, with other gains on the same samples. The inclinations that
+the others find are **candidates**: tilts of the published filter's level frame. What the network sees of them, and of
+the motion in that frame, does not change with the heading, which is arbitrary.
 """
 
 from __future__ import annotations
@@ -22,19 +22,13 @@ from ....filters.core.kalman import KalmanFilter
 from ....filters.core.quantity import UP, Channel, Measurement
 from ....filters.core.rotation import rotate
 from ....filters.core.sampling import FilterState, zeros
-from ....filters.registry import make, name_of
 from .front_end import Seen
 from .gravity_aligned_frame import SCALARS, VECTORS
 from .level_frame import LevelFrame, LevelState
 
-TUNINGS = (
-    *((0.1, 1.0), (0.3, 1.0), (0.3, 5.0), (1.0, 0.5)),
-    *((1.0, 1.0), (1.0, 4.0), (3.0, 1.0), (3.0, 4.0)),
-)
+TUNINGS = (*((0.1, 1.0), (0.3, 1.0), (0.3, 5.0), (1.0, 0.5)), *((1.0, 4.0), (3.0, 1.0), (3.0, 4.0)))
 """Factors on the deviations σ_g of the gyroscope and σ_V of the velocity of bounded-motion, one pair a candidate. They
 surround the published pair as far as recordings of hands, phones and a drone prefer one of them."""
-CANDIDATE = "bounded-motion-rest"
-"""The filter that runs with these: unlike the published one it measures the bias of a gyroscope that lies still."""
 VELOCITY = 1
 """Which of the vectors the directions of the others are told from: the filter's velocity in its level frame."""
 
@@ -59,7 +53,6 @@ class FilterBank:
     Attributes:
         level: with the filter.
         tunings: factors on its deviations ``process`` and ``velocity``, a pair for each of K candidates.
-        candidate: name of the filter that runs with them; it has these gains and the filter's channels.
 
     Raises:
         ValueError: no filter, one without these gains, or factors that are not positive.
@@ -67,7 +60,6 @@ class FilterBank:
 
     level: LevelFrame
     tunings: tuple[tuple[float, float], ...] = TUNINGS
-    candidate: str = CANDIDATE
 
     kind: ClassVar[str] = "filter-bank"
     gains: ClassVar[tuple[str, str]] = ("process", "velocity")
@@ -117,15 +109,13 @@ class FilterBank:
 
     def describe(self) -> dict[str, Any]:
         """See :class:`.front_end.FrontEnd`."""
-        return {**self.level.describe(), "kind": self.kind, "tunings": [list(pair) for pair in self.tunings]} | {
-            "candidate": self.candidate
-        }
+        return {**self.level.describe(), "kind": self.kind, "tunings": [list(pair) for pair in self.tunings]}
 
     @classmethod
     def read(cls, described: Mapping[str, Any], dt: float) -> Self:
         """The inverse of :meth:`describe`."""
         tunings = tuple((float(process), float(velocity)) for process, velocity in described["tunings"])
-        return cls(LevelFrame.read(described, dt), tunings, described.get("candidate", described["filter"]["name"]))
+        return cls(LevelFrame.read(described, dt), tunings)
 
     def init(self, measurement: Measurement) -> BankState:
         """See :class:`.front_end.FrontEnd`."""
@@ -149,8 +139,7 @@ class FilterBank:
 
     @property
     def _others(self) -> KalmanFilter:
-        made: Any = self.kalman if self.candidate == name_of(self.kalman.model) else make(self.candidate, dt=self.dt)
-        return replace(made, keep_covariance=False, compiled=self.kalman.compiled)
+        return replace(self.kalman, keep_covariance=False)
 
     def _factors(self) -> dict[str, np.ndarray]:
         """Gain → logarithm of its factor ``(K,)``, of the variance."""

@@ -101,7 +101,7 @@ def test_candidates_are_the_filter_with_other_constants(samples: dict[str, np.nd
     for index, changed in enumerate(
         ({"gyroscope_noise": 0.3 * model.gyroscope_noise}, {"velocity_bound": 4.0 * model.velocity_bound})
     ):
-        up = make("bounded-motion-rest", dt=dt, **changed).run(samples).pose["up"]
+        up = make("bounded-motion", dt=dt, **changed).run(samples).pose["up"]
         tilt = rotation.rotate(seen.base["relative_orientation"], up)[10:, :2]
         found = seen.spread[10:, 1 + 2 * index : 3 + 2 * index]
         np.testing.assert_allclose(found, tilt, atol=1e-12)
