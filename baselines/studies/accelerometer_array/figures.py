@@ -72,7 +72,7 @@ def pointing_figures(report: Report, device: str, curves: dict[str, Any]) -> Non
             below.plot(time, both[row], color=colour, label=name, zorder=3 if first else 2, **style)
         below.set_ylim(-30.0, 30.0)
         below.set_ylabel(f"error of {angle}, °")
-    axes[0].legend(loc="upper right", fontsize=7, ncols=2)
+    legend_above(axes[0])
     figure.legend(*axes[1].get_legend_handles_labels(), loc="outside lower center", fontsize=7.5, ncols=3)
     axes[-1].set_xlabel("time, s")
     report.figure(
@@ -89,7 +89,7 @@ def pointing_figures(report: Report, device: str, curves: dict[str, Any]) -> Non
     ax.set_xlabel("azimuth, °")
     ax.set_ylabel("pitch, °")
     ax.set_aspect("equal")
-    ax.legend(loc="upper right", fontsize=8)
+    legend_above(ax)
     report.figure(
         f"path-{device}", figure, f"Figure {path_name}: where the {device} points", "Dotted: targets' limits."
     )

@@ -42,7 +42,7 @@ SETTINGS = {
     ),
 }
 """Settings of figure 4(c), which hold the paper's claim or not."""
-UNSEEN = "unobservable"
+UNSEEN, MOTION = "unobservable", "motion of 40 s"
 Model = Literal["sigma1", "sigma2"]
 NAMES: dict[str, Model] = {"Σ2": "sigma2", "Σ1": "sigma1"}
 
@@ -190,7 +190,7 @@ def observability(study: Study, report: Report) -> None:
         deviation = seen.deviations()[0] / DEG
         rows.append(
             {
-                "motion of 40 s": label,
+                MOTION: label,
                 "model": "Σ2" if model == "sigma2" else "Σ1",
                 "rank": seen.rank(),
                 "other": other,
@@ -217,12 +217,10 @@ def rank_claims(rows: Sequence[dict[str, Any]]) -> list[Claim]:
     """What section IV-A says of Σ1, and of Σ2 with and without a yaw rate."""
 
     def said(statement: str, model: str, start: str, whole: bool) -> Claim:
-        part = [row for row in rows if row["model"] == model and row["motion"].startswith(start)]
-        part = [row for row in part if whole or start or not row["motion"].startswith("nothing")]
-        unseen = [row["σ of φ without prior, deg"] == UNSEEN for row in part]
+        part = [row for row in rows if row["model"] == model and row[MOTION].startswith(start)]
         ranks = ", ".join(f"{row['rank']} of {row['of']}" for row in part)
-        holds = all(row["rank"] == row["of"] for row in part) if whole else all(unseen)
-        return Claim(statement, f"rank {ranks}", holds)
+        unseen = all(row["σ of φ without prior, deg"] == UNSEEN for row in part)
+        return Claim(statement, f"rank {ranks}", all(row["rank"] == row["of"] for row in part) if whole else unseen)
 
     return [
         said("Σ2 observes every state while body and yaw rate move", "Σ2", "moving body, varying", True),
