@@ -20,8 +20,8 @@ class PilotParameters:
     """A human control model of steering.
 
     Noise of a sense is white; its level is the standard deviation of the mean over one second. Delays and muscles are
-    published. Levels and weights are choices of this project, made on rides with seeds below 5: riders stay up, and
-    steering grows more than six times from 20 to 5 km/h, as measured (``poise realism --parts steering``). What an
+    published. Levels and weights are choices of this project, made on rides with seeds below 13: riders stay up, and
+    steering grows about six times from 20 to 5 km/h, as measured (``poise realism --parts steering``). What an
     error of a sense does to the steering depends on the speed: one of roll or roll rate is answered by a steering angle
     that grows with about the inverse square of the speed, one of steering or heading by the same at any speed. Balance
     therefore has to be the least exact sense, and the path must not be followed more closely the faster the bicycle is.
