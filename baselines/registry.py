@@ -99,6 +99,7 @@ TRAINED: dict[str, Entry] = {
             HERE,
             "learned",
             {"weights": f"gru-{name}-bicycle"},
+            experimental=True,  # a comparison: both lose to the filter of the paper
         )
         for name in ("two-gyro", "force-inertial")
     },
