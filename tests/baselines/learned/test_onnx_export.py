@@ -42,14 +42,16 @@ def compare(weights: str | Path, folder: Path, tolerance: float = 1e-5) -> None:
     features = np.random.default_rng(0).normal(0.0, 1.0, (3, 150, network.features)).astype(np.float32)
     expected, last = by_steps(network, features)
     assert np.abs(expected).max() > 1e-4
+    # a sum in single precision is as exact as its largest terms: an output near zero no more than the others
+    absolute = tolerance * max(1.0, float(np.abs(expected).max()))
     memory = np.zeros((3, network.memory_size), np.float32)
     output, after = run.run(["output", "memory_after"], {"features": features, "memory": memory})
-    np.testing.assert_allclose(output, expected, rtol=tolerance, atol=tolerance)
+    np.testing.assert_allclose(output, expected, rtol=tolerance, atol=absolute)
     np.testing.assert_allclose(after, last, atol=10.0 * tolerance)
     # one update at a time, the memory handed on
     for index in range(features.shape[1]):
         one, memory = run.run(None, {"features": features[:, index : index + 1], "memory": memory})
-        np.testing.assert_allclose(one[:, 0], expected[:, index], rtol=tolerance, atol=tolerance)
+        np.testing.assert_allclose(one[:, 0], expected[:, index], rtol=tolerance, atol=absolute)
     assert json.loads(run.get_modelmeta().custom_metadata_map["card"]) == card
 
 
