@@ -65,13 +65,13 @@ def without_glitches(trajectory: Trajectory) -> dict[str, np.ndarray]:
         site, _, kind = name.rpartition("/")
         if kind not in LEAST or values.shape[1] != 3:
             continue
-        absent = np.zeros(len(values), bool)
+        absent: Any = np.zeros(len(values), bool)
         force = trajectory.measurements.get(f"{site}/acc")
         if kind == "gyr" and force is not None:
             absent = ~values.any(axis=1) & ~force.any(axis=1)
-        parts = {"glitches": glitches(values, LEAST[kind]), "rows of zeros": absent}
+        parts: dict[str, np.ndarray] = {"glitches": glitches(values, LEAST[kind]), "rows of zeros": absent}
         if name in ranges:
-            parts["saturated"] = (np.abs(values) >= FULL * ranges[name]).any(axis=1)
+            parts["saturated"] = np.any(np.abs(values) >= FULL * ranges[name], axis=1)
         wrong = np.logical_or.reduce(list(parts.values()))
         if wrong.any():
             measurements[name] = np.where(wrong[:, None], np.nan, values)

@@ -162,7 +162,7 @@ def _runs(
         step = np.searchsorted(gesture.starts, run.time, "right") - 1
         steady = (step >= 0) & (run.time > gesture.starts[np.maximum(step, 0)] + table.ramp + 0.05)
         time, readings = run.time[steady], {name: values[steady] for name, values in run.measurements.items()}
-        mounted = (np.full(len(time), each) for each in (up, out))
+        mounted = np.full(len(time), up), np.full(len(time), out)
         if data is not None:
             time = time + data.time[-1] + 60.0
         one = RateTableData(time, *mounted, gesture.rates[step[steady]], raw(readings))

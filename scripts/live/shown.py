@@ -266,6 +266,7 @@ def tuned_episode(env: Any, seed: int) -> Trajectory | None:
     if not isinstance(env.unwrapped, GainTuningEnv):
         return None
     env.reset(seed=seed)
+    assert env.unwrapped.trajectory is not None  # after a reset
     trajectory = env.unwrapped.trajectory.on_grid()
     return trajectory.replace(metadata=trajectory.metadata | {"rate": 1.0 / trajectory.dt})
 

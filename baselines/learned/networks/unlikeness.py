@@ -74,7 +74,7 @@ class WithUnlikeness:
     @property
     def counted(self) -> float:
         """How many features are counted; 1 if none is, since u is 0 then."""
-        return float(max(1, np.count_nonzero(self.factor)))
+        return float(max(1, int(np.count_nonzero(self.factor))))
 
     def unlikeness(self, features: Array) -> Array:
         """U ``(...)`` of features ``(..., F)``."""
@@ -121,5 +121,6 @@ def read_network(kind: Any, arrays: Mapping[str, np.ndarray]) -> Any:
         ValueError: an array is missing or unknown, or has the wrong shape.
     """
     own = {name: array for name, array in arrays.items() if name not in NAMES}
-    network = kind.from_arrays(own) if isinstance(kind, type) else kind
+    made: Any = kind
+    network = made.from_arrays(own) if isinstance(kind, type) else kind
     return network if len(own) == len(arrays) else WithUnlikeness(network, *(arrays[name] for name in NAMES))

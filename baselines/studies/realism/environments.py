@@ -78,8 +78,8 @@ def ride_statistics(scenario: str, subject: int, seed: int, duration: float, fid
         for site in PLACES
         for name, value in motion_statistics(ride, site, bandwidth=BANDWIDTH).items()
     }
-    trunk = (ride.measurements[f"trunk_imu/{kind}"] for kind in ("gyr", "acc"))
-    found |= pedalling(*trunk, 1.0 / ride.dt, ride.truth["crank/rate"][:, 0])
+    gyr, force = (ride.measurements[f"trunk_imu/{kind}"] for kind in ("gyr", "acc"))
+    found |= pedalling(gyr, force, 1.0 / ride.dt, ride.truth["crank/rate"][:, 0])
     return found | saddle_statistics(ride.measurements["seat/load_cells"]) | control_statistics(ride)
 
 

@@ -17,8 +17,10 @@ from .mapping import RecordingMap, Reference, apply_map, as_columns, finite
 from .names import Group, counter_column, groups, is_ros, time_column
 from .table import UNITS, Table, factor, plain
 
-RATES = ("Update Rate", "Sample Rate", "Sampling Rate", "OutputRate", "Rate", "Frequency", "Sampling Frequency")
-RATES += ("Sample Frequency", "Sampling Interval", "Sample Interval", "Sampling Period", "Sample Period")
+RATES = (
+    *("Update Rate", "Sample Rate", "Sampling Rate", "OutputRate", "Rate", "Frequency", "Sampling Frequency"),
+    *("Sample Frequency", "Sampling Interval", "Sample Interval", "Sampling Period", "Sample Period"),
+)
 """Keys of a header for the sampling rate."""
 APPS = {("gFx", "wx"): {"acc": ("gFx gFy gFz", "g"), "gyr": ("wx wy wz", "rad/s"), "mag": ("Bx By Bz", "uT")}}
 """First names of tables without units (Physics Toolbox) → kind → its columns and their unit."""

@@ -23,22 +23,12 @@ from .table import Table, split_unit, units_row
 if TYPE_CHECKING:
     import pandas
 
-MISSING = ("", "-", "--", "---", "…", "...", "?", "*", "na", "n/a", "n.a.", "null", "<null>", "none", "nil", "missing")
-MISSING += ("undef", "undefined", "void", "nat", "<na>", "nan", "-nan", "nan(ind)", "-nan(ind)", "nan(snan)", "1.#qnan")
-MISSING += (
-    "-1.#qnan",
-    "1.#ind",
-    "-1.#ind",
-    "1.#inf",
-    "-1.#inf",
-    "1.#snan",
-    "#n/a",
-    "#na",
-    "#value!",
-    "#div/0!",
-    "#num!",
-)
-MISSING += ("#name?", "#ref!", "#null!")
+MISSING = (
+    "", "-", "--", "---", "…", "...", "?", "*", "na", "n/a", "n.a.", "null", "<null>", "none", "nil", "missing",
+    "undef", "undefined", "void", "nat", "<na>", "nan", "-nan", "nan(ind)", "-nan(ind)", "nan(snan)", "1.#qnan",
+    "-1.#qnan", "1.#ind", "-1.#ind", "1.#inf", "-1.#inf", "1.#snan", "#n/a", "#na", "#value!", "#div/0!", "#num!",
+    "#name?", "#ref!", "#null!",
+)  # fmt: skip
 """Texts for no value, in lower case: of languages, databases, C libraries and spreadsheets."""
 NUMBER = re.compile(r"[-+]?(\d+[.,]?\d*|[.,]\d+)([eEdD][-+]?\d+)?|[-+]?(inf|infinity)", re.IGNORECASE)
 GROUPED = re.compile(r"[-+]?\d{1,3}('\d{3})+([.,]\d*)?|[-+]?\d{1,3}(,\d{3})*\.\d*|[-+]?\d{1,3}(\.\d{3})*,\d*")
