@@ -20,7 +20,7 @@ def fabricated(errors, length=60.0):
     }
     consistency = {name: {"NEES": 1.0, "NIS": 9.0} for name in RIDES.checked}
     ride = {"name": "r", "length": length, "rms": windows, "peak": {"Σ2": {"φ": 4.0}}, "consistency": consistency}
-    return [ride | {"nees": {"φ": 2.5}, "bound": {"φ": 0.25}}]
+    return [ride | {"nees": {"φ": 2.5}, "bound": {"φ": 0.25}, "yaw": {"early": 1.0, "end": 3.0}}]
 
 
 def verdicts(found):
