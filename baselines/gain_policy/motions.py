@@ -9,7 +9,8 @@ from typing import Any, Protocol
 
 from ...envs.data.trajectory import Trajectory
 from ...envs.hand.carried import Carried
-from ...envs.hand.hand_held import HandHeld, Over
+from ...envs.hand.everyday import ALONE
+from ...envs.hand.hand_held import HandHeld
 from ...envs.hand.parts.shaking import Vibration
 from ...envs.recipes.devices import VariedSensors
 from ...envs.recipes.hand import HandRecipe
@@ -111,14 +112,10 @@ FLOWN_MOTIONS = GradedMotions(
         position_band=((0.03, 0.3), (0.2, 1.5)),
         angle_band=((0.03, 0.3), (0.15, 3.0)),
         rhythmic_share=0.1,
-        over=Over(
+        over=dataclasses.replace(
+            ALONE,
             clean_share=0.1,
-            tremor_share=0.0,
-            drift_share=0.0,
-            taps_share=0.0,
             vibration_share=0.9,
-            set_down_share=0.0,
-            tissue_share=0.0,
             vibration=Vibration(frequency=(20.0, 200.0), acceleration=(0.3, 6.0)),
         ),
     ),

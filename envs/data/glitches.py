@@ -65,11 +65,10 @@ def without_glitches(trajectory: Trajectory) -> dict[str, np.ndarray]:
         site, _, kind = name.rpartition("/")
         if kind not in LEAST or values.shape[1] != 3:
             continue
-        absent: Any = np.zeros(len(values), bool)
+        parts: dict[str, np.ndarray] = {"glitches": glitches(values, LEAST[kind])}
         force = trajectory.measurements.get(f"{site}/acc")
         if kind == "gyr" and force is not None:
-            absent = ~values.any(axis=1) & ~force.any(axis=1)
-        parts: dict[str, np.ndarray] = {"glitches": glitches(values, LEAST[kind]), "rows of zeros": absent}
+            parts["rows of zeros"] = np.logical_not(values.any(axis=1) | force.any(axis=1))
         if name in ranges:
             parts["saturated"] = np.any(np.abs(values) >= FULL * ranges[name], axis=1)
         wrong = np.logical_or.reduce(list(parts.values()))
