@@ -66,10 +66,7 @@ def linearise(model: Model, states: np.ndarray, measurements: Mapping[str, Any])
     states = np.asarray(states, dtype=float)
     if states.shape != (len(samples), model.state_size):
         raise ValueError(f"states must have shape {(len(samples), model.state_size)}, got {states.shape}")
-    inputs = split(filled(held), model.channels)
-    now = {name: array[1:] for name, array in inputs.items()}
-    before = {name: array[:-1] for name, array in inputs.items()}
-    _, F, Q = model.predict(states[:-1], now, before)
+    _, F, Q = model.predict(states[:-1], *inputs_of_steps(model, held))
     r, H, R = model.residual(states, split(samples, model.channels))
     usable = np.isfinite(r) & np.isfinite(H).all(-1) & np.isfinite(np.linalg.diagonal(R))
     steps, e, m = len(samples), model.error_size, model.residual_size
@@ -85,6 +82,12 @@ def samples_of(model: Model, measurements: Mapping[str, Any]) -> tuple[np.ndarra
     for sample in samples[1:]:
         held.append(hold(sample, held[-1]))
     return samples, np.array(held)
+
+
+def inputs_of_steps(model: Model, held: np.ndarray) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Samples at the end and at the beginning of each step, channel → ``(T − 1, size)``, of held ones ``(T, d)``."""
+    inputs = split(filled(held), model.channels)
+    return {name: array[1:] for name, array in inputs.items()}, {name: array[:-1] for name, array in inputs.items()}
 
 
 def start_of(model: Model, measurements: Mapping[str, Any]) -> tuple[int, np.ndarray]:

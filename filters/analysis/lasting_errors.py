@@ -22,8 +22,8 @@ from scipy.linalg import block_diag, expm
 
 from ..core.model import Model
 from ..core.rotation import wrap
-from ..core.sampling import filled, split
-from .bounds import linearise, samples_of, start_of
+from ..core.sampling import split
+from .bounds import inputs_of_steps, linearise, measured, samples_of, start_of
 
 STEP = 1e-6
 """of numerical derivatives by an error, in its unit"""
@@ -94,8 +94,7 @@ def lasting_bound(
     Raises:
         ValueError: shapes do not fit, or the samples never suffice for the model's prior.
     """
-    F, Q, H, R, usable = linearise(model, states(measurements), measurements)
-    R = R if white is None else np.broadcast_to(white, R.shape)
+    system = linearise(model, states(measurements), measurements)
     by_step, by_output = _derivatives(model, states, measurements, errors)
     steps, noises, starts, loads = [], [], [], []
     for error in errors:
@@ -105,22 +104,23 @@ def lasting_bound(
             starts.append(std**2 * stationary)
             noises.append(std**2 * (stationary - keep @ stationary @ keep.T))
             loads.append(seen)
-    e, load = F.shape[-1], block_diag(*loads)
+    e, load = model.error_size, block_diag(*loads)
     by_step, by_output = by_step @ load, by_output @ load
     size = e + load.shape[-1]
     grown, P, A = (np.zeros((size, size)) for _ in range(3))
     grown[e:, e:], P[e:, e:], A[e:, e:] = block_diag(*noises), block_diag(*starts), block_diag(*steps)
     first, own = (0, prior) if prior is not None else start_of(model, measurements)
     P[:e, :e] = own
-    H = np.concatenate([H, by_output], axis=-1)
+    R = system.R if white is None else np.broadcast_to(white, system.R.shape)
+    system = system._replace(H=np.concatenate([system.H, by_output], axis=-1), R=R)
     if prior is not None:
-        P = _corrected(P, H[0], R[0], usable[0])
+        P = measured(P, system, 0)
     bounds = [np.full((e, e), np.nan)] * first + [P[:e, :e].copy()]
-    for k in range(first, len(F)):
-        A[:e, :e], A[:e, e:] = F[k], by_step[k]
+    for k in range(first, len(by_step)):
+        A[:e, :e], A[:e, e:] = system.F[k], by_step[k]
         P = A @ P @ A.T + grown
-        P[:e, :e] += Q[k]
-        P = _corrected(P, H[k + 1], R[k + 1], usable[k + 1])
+        P[:e, :e] += system.Q[k]
+        P = measured(P, system, k + 1)
         bounds.append(P[:e, :e].copy())
     return np.array(bounds)
 
@@ -154,21 +154,8 @@ def _derivatives(
 def _moved(model: Model, x: np.ndarray, measurements: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray]:
     """First e elements of the predicted states ``(T − 1, e)``, and the residual ``(T, m)``."""
     samples, held = samples_of(model, {channel.name: measurements[channel.name] for channel in model.channels})
-    inputs = split(filled(held), model.channels)
-    now = {name: array[1:] for name, array in inputs.items()}
-    before = {name: array[:-1] for name, array in inputs.items()}
-    predicted = np.asarray(model.predict(x[:-1], now, before)[0])[:, : model.error_size]
+    predicted = np.asarray(model.predict(x[:-1], *inputs_of_steps(model, held))[0])[:, : model.error_size]
     return predicted, np.asarray(model.residual(x, split(samples, model.channels))[0])
-
-
-def _corrected(P: np.ndarray, H: np.ndarray, R: np.ndarray, usable: np.ndarray) -> np.ndarray:
-    """Covariance after a measurement of the usable rows."""
-    if not usable.any():
-        return P
-    H, R = H[usable], R[np.ix_(usable, usable)]
-    HP = H @ P
-    P = P - HP.T @ np.linalg.solve(HP @ H.T + R, HP)
-    return 0.5 * (P + P.T)
 
 
 def lasting_and_white(values: np.ndarray, dt: float, window: float = 0.1) -> tuple[list[Lasting], np.ndarray]:
