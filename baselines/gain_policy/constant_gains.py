@@ -100,6 +100,12 @@ def best_constant_gains(
     return ConstantGains(tried[best], float(means[best]), np.stack(tried), np.stack(scores))
 
 
+def left_out_errors(tried: np.ndarray) -> np.ndarray:
+    """Error ``(E,)`` of each trajectory under the gains that are best on all others, of errors ``(gains, E)``."""
+    others = (tried.sum(axis=1, keepdims=True) - tried).argmin(axis=0)
+    return np.asarray(tried[others, np.arange(tried.shape[1])])
+
+
 def constant_errors(
     tuned: TunedFilter,
     trajectories: Sequence[Trajectory],

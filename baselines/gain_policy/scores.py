@@ -15,7 +15,7 @@ from ...envs.registration import make_environment
 from ...filters.core.metrics import rms
 from ...filters.support.names import look_up
 from ...filters.support.seeds import child_seed
-from .constant_gains import best_constant_gains, constant_errors
+from .constant_gains import best_constant_gains, constant_errors, left_out_errors
 
 REPLAY = "poise/ReplayGain-v0"
 """Its episodes are recordings, so its scores depend on them."""
@@ -121,8 +121,7 @@ def reference_scores(
         tried = np.stack([constant_errors(tuned, test, action, quantity) for action in found.tried[: points + 1]])
     else:
         tried = found.scores
-        others = (tried.sum(axis=1, keepdims=True) - tried).argmin(axis=0)
-        constant = tried[others, np.arange(len(test))]
+        constant = left_out_errors(tried)
     neutral = tried[0]
     rng, random = np.random.default_rng(child_seed(seed, 2)), []
     for trajectory in test:

@@ -15,7 +15,7 @@ from ....filters.support.seeds import child_seed
 from ...registry import TRAINED
 from ...run import fitted, run_on
 from ...statistics import Interval, bootstrap_interval
-from ..constant_gains import constant_errors, policy_errors
+from ..constant_gains import constant_errors, left_out_errors, policy_errors
 from ..policy import GainPolicy
 from ..rules import RULES, ruled
 from .oracles import pose_error, schedule_error, windowed_oracle
@@ -77,8 +77,7 @@ def contenders(
     tried = np.stack([constant_errors(tuned, trajectories, action, quantity) for action in grid])
     found: dict[str, Any] = {"random gains": [], "published": tried[0], REFERENCE: tried[1]}
     if leave_out and len(trajectories) > 1:
-        others = (tried.sum(axis=1, keepdims=True) - tried).argmin(axis=0)
-        found[OTHERS] = tried[others, np.arange(len(trajectories))]
+        found[OTHERS] = left_out_errors(tried)
     rng, random = np.random.default_rng(child_seed(seed, 1)), []
     rules: dict[str, list[float]] = {name: [] for name in applicable_rules(tuned)}
     mixed: list[float] = []
