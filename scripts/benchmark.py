@@ -49,7 +49,8 @@ class Args:
     baseline: Path | None = None
     """results.csv of an earlier run: errors that grew by more than 2 % are listed, and the exit status is 1"""
     save: Path | None = None
-    """file for the errors of all recordings and simulations, from which `poise recommend` reads"""
+    """file for the errors of recordings, simulations and riders, from which `poise recommend` and `poise list` read;
+    what this run has nothing of stays in it as it is"""
     quick: bool = False
     """one episode of each gesture, one scenario of single IMUs, one trial of each test, and of the rider suite one ride
     of each group without the references that learn"""
@@ -67,6 +68,7 @@ class Args:
 
 def run(args: Args) -> int:
     """Simulate, load, estimate, compare."""
+    from ..baselines.comparison.recommendation import load_results
     from ..baselines.comparison.tasks import run_tasks
     from .comparison.riders import rider_settings, rider_sweeps, rider_tables
     from .experiment import open_run
@@ -80,6 +82,7 @@ def run(args: Args) -> int:
     if args.sweep and args.suite != "rider":
         raise ValueError(f"--sweep belongs to --suite rider, not {args.suite}")
     before = None if args.baseline is None else load_baseline(args.baseline)
+    kept = load_results(args.save) if args.save is not None and args.save.exists() else {}
     with plain_warnings(), Output("benchmark", args) as out:
         recorded, passed_over = load_all(args.recordings) if args.recordings else ([], [])
         tasks, channels = tasks_of(args, recorded)
@@ -110,6 +113,10 @@ def run(args: Args) -> int:
         if ridden is not None:
             sections |= ridden.sections
             suites |= ridden.suites
+        if args.save is not None:
+            recordings = [one for results in suites.values() for one in results.recordings]
+            parts = {"recordings": recordings, "riders": [] if ridden is None else ridden.summary}
+            out.say(f"results: {keep(args, folder, kept, parts)}")
         grown = [] if before is None else show_regressions(table, before, sections, out)
         if passed_over:
             sections["Passed over"] = passed_over_text(passed_over, most=1000)
@@ -171,9 +178,8 @@ def show_suite(suite: str, results: Results, tasks: list[Task], args: Args, fold
 
 
 def show_data_sets(suites: dict[str, Results], args: Args, folder: Run, out: Output) -> dict[str, str]:
-    """Mean errors of all data sets side by side; heading → Markdown. Saves what ``--save`` asks for."""
+    """Mean errors of all data sets side by side; heading → Markdown."""
     from ..baselines.comparison.recommendation import ERRORS, dataset_errors
-    from ..filters.support.files import write_json
     from ..filters.support.rows import markdown_table
 
     results = [one for each in suites.values() for one in each.recordings]
@@ -185,10 +191,18 @@ def show_data_sets(suites: dict[str, Results], args: Args, folder: Run, out: Out
             title = f"All data sets: {metric} error, RMS, mean over recordings, deg"
             sections[title] = markdown_table(rows, ["estimator", *names])
             out.table(rows, title, columns=["estimator", *names])
-    if args.save is not None:
-        source = {key: folder.versions[key] for key in ("poise", "python", "packages")} | {"seed": args.seed}
-        out.say(f"results: {write_json(args.save, {'source': source, 'recordings': results}, indent=None)}")
     return sections
+
+
+def keep(args: Args, folder: Run, kept: dict[str, Any], parts: dict[str, list[dict[str, Any]]]) -> Path:
+    """Write the parts that this run has into the file of ``--save``, each with its source, beside what was there."""
+    from ..filters.support.files import write_json
+
+    assert args.save is not None
+    new = {part: rows for part, rows in parts.items() if rows}
+    source = {key: folder.versions[key] for key in ("poise", "python", "packages")} | {"seed": args.seed}
+    sources = {**kept.get("source", {}), **dict.fromkeys(new, source)}
+    return write_json(args.save, {"recordings": [], **kept, **new, "source": sources}, indent=None)
 
 
 def show_paper(trials: int, out: Output) -> dict[str, str]:

@@ -35,7 +35,7 @@ class Args:
     lists: tyro.conf.Positional[tuple[str, ...]] = ()
     """which lists: estimators, environments, sensors, sensor-drift, sensor-kinds, timings, magnetics, gestures,
     scenarios, surfaces, recipes, presets, learned, formats, benchmark, benchmark-best, benchmark-heading,
-    benchmark-limits; all if none is named"""
+    benchmark-limits, riders, riders-best, riders-consistency, riders-bound; all if none is named"""
     markdown: bool = False
     """print the tables in Markdown, as the documentation has them"""
     update: tuple[Path, ...] = ()
@@ -84,6 +84,39 @@ def benchmark_limits() -> Rows:
             }
         )
     return found
+
+
+def riders(table: str = "error") -> Rows:
+    """Errors of the shipped benchmark's riders, deg: mean over the paper's angles [95 % interval over riders]."""
+    from ..baselines.comparison.recommendation import load_results
+
+    kept = [row for row in load_results().get("riders", []) if row["table"] == table]
+    return [
+        {"name": row["method"], "sensors of": row["paper"]}
+        | {key: value for key, value in row.items() if key not in ("paper", "table", "method")}
+        for row in kept
+    ]
+
+
+def riders_best() -> Rows:
+    """The mean errors of what is told apart most easily: the mean, the filter of each paper, and its networks."""
+    found = []
+    for row in riders():
+        paper = row["sensors of"]
+        if row["name"] in ("always the mean", paper, f"{paper}-consistent", f"{paper}+network", f"gru-{paper}"):
+            means = {key: float(value.split(" [")[0]) for key, value in row.items() if key not in ("name", "sensors of")}
+            found.append({"name": row["name"], "sensors of": paper, **means})
+    return found
+
+
+def riders_consistency() -> Rows:
+    """Mean NEES of an angle, and share of the errors inside the stated 90 %, of the same."""
+    return riders("consistency")
+
+
+def riders_bound() -> Rows:
+    """The same errors in multiples of the posterior bound of the published filter's model."""
+    return riders("bound")
 
 
 def run(args: Args) -> int:
@@ -310,6 +343,7 @@ LISTS: Mapping[str, Callable[[], Rows]] = {
             formats,
         ),
         *(benchmark, benchmark_best, benchmark_heading, benchmark_limits),
+        *(riders, riders_best, riders_consistency, riders_bound),
     )
 }
 """Name → rows."""

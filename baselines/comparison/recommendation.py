@@ -119,7 +119,8 @@ def load_results(path: Path = RESULTS) -> dict[str, Any]:
     """
     try:
         found = json.loads(path.read_text(encoding="utf-8"))
-        found["recordings"][0]["errors"]
+        if "riders" not in found or found["recordings"]:
+            found["recordings"][0]["errors"]
     except (OSError, ValueError, KeyError, IndexError, TypeError) as reason:
         raise ValueError(f"{path} holds no results of poise benchmark --save: {reason}") from None
     return found

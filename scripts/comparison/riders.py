@@ -23,11 +23,13 @@ class RiderPart(NamedTuple):
         rows: of ``results.csv``.
         sections: heading → Markdown.
         suites: title → results, for the page.
+        summary: paper, method and group with their numbers, as ``--save`` keeps them.
     """
 
     rows: list[dict[str, Any]]
     sections: dict[str, str]
     suites: dict[str, Results]
+    summary: list[dict[str, Any]]
 
 
 def rider_settings(estimators: Sequence[str], seed: int, *, quick: bool) -> RiderSuite | None:
@@ -70,7 +72,8 @@ def rider_tables(settings: RiderSuite, args: Any, folder: Run, out: Output) -> R
     means = [mean for paper in settings.papers for mean in tables.ride_means(rows, paper)]
     groups = {trajectory: trajectory.split(":")[0] for _, trajectory, *_ in means}
     page = Results(ErrorTable(means, columns=list(COLUMNS)), groups, [])
-    return RiderPart([{"suite": SUITE, **row} for row in tables.results(rows)], sections, {SUITE: page})
+    found = [{"suite": SUITE, **row} for row in tables.results(rows)]
+    return RiderPart(found, sections, {SUITE: page}, tables.summary(rows))
 
 
 def rider_sweeps(settings: RiderSuite, args: Any, folder: Run, out: Output) -> dict[str, str]:

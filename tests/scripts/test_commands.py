@@ -120,8 +120,16 @@ def test_benchmark_compares_and_reports(episodes, tmp_path, capsys):
     assert (folder / "report.html").stat().st_size > 1_000_000
     again = [*words, "--recordings", str(episodes / "hand_motion_0000.h5"), "--resume", str(folder)]
     before = (folder / "results.csv").read_bytes()
-    assert main([*again, "--baseline", str(folder / "results.csv")]) == 0
+    kept = tmp_path / "kept.json"
+    kept.write_text(
+        json.dumps({"source": {"riders": {"seed": 1}}, "recordings": [], "riders": [{"paper": "two-gyro"}]})
+    )
+    assert main([*again, "--baseline", str(folder / "results.csv"), "--save", str(kept)]) == 0
     assert (folder / "results.csv").read_bytes() == before
+    saved = json.loads(kept.read_text())
+    assert {one["dataset"] for one in saved["recordings"]} == {"simulated hand"}
+    assert saved["riders"] == [{"paper": "two-gyro"}], "what this run has nothing of stays"
+    assert {part: one["seed"] for part, one in saved["source"].items()} == {"riders": 1, "recordings": 0}
     better = results.assign(value=results["value"] * 0.9)
     better.to_csv(tmp_path / "better.csv", index=False)
     assert main([*again, "--baseline", str(tmp_path / "better.csv")]) == 1

@@ -67,6 +67,22 @@ def told(method: str) -> str:
     return f"{method} (roll alone)" if method == ROLL_ONLY else method
 
 
+def summary(rows: Sequence[Row]) -> list[dict[str, Any]]:
+    """The cells of the tables of all papers as JSON has them, one row for each paper, method and table.
+
+    Columns: paper, method, table (``error``, ``consistency`` or ``bound``), and the groups.
+    """
+    made = {"error": error_table, "consistency": consistency_table, "bound": bound_table}
+    papers = dict.fromkeys(row.paper for row in rows)
+    return [
+        {"paper": paper, "table": name}
+        | {key: None if isinstance(value, float) and np.isnan(value) else value for key, value in cells.items()}
+        for paper in papers
+        for name, table in made.items()
+        for cells in table(rows, paper)
+    ]
+
+
 def error_table(rows: Sequence[Row], paper: str) -> list[dict[str, str]]:
     """Method × group: mean of the RMS errors over angles, draws and riders, deg, with 95 % interval over riders."""
     table = []

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -137,6 +138,11 @@ def test_the_comparison_of_one_paper(monkeypatch: pytest.MonkeyPatch, tmp_path: 
     consistent = {cells["method"] for cells in tables.consistency_table(rows, "two-gyro")}
     assert {"two-gyro", "two-gyro+network"} <= consistent
     assert len(tables.results(rows)) == len(rows) * 8
+    summary = json.loads(json.dumps(tables.summary(rows), allow_nan=False))
+    assert [one["unseen riders"] for one in summary if one["table"] == "error"] == [
+        cells["unseen riders"] for cells in found.values()
+    ]
+    assert {one["table"] for one in summary} == {"error", "consistency", "bound"}
     ratios = {cells["method"]: cells["unseen riders"] for cells in tables.bound_table(rows, "two-gyro")}
     assert ratios["two-gyro"] > 1.0
     means = tables.ride_means(rows, "two-gyro")
