@@ -137,8 +137,10 @@ def run(args: Args) -> int:
             if args.markdown and not args.json:
                 out.say(f"{placed(name)}\n")
             else:
-                out.rows(rows(), name)
-                out.show(rows(), name, [key for key in rows()[0] if key not in ("channels", "outputs", "source")])
+                found = rows()
+                shown = [key for row in found[:1] for key in row if key not in ("channels", "outputs", "source")]
+                out.rows(found, name)
+                out.show(found, name, shown)
     return 0
 
 
