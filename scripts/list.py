@@ -104,7 +104,8 @@ def riders_best() -> Rows:
     for row in riders():
         paper = row["sensors of"]
         if row["name"] in ("always the mean", paper, f"{paper}-consistent", f"{paper}+network", f"gru-{paper}"):
-            means = {key: float(value.split(" [")[0]) for key, value in row.items() if key not in ("name", "sensors of")}
+            groups = {key: value for key, value in row.items() if key not in ("name", "sensors of")}
+            means = {group: float(cell.split(" [")[0]) for group, cell in groups.items()}
             found.append({"name": row["name"], "sensors of": paper, **means})
     return found
 
