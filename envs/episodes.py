@@ -10,6 +10,7 @@ import contextlib
 import dataclasses
 import hashlib
 import json
+import time
 from collections import OrderedDict
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -23,6 +24,8 @@ IN_MEMORY = 16
 """episodes of a store"""
 ON_DISK = 10**9
 """bytes of all stores of one name"""
+UNUSED = 30 * 86400.0
+"""s after which an episode that nobody read is removed"""
 
 
 class EpisodeStore:
@@ -32,7 +35,8 @@ class EpisodeStore:
         name: folder below the user's cache folder.
         settings: everything that the episodes depend on besides code and key.
         in_memory: how many are kept in memory.
-        on_disk: largest size of the folder, bytes; the files that were used longest ago are removed first.
+        on_disk: largest size of the folder, bytes; the files that were used longest ago are removed first. Versions of
+            the code share it, since several checkouts may be at work; what was not used for a month is removed too.
     """
 
     def __init__(self, name: str, settings: Any, *, in_memory: int = IN_MEMORY, on_disk: int = ON_DISK) -> None:
@@ -75,17 +79,20 @@ class EpisodeStore:
         return found
 
     def _write(self, path: Path, episode: Trajectory) -> None:
-        """Keep an episode if the folder can be written, and remove others until the folder is small enough."""
+        """Keep an episode if the folder can be written, and remove the oldest ones, and others if there is too much."""
         with contextlib.suppress(OSError):
             episode.save(path)
             files = {file: file.stat() for file in self.folder.rglob("*.h5") if not file.name.startswith(".")}
-            size = sum(stat.st_size for stat in files.values())
-            # other versions of the code first, then what was used longest ago
-            for file in sorted(files, key=lambda each: (each.parent == path.parent, files[each].st_mtime)):
-                if size <= self._on_disk and file.parent == path.parent:
+            size, now = sum(stat.st_size for stat in files.values()), time.time()
+            # whatever version they are of: another checkout may use the same folder
+            for file in sorted(files, key=lambda each: files[each].st_mtime):
+                if size <= self._on_disk and now - files[file].st_mtime <= UNUSED:
                     break
                 file.unlink(missing_ok=True)
                 size -= files[file].st_size
+            for folder in {file.parent for file in files} - {path.parent}:
+                with contextlib.suppress(OSError):
+                    folder.rmdir()  # one that is not empty stays
 
 
 def exact(value: Any) -> Any:

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import os
+import time
+
 import numpy as np
 import pytest
 
+from poise.envs import episodes
 from poise.envs.data.trajectory import Trajectory
 from poise.envs.episodes import EpisodeStore, exact
 from poise.envs.sensors.noise import NoiseModel
+from poise.filters.support.version import code_version
 
 
 def episode(number: int) -> Trajectory:
@@ -66,6 +71,38 @@ def test_memory_and_folder_are_bounded(store):
     assert calls == list(range(6))
     draw(0)
     assert calls == [*range(6), 0]
+
+
+def test_checkouts_of_other_versions_share_the_folder(store, monkeypatch):
+    make, calls = store
+    _, ours = make(on_disk=50_000)
+    ours(1)
+    with monkeypatch.context() as other:
+        other.setattr(episodes, "code_version", lambda *layers: "other")
+        _, theirs = make(on_disk=50_000)
+        theirs(2)
+    kept, ours = make(on_disk=50_000)
+    ours(1)
+    assert calls == [1, 2]
+    assert {path.parent.name for path in kept.folder.rglob("*.h5")} == {code_version("filters", "envs"), "other"}
+    for number in range(3, 20):
+        ours(number)
+    assert {path.parent.name for path in kept.folder.rglob("*.h5")} == {code_version("filters", "envs")}
+    assert not (kept.folder / "other").exists()
+
+
+def test_what_nobody_read_for_a_month_is_removed(store):
+    make, calls = store
+    kept, draw = make(in_memory=1)
+    for number in range(2):
+        draw(number)
+    old = kept.path((0,))
+    os.utime(old, (time.time() - 31 * 86400.0,) * 2)
+    draw(2)
+    assert not old.exists()
+    assert kept.path((1,)).exists()
+    draw(0)
+    assert calls == [0, 1, 2, 0]
 
 
 def test_settings_without_an_exact_form_stay_in_memory(store):
