@@ -204,8 +204,12 @@ def episode_path(folder: Path, env_id: str, index: int) -> Path:
 
 def record_episode(env_id: str, options: Mapping[str, Any], seed: int, path: Path) -> Path:
     """Play one episode and write it; the file appears whole or not at all."""
-    trajectory = record_once(make_environment(env_id, **options), seed)
-    return trajectory.replace(metadata={**trajectory.metadata, "name": path.stem}).save(path)
+    return named(record_once(make_environment(env_id, **options), seed), path).save(path)
+
+
+def named(trajectory: Trajectory, path: Path) -> Trajectory:
+    """The same with the name of its file."""
+    return trajectory.replace(metadata={**trajectory.metadata, "name": path.stem})
 
 
 def record_episodes(

@@ -261,6 +261,16 @@ class RiderBicycleEnv(PoseEnv):
         """The person on the bicycle and the ground of the present ride, for a picture."""
         return self._worn.posture, self._source.ground
 
+    def ride_with(self, leader: RiderBicycleEnv) -> None:
+        """Sense the rides of another environment from now on instead of riding them again, with the same results.
+
+        A reset must follow one of the other environment with the same seed and options. Neither can take snapshots.
+
+        Raises:
+            ValueError: bicycle, rider model or sampling differ.
+        """
+        self._source.follow(leader._source)
+
     def begin(self, motion: np.random.Generator, sensors: np.random.Generator, options: Mapping[str, Any]) -> int:
         """Draw rider, course and movements, and start the ride."""
         chosen = named_scenario(options.get("scenario", self.scenario))

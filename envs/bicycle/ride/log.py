@@ -14,6 +14,7 @@ from ..rider.limbs import Limb, LimbPosture, reach_to
 from ..rider.posture import KNEE_OUT, LIMBS, SIDES, SIGNS, two_turns
 from .contact_forces import Contact
 from .ride import Ride
+from .tape import PhysicsStep, Tape, advance
 
 
 @dataclass(frozen=True)
@@ -62,10 +63,15 @@ class RideRecorder:
         sampling: of the contact forces. ``interval``: their mean in bicycle axes over all physics steps of a sample,
             turned into the world at its end, so that a force sensor on the bicycle reads the mean of what acts on it;
             ``instant``: those of the last physics step.
+        tape: of the ride, if other recorders read it too; None rides on without one.
+        begin: number of the first physics step on the tape that is recorded.
     """
 
-    def __init__(self, ride: Ride, steps: int, sampling: Sampling = "interval") -> None:
+    def __init__(
+        self, ride: Ride, steps: int, sampling: Sampling = "interval", tape: Tape | None = None, begin: int = 0
+    ) -> None:
         self.ride, self.steps, self.sampling = ride, steps, sampling
+        self._tape, self._next = tape, begin
         rider, links = ride.rider, ride.bicycle.links
         self._links = [links["front_assembly"], links["crank"], *rider.mass_links]
         self._names = ["front_assembly", "crank", "pelvis", "trunk"]
@@ -76,20 +82,20 @@ class RideRecorder:
 
     def record(self, samples: int) -> RideLog:
         """Ride on for some samples; stops early after the one in which the rider fell."""
-        ride, rider, body = self.ride, self.ride.rider, self.ride.bicycle.body
-        states = np.empty((samples * self.steps + 1, len(body.state)))
-        states[0] = body.state
+        first = self.ride.bicycle.body.state if self._tape is None else self._tape.state(self._next)
+        states = np.empty((samples * self.steps + 1, len(first)))
+        states[0] = first
         forces, torques, times, fallen, swivels = [], [], [], [], []
         for _ in range(samples):
             for _ in range(self.steps):
-                ride.step()
-                forces.append(rider.raw_forces())
-                states[len(forces)] = body.state
-            torques.append(rider.torques)
-            times.append(ride.physics.time)
-            swivels.append(rider.swivel)
-            fallen.append(ride.fallen)
-            if fallen[-1]:
+                step = self._advance()
+                forces.append(step.forces)
+                states[len(forces)] = step.state
+            torques.append(step.torques)
+            times.append(step.time)
+            swivels.append(step.swivel)
+            fallen.append(step.fallen)
+            if step.fallen:
                 break
         states = states[: len(forces) + 1]
         first, rates = BASE_SIZE + np.array(self._joints), (states.shape[1] - BASE_SIZE) // 2
@@ -105,6 +111,13 @@ class RideRecorder:
             np.array(fallen),
             np.array(swivels),
         )
+
+    def _advance(self) -> PhysicsStep:
+        """The next physics step, from the tape or ridden."""
+        if self._tape is None:
+            return advance(self.ride)
+        self._next += 1
+        return self._tape.step(self._next - 1)
 
     def _motion(self, states: np.ndarray) -> CentreMotion:
         """Motion of base and links from the states of all physics steps."""

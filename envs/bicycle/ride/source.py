@@ -6,7 +6,7 @@ import copy
 import math
 import uuid
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
@@ -24,6 +24,7 @@ from ..rider.style import RiderMotion, RiderStyle, rider_style
 from .log import RideLog, RideRecorder
 from .pilot import IDEAL, PILOTS, RANDOM, PilotParameters
 from .ride import Ride, RideMemory
+from .tape import Tape
 from .truth import Quaternions, continuous_pose, segment_states, true_pose
 
 SETTLING = 1.0
@@ -93,6 +94,8 @@ class RideSource:
             raise ValueError(f"rate must be at least {1.0 / SETTLING:g} Hz, got {rate:g}")
         self._settling, self._each = round(SETTLING * physics_rate), round(physics_rate / rate)
         self.ride: Ride | None = None
+        self._tape: Tape | None = None
+        self._taped, self._leader = False, cast("RideSource | None", None)
         self.fallen_at = math.inf
         self._kept: dict[str, RideMemory] = {}
         self._motion_key: tuple[Any, ...]
@@ -100,6 +103,20 @@ class RideSource:
         self._first: RideMemory
         self.posture: Posture
         self.ground: Ground
+
+    def follow(self, leader: RideSource) -> None:
+        """From now on read the rides of another source, which keeps them on a tape, instead of riding them again.
+
+        Every ride must have begun there, with the same draw. Neither source can save its rides then.
+
+        Raises:
+            ValueError: the other source rides another bicycle, rider model or sampling.
+        """
+        for name in ("bicycle", "fidelity", "sampling"):
+            ours, theirs = getattr(self, name), getattr(leader, name)
+            if ours != theirs:
+                raise ValueError(f"{name} must be that of the ride that is shared, {theirs!r}, got {ours!r}")
+        self._leader, leader._taped = leader, True
 
     def begin(self, scenario: Scenario, subject: Any, motion: np.random.Generator) -> None:
         """Begin a ride one sample before its first second is over; what was drawn is kept to ride it again.
@@ -119,19 +136,31 @@ class RideSource:
             self.pilot,
             seed,
         )
-        if self.ride is not None and self.ride.fallen:
-            self.close()
-        if self.ride is None or key != self._motion_key:
-            plan = (scenario, subject, copy.deepcopy(motion))
-            self._ride_first_second(scenario, subject, motion)
-            self._plan, self._motion_key = plan, key
+        if self._leader is not None:
+            self._take_ride(self._leader, key)
         else:
-            self.ride.restore(self._first)
+            if self.ride is not None and (self.ride.fallen or self._taped):
+                self.close()
+            if self.ride is None or key != self._motion_key:
+                plan = (scenario, subject, copy.deepcopy(motion))
+                self._ride_first_second(scenario, subject, motion)
+                self._plan, self._motion_key = plan, key
+            else:
+                self.ride.restore(self._first)
         assert self.ride is not None
-        self._recorder = RideRecorder(self.ride, self._each, self.sampling)
+        begin = self._settling - self._each
+        self._recorder = RideRecorder(self.ride, self._each, self.sampling, self._tape, begin)
         self._began = self._settling * self.ride.physics.time_step
         self._samples, self.fallen_at, self._head.state = 0, math.inf, None
         self._quaternions: Quaternions = {}
+
+    def _take_ride(self, leader: RideSource, key: tuple[Any, ...]) -> None:
+        """Share the present ride of another source."""
+        if leader.ride is None or leader._motion_key != key:
+            raise ValueError("the ride that is shared must have begun, with the same scenario, rider and seed")
+        self.ride, self._tape, self._motion_key = leader.ride, leader._tape, key
+        self.posture, self.ground = leader.posture, leader.ground
+        self._head = HeadMotion(self.posture, self.ride.rider.motion.gaze, self.rate)
 
     def _ride_first_second(self, scenario: Scenario, subject: Any, motion: np.random.Generator) -> None:
         """Draw rider, course and movements, and settle on the saddle."""
@@ -181,6 +210,9 @@ class RideSource:
             self._world_key, self.posture = world, posture
         self.ground = course.ground
         self._head = HeadMotion(posture, movement.gaze, self.rate)
+        if self._taped:
+            self._tape = Tape(self.ride)
+            return
         for _ in range(self._settling - self._each):
             self.ride.step()
         self._first = self.ride.save()
@@ -206,6 +238,8 @@ class RideSource:
     def save(self) -> SavedRide:
         """The drawn ride and the position in it, with a reference to PyBullet's state for a quick return."""
         assert self.ride is not None
+        if self._tape is not None:
+            raise RuntimeError("a ride that several environments share cannot be saved")
         token = uuid.uuid4().hex
         self._kept[token] = self.ride.save()
         if len(self._kept) > KEPT:
@@ -227,7 +261,7 @@ class RideSource:
 
     def close(self) -> None:
         """End the world; may be called twice."""
-        ride, self.ride = self.ride, None
+        ride, self.ride, self._tape = self.ride, None, None
         self._kept = {}
-        if ride is not None:
+        if ride is not None and self._leader is None:
             ride.close()

@@ -1,0 +1,58 @@
+"""Physics steps of one ride, kept so that several recorders of different rates read them: a ride is ridden once."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from .ride import Ride
+
+
+class PhysicsStep(NamedTuple):
+    """What a recorder needs of one physics step."""
+
+    state: np.ndarray
+    """state of the bodies after it, see :attr:`poise.envs.physics.multibody.Multibody.state`"""
+    forces: Sequence[Sequence[float]]
+    """of hands and feet in it, see :meth:`.Rider.raw_forces`"""
+    torques: list[float]
+    """N·m of the rider's muscles in it"""
+    swivel: list[float]
+    """rad, wanted swivels of the limbs"""
+    time: float
+    """s of the physics after it"""
+    fallen: bool
+
+
+def advance(ride: Ride) -> PhysicsStep:
+    """Ride one physics step; its ``state`` is overwritten by the next one."""
+    ride.step()
+    rider = ride.rider
+    return PhysicsStep(
+        ride.bicycle.body.state, rider.raw_forces(), rider.torques, rider.swivel, ride.physics.time, ride.fallen
+    )
+
+
+class Tape:
+    """A ride from its start, ridden on when a step is wanted that is not there yet.
+
+    Args:
+        ride: at its start; nobody else may step it.
+    """
+
+    def __init__(self, ride: Ride) -> None:
+        self.ride, self.start = ride, ride.bicycle.body.state.copy()
+        self._steps: list[PhysicsStep] = []
+
+    def step(self, number: int) -> PhysicsStep:
+        """The physics step of this number; the first is 0."""
+        while len(self._steps) <= number:
+            step = advance(self.ride)
+            self._steps.append(step._replace(state=step.state.copy()))
+        return self._steps[number]
+
+    def state(self, number: int) -> np.ndarray:
+        """State of the bodies before the physics step of this number."""
+        return self.step(number - 1).state if number else self.start
