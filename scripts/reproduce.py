@@ -2,13 +2,17 @@
 
 Papers: two-gyro, force-inertial, whole-body, accelerometer-array, external-acceleration; all does the five, several at
 a time, and prints one page of coverage. Results are kept in the run folder; --resume continues an interrupted study.
+If one of the five fails, the others are finished, the exit status is 1, and --resume does the failed one again.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import os
-from collections.abc import Iterator
+import sys
+import traceback
+from collections.abc import Iterator, Sequence
+from concurrent.futures import BrokenExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,6 +29,8 @@ if TYPE_CHECKING:
     from ..baselines.studies.report import Entry, Report
 
 
+DONE = "done.json"
+"""File in the folder of a work that is finished."""
 EVERY = "all"
 """In the place of a paper: all of them."""
 
@@ -80,28 +86,79 @@ def run(args: Args) -> int:
 
 
 def run_every(args: Args, settings: dict[str, Any]) -> int:
-    """Do all studies, one in each process; a study that is done is not done again when the run is resumed."""
+    """Do all studies, one in each process; those that are done are not done again when the run is resumed.
+
+    Returns:
+        0, or 1 if a study failed: the others are finished all the same.
+    """
     from ..baselines.studies import PAPERS, coverage
+    from ..baselines.studies.kit import Study
+    from ..baselines.studies.shared_rides import record_rides
     from ..filters.support.files import write_text
-    from ..filters.support.parallel import in_parallel
 
     check(settings)
     folder = open_run("reproduce", args, may_differ=("page",))
-    jobs = [(paper, {**settings, "processes": 1, "progress": False}, folder) for paper in PAPERS]
+    rides = folder.folder.resolve() / "rides"
+    left = [paper for paper in PAPERS if not is_done(paper, folder)]
+    record_rides(Study(folder.folder.resolve(), **settings, rides=rides), left)
+    failed: dict[str, str] = {}
     with Output("reproduce", args) as out:
-        for paper in in_parallel(one_study, jobs, args.processes, label="works", unit="work"):
-            if not out.as_json:
+        for paper, error in attempts(left, {**settings, "rides": rides}, folder):
+            if error is not None:
+                failed[paper] = error
+                print(f"{paper} is not computed: {error}", file=sys.stderr)
+            elif not out.as_json:
                 out.say(f"{paper}: {coverage.counted(coverage.read(folder.folder / paper))}")
-        works = {paper: coverage.read(folder.folder / paper) for paper in PAPERS}
+        works = {paper: coverage.read(folder.folder / paper) for paper in PAPERS if paper not in failed}
         for paper, rows in works.items():
             shown = [{name: row[name] for name in ("item", "content", "verdict")} for row in rows]
             out.table(shown, paper, console=console(None))
         command = command_line("reproduce", args, ("quick", "seed", "subjects", "seeds", "duration"))
-        page = coverage.page(works, f"- `{command}`\n{made_with(folder)}")
+        page = coverage.page(works, f"- `{command}`\n{made_with(folder)}", failed)
         if args.page is not None:
             write_text(args.page, page)
+        out.add(failed=failed)
         out.report(write_text(folder.folder / "report.md", page))
-    return 0
+        if failed:
+            out.say(f"not computed: {', '.join(failed)}; do that again with --resume {folder.folder}")
+    return 1 if failed else 0
+
+
+def attempts(papers: Sequence[str], settings: dict[str, Any], run: Run) -> Iterator[tuple[str, str | None]]:
+    """Do the studies of papers, one in each process; paper and error (None: it is done), as soon as each ends."""
+    from ..filters.support.parallel import in_parallel
+
+    jobs = [(paper, {**settings, "processes": 1, "progress": False}, run) for paper in papers]
+    waiting = dict.fromkeys(papers)
+    try:
+        for paper, error in in_parallel(attempt, jobs, settings["processes"], label="works", unit="work"):
+            del waiting[paper]
+            yield paper, error
+    except BrokenExecutor as error:
+        # a process was killed, and with it went the results of the others at work
+        for paper in waiting:
+            yield paper, None if is_done(paper, run) else f"{type(error).__name__}: {error}".splitlines()[0]
+
+
+def attempt(paper: str, settings: dict[str, Any], run: Run) -> tuple[str, str | None]:
+    """:func:`one_study`, with its error in one line; all of it goes to ``error.txt`` in the folder of the work."""
+    from ..filters.support.files import write_text
+
+    report = run.folder / paper / "error.txt"
+    try:
+        one_study(paper, settings, run)
+    except Exception as error:
+        write_text(report, traceback.format_exc())
+        return paper, f"{type(error).__name__}: {error}".splitlines()[0]
+    report.unlink(missing_ok=True)
+    return paper, None
+
+
+def is_done(paper: str, run: Run) -> bool:
+    """Whether the study of a paper was finished in this run, with this version of the code."""
+    from ..filters.support.resume import is_kept
+
+    return is_kept(run.folder / paper / DONE, {"paper": paper})
 
 
 def made_with(run: Run) -> str:
@@ -113,25 +170,21 @@ def made_with(run: Run) -> str:
     return f"- poise {state['poise']['version']}{commit}{changed}, Python {state['python']}\n- {packages}"
 
 
-def one_study(paper: str, settings: dict[str, Any], run: Run) -> str:
-    """Do the study of one paper in a folder of its own in the run's, unless it is done; returns the paper's name."""
+def one_study(paper: str, settings: dict[str, Any], run: Run) -> None:
+    """Do the study of one paper in a folder of its own in the run's."""
     from ..baselines.studies import find_paper
     from ..baselines.studies.kit import Study
     from ..baselines.studies.report import Report
-    from ..filters.support.resume import is_kept, keep
+    from ..filters.support.resume import keep
 
     folder = dataclasses.replace(run, folder=run.folder / paper)
-    done, key = folder.folder / "done.json", {"paper": paper}
-    if is_kept(done, key):
-        return paper
     folder.figures.mkdir(parents=True, exist_ok=True)
     write_json(folder.folder / "versions.json", run.versions)
     report = Report(folder.folder)
     find_paper(paper)(Study(folder.folder.resolve(), **settings), report)
     folder.write_results(report.results)
     write(f"poise reproduce {paper}", folder, report)
-    keep(done, key, len(report.entries))
-    return paper
+    keep(folder.folder / DONE, {"paper": paper}, len(report.entries))
 
 
 @contextmanager

@@ -117,13 +117,17 @@ def read(folder: Path) -> list[dict[str, str]]:
         return list(csv.DictReader(file))
 
 
-def page(works: Mapping[str, Sequence[Mapping[str, Any]]], provenance: str) -> str:
+def page(
+    works: Mapping[str, Sequence[Mapping[str, Any]]], provenance: str, failed: Mapping[str, str] | None = None
+) -> str:
     """Markdown page of all works: how many items have each verdict, then a table for each work.
 
     Args:
         works: name of the work → rows of its table.
         provenance: Markdown that says with what the numbers were computed.
+        failed: name of a work that was not computed → its error.
     """
+    failed = failed or {}
     every = [row for rows in works.values() for row in rows]
     parts = [
         "# Coverage of the five works",
@@ -134,7 +138,11 @@ def page(works: Mapping[str, Sequence[Mapping[str, Any]]], provenance: str) -> s
         "* *Cannot be answered*: a simulator has no counterpart.",
         f"{len(every)} items: {counted(every)}. The page is written by `poise reproduce all --page FILE`.",
     ]
+    if failed:
+        parts.append(f"**Not computed: {', '.join(failed)}.** What is counted above is without.")
     for work, rows in works.items():
         parts += [f"## {work}", f"{counted(rows)[:1].upper()}{counted(rows)[1:]}."]
         parts.append(markdown_table(rows, COLUMNS[:4]))
+    for work, error in failed.items():
+        parts += [f"## {work}", f"Not computed: `{error}`"]
     return "\n\n".join([*parts, "## Provenance", provenance]) + "\n"

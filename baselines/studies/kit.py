@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from ...envs.bicycle.several_suites import record_suite_files
 from ...envs.data.trajectory import Trajectory, load_trajectory
 from ...envs.record import plain, record_episode
 from ...filters.support.files import write_text
@@ -22,6 +23,10 @@ from ...filters.support.seeds import named_seed
 from ...filters.support.version import code_version
 
 RIDER = "poise/RiderBicycle-v0"
+OF_SENSORS = ("suite", "sensors", "rate")
+"""Arguments of the environment that leave the ride as it is."""
+RideJob = tuple[str, dict[str, Any], int, Path]
+"""Environment, its arguments, seed and file of a ride, as :func:`.record_episode` takes them."""
 
 
 @dataclass(frozen=True)
@@ -50,6 +55,8 @@ class Study:
     """recorded data (files or folders) to look at as well"""
     progress: bool = True
     """show bars on the standard error"""
+    rides: Path | None = None
+    """where rides go that several studies share; None for ``rides/`` in the folder"""
 
     def __post_init__(self) -> None:
         if self.seed < 0:
@@ -66,7 +73,7 @@ class Study:
         """A seed below 2³² that depends on the root seed and on the names only."""
         return named_seed(self.seed, *names)
 
-    def ride_files(
+    def ride_jobs(
         self,
         scenario: str,
         suite: str | Sequence[str],
@@ -77,8 +84,8 @@ class Study:
         duration: float | None = None,
         style: str | None = None,
         options: Mapping[str, Any] | None = None,
-    ) -> list[Path]:
-        """Rides of every subject and seed in ``poise/RiderBicycle-v0``, recorded once.
+    ) -> list[RideJob]:
+        """What records the rides of every subject and seed in ``poise/RiderBicycle-v0``.
 
         The motion of a ride depends on the root seed, scenario, subject and index alone: other sensors see the same
         ride (if duration, fidelity and style are the same).
@@ -94,9 +101,7 @@ class Study:
             options: further arguments of the environment.
 
         Returns:
-            Their files, for :func:`load_ride`: :meth:`map` should get them rather than long trajectories. Rides are
-            named ``<scenario>-<subject>-<index>``, subjects first. One that ended in a fall is as long as the rider was
-            up, and its ``metadata["ended"]`` is ``terminated``.
+            One for each ride, named ``<scenario>-<subject>-<index>``, subjects first.
         """
         settings = {
             "scenario": scenario,
@@ -114,7 +119,16 @@ class Study:
             for index in range(self.seeds)
         ]
         suite_name = suite if isinstance(suite, str) else "channels"
-        return self._recorded(RIDER, f"{scenario}-{suite_name}-{sensors}", settings, wanted)
+        return self._jobs(RIDER, f"{scenario}-{suite_name}-{sensors}", settings, wanted)
+
+    def ride_files(self, scenario: str, suite: str | Sequence[str], **settings: Any) -> list[Path]:
+        """Rides of :meth:`ride_jobs`, which has the same arguments, recorded once.
+
+        Returns:
+            Their files, for :func:`load_ride`: :meth:`map` should get them rather than long trajectories. A ride that
+            ended in a fall is as long as the rider was up, and its ``metadata["ended"]`` is ``terminated``.
+        """
+        return self._recorded(scenario, self.ride_jobs(scenario, suite, **settings))
 
     def episodes(
         self, env_id: str, count: int, *, name: str, options: Mapping[str, Any] | None = None
@@ -132,21 +146,31 @@ class Study:
         """
         settings = dict(options or {})
         wanted = [(f"{name}-{index}", self.seed_of(env_id, name, index), settings) for index in range(count)]
-        return [load_ride(path) for path in self._recorded(env_id, name, settings, wanted)]
+        return [load_ride(path) for path in self._recorded(name, self._jobs(env_id, name, settings, wanted))]
 
-    def _recorded(
+    def _jobs(
         self, env_id: str, label: str, settings: Mapping[str, Any], wanted: list[tuple[str, int, dict[str, Any]]]
-    ) -> list[Path]:
+    ) -> list[RideJob]:
         origin = [env_id, plain(settings), code_version("filters", "envs")]
-        folder = self.folder / "rides" / f"{slug(label)}-{digest(origin)}"
-        paths = [folder / f"{slug(name)}.h5" for name, _, _ in wanted]
-        jobs = [
-            (env_id, options, seed, path)
-            for path, (_, seed, options) in zip(paths, wanted, strict=True)
-            if not path.exists()
-        ]
-        self._compute(record_episode, jobs, label, "ride")
-        return paths
+        folder = (self.rides or self.folder / "rides") / f"{slug(label)}-{digest(origin)}"
+        return [(env_id, options, seed, folder / f"{slug(name)}.h5") for name, seed, options in wanted]
+
+    def _recorded(self, label: str, jobs: list[RideJob]) -> list[Path]:
+        self._compute(record_episode, [job for job in jobs if not job[-1].exists()], label, "ride")
+        return [job[-1] for job in jobs]
+
+    def record_together(self, jobs: Iterable[RideJob]) -> None:
+        """Record rides of ``poise/RiderBicycle-v0`` that are not there yet, each once for all suites that want it.
+
+        A ride that cannot be recorded is left out: the study that needs it tries again, and its error counts.
+        """
+        together: dict[str, list[RideJob]] = {}
+        for job in jobs:
+            _, options, seed, path = job
+            if not path.exists():
+                motion = {name: value for name, value in options.items() if name not in OF_SENSORS}
+                together.setdefault(digest([plain(motion), seed]), []).append(job)
+        self._compute(record_or_leave, [(each,) for each in together.values()], "rides", "ride")
 
     def cached(self, key: str, function: Callable[..., Any], *args: Any) -> Any:
         """``function(*args)``, computed once a run folder and version of the code.
@@ -197,6 +221,15 @@ class Study:
         label = label if self.progress else ""
         for _ in in_parallel(function, jobs, self.processes, label=label, unit=unit):
             pass
+
+
+def record_or_leave(jobs: Sequence[RideJob]) -> None:
+    """Record one ride for all jobs, or none of them if it fails."""
+    _, options, seeds, paths = zip(*jobs, strict=True)
+    try:
+        record_suite_files(options, seeds[0], paths)
+    except Exception as error:
+        print(f"{paths[0].stem} is recorded later: {type(error).__name__}: {error}", file=sys.stderr)
 
 
 def compute(path: Path, key: dict[str, Any], function: Callable[..., Any], job: tuple[Any, ...]) -> None:

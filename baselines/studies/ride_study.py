@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -19,7 +19,7 @@ from ...filters.core.quantity import Estimate
 from ..evaluation import COLUMNS
 from .averages import circular_mean, largest, mean_of, mean_rms, rounded, windowed
 from .claims import Claim
-from .kit import Study, load_ride
+from .kit import RideJob, Study, load_ride
 from .report import STD, Report
 from .yaw import yaw_claim, yaw_drift
 
@@ -69,10 +69,12 @@ class RideStudy:
     """What a paper's study does with every ride. Everything in it can be pickled, since rides are assessed in parallel.
 
     Args:
-        name: of the estimator.
+        name: of the estimator, and of the work.
+        suite: of its sensors.
         model: class with ``for_rider(geometry, dt=…, **options)``.
         variants: name → how the filter is run; the first is the one that everything is compared with.
         ablations: name → the same filter with better sensors.
+        scenarios: courses of its rides → most rides of each rider (None: as many as the study has).
         angles: name of an angle in the paper → quantity and component.
         truth: truth of a ride → quantities of the model.
         states: angle → element of the error state, of angles that are states.
@@ -94,9 +96,11 @@ class RideStudy:
     """
 
     name: str
+    suite: str
     model: Any
     variants: Mapping[str, Variant]
     ablations: Mapping[str, Variant]
+    scenarios: Mapping[str, int | None]
     angles: Mapping[str, tuple[str, int]]
     truth: Callable[[Mapping[str, np.ndarray]], Mapping[str, np.ndarray]]
     states: Mapping[str, int]
@@ -211,9 +215,19 @@ class RideStudy:
         error = np.radians(np.stack([errors[angle][settled] for angle in angles], axis=-1))
         return float(np.mean(nees(error, estimate.covariance[settled][:, states][:, :, states]))) / len(states)
 
-    def run(self, study: Study, scenario: str, suite: str) -> tuple[list[Path], list[dict[str, Any]]]:
+    def part(self, study: Study, scenario: str) -> Study:
+        """The study with as many rides as this scenario has."""
+        most = self.scenarios[scenario]
+        return study if most is None else replace(study, seeds=min(most, study.seeds))
+
+    def jobs(self, study: Study) -> list[RideJob]:
+        """What records the rides of all scenarios."""
+        return [job for name in self.scenarios for job in self.part(study, name).ride_jobs(name, self.suite)]
+
+    def run(self, study: Study, scenario: str) -> tuple[list[Path], list[dict[str, Any]]]:
         """Record the rides of a scenario and assess each, several at a time; returns their files and their numbers."""
-        paths = study.ride_files(scenario, suite)
+        study = self.part(study, scenario)
+        paths = study.ride_files(scenario, self.suite)
         return paths, study.map(f"rides {scenario}", assessed, [(self, path) for path in paths])
 
     def report(self, report: Report, course: str, results: list[dict[str, Any]], claims: Sequence[Claim] = ()) -> None:

@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import json
 import sys
+from concurrent.futures import BrokenExecutor
 from types import ModuleType
 
 import pandas
 import pytest
+from joblib import Parallel
 
 from poise.baselines import studies as package
 from poise.baselines.plots import new_figure
 from poise.baselines.studies.coverage import Item, cover
+from poise.scripts.experiment import Run
 from poise.scripts.main import main
+from poise.scripts.reproduce import attempts
 
 STUDIES = []
 
@@ -122,6 +126,52 @@ def test_all_papers_make_one_page_and_what_is_done_is_not_done_again(tmp_path, c
     assert "poise reproduce all --quick --seed 0" in text
     assert main([*words, "--resume", str(folder)]) == 0
     assert len(STUDIES) == 1
+
+
+def broken(study, report):
+    if not (study.folder / "mended").exists():
+        raise ValueError("a ride of 3 s is too short\nand so on")
+    reproduce(study, report)
+
+
+@pytest.mark.parametrize("processes", ["1", "2"])
+def test_a_work_that_fails_stops_no_other_and_alone_is_done_again(tmp_path, capsys, monkeypatch, processes):
+    module = ModuleType("poise.baselines.studies.bad")
+    vars(module).update(reproduce=broken)
+    monkeypatch.setitem(sys.modules, module.__name__, module)
+    monkeypatch.setattr(package, "PAPERS", {"bad": ".bad", "small": ".small"})
+    if processes == "2":
+        # in threads, since other processes do not know these studies
+        monkeypatch.setattr("joblib.Parallel", lambda **options: Parallel(**options, prefer="threads"))
+    page = tmp_path / "page.md"
+    words = ["reproduce", "all", "--quick", "--processes", processes, "--runs", str(tmp_path), "--page", str(page)]
+    assert main(words) == 1
+    shown = capsys.readouterr()
+    assert "bad is not computed: ValueError: a ride of 3 s is too short" in shown.err
+    assert "small: 1 reproduced, 1 cannot be answered" in shown.out
+    text = page.read_text(encoding="utf-8")
+    assert "## bad\n\nNot computed: `ValueError: a ride of 3 s is too short`" in text
+    assert "**Not computed: bad.**" in text
+    assert "| Table I | squares of numbers | reproduced |" in text
+    (folder,) = (tmp_path / "reproduce").iterdir()
+    assert "and so on" in (folder / "bad" / "error.txt").read_text(encoding="utf-8")
+    assert len(STUDIES) == 1
+    (folder / "bad" / "mended").touch()
+    assert main([*words, "--resume", str(folder)]) == 0
+    assert [study.folder.name for study in STUDIES] == ["small", "bad"]
+    assert "Not computed" not in page.read_text(encoding="utf-8")
+    assert not (folder / "bad" / "error.txt").exists()
+
+
+def test_works_of_a_process_that_was_killed_are_named(tmp_path, monkeypatch):
+    def killed(*_, **__):
+        yield "one", None
+        raise BrokenExecutor("the process was killed")
+
+    monkeypatch.setattr("poise.filters.support.parallel.in_parallel", killed)
+    run = Run(tmp_path, "reproduce", 0)
+    found = list(attempts(["one", "two"], {"processes": 2}, run))
+    assert found == [("one", None), ("two", "BrokenExecutor: the process was killed")]
 
 
 def test_the_page_is_that_of_all_papers(tmp_path, capsys):

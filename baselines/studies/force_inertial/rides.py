@@ -144,6 +144,7 @@ def torque_numbers(
 
 RIDES = RideStudy(
     name="force-inertial",
+    suite="force-inertial",
     model=ForceInertial,
     variants={
         OURS: Variant(),
@@ -165,6 +166,7 @@ RIDES = RideStudy(
         "gyroscopes: no bias": Variant(samples=partial(without_errors, unbiased=GYROSCOPES)),
         EXACT: Variant(samples=partial(without_errors, unbiased=GYROSCOPES, exact=FORCES)),
     },
+    scenarios={"indoor_circle": None, "outdoor": None},
     angles={name: ("force-inertial/trunk_angles", i) for i, name in enumerate(ANGLES[:3])}
     | {"φ_b": ("bicycle/roll", 0)},
     truth=_truth,
@@ -222,8 +224,8 @@ def rides(study: Study, report: Report) -> None:
         "Variants: *geometry measured*: segment lengths within 2 %, joints within 1 cm, trunk mass within 3 %. "
         "*Without load cells*: they read a constant. *No pedals, no pelvis, sum of the hands*: the paper's point mass."
     )
-    for scenario in ("indoor_circle", "outdoor"):
-        paths, every = RIDES.run(study, scenario, "force-inertial")
+    for scenario in RIDES.scenarios:
+        paths, every = RIDES.run(study, scenario)
         mean = {name: mean_of(each["torques"][name] for each in every) for name in ("read", "dynamic", "static")}
         bound = mean_of(each["white bound"] for each in every)
         drawn = course_figures(RIDES, report, paths, every, scenario)

@@ -120,6 +120,7 @@ def _arm(model: WholeBody, side: str, pose: Mapping[str, np.ndarray], steer: np.
 
 RIDES = RideStudy(
     name="whole-body",
+    suite="whole-body",
     model=WholeBody,
     variants={
         "filter": Variant(),
@@ -133,6 +134,7 @@ RIDES = RideStudy(
         STRAPDOWN: Variant(model=WholeBodyIntegration),
     },
     ablations={},
+    scenarios=dict.fromkeys(COURSES.values()),
     angles=ANGLES,
     truth=true_angles,
     states=STATES,
@@ -184,7 +186,7 @@ def rides(study: Study, report: Report) -> None:
     table_i(report)
     table_ii(report)
     for course, scenario in COURSES.items():
-        paths, every = RIDES.run(study, scenario, "whole-body")
+        paths, every = RIDES.run(study, scenario)
         first, last = (np.mean([each["deviations"][i] for each in every], axis=0) for i in (0, 1))
         hinge, swivel = np.max([each["hinges"] for each in every]), np.mean([each["swivels"] for each in every])
         claims = [

@@ -1,0 +1,22 @@
+"""Rides of all works, recorded before the works begin: a ride that several of them want is ridden once."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+
+from .kit import Study
+
+
+def record_rides(study: Study, papers: Collection[str]) -> None:
+    """Record the rides of these works, several at a time; :attr:`.Study.rides` is where they find them.
+
+    Args:
+        study: of all works.
+        papers: names; those that ride nothing may be among them.
+    """
+    from .force_inertial.rides import RIDES as FORCE_INERTIAL
+    from .two_gyro.rides import RIDES as TWO_GYRO
+    from .whole_body.rides import RIDES as WHOLE_BODY
+
+    works = (TWO_GYRO, FORCE_INERTIAL, WHOLE_BODY)
+    study.record_together(job for work in works if work.name in papers for job in work.jobs(study))
