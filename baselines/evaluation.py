@@ -20,7 +20,7 @@ from ..filters.core.quantity import ORIENTATION
 from ..filters.support.parallel import progress_bar
 from .measures import measures
 from .registry import list_estimators, make_estimator
-from .run import fitted, run_on
+from .run import fitted, run_on, without_estimate
 from .scoring import (
     COLUMNS,
     LARGEST_NORTH,
@@ -197,7 +197,12 @@ class Evaluation:
                 )
                 self.skipped[label] = f"no channel {', '.join(lacking)}{hint}"
                 return
-            self.estimates[label] = (estimator, run_on(estimator, self.trajectory))
+            estimate = run_on(estimator, self.trajectory)
+            reason = without_estimate(estimator, self.trajectory.measurements, estimate)
+            if reason:
+                self.skipped[label] = reason
+                return
+            self.estimates[label] = (estimator, estimate)
         except Exception as reason:  # user code may raise anything; the results of the others must be kept
             kind = "" if isinstance(reason, ValueError | ImportError) else f"{type(reason).__name__}: "
             self.skipped[label] = f"{kind}{reason}"

@@ -11,6 +11,7 @@ import numpy as np
 from ..envs.data.trajectory import Trajectory
 from ..filters.core.metrics import DEGREES, error
 from ..filters.core.quantity import UP, Estimate
+from ..filters.support.files import replacing
 from .scoring import with_up
 
 if TYPE_CHECKING:
@@ -32,6 +33,8 @@ COLOURS = {
 }
 """Kind of estimator → colour."""
 
+UNDATED = {".png": "Software", ".pdf": "CreationDate", ".svg": "Date"}
+"""Ending of a figure → the entry of its file that differs from run to run."""
 TRUTH_COLOR = "black"
 """Colour of the truth, in every figure."""
 
@@ -71,8 +74,16 @@ def legend_above(ax: Any) -> None:
 
 
 def save(figure: Figure, path: Path) -> Path:
-    """Write a figure as PNG, without a date, so that equal runs give equal files."""
-    figure.savefig(path, metadata={"Software": None})
+    """Write a figure as PNG, PDF or SVG, by its ending, without a date, so that equal runs give equal files.
+
+    Raises:
+        ValueError: another ending.
+    """
+    ending = path.suffix.lower()
+    if ending not in UNDATED:
+        raise ValueError(f"a figure must end in one of {', '.join(UNDATED)}, got {str(path)!r}")
+    with replacing(path) as part:
+        figure.savefig(part, metadata={UNDATED[ending]: None})
     return path
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Mapping
 from numbers import Real
 from typing import Any
@@ -11,7 +12,8 @@ import numpy as np
 
 from ..envs.data.glitches import without_glitches
 from ..envs.data.trajectory import Trajectory
-from ..filters.core.estimator import Estimator
+from ..filters.core.backend import to_numpy
+from ..filters.core.estimator import Estimator, without_impossible
 from ..filters.core.estimator import run as run_sequence
 from ..filters.core.model import equations_of
 from ..filters.core.offline import SUFFIX, Offline
@@ -46,6 +48,9 @@ def run(
     Returns:
         The estimate, time first, with ``time``: as many samples as the trajectory has, or as its grid.
 
+    Warns:
+        UserWarning: there is no estimate at all, as a channel has no valid sample; or see :func:`run_on`.
+
     Raises:
         ValueError: no ``dt`` with arrays; a ``dt`` that contradicts trajectory or estimator; an unknown name; missing
             channels; a clock without uniform sampling (:meth:`Trajectory.on_grid`).
@@ -59,7 +64,11 @@ def run(
             raise ValueError(
                 f"dt={interval:.6g} s contradicts {data.name!r}, which has {on_grid.dt:.6g} s; leave it out"
             )
-        estimate = run_on(fitted(estimator, on_grid), on_grid)
+        made = fitted(estimator, on_grid)
+        estimate = run_on(made, on_grid)
+        reason = without_estimate(made, on_grid.measurements, estimate)
+        if reason:
+            warnings.warn(f"{data.name}: {reason}", stacklevel=2)
         return estimate if grid or on_grid is data else at_samples(estimate, data, on_grid)
     if not isinstance(data, Mapping):
         raise ValueError(f"data must be a Trajectory or a mapping from channel to array, got {type(data).__name__}")
@@ -76,6 +85,9 @@ def run(
             f"use estimator.with_dt({interval:.6g})"
         )
     estimate = run_sequence(estimator, data)
+    reason = without_estimate(estimator, data, estimate)
+    if reason:
+        warnings.warn(reason, stacklevel=2)
     length = len(next(iter(estimate.pose.values())))
     return estimate._replace(time=interval * np.arange(length), layout=layout_of(estimator))
 
@@ -138,6 +150,18 @@ def run_on(estimator: Estimator[Any], trajectory: Trajectory) -> Estimate:
     """Run an estimator over a trajectory that is on its grid already, without glitches."""
     estimate = run_sequence(estimator, without_glitches(trajectory))
     return estimate._replace(time=trajectory.time, layout=layout_of(estimator))
+
+
+def without_estimate(estimator: Estimator[Any], measurements: Mapping[str, Any], estimate: Estimate) -> str:
+    """Why no sample of a recording has an estimate; empty if one has."""
+    if any(bool(np.isfinite(to_numpy(values)).any()) for values in estimate.pose.values()):
+        return ""
+    read = {
+        channel: without_impossible(channel, np.asarray(measurements[channel.name])) for channel in estimator.channels
+    }
+    empty = [channel.name for channel, values in read.items() if not np.isfinite(values).all(axis=-1).any()]
+    cause = f"{', '.join(empty)} without a valid sample" if empty else "too few samples in which all channels are valid"
+    return f"no estimate at all: {cause}"
 
 
 def layout_of(estimator: Estimator[Any]) -> Layout:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from .main import run_command
 from .output import Output
+from .targets import check_file
 
 if TYPE_CHECKING:
     import pandas
@@ -81,6 +82,7 @@ def run(args: Args) -> int:
         raise ValueError(f"{wrong} has nothing for --suite rider, which compares the filters of the papers on riders")
     if args.sweep and args.suite != "rider":
         raise ValueError(f"--sweep belongs to --suite rider, not {args.suite}")
+    check_file("save", args.save, (*args.recordings, *(() if args.baseline is None else (args.baseline,))))
     before = None if args.baseline is None else load_baseline(args.baseline)
     kept = load_results(args.save) if args.save is not None and args.save.exists() else {}
     with plain_warnings(), Output("benchmark", args) as out:

@@ -18,6 +18,7 @@ import json
 import platform
 import shlex
 import subprocess
+import warnings
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from datetime import datetime
 from pathlib import Path
@@ -140,17 +141,25 @@ def open_run(command: str, args: Any, may_differ: Collection[str] = ()) -> Run:
 
 
 def known_recordings(paths: Sequence[Path]) -> list[Trajectory]:
-    """Recordings of files and folders that know an orientation or the inclination.
+    """Recordings of files and folders that know an orientation or the inclination; others are named in warnings.
 
     Raises:
-        ValueError: paths are given but hold none.
+        ValueError: paths are given but hold none, or a file that was named itself cannot be read.
     """
-    from ..envs.data.formats.load import load_recording, recording_files
+    from .recordings.load import load_all, passed_over_text, plain_warnings
 
-    loaded = [load_recording(path) for path in recording_files(tuple(paths))]
-    known = [trajectory for trajectory in loaded if "up" in trajectory.quantities]
-    if paths and not known:
-        raise ValueError(f"recordings must know an orientation, none of {', '.join(map(str, paths))} does")
+    if not paths:
+        return []
+    with plain_warnings():
+        loaded, passed_over = load_all(paths)
+        known = [trajectory for trajectory in loaded if "up" in trajectory.quantities]
+        if not known:
+            raise ValueError(f"recordings must know an orientation, none of {', '.join(map(str, paths))} does")
+        for other in loaded:
+            if "up" not in other.quantities:
+                warnings.warn(f"{other.name} is passed over: it does not know its orientation", stacklevel=2)
+        if passed_over:
+            warnings.warn(f"passed over: {passed_over_text(passed_over)}", stacklevel=2)
     return known
 
 

@@ -9,6 +9,7 @@ import tyro
 
 from .main import run_command
 from .output import Output
+from .targets import check_file
 
 
 @dataclass
@@ -27,6 +28,7 @@ def run(args: Args) -> int:
     """Write the file."""
     from ..baselines.learned.onnx_export import export_onnx
 
+    check_file("onnx", args.onnx, (Path(args.weights),))
     with Output("export", args) as out:
         path = export_onnx(args.weights, args.onnx)
         out.say(f"{path}: {path.stat().st_size / 1000.0:.0f} kB")

@@ -16,6 +16,7 @@ from ..filters.support.names import look_up
 from ..filters.support.parallel import progress_bar
 from .main import run_command
 from .output import Output
+from .targets import check_folder
 
 
 @dataclass
@@ -78,6 +79,7 @@ def run(args: Args) -> int:
     """Record and say where the files are."""
     if args.minari is not None:
         return record_minari(args, args.minari)
+    check_folder("folder", args.folder)
     record, what = recorder(args)
     with Output("record", args) as out:
         with progress_bar(args.episodes, f"record {what}", "episode") as bar:

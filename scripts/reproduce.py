@@ -23,6 +23,7 @@ import tyro
 from .experiment import Run, command_line, open_run, write_json
 from .main import run_command
 from .output import Output
+from .targets import check_file
 
 if TYPE_CHECKING:
     from ..baselines.studies.kit import Study
@@ -72,6 +73,7 @@ def run(args: Args) -> int:
     reproduce = None if args.paper == EVERY else find_paper(args.paper)
     if args.page is not None and args.paper != EVERY:
         raise ValueError(f"--page is the page of all papers: use it with {EVERY!r}, not with {args.paper!r}")
+    check_file("page", args.page, args.recordings)
     args = filled(args)
     for path in args.recordings:
         if not path.exists():

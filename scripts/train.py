@@ -15,6 +15,7 @@ from ..filters.support.rows import jsonable
 from .experiment import command_line, known_recordings, open_run, versions
 from .main import run_command
 from .output import Output
+from .targets import check_file
 
 if TYPE_CHECKING:
     import pandas
@@ -80,6 +81,7 @@ def run(args: Args) -> int:
     from ..baselines.learned.training import train_preset
 
     start = process_times()
+    check_file("export", args.export, args.recordings)
     preset = chosen(args)
     own = known_recordings(args.recordings) if args.recordings else None
     folder = open_run("train", args, may_differ=("test_episodes", "processes"))

@@ -21,6 +21,7 @@ from ..filters.support.seeds import child_seed
 from .experiment import Run, command_line, known_recordings, open_run, start_run, versions
 from .main import run_command
 from .output import Output
+from .targets import check_file
 
 if TYPE_CHECKING:
     from ..baselines.gain_policy.agents.learners import Trained
@@ -90,6 +91,7 @@ def run(args: Args) -> int:
     from ..filters.adaptation.gains import tunable_filter
     from ..filters.adaptation.tuned import TunedFilter
 
+    check_file("export", args.export, args.recordings)
     config = training_config(args)
     tuned = TunedFilter.of(tunable_filter(args.filter), config.gains)
     if args.test_trajectories < 1:

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 
-from ...envs.data.plausibility import vectors
+from ...envs.data.plausibility import seen
 from ...envs.data.trajectory import Trajectory
 from ..registry import list_estimators
 from .data_sets import NORTH, dataset_of
@@ -75,9 +75,12 @@ def motion_of(trajectory: Trajectory) -> Motion:
     Raises:
         ValueError: it has no ``imu/gyr`` and ``imu/acc`` with samples.
     """
-    gyr, acc = vectors(trajectory, "imu/gyr"), vectors(trajectory, "imu/acc")
-    if gyr is None or acc is None or not np.isfinite(gyr).any() or not np.isfinite(acc).any():
+    gyr, acc = seen(trajectory, "imu/gyr"), seen(trajectory, "imu/acc")
+    if gyr is None or acc is None:
         raise ValueError(f"{trajectory.name!r} needs the channels imu/gyr and imu/acc, with samples")
+    if len(trajectory) * trajectory.dt < 2.0 * SMOOTHING:
+        lasts = f"{len(trajectory) * trajectory.dt:.3g} s"
+        raise ValueError(f"{trajectory.name!r} lasts {lasts}; motions are compared from {2.0 * SMOOTHING:g} s on")
     scored = trajectory.mask if trajectory.mask.any() else np.ones(len(trajectory), bool)
     length = np.linalg.norm(acc, axis=1)
     excess = length - np.nanmedian(length)

@@ -31,7 +31,7 @@ def glitches(values: np.ndarray, least: float) -> np.ndarray:
     found = np.zeros(len(values), bool)
     if len(values) < 9:
         return found
-    with np.errstate(invalid="ignore"):
+    with np.errstate(invalid="ignore", over="ignore"):
         distance = np.zeros(len(values))
         distance[1:-1] = np.linalg.norm(values[1:-1] - 0.5 * (values[:-2] + values[2:]), axis=1)
         far = np.flatnonzero(distance > least)

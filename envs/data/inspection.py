@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from .plausibility import sites, vectors
+from .plausibility import seen, sites
 from .readings import clipped_share
 from .trajectory import Trajectory
 
@@ -91,7 +91,7 @@ def channel_row(name: str, values: np.ndarray, time: np.ndarray) -> dict[str, An
 
 def at_rest(trajectory: Trajectory, site: str) -> np.ndarray:
     """Samples ``(T,)`` at which a sensor rests, found in windows of a second."""
-    gyr, acc = vectors(trajectory, f"{site}/gyr"), vectors(trajectory, f"{site}/acc")
+    gyr, acc = seen(trajectory, f"{site}/gyr"), seen(trajectory, f"{site}/acc")
     resting = np.zeros(len(trajectory), bool)
     if gyr is None and acc is None:
         return resting
@@ -117,7 +117,7 @@ def at_rest(trajectory: Trajectory, site: str) -> np.ndarray:
 
 def sensor_row(trajectory: Trajectory, site: str, rest: np.ndarray) -> dict[str, Any]:
     """Rest, noise and bias at rest, gravity, magnetic field of one sensor."""
-    gyr, acc, mag = (vectors(trajectory, f"{site}/{kind}") for kind in ("gyr", "acc", "mag"))
+    gyr, acc, mag = (seen(trajectory, f"{site}/{kind}") for kind in ("gyr", "acc", "mag"))
     row: dict[str, Any] = {"sensor": site, "rest %": 100.0 * float(rest.mean())}
     if gyr is not None:
         row["turns °/s RMS"] = float(np.degrees(np.sqrt(np.nanmean(np.square(gyr).sum(axis=1)))))
@@ -130,8 +130,8 @@ def sensor_row(trajectory: Trajectory, site: str, rest: np.ndarray) -> dict[str,
         if rest.any():
             row["|acc| at rest"] = float(np.nanmedian(length[rest]))
             row["noise m/s²"] = quiet_noise(acc, rest)
-    if mag is not None and mag.any():
-        length = np.linalg.norm(np.where(mag.any(axis=1, keepdims=True), mag, np.nan), axis=1)
+    if mag is not None:
+        length = np.linalg.norm(mag, axis=1)
         row["|mag|"] = float(np.nanmedian(length))
         row["|mag| varies %"] = 100.0 * float(np.nanstd(length) / np.nanmedian(length))
         if acc is not None:

@@ -90,9 +90,18 @@ def vectors(trajectory: Trajectory, channel: str) -> np.ndarray | None:
     return values if values is not None and values.shape[1] == 3 else None
 
 
+def seen(trajectory: Trajectory, channel: str) -> np.ndarray | None:
+    """Plausible samples ``(T, 3)`` of a channel, NaN elsewhere; None if it has none."""
+    values = vectors(trajectory, channel)
+    found = None if values is None else plausible_samples(channel.rpartition("/")[2], values)
+    return found if found is not None and np.isfinite(found).all(axis=1).any() else None
+
+
 def check_clock(trajectory: Trajectory) -> Iterator[Finding]:
     """Unit of time, gaps."""
     if len(trajectory) < 2:
+        what = "a single sample"
+        yield Finding("warning", "time", what, "a recording that was cut off", "Estimators need a sequence of samples.")
         return
     step = np.diff(trajectory.time)
     try:
@@ -133,7 +142,7 @@ def check_site(trajectory: Trajectory, site: str, wrong_clock: bool) -> list[Fin
     for kind, values in recorded.items():
         if values is not None:
             findings += check_alive(f"{site}/{kind}", values, trajectory.dt if not wrong_clock else None)
-    gyr, acc, mag = (None if values is None else plausible_samples(kind, values) for kind, values in recorded.items())
+    gyr, acc, mag = (seen(trajectory, f"{site}/{kind}") for kind in recorded)
     dead = {finding.channel for finding in findings if finding.severity == "warning"}
     if acc is not None and f"{site}/acc" not in dead:
         findings += check_force(f"{site}/acc", acc)

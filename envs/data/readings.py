@@ -13,6 +13,8 @@ from ...filters.core.quantity import ACCELEROMETER, GYROSCOPE, MAGNETOMETER
 CHANNELS = {"gyr": GYROSCOPE, "acc": ACCELEROMETER, "mag": MAGNETOMETER}
 LONGEST_ABSENCE = 0.3
 """Share of a recording: a longer stretch without rates makes most of an estimate a guess."""
+UNREADABLE = 1e12
+"""Beyond any reading in any unit of a sensor: numbers that were damaged, or read as another type."""
 MOST_CODES = 3
 """Magnitudes of codes for no value in one channel."""
 HELD = 0.5
@@ -60,8 +62,9 @@ def codes(kind: str, values: np.ndarray) -> np.ndarray:
 
 
 def plausible_samples(kind: str, values: np.ndarray) -> np.ndarray:
-    """Samples ``(T, 3)`` with NaN for codes and, of an accelerometer or magnetometer, for zeros."""
-    found = np.where(codes(kind, values)[:, None], np.nan, values)
+    """Samples ``(T, 3)`` with NaN for codes, numbers that are no readings and, except of a gyroscope, for zeros."""
+    none = codes(kind, values) | (np.abs(values) > UNREADABLE).any(axis=1)
+    found = np.where(none[:, None], np.nan, values)
     return found if kind == "gyr" else np.where(found.any(axis=1, keepdims=True), found, np.nan)
 
 
@@ -77,6 +80,15 @@ def check_alive(channel: str, values: np.ndarray, dt: float | None = None) -> It
     if not present.any():
         yield Finding("warning", channel, "no sample at all", "a channel that was not recorded", "Leave it out.")
         return
+    unreadable = present & (np.abs(values) > UNREADABLE).any(axis=1)
+    if unreadable.any() and not codes(channel.rpartition("/")[2], values).any():
+        share, largest = 100.0 * unreadable.sum() / present.sum(), np.abs(values[unreadable]).max()
+        what = f"{share:.3g} % of the samples reach {largest:.2g}"
+        cause = "a damaged file, or numbers that were read as another type"
+        yield Finding("warning", channel, what, cause, "They are treated as missing samples.")
+        present &= ~unreadable
+        if not present.any():
+            return
     samples = values[present]
     longest = float(np.diff(np.flatnonzero(np.concatenate([[True], present, [True]]))).max() - 1) / len(present)
     if channel.endswith("gyr") and longest > LONGEST_ABSENCE:
@@ -97,7 +109,7 @@ def check_alive(channel: str, values: np.ndarray, dt: float | None = None) -> It
         yield Finding("note", channel, what, "drop-outs written as zeros", "They are treated as missing samples.")
     impossible = codes(channel.rpartition("/")[2], samples)
     if impossible.any():
-        what = f"{100 * impossible.mean():.2g} % of the samples reach {np.abs(samples[impossible]).max():g}"
+        what = f"{100 * impossible.mean():.3g} % of the samples reach {np.abs(samples[impossible]).max():g}"
         yield Finding("note", channel, what, "codes for no value", "They are treated as missing samples.")
     yield from check_axes_alive(channel, samples[~impossible])
     yield from check_repeats(channel, values, dt)

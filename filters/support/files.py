@@ -43,6 +43,11 @@ def replacing(path: str | Path) -> Iterator[Path]:
     try:
         yield part
         os.replace(part, path)
+    except OSError as reason:
+        if reason.filename is None or Path(reason.filename) != part:
+            raise
+        # The file that was asked for, not the temporary one that stands for it.
+        raise type(reason)(reason.errno, reason.strerror, str(path)) from reason
     finally:
         part.unlink(missing_ok=True)
 

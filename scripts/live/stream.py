@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 import tyro
 
 from ..main import run_command
+from ..targets import check_file
 from .lines import LineFormat
 from .sources import lines_of
 
@@ -205,10 +206,12 @@ def as_line(row: Mapping[str, float], as_json: bool) -> str:
 def run(args: Args) -> int:
     """Estimate until the lines end or the command is interrupted."""
     from ...baselines.registry import make_estimator
+    from ...filters.core.offline import Offline
     from .online import OnlineEstimator
 
+    check_file("output", args.output, () if args.source == "-" else (Path(args.source),))
     made = make_estimator(args.estimator)
-    if not hasattr(made, "step"):
+    if isinstance(made, Offline):
         raise ValueError(
             f"{args.estimator} needs the whole recording: use `poise estimate`, or an estimator with steps"
         )

@@ -22,6 +22,7 @@ import tyro
 from ...filters.support.optional import extra
 from ..main import run_command
 from ..output import Output
+from ..targets import check_file
 from .curves import TRUTH
 from .lines import LineFormat
 from .sources import lines_of
@@ -91,6 +92,10 @@ class Args:
 
 def run(args: Args) -> int:
     """Show motion until interrupted."""
+    from .picture import FILMS
+
+    sources = () if args.source == "-" else (Path(args.source),)
+    check_file("screenshot", args.screenshot, sources, (".png", *FILMS))
     with extra("view"):
         from .viewer import Viewer
 
@@ -121,11 +126,11 @@ def run(args: Args) -> int:
 
 def picture(viewer: Any, args: Args, out: Output) -> int:
     """Write a picture of the page."""
-    from .picture import FILMS, take_film, take_picture
+    from .picture import take_film, take_picture
 
     assert args.screenshot is not None
     viewer.player.playing = False
-    if args.screenshot.suffix.lower() in FILMS:
+    if args.screenshot.suffix.lower() != ".png":
         until = viewer.player.end if args.until is None else args.until
         out.say(f"film: {take_film(viewer, args.screenshot, until)}")
         return 0

@@ -16,6 +16,7 @@ import tyro
 
 from ..main import run_command
 from ..output import Output
+from ..targets import FIGURES, check_file
 
 if TYPE_CHECKING:
     from ...envs.data.trajectory import Trajectory
@@ -51,8 +52,11 @@ def run(args: Args) -> int:
     """Load, align, write."""
     from .load import load_all, plain_warnings
 
-    if args.output is not None and args.output.suffix != ".h5":
-        raise ValueError(f"--output must end in .h5, got {args.output}")
+    if args.what == "magnetometer":
+        check_file("record", args.record, args.files)
+    else:
+        check_file("output", args.output, args.files, (".h5",))
+    check_file("plot", args.plot, args.files, FIGURES)
     with plain_warnings(), Output("align", args) as out:
         recordings, _ = load_all(args.files)
         if args.what == "clocks":
@@ -116,10 +120,10 @@ def magnetometer(args: Args, recording: Trajectory, out: Output) -> None:
     from ...envs.data.alignment.magnetic import calibrate_magnetometer
     from ...envs.data.calibration.records import CalibrationRecord, apply_calibration, load_calibration
 
+    earlier = load_calibration(args.record) if args.record.is_file() else CalibrationRecord({})
     found = calibrate_magnetometer(recording, args.site)
     (details,) = found.details.values()
     out.table([{name: value for name, value in details.items() if name != "centre"}], f"{args.site}/mag")
-    earlier = load_calibration(args.record) if args.record.is_file() else CalibrationRecord({})
     out.say(f"record: {earlier.merged(found).save(args.record)}")
     if args.plot is not None:
         channel = f"{args.site}/mag"

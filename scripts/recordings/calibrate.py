@@ -20,6 +20,7 @@ import tyro
 
 from ..main import run_command
 from ..output import Output
+from ..targets import check_file, check_folder
 
 if TYPE_CHECKING:
     from ...envs.data.calibration.records import CalibrationRecord
@@ -65,15 +66,15 @@ def run(args: Args) -> int:
 
     if args.simulate == bool(args.files):
         raise ValueError("name CSV files, or --simulate runs instead of them")
-    if args.record.is_dir():
-        raise ValueError(f"record must be a file, {args.record} is a folder")
+    check_file("record", args.record, args.files)
+    check_folder("raw", args.raw)
     if args.raw is not None and not args.simulate:
         raise ValueError("raw is where --simulate leaves its runs: it needs --simulate")
     if args.seed < 0:
         raise ValueError(f"seed must be 0 or more, got {args.seed}")
     with Output("calibrate", args) as out:
-        found, truth = (frame(args), None) if args.sensor == "frame" else calibrate(args, out)
         earlier = load_calibration(args.record) if args.record.is_file() else CalibrationRecord({})
+        found, truth = (frame(args), None) if args.sensor == "frame" else calibrate(args, out)
         earlier.merged(found).save(args.record)
         show(found, truth, out)
         out.add(record=found.describe(), path=str(args.record))

@@ -10,6 +10,7 @@ import tyro
 
 from ..main import run_command
 from ..output import Output
+from ..targets import FIGURES, check_file
 
 if TYPE_CHECKING:
     from ...filters.core.quantity import Estimate
@@ -48,8 +49,8 @@ def run(args: Args) -> int:
     from ...envs.data.plausibility import check_recording
     from .load import load_all, passed_over_text, plain_warnings, sensors_of
 
-    if args.output is not None and args.output.suffix.lower() not in WRITERS:
-        raise ValueError(f"output must end in one of {', '.join(WRITERS)}, got {args.output.name!r}")
+    check_file("output", args.output, args.recordings, tuple(WRITERS))
+    check_file("plot", args.plot, args.recordings, FIGURES)
     with plain_warnings(), Output("estimate", args) as out:
         channels = [channel.name for channel in make_estimator(args.estimator).channels]
         loaded, passed_over = load_all(args.recordings, args.calibration, args.site)

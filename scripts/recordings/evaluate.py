@@ -10,6 +10,7 @@ import tyro
 
 from ..main import run_command
 from ..output import Output
+from ..targets import check_folder
 
 
 @dataclass
@@ -48,6 +49,7 @@ def run(args: Args) -> int:
     from ..report import draw_example, print_comparison, provenance
     from .load import load_all, passed_over_text, plain_warnings
 
+    check_folder("runs", args.runs)
     names = tuple(list_estimators()) if args.estimators == ("all",) else args.estimators
     with plain_warnings():
         trajectories, passed_over = load_all(args.recordings, args.calibration, args.site)

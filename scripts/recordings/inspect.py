@@ -9,6 +9,7 @@ import tyro
 
 from ..main import run_command
 from ..output import Output
+from ..targets import FIGURES, check_file
 
 
 @dataclass
@@ -33,6 +34,7 @@ def run(args: Args) -> int:
     from ...envs.data.plausibility import check_recording
     from .load import load_all, passed_over_text, plain_warnings
 
+    check_file("plot", args.plot, args.recordings, FIGURES)
     with plain_warnings(), Output("inspect", args) as out:
         if args.write_map is not None:
             from ...envs.data.formats.draft import draft_map
@@ -41,6 +43,11 @@ def run(args: Args) -> int:
             data = args.recordings[0]
             if args.write_map.resolve().parent != data.resolve().parent:
                 raise ValueError(f"write_map must name a file beside the data, in {data.parent}, got {args.write_map}")
+            check_file("write_map", args.write_map, args.recordings, (".toml",))
+            if args.write_map.exists():
+                raise ValueError(
+                    f"write_map must be a new file: {args.write_map} is there, and may be complete already"
+                )
             text = draft_map(data)
             out.say(f"{text}\ndraft of a mapping: {write_text(args.write_map, text)}")
             return 0

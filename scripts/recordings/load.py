@@ -61,7 +61,7 @@ def load_all(
 
 def chosen(trajectories: list[Trajectory], site: str) -> list[Trajectory]:
     """One sensor of a recording: a trajectory of its own, or channels of the only trajectory."""
-    named = [one for one in trajectories if str(one.metadata.get("sensor", "")).lower() == site.lower()]
+    named = [one for one in trajectories if str(one.metadata.get("sensor")).lower() == site.lower()]
     if named or len(trajectories) > 1:
         if not named:
             there = ", ".join(str(one.metadata.get("sensor")) for one in trajectories)

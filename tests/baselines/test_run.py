@@ -101,3 +101,19 @@ def test_an_interval_is_a_positive_number(motion, dt):
 def test_other_data_are_named():
     with pytest.raises(ValueError, match="Trajectory or a mapping"):
         poise.run("mekf", np.zeros((10, 3)))
+
+
+@pytest.mark.parametrize("channel", ["imu/gyr", "imu/acc"])
+@pytest.mark.parametrize("value", [np.nan, 1e12])
+def test_no_estimate_at_all_has_its_cause(motion, channel, value):
+    empty = {**motion.measurements, channel: np.full((len(motion), 3), value)}
+    cause = f"no estimate at all: {channel} without a valid sample"
+    with pytest.warns(UserWarning, match=cause):
+        poise.run("vqf", motion.replace(measurements=empty))
+    with pytest.warns(UserWarning, match=cause):
+        poise.run("vqf", empty, dt=motion.dt)
+    with (
+        pytest.warns(UserWarning, match="not run"),
+        pytest.raises(ValueError, match=f"nothing could be run: vqf: {cause}"),
+    ):
+        poise.evaluate("vqf", motion.replace(measurements=empty))

@@ -19,6 +19,8 @@ from ....filters.imu.bounded_motion import BoundedMotion
 from ..calibration.records import CalibrationRecord, ChannelCalibration
 from ..trajectory import Trajectory
 
+FEWEST = 30
+"""Samples of all three sensors that the axes are found from."""
 SETTLED = 3.0
 """s of the filter's start that are left out."""
 LARGEST_ROTATION = 30.0
@@ -55,6 +57,11 @@ def calibrate_magnetometer(trajectory: Trajectory, site: str = "imu") -> Calibra
     up = rotation.up_in_body(estimate.pose["relative_orientation"])
     used = np.isfinite(unit).all(axis=1) & np.isfinite(up).all(axis=1)
     used[: round(SETTLED / on_grid.dt)] = False
+    if used.sum() < FEWEST:
+        raise ValueError(
+            f"{trajectory.name!r} has {used.sum()} samples of {', '.join(names.values())} together after the first "
+            f"{SETTLED:g} s, at least {FEWEST} are needed"
+        )
     turn, spread = rotation_by_dip(unit[used], up[used])
     matrix = np.asarray(rotation.to_matrix(turn)) @ ellipsoid.root
     angle = math.degrees(float(rotation.angle(turn)))

@@ -97,7 +97,10 @@ def align_segment(
         raise ValueError(f"rest {rest} has {len(force)} valid samples of {site}/acc, at least 5 are needed")
     if force.std(axis=0).max() > 0.5:
         raise ValueError(f"rest {rest} is no rest: the accelerometer varies by {force.std(axis=0).max():.2f} m/s²")
-    bias = known(gyr[still]).mean(axis=0)
+    rates = known(gyr[still])
+    if len(rates) < 5:
+        raise ValueError(f"rest {rest} has {len(rates)} valid samples of {site}/gyr, at least 5 are needed")
+    bias = rates.mean(axis=0)
     up = force.mean(axis=0) / np.linalg.norm(force.mean(axis=0))
     rate = known(gyr[moving]) - bias
     turning, shares = main_axis(rate)
@@ -143,7 +146,8 @@ def chosen(trajectory: Trajectory, name: str, part: tuple[float, float]) -> np.n
     """Samples of an interval ``(T,)`` bool."""
     begin, end = part
     inside = (trajectory.time >= begin) & (trajectory.time <= end)
-    if not begin < end or not inside.any():
+    first, last = trajectory.time[0] - trajectory.dt, trajectory.time[-1] + trajectory.dt
+    if not first <= begin < end <= last or not inside.any():
         raise ValueError(
             f"{name} must be (begin, end) in s inside the recording, {trajectory.time[0]:.2f} to "
             f"{trajectory.time[-1]:.2f} s, got {part}"

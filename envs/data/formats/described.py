@@ -79,13 +79,16 @@ def mapping_of(table: Table, details: dict[str, object] | None = None) -> Record
 
 
 def best_range(table: Table, candidates: list[Group]) -> Group:
-    """Of several sensors of one kind the first (the one of low noise) that does not saturate."""
-    for group in candidates:
-        values = np.abs(finite(table.matrix(group.columns)))
-        largest = np.nanmax(values, axis=0)
-        if np.all(np.nanmean(values >= largest - 1e-9 * largest, axis=0) < SATURATED) or len(candidates) == 1:
+    """Of several sensors of one kind the first (the one of low noise) that was recorded and does not saturate."""
+    if len(candidates) == 1:
+        return candidates[0]
+    sizes = [np.abs(finite(table.matrix(group.columns))) for group in candidates]
+    recorded = [(group, size) for group, size in zip(candidates, sizes, strict=True) if np.isfinite(size).any()]
+    for group, size in recorded:
+        largest = np.nanmax(size, axis=0, initial=0.0)
+        if np.all(np.mean(size >= largest - 1e-9 * largest, axis=0) < SATURATED):
             return group
-    return candidates[-1]
+    return recorded[-1][0] if recorded else candidates[0]
 
 
 def complete(table: Table, mapping: RecordingMap) -> bool:

@@ -159,3 +159,9 @@ def test_the_shipped_results_cover_benchmarks_and_estimators():
     known = {*list_estimators(experimental=True), "external-acceleration (mode 2)", "external-acceleration (mode 3)"}
     for one in found["recordings"]:
         assert {name.removesuffix(" (offline)") for name in one["errors"]} <= known
+
+
+@pytest.mark.parametrize("samples", [1, 2, 50])
+def test_a_short_recording_is_refused(motions, samples):
+    with pytest.raises(ValueError, match=r"lasts .* s; motions are compared from 2 s on"):
+        recommend(motions["slow"][:samples])

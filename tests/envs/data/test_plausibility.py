@@ -1,9 +1,12 @@
 """Mistakes of units, signs, axes and clocks are named; sound recordings are left in peace."""
 
+import warnings
+
 import numpy as np
 import pytest
 
 import poise
+from poise.envs.data.inspection import inspect_recording
 from poise.envs.data.plausibility import check_recording
 from poise.envs.data.rate_consistency import rate_consistency
 from poise.envs.data.trajectory import Trajectory
@@ -202,3 +205,29 @@ def test_a_gyroscope_that_fails_is_named(share):
     gyr[int((1.0 - share) * len(gyr)) :] = np.nan
     findings = check_recording(motion.replace(measurements={**motion.measurements, "imu/gyr": gyr}))
     assert any(f"{100 * share:.0f} % of the samples are missing" in str(each) for each in findings)
+
+
+@pytest.mark.parametrize("kind", ["gyr", "acc", "mag"])
+@pytest.mark.parametrize("value", [np.nan, 1e200, 0.0])
+def test_channels_without_a_reading_are_named_once(motions, kind, value):
+    dead = changed(motions["mixed"], **{kind: lambda values: np.full_like(values, value) * (1.0 + values[:1] ** 2)})
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        found = warnings_of(dead)
+        inspect_recording(dead)
+    assert len(found) == 1
+    assert found[0].startswith(f"imu/{kind}: ")
+
+
+def test_unreadable_samples_are_named_and_left_out(motions):
+    def damaged(values):
+        number = np.arange(len(values))[:, None]
+        return np.where(number % 200 == 7, 1e300 / (1.0 + number), values)
+
+    (found,) = warnings_of(changed(motions["mixed"], gyr=damaged))
+    assert "0.5 % of the samples reach 1.2e+299; likely cause: a damaged file" in found
+
+
+def test_a_single_sample_is_named(motions):
+    (found,) = warnings_of(motions["slow"][:1].replace(metadata={}))
+    assert "a single sample; likely cause: a recording that was cut off" in found

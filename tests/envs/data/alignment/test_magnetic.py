@@ -57,3 +57,9 @@ def test_missing_channel_and_too_little_motion() -> None:
         )
     with pytest.raises(ValueError, match=r"turn the device about|cover too little"):
         calibrate_magnetometer(simulate_hand("slow", seed=0, duration=5.0))
+
+
+def test_a_sensor_that_was_off_is_named() -> None:
+    off = {**TUMBLED.measurements, "imu/acc": np.full((len(TUMBLED), 3), np.nan)}
+    with pytest.raises(ValueError, match="has 0 samples of imu/gyr, imu/acc, imu/mag together"):
+        calibrate_magnetometer(TUMBLED.replace(measurements=off))

@@ -56,6 +56,13 @@ def test_applied_vectors_are_those_of_the_segment() -> None:
     assert "mounting" in turned.metadata
 
 
+def without_rates():
+    """The same with a gyroscope that was off at rest."""
+    recording = leaning()
+    rates = np.where(recording.time[:, None] < 4.6, np.nan, recording.measurements["imu/gyr"])
+    return recording.replace(measurements={**recording.measurements, "imu/gyr": rates})
+
+
 @pytest.mark.parametrize(
     ("recording", "rest", "movement", "axis", "message"),
     [
@@ -66,6 +73,8 @@ def test_applied_vectors_are_those_of_the_segment() -> None:
         (leaning("z"), (0.0, 4.5), (5.0, 15.0), "z", "along gravity"),
         (leaning("z"), (0.0, 4.5), (5.0, 15.0), "x", "about the vertical"),
         (leaning(), (0.0, 4.5), (50.0, 60.0), "x", "movement must be"),
+        (leaning(), (0.0, 4.5), (5.0, 60.0), "x", "movement must be"),
+        (without_rates(), (0.0, 4.5), (5.0, 15.0), "x", "has 0 valid samples of imu/gyr"),
     ],
 )
 def test_what_does_not_serve_is_refused(recording, rest, movement, axis, message) -> None:
