@@ -6,6 +6,7 @@ import re
 import time
 import warnings
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -136,10 +137,24 @@ def run_tasks(
         for task in tasks
         if not is_kept(folder / task.file, {})
     ]
+    if processes > 1 and len(jobs) > 1:
+        labels = list(contenders(names, channels))
+        shares = [(labels[first::processes], tuple(names), tuple(channels), offline) for first in range(processes)]
+        for _ in in_parallel(compile_ahead, shares, processes):
+            pass
     for _ in in_parallel(run_task, jobs, processes, label="compare", unit="task"):
         pass
     suites = dict.fromkeys(task.suite for task in tasks)
     return {suite: collected([folder / task.file for task in tasks if task.suite == suite]) for suite in suites}
+
+
+def compile_ahead(labels: Sequence[str], names: Sequence[str], channels: Sequence[str], offline: bool) -> None:
+    """Compile some of the estimators, which processes that begin with the same task would all do in the same order."""
+    (motion,) = hand_episode("mixed", 1, 0, duration=2.0)
+    found = contenders(names, channels)
+    with warnings.catch_warnings(), suppress(ValueError):
+        warnings.simplefilter("ignore")
+        evaluate({label: found[label] for label in labels}, motion, offline=offline)
 
 
 def run_task(

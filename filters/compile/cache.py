@@ -15,7 +15,8 @@ import sys
 import tempfile
 import threading
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -150,6 +151,23 @@ def compile_now(function: Any, arguments: tuple[Any, ...], label: str) -> None:
 
     threading.Thread(target=tell, daemon=True).start()
     try:
-        function(*arguments)
+        with _alone(function.py_func.__module__):
+            function(*arguments)
     finally:
         done.set()
+
+
+@contextmanager
+def _alone(name: str) -> Iterator[None]:
+    """One process at a time is inside with this name: the others then find in the cache what it has compiled."""
+    folder = cache_folder()
+    try:
+        import fcntl
+    except ImportError:  # not on Windows, where each process compiles for itself
+        folder = None
+    if folder is None:
+        yield
+        return
+    with open(folder / f"{name}.lock", "w") as file:
+        fcntl.flock(file, fcntl.LOCK_EX)
+        yield

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import stat
+import subprocess
+import sys
 import tempfile
 import warnings
 from pathlib import Path
@@ -41,6 +43,27 @@ def test_a_line_tells_what_takes_long_and_only_then(
     assert str(tmp_path) in told
     assert compiled(tmp_path, monkeypatch) == (1, 0)
     assert capsys.readouterr().err == ""
+
+
+@pytest.mark.skipif(os.name != "posix", reason="processes wait for each other on POSIX only")
+def test_processes_that_need_the_same_code_compile_it_once(tmp_path: Path) -> None:
+    script = f"""
+import sys
+from poise.filters.compile import cache
+module = cache.load({TEXT!r}, "double")
+print("ready", flush=True)
+sys.stdin.readline()
+cache.compile_now(module.run, (0.0,), "double")
+print(len(module.run.stats.cache_misses))
+"""
+    environment = {**os.environ, "POISE_CACHE": str(tmp_path)}
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True, "env": environment}
+    both = [subprocess.Popen([sys.executable, "-c", script], **pipes) for _ in range(2)]  # type: ignore[call-overload]
+    assert [one.stdout.readline() for one in both] == ["ready\n"] * 2
+    for one in both:
+        one.stdin.write("go\n")
+        one.stdin.flush()
+    assert sorted(int(one.communicate()[0]) for one in both) == [0, 1]
 
 
 @pytest.mark.parametrize("damage", ["cut", "empty", "garbage", "flipped"])
