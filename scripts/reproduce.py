@@ -30,6 +30,8 @@ if TYPE_CHECKING:
     from ..baselines.studies.report import Entry, Report
 
 
+KEPT = ("page", "pages")
+"""Arguments of which no result depends."""
 DONE = "done.json"
 """File in the folder of a work that is finished."""
 EVERY = "all"
@@ -62,6 +64,8 @@ class Args:
     """parent of the run folder"""
     page: Path | None = None
     """with all: file to which the page of coverage is written too, as Markdown"""
+    pages: tuple[Path, ...] = ()
+    """pages whose tables of studies are replaced by those of this run, for instance `docs/*.md`"""
     json: bool = False
     """print one JSON document instead of tables"""
 
@@ -69,12 +73,16 @@ class Args:
 def run(args: Args) -> int:
     """Do the study, print results as they are computed, and write a run folder with a report."""
     from ..baselines.studies import find_paper
+    from .pages.studies import update
 
     reproduce = None if args.paper == EVERY else find_paper(args.paper)
     if args.page is not None and args.paper != EVERY:
         raise ValueError(f"--page is the page of all papers: use it with {EVERY!r}, not with {args.paper!r}")
     check_file("page", args.page, args.recordings)
     args = filled(args)
+    for path in args.pages:
+        if not path.is_file():
+            raise FileNotFoundError(f"no page at {path}: --pages takes Markdown files that are there")
     for path in args.recordings:
         if not path.exists():
             raise FileNotFoundError(f"no recording at {path}: there is no such file or folder")
@@ -82,8 +90,9 @@ def run(args: Args) -> int:
     settings = {name: getattr(args, name) for name in shared}
     if reproduce is None:
         return run_every(args, settings)
-    with studying("reproduce", args, settings, f"poise reproduce {args.paper}") as (study, _, report):
+    with studying("reproduce", args, settings, f"poise reproduce {args.paper}", may_differ=KEPT) as (study, _, report):
         reproduce(study, report)
+    update(args.pages, {args.paper: study.folder}, made_with(args, study.folder))
     return 0
 
 
@@ -97,9 +106,10 @@ def run_every(args: Args, settings: dict[str, Any]) -> int:
     from ..baselines.studies.kit import Study
     from ..baselines.studies.shared_rides import record_rides
     from ..filters.support.files import write_text
+    from .pages.studies import update
 
     check(settings)
-    folder = open_run("reproduce", args, may_differ=("page",))
+    folder = open_run("reproduce", args, may_differ=KEPT)
     rides = folder.folder.resolve() / "rides"
     left = [paper for paper in PAPERS if not is_done(paper, folder)]
     record_rides(Study(folder.folder.resolve(), **settings, rides=rides), left)
@@ -115,8 +125,9 @@ def run_every(args: Args, settings: dict[str, Any]) -> int:
         for paper, rows in works.items():
             shown = [{name: row[name] for name in ("item", "content", "verdict")} for row in rows]
             out.table(shown, paper, console=console(None))
-        command = command_line("reproduce", args, ("quick", "seed", "subjects", "seeds", "duration"))
-        page = coverage.page(works, f"- `{command}`\n{made_with(folder)}", failed)
+        made = made_with(args, folder.folder)
+        page = coverage.page(works, made, failed)
+        update(args.pages, {paper: folder.folder / paper for paper in works}, made)
         if args.page is not None:
             write_text(args.page, page)
         out.add(failed=failed)
@@ -163,13 +174,15 @@ def is_done(paper: str, run: Run) -> bool:
     return is_kept(run.folder / paper / DONE, {"paper": paper})
 
 
-def made_with(run: Run) -> str:
-    """Lines of a page that is kept: version, commit and packages that a run was made with, and no machine."""
-    state = run.versions
+def made_with(args: Args, folder: Path) -> str:
+    """Lines of a page that is kept: command, version, commit and packages of a run, and no machine."""
+    command = command_line("reproduce", args, ("quick", "seed", "subjects", "seeds", "duration"))
+    state = Run(folder, "reproduce", args.seed).versions
     commit = f", commit {state['poise']['commit'][:12]}" if "commit" in state["poise"] else ""
     changed = " with changes" if state["poise"].get("changed") else ""
     packages = ", ".join(f"{name} {version}" for name, version in state["packages"].items() if version)
-    return f"- poise {state['poise']['version']}{commit}{changed}, Python {state['python']}\n- {packages}"
+    made = f"poise {state['poise']['version']}{commit}{changed}, Python {state['python']}"
+    return f"- `{command}`\n- {made}\n- {packages}"
 
 
 def one_study(paper: str, settings: dict[str, Any], run: Run) -> None:
@@ -191,7 +204,12 @@ def one_study(paper: str, settings: dict[str, Any], run: Run) -> None:
 
 @contextmanager
 def studying(
-    command: str, args: Any, settings: dict[str, Any], title: str, width: int | None = None
+    command: str,
+    args: Any,
+    settings: dict[str, Any],
+    title: str,
+    width: int | None = None,
+    may_differ: Sequence[str] = (),
 ) -> Iterator[tuple[Study, Output, Report]]:
     """A study in a new or resumed run folder: entries of its report are printed and written as they are found.
 
@@ -201,6 +219,7 @@ def studying(
         settings: fields of :class:`.Study`.
         title: of the report.
         width: columns of a table that does not go to a terminal.
+        may_differ: arguments that a resumed run need not share, see :func:`.open_run`.
 
     Raises:
         ValueError: a setting is out of its range, or what :func:`.open_run` refuses.
@@ -209,7 +228,7 @@ def studying(
     from ..baselines.studies.report import Report
 
     check(settings)
-    folder = open_run(command, args)
+    folder = open_run(command, args, may_differ)
     study = Study(folder.folder.resolve(), **settings)
     with Output(command, args) as out:
 

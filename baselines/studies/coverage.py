@@ -20,6 +20,8 @@ TITLE = "Coverage"
 """Title of the table in every report, and name of its file ``tables/coverage.csv``."""
 REPRODUCED, CORRECTED, DIFFERS, IMPOSSIBLE = "reproduced", "reproduced as corrected", "differs", "cannot be answered"
 UNDECIDED, ABSENT = "undecided in this run", "not in this run"
+UNEXPLAINED = "no cause that was looked for holds"
+"""Stands where none of an item's causes is confirmed."""
 VERDICTS = (REPRODUCED, CORRECTED, DIFFERS, IMPOSSIBLE, UNDECIDED, ABSENT)
 COLUMNS = ("item", "content", "verdict", "what decides", "shown in")
 Decided = tuple[str, str]
@@ -43,11 +45,13 @@ class Item:
     causes: tuple[Decided, ...] = ()
     """claims that explain a difference; those that hold are printed where the item differs"""
     because: str = ""
-    """why no run can answer it, or the cause of a difference that no claim measures"""
+    """why no run can answer it; where one can, claims say why: no sentence stays that no number changes"""
 
     def __post_init__(self) -> None:
         if not (self.shown or self.decided or self.because):
             raise ValueError(f"{self.label}: an item that nothing shows or decides needs a reason in 'because'")
+        if self.because and (self.shown or self.decided):
+            raise ValueError(f"{self.label}: claims in 'causes' say why it differs, not 'because' = {self.because!r}")
 
 
 def verdict(item: Item, report: Report) -> dict[str, str]:
@@ -59,9 +63,9 @@ def verdict(item: Item, report: Report) -> dict[str, str]:
         not claims_of(report, key) for key in (*item.decided, *item.corrected)
     )
     failed = [claim for claim in found if claim.holds is False]
-    reasons = [item.because] if item.because else []
+    reasons: list[str] = []
     if not (item.shown or item.decided):
-        result = IMPOSSIBLE
+        result, reasons = IMPOSSIBLE, [item.because]
     elif missing and item.corrected:
         result = ABSENT
     elif failed:
@@ -69,7 +73,9 @@ def verdict(item: Item, report: Report) -> dict[str, str]:
         result = CORRECTED if mended and all(claim.holds for claim in mended) else DIFFERS
         failed += mended
         causes = [claim for key in item.causes for claim in claims_of(report, key) if claim.holds]
-        reasons = [*map(said, failed), *(f"because: {said(claim)}" for claim in causes), *reasons]
+        reasons = [*map(said, failed), *(f"because: {said(claim)}" for claim in causes)]
+        if result == DIFFERS and not causes:
+            reasons.append(UNEXPLAINED)
     elif missing:
         result = ABSENT
     elif any(claim.holds is None for claim in found):
@@ -134,7 +140,7 @@ def page(
         "Each table, figure and statement of the five works, with the verdict of a run.",
         "* *Reproduced*: the run shows it, and every claim that decides it holds.\n"
         "* *Reproduced as corrected*: not with the equations as published, but with their misprints corrected.\n"
-        "* *Differs*: a claim does not hold. Its number follows, then the cause, as a claim where a run measures it.\n"
+        "* *Differs*: a claim does not hold. Its number follows, then the causes that the run confirms, with theirs.\n"
         "* *Cannot be answered*: a simulator has no counterpart.",
         f"{len(every)} items: {counted(every)}. The page is written by `poise reproduce all --page FILE`.",
     ]

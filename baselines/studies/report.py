@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ...filters.support.files import write_text
+from ...filters.support.rows import markdown_table
 from ..plots import save, save_animation
 from ..scoring import COLUMNS
 from .claims import Claim
@@ -61,7 +63,7 @@ class Report:
         self._add(Entry(title, markdown.strip()))
 
     def table(self, title: str, rows: Sequence[Mapping[str, Any]], note: str = "") -> None:
-        """Add a table, and write it to ``tables/<title>.csv`` with all digits.
+        """Add a table, and write it to ``tables/<title>.csv`` with all digits and, as it is read, to ``<title>.md``.
 
         Args:
             title: heading, of its own in this report.
@@ -79,7 +81,9 @@ class Report:
             writer = csv.DictWriter(file, columns, lineterminator="\n")
             writer.writeheader()
             writer.writerows(rows)
-        self._add(Entry(title, note.strip(), tuple(map(dict, rows))))
+        entry = Entry(title, note.strip(), tuple(map(dict, rows)))
+        write_text(path.with_suffix(".md"), "\n\n".join(filter(None, (markdown_table(rows), entry.text))) + "\n")
+        self._add(entry)
 
     def figure(self, name: str, figure: Figure, title: str, note: str = "") -> Path:
         """Add a picture, written to ``figures/<name>.png``; returns the file.
@@ -165,7 +169,7 @@ class Report:
         self.claimed[title] = list(claims)
 
     def _new_file(self, folder: str, name: str, suffix: str) -> Path:
-        path = self.folder / folder / (re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-")[:80] + suffix)
+        path = self.folder / folder / (stem(name) + suffix)
         if path in self.files:
             raise ValueError(f"the report has {path.name} already: choose another title than {name!r}")
         self.files.add(path)
@@ -175,6 +179,11 @@ class Report:
     def _add(self, entry: Entry) -> None:
         self.entries.append(entry)
         self.publish(entry)
+
+
+def stem(title: str) -> str:
+    """Name of the file of an entry, without its suffix."""
+    return re.sub(r"[^a-z0-9]+", "-", title.lower()).strip("-")[:80]
 
 
 OWN = ("quantity", "published", "ours", "interval", "unit", "values")

@@ -250,7 +250,7 @@ class RideStudy:
                     rows.append(row | {"values": values, "unit": "deg"})
         if rows:
             report.compare(f"{self.table}, {course}", rows, f"RMS from {SETTLED:g} s on.", interval=STD)
-        report.table(f"Skill, {course}, RMS in deg", self.skill(course, results), SKILL.format(bound=self.bound))
+        report.table(f"Skill, {course}, RMS in deg", self.skill(course, results), self.note(results))
         cells = self.cells or rounded
         methods = [*self.variants, ZERO, MEAN]
         report.table(
@@ -279,6 +279,11 @@ class RideStudy:
         report.claims(f"What holds, {course}", [*self.claims(course, results), *claims])
         report.numbers(self.results(results))
 
+    def note(self, results: list[dict[str, Any]]) -> str:
+        """What stands below the table of skill."""
+        length = float(np.median([each["length"] for each in results]))
+        return SKILL.format(rides=len(results), length=length, bound=self.bound)
+
     def skill(self, course: str, results: list[dict[str, Any]]) -> list[dict[str, Any]]:
         """A row for each angle: what is published, the filter, what it must beat, its bound, and its consistency."""
         first = next(iter(self.variants))
@@ -289,7 +294,11 @@ class RideStudy:
         rows = []
         for angle in self.angles:
             row: dict[str, Any] = {"angle": angle, "published": published.get(angle)}
-            row |= {name: _rounded(mean.get(angle)) for name, mean in means.items()}
+            spread = [each["rms"][first]["settled"].get(angle, np.nan) for each in results]
+            for name, mean in means.items():
+                row[name] = _rounded(mean.get(angle))
+                if name == first:
+                    row["± over rides"] = _rounded(float(np.std(spread, ddof=1))) if len(spread) > 1 else None
             row["posterior bound"] = _rounded(bound.get(angle))
             values = [each["nees"][angle] for each in results if angle in each["nees"]]
             row["NEES, 95 % interval"] = interval_of_mean(values) if values else None
@@ -338,9 +347,9 @@ def assessed(study: RideStudy, path: Path) -> dict[str, Any]:
 
 
 SKILL = (
-    f"Mean over rides from {SETTLED:g} s on. *{STRAPDOWN}*: gyroscopes alone. *Posterior bound*: {{bound}}. *NEES*: "
-    "of the angle alone, 1 if the covariance is right; mean over rides, with the 95 % interval of that mean by the "
-    "spread between rides, since errors within a ride are correlated."
+    f"{{rides}} rides of {{length:.0f}} s, mean over them from {SETTLED:g} s on. *{STRAPDOWN}*: gyroscopes alone. "
+    "*Posterior bound*: {bound}. *NEES*: of the angle alone, 1 if the covariance is right; mean over rides, with the "
+    "95 % interval of that mean by the spread between rides, since errors within a ride are correlated."
 )
 
 

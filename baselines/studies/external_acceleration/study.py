@@ -254,6 +254,11 @@ def claims(tests: dict[str, Any], still: dict[str, Any]) -> list[Claim]:
             wins > 0,
         ),
         Claim.less("Mode 1 is better than mode 3 in test C", c[0], c[2], names=("mode 1", "mode 3")),
+        Claim.less(
+            "With the exact rotation mode 1 is better than mode 3 in test C",
+            *(inclination("C", mode, "exact") for mode in (1, 3)),
+            names=("mode 1", "mode 3"),
+        ),
         Claim.every(
             "A properly chosen c_a works in every test: 0.1 loses no more to the best one than in table II",
             losses,

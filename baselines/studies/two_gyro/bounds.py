@@ -125,6 +125,9 @@ def constant_rates() -> tuple[list[dict[str, Any]], list[Claim]]:
             last.append(deviation[-1])
         row["5 : 20 °/s at 60 s"] = round(float(last[0] / last[-1]), 2)
         rows.append(row)
+        product = float(last[0] * YAW_RATES[0] / (last[-1] * YAW_RATES[-1]))
+        statement = f"(c) {setting}: bounds go with 1 / yaw rate: times the rate, that of 5 is that of 20 °/s at 60 s"
+        claims.append(Claim.within(statement, product, 0.8, 1.25, "times"))
         for time, values in (("2 s", early), ("60 s", last)):
             ratio = float(values[0] / values[-1])
             claims.append(

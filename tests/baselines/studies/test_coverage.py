@@ -51,19 +51,22 @@ def test_a_verdict_follows_from_entries_and_claims(report, item, expected, text)
 
 def test_a_difference_has_its_number_and_the_causes_that_hold(report):
     causes = (("What", "The camera"), ("What", "It is late"))
-    item = Item("Table I", "skill", ("Table I",), (("What", "It beats"),), (), causes, "the course is short")
-    row = verdict(item, report)
+    row = verdict(Item("Table I", "skill", ("Table I",), (("What", "It beats"),), (), causes), report)
     assert row["what decides"] == (
-        "It beats zero: 2 against 1 deg – does not hold; because: The camera is off: by 1 deg; the course is short"
+        "It beats zero: 2 against 1 deg – does not hold; because: The camera is off: by 1 deg"
+    )
+    bare = verdict(Item("Table I", "skill", (), (("What", "It beats"),), (), causes[1:]), report)
+    assert bare["what decides"] == (
+        "It beats zero: 2 against 1 deg – does not hold; no cause that was looked for holds"
     )
     assert row["shown in"] == "Table I, indoors; What"
 
 
 def test_what_is_right_once_it_is_corrected_is_told_from_a_difference(report):
     published, mended = (("What", "It beats zero"),), (("What", "It does not drift"),)
-    row = verdict(Item("(3)", "equation", (), published, mended, because="a sign"), report)
+    row = verdict(Item("(3)", "equation", (), published, mended), report)
     assert row["verdict"] == "reproduced as corrected"
-    assert row["what decides"] == ("It beats zero: 2 against 1 deg – does not hold; It does not drift: 0.1 deg; a sign")
+    assert row["what decides"] == ("It beats zero: 2 against 1 deg – does not hold; It does not drift: 0.1 deg")
     assert verdict(Item("(3)", "equation", (), published, published), report)["verdict"] == "differs"
     assert verdict(Item("(3)", "equation", (), published, (("What", "Nobody"),)), report)["verdict"] == (
         "not in this run"
@@ -73,6 +76,8 @@ def test_what_is_right_once_it_is_corrected_is_told_from_a_difference(report):
 def test_an_item_that_nothing_answers_needs_a_reason():
     with pytest.raises(ValueError, match="Figure 3: an item that nothing shows or decides needs a reason"):
         Item("Figure 3", "curves")
+    with pytest.raises(ValueError, match="claims in 'causes' say why it differs, not 'because' = 'it is short'"):
+        Item("Figure 3", "curves", ("Figure 3",), because="it is short")
 
 
 def test_the_page_has_every_row(report, tmp_path):
