@@ -220,7 +220,8 @@ ITEMS = (
         "not in the thesis",
         "no error lies below its bound",
         shown=("Bound of the orientation",),
-        decided=(("Bound of the orientation: what", ""),),
+        decided=tuple(("Bound of the orientation: what", device) for device in ("controller", "octa")),
+        causes=(("Bound of the orientation: what", "Were the hand's acceleration known"),),
     ),
     Item(
         "Figure 5.24, (5.66), (5.67)",
