@@ -1,5 +1,8 @@
 """Samples that a recording shows to be none, although each alone could be one: found from what comes before and after.
 
+While samples arrive, :class:`SamplesSoFar` decides as for a recording that ends with the last one, and revises what it
+decided on the samples before.
+
 A glitch of the transmission stands alone: the sample after it is where the sample before was. What a motion or an
 impact does to a sensor rings on. In the recordings of BROAD, RepoIMU, EuRoC, smartphones and a bicycle ride no sample
 comes near the bounds below; tapping on the sensor of BROAD reaches a third of :data:`ISOLATION`.
@@ -8,7 +11,9 @@ comes near the bounds below; tapping on the sensor of BROAD reaches a third of :
 from __future__ import annotations
 
 import warnings
+from collections import deque
 from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -22,6 +27,10 @@ ISOLATION = 6.0
 RETURN = 0.3
 """Difference of the neighbours, as a share of the distance."""
 AWAY = (-4, -3, -2, 2, 3, 4)
+REACH = 5
+"""Samples before and after that decide on one."""
+FEWEST = 9
+"""Samples from which on there is a decision."""
 FULL = 0.999
 """Share of the range from which a sample is saturated."""
 
@@ -29,7 +38,7 @@ FULL = 0.999
 def glitches(values: np.ndarray, least: float) -> np.ndarray:
     """Samples ``(T,)`` bool of ``(T, 3)`` that stand alone, far from neighbours that agree."""
     found = np.zeros(len(values), bool)
-    if len(values) < 9:
+    if len(values) < FEWEST:
         return found
     with np.errstate(invalid="ignore", over="ignore"):
         distance = np.zeros(len(values))
@@ -43,38 +52,121 @@ def glitches(values: np.ndarray, least: float) -> np.ndarray:
     return found
 
 
+def sudden(values: np.ndarray, least: float) -> bool:
+    """Whether the last of samples ``(T, 3)`` looks like a glitch as long as the next one has not come."""
+    with np.errstate(invalid="ignore", over="ignore"):
+        steps = np.linalg.norm(np.diff(values[-REACH:], axis=0), axis=1)
+    if len(steps) < REACH - 1 or not steps[-1] > least:
+        return False
+    return bool(steps[-1] > ISOLATION * np.sort(np.nan_to_num(steps[:-1]))[-2])
+
+
 def full_scales(metadata: Mapping[str, Any]) -> dict[str, float]:
     """Channel → range in its unit, of ``metadata["full_scale"]``."""
     given = metadata.get("full_scale", {})
     return {str(name): float(limit) for name, limit in given.items()} if isinstance(given, Mapping) else {}
 
 
-def without_glitches(trajectory: Trajectory) -> dict[str, np.ndarray]:
-    """The measurements of a trajectory on its grid, NaN where there is no sample in truth.
+def no_samples(measurements: Mapping[str, np.ndarray], ranges: Mapping[str, float]) -> dict[str, dict[str, np.ndarray]]:
+    """Channel → kind of what is no sample → where ``(T,)`` bool.
 
     That is a glitch of a gyroscope or an accelerometer; a gyroscope's 0, 0, 0 beside an accelerometer's, which is how a
-    logger writes that nothing came; and what reaches the range of a sensor, where ``metadata["full_scale"]`` names it
-    (channel → range).
+    logger writes that nothing came; and what reaches the range of a sensor.
+
+    Args:
+        measurements: channel → ``(T, size)``, on a grid.
+        ranges: channel → range in its unit, where it is known.
+    """
+    found: dict[str, dict[str, np.ndarray]] = {}
+    for name, values in measurements.items():
+        site, _, kind = name.rpartition("/")
+        if kind not in LEAST or values.shape[1] != 3:
+            continue
+        found[name] = {"glitches": glitches(values, LEAST[kind])}
+        force = measurements.get(f"{site}/acc")
+        if kind == "gyr" and force is not None:
+            found[name]["rows of zeros"] = np.logical_not(values.any(axis=1) | force.any(axis=1))
+        if name in ranges:
+            found[name]["saturated"] = np.any(np.abs(values) >= FULL * ranges[name], axis=1)
+    return found
+
+
+def without_glitches(trajectory: Trajectory) -> dict[str, np.ndarray]:
+    """The measurements of a trajectory on its grid, NaN where :func:`no_samples` are.
+
+    ``metadata["full_scale"]`` names the ranges of sensors (channel → range).
 
     Warns:
         UserWarning: how many samples there are.
     """
     measurements, told = dict(trajectory.measurements), []
-    ranges = full_scales(trajectory.metadata)
-    for name, values in trajectory.measurements.items():
-        site, _, kind = name.rpartition("/")
-        if kind not in LEAST or values.shape[1] != 3:
-            continue
-        parts: dict[str, np.ndarray] = {"glitches": glitches(values, LEAST[kind])}
-        force = trajectory.measurements.get(f"{site}/acc")
-        if kind == "gyr" and force is not None:
-            parts["rows of zeros"] = np.logical_not(values.any(axis=1) | force.any(axis=1))
-        if name in ranges:
-            parts["saturated"] = np.any(np.abs(values) >= FULL * ranges[name], axis=1)
+    for name, parts in no_samples(measurements, full_scales(trajectory.metadata)).items():
         wrong = np.logical_or.reduce(list(parts.values()))
         if wrong.any():
-            measurements[name] = np.where(wrong[:, None], np.nan, values)
+            measurements[name] = np.where(wrong[:, None], np.nan, measurements[name])
             told += [f"{name}: {int(part.sum())} {what}" for what, part in parts.items() if part.any()]
     if told:
         warnings.warn(f"{trajectory.name}: {', '.join(told)}; they count as missing samples", stacklevel=4)
     return measurements
+
+
+@dataclass
+class SamplesSoFar:
+    """The last samples of a stream, NaN where they are none as far as the samples so far tell.
+
+    Attributes:
+        ranges: channel → range of the sensor in its unit.
+    """
+
+    ranges: Mapping[str, float] = field(default_factory=dict)
+    _raw: deque[dict[str, np.ndarray]] = field(default_factory=lambda: deque(maxlen=2 * REACH + 1), init=False)
+    _clean: deque[dict[str, np.ndarray]] = field(default_factory=lambda: deque(maxlen=FEWEST), init=False)
+    _watched: int = field(default=0, init=False)
+
+    def add(self, measurement: Mapping[str, np.ndarray]) -> list[dict[str, np.ndarray]]:
+        """The sample (channel → ``(size,)``) as it counts now, and before it those that count otherwise from now on.
+
+        All of them are the last ones of the stream, in their order.
+        """
+        sample = dict(measurement)
+        odd = self._odd(sample)
+        self._raw.append(sample)
+        self._watched = 2 * REACH + 1 if odd else max(0, self._watched - 1)
+        if not self._watched:
+            self._clean.append(sample)
+            return [sample]
+        window = {name: np.array([each[name] for each in self._raw]) for name in sample}
+        clean = dict(window)
+        for name, parts in no_samples(window, self.ranges).items():
+            wrong = np.logical_or.reduce(list(parts.values()))
+            wrong[-1] |= sudden(window[name], LEAST[name.rpartition("/")[2]])
+            clean[name] = np.where(wrong[:, None], np.nan, window[name])
+        count = min(len(self._raw), FEWEST if len(self._raw) == FEWEST else REACH + 1)
+        now = [{name: values[row] for name, values in clean.items()} for row in range(-count, 0)]
+        before = list(self._clean)[len(self._clean) + 1 - count :]
+        same = next((row for row, each in enumerate(before) if not alike(each, now[row])), count - 1)
+        for _ in before:
+            self._clean.pop()
+        self._clean.extend(now)
+        return now[same:]
+
+    def _odd(self, sample: Mapping[str, np.ndarray]) -> bool:
+        """Whether a sample is one that :func:`no_samples` may find, or that makes it find one."""
+        last = self._raw[-1] if self._raw else sample
+        for name, values in sample.items():
+            kind = name.rpartition("/")[2]
+            if kind not in LEAST or len(values) != 3:
+                continue
+            step = float(np.abs(values - last[name]).max())
+            # The distance of a glitch is at most its larger step; one coordinate has at least 1/√3 of it.
+            if step > 0.5 * LEAST[kind] or not values.any() or (name in self.ranges and self._full(name, values)):
+                return True
+        return False
+
+    def _full(self, name: str, values: np.ndarray) -> bool:
+        return bool(np.abs(values).max() >= FULL * self.ranges[name])
+
+
+def alike(one: Mapping[str, np.ndarray], other: Mapping[str, np.ndarray]) -> bool:
+    """Whether two samples have the same numbers, and NaN in the same places."""
+    return all(np.array_equal(values, other[name], equal_nan=True) for name, values in one.items())

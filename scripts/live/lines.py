@@ -89,15 +89,12 @@ def layout_of(names: Sequence[str], units: Mapping[str, str], channels: Sequence
 
     Args:
         names: of the columns, units in brackets.
-        units: kind (``gyr``, ``acc``, ``mag``, ``time``) → unit, which takes precedence over those of the names.
+        units: kind → unit (see :func:`check_units`), which takes precedence over those of the names.
         channels: what the estimators need.
 
     Raises:
-        ValueError: an unknown kind or unit, two columns of one name, or no column of a sensor.
+        ValueError: an unknown unit, two columns of one name, or no column of a sensor.
     """
-    for kind in units:
-        if kind not in ("gyr", "acc", "mag", "time"):
-            raise ValueError(f"units: {unknown('kind', kind, ['gyr', 'acc', 'mag', 'time'])}")
     split = [split_unit(name) for name in names]
     plain = [name for name, _ in split if name != IGNORED]
     if len(set(plain)) < len(plain):
@@ -130,6 +127,18 @@ def layout_of(names: Sequence[str], units: Mapping[str, str], channels: Sequence
     return Layout(time, factor("time", unit) if unit else 1.0, found)
 
 
+def check_units(units: Mapping[str, str]) -> None:
+    """Check units by kind (``gyr``, ``acc``, ``mag``, ``time``).
+
+    Raises:
+        ValueError: an unknown kind or unit; the message lists those that there are.
+    """
+    for kind, unit in units.items():
+        if kind not in ("gyr", "acc", "mag", "time"):
+            raise ValueError(f"units: {unknown('kind', kind, ['gyr', 'acc', 'mag', 'time'])}")
+        factor(kind, unit)
+
+
 @dataclass
 class LineReader:
     """Turns lines into samples; the first line decides on format and columns where they are not given.
@@ -148,6 +157,7 @@ class LineReader:
     layout: Layout | None = None
 
     def __post_init__(self) -> None:
+        check_units(self.units)
         self._names: tuple[str, ...] = tuple(split_unit(name)[0] for name in self.columns)
         if self.columns:
             self.layout = layout_of(self.columns, self.units, self.channels)

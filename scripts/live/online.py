@@ -5,14 +5,17 @@ from __future__ import annotations
 import math
 import time
 from array import array
-from collections.abc import Iterator
+from collections import deque
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple, Self
 
 import numpy as np
 
-from ...envs.data.clock import fit_clock
+from ...envs.data.clock import check_interval, fit_clock
+from ...envs.data.glitches import FEWEST, SamplesSoFar
 from ...filters.core.estimator import Estimator, check_measurements
+from ...filters.core.offline import Offline
 from ...filters.core.quantity import Estimate
 from .lines import BadLineError, Sample
 
@@ -22,7 +25,13 @@ FORWARD, BACK = 0.5, 0.01
 """Shares by which the clock follows a stamp that is late and one that is early: it runs with the latest stamps, so that
 jitter, drift, and packets of samples that share a stamp are not gaps."""
 FITTED = 50
-"""Samples from whose stamps the sampling rate is found, where it is not given."""
+"""Samples from whose stamps the sampling rate is found, or checked where it is given."""
+SAME_RATE = 0.7
+"""Share of the sampling interval given that the interval of the stamps has at least."""
+UNCONFIRMED = 0.5
+"""s; a sample whose stamp is so far ahead waits for the next one, which may show that the stamp is wrong."""
+SET_BACK = 3
+"""Samples in a row that lie before the last one but in order, from which on the clock counts as set back."""
 
 
 class Timed(NamedTuple):
@@ -38,6 +47,13 @@ class Timed(NamedTuple):
     """whether the gap before it is too long for predictions"""
 
 
+def alike(one: Sample, other: Sample) -> bool:
+    """Whether two samples have the same values, and NaN in the same places."""
+    return one.measurement.keys() == other.measurement.keys() and all(
+        np.array_equal(values, other.measurement[name], equal_nan=True) for name, values in one.measurement.items()
+    )
+
+
 @dataclass
 class StreamClock:
     """Puts samples on a uniform clock and inserts the missing ones.
@@ -46,52 +62,126 @@ class StreamClock:
         dt: sampling interval, s; None: found from the first stamps.
         longest_gap: s; a longer gap is not filled.
         missing: samples inserted so far.
-        restarts: gaps that were too long.
+        repeated: samples that repeated the one before, stamp and values; they are dropped.
+        restarts: gaps that were too long, and clocks that were set back.
     """
 
     dt: float | None = None
     longest_gap: float = LONGEST_GAP
     missing: int = 0
+    repeated: int = 0
     restarts: int = 0
     _now: float = field(default=math.nan, init=False)
-    _last: float = field(default=math.nan, init=False)
+    _last: Sample | None = field(default=None, init=False)
+    _behind: list[float] = field(default_factory=list, init=False)
+    _ahead: Sample | None = field(default=None, init=False)
     _waiting: list[Sample] = field(default_factory=list, init=False)
+    _early: list[float] = field(default_factory=list, init=False)
+    _anew: bool = field(default=False, init=False)
 
     def add(self, sample: Sample) -> Iterator[Timed]:
         """The sample with the missing ones before it; the first ones come late where the rate is found from them.
 
         Raises:
-            BadLineError: its time lies before that of the sample before it.
-            ValueError: the samples have no time, and there is no ``dt``; or no rate explains the first stamps.
+            BadLineError: its time lies before that of the sample before it, or that one's far ahead of it.
+            ValueError: the samples have no time, and there is no ``dt``; or no rate explains the first stamps, or
+                another one than ``dt``.
         """
         if sample.time is None:
             if self.dt is None:
                 raise ValueError("the lines have no time: name the sampling rate in Hz by --rate")
             sample = sample._replace(time=0.0 if math.isnan(self._now) else self._now + self.dt)
         assert sample.time is not None
-        if sample.time < self._last:
-            raise BadLineError(f"its time {sample.time:.6g} s lies before {self._last:.6g} s of the sample before it")
-        self._last = sample.time
+        ahead, self._ahead = self._ahead, None
+        wrong = ahead is not None and sample.time < ahead.time
+        if ahead is not None and not wrong:
+            yield from self._accept(ahead)
+        if self._last is not None and sample.time == self._last.time and alike(sample, self._last):
+            self.repeated += 1
+            return
+        if self._last is not None and sample.time < self._last.time:
+            self._check_set_back(sample.time, self._last.time)
+        self._behind.clear()
+        if self.dt is not None and UNCONFIRMED < sample.time - self._now < math.inf and not wrong:
+            self._ahead = sample
+            return
+        yield from self._accept(sample)
+        if wrong:
+            assert ahead is not None
+            raise BadLineError(f"the sample before it is left out, whose time {ahead.time:.6g} s lies far ahead")
+
+    def _check_set_back(self, time: float, last: float) -> None:
+        """Start anew where the clock was set back; a single sample that lies before the last one is a bad line."""
+        if self._behind and not self._behind[-1] <= time <= self._behind[-1] + self.longest_gap:
+            self._behind.clear()
+        self._behind.append(time)
+        if len(self._behind) < SET_BACK:
+            raise BadLineError(f"its time {time:.6g} s lies before {last:.6g} s of the sample before it")
+        self._now = math.nan
+        self._waiting.clear()
+        self._anew = True
+        self.restarts += 1
+
+    def _accept(self, sample: Sample) -> Iterator[Timed]:
+        assert sample.time is not None
+        self._last = sample
         if self.dt is not None:
+            self._check_rate(sample.time)
             yield from self._place(sample)
             return
         self._waiting.append(sample)
         if len(self._waiting) == FITTED:
-            yield from self.finish()
+            yield from self._fit()
+
+    def _check_rate(self, time: float) -> None:
+        """Compare the sampling interval that was given with the first stamps.
+
+        Raises:
+            ValueError: the stamps show another one.
+        """
+        assert self.dt is not None
+        if len(self._early) >= FITTED:
+            return
+        self._early.append(time)
+        if len(self._early) < FITTED:
+            return
+        stamps = np.array(self._early)
+        counts = np.unique(stamps, return_counts=True)[1]
+        if len(counts) < 2 or (np.diff(stamps) < 0.0).any():
+            return
+        # The samples of a packet lie before its stamp.
+        mean = (stamps[-1] - stamps[0]) / (len(stamps) - counts[0])
+        shortest = float(np.quantile(np.diff(np.unique(stamps)) / counts[1:], 0.1))
+        found = mean if mean < SAME_RATE * self.dt else shortest
+        if mean < SAME_RATE * self.dt or shortest > self.dt / SAME_RATE:
+            raise ValueError(
+                f"rate={1.0 / self.dt:.4g} Hz contradicts the time of the lines: the first {len(stamps)} samples are "
+                f"{found:.4g} s apart, {1.0 / found:.4g} Hz; leave it out, or name the unit of the time, such as "
+                "--units time=ms"
+            )
 
     def finish(self) -> Iterator[Timed]:
-        """The samples that still wait for the sampling rate.
+        """The samples that still wait, for the sampling rate or for a later sample.
 
         Raises:
             ValueError: no sampling rate explains their stamps.
         """
+        yield from self._fit()
+        if self._ahead is not None:
+            ahead, self._ahead = self._ahead, None
+            yield from self._accept(ahead)
+
+    def _fit(self) -> Iterator[Timed]:
         waiting, self._waiting = self._waiting, []
         if not waiting:
             return
         stamps = np.array([sample.time for sample in waiting], float)
         if len(stamps) < 2 or stamps[-1] == stamps[0]:
             raise ValueError(f"{len(stamps)} samples at {stamps[0]:g} s give no sampling rate: add --rate in Hz")
-        self.dt = fit_clock(stamps).interval
+        clock = fit_clock(stamps)
+        check_interval(clock.interval, stamps)
+        self.dt = clock.interval
+        self._early = [math.nan] * FITTED
         for sample in waiting:
             yield from self._place(sample)
 
@@ -103,7 +193,8 @@ class StreamClock:
         if math.isnan(gap) or restart:
             self.restarts += restart
             self._now = sample.time
-            yield Timed(sample.time, sample.measurement, False, restart)
+            anew, self._anew = self._anew, False
+            yield Timed(sample.time, sample.measurement, False, restart or anew)
             return
         none = {name: np.full_like(values, np.nan) for name, values in sample.measurement.items()}
         for _ in range(round(gap / self.dt) - 1):
@@ -122,12 +213,29 @@ class OnlineEstimator:
 
     Attributes:
         estimator: at the sampling interval of the stream.
+        ranges: channel → range of the sensor in its unit; what reaches it is no sample.
         seconds: of every step.
+
+    Glitches count as missing, as in :func:`poise.run`: what looks like one does at once, and where later samples show
+    that it is one or is none, the estimate begins again from there.
+
+    Raises:
+        ValueError: the estimator needs the whole recording.
     """
 
     estimator: Estimator[Any]
+    ranges: Mapping[str, float] = field(default_factory=dict)
     seconds: array[float] = field(default_factory=lambda: array("d"))
     _state: Any = field(default=None, init=False)
+    _before: deque[Any] = field(default_factory=lambda: deque(maxlen=FEWEST), init=False)
+    _samples: SamplesSoFar = field(init=False)
+
+    def __post_init__(self) -> None:
+        if isinstance(self.estimator, Offline):
+            raise ValueError(
+                "a smoother needs the whole recording: name an estimator with steps, or use `poise estimate`"
+            )
+        self._samples = SamplesSoFar(self.ranges)
 
     def warm_up(self) -> Self:
         """Compute an estimate of a resting sensor, so that compiled code is loaded before the first sample comes."""
@@ -146,7 +254,14 @@ class OnlineEstimator:
         if self._state is None or sample.restart:
             measurement = check_measurements(self.estimator.channels, sample.measurement, time_axis=False)
             self._state = self.estimator.init(measurement)
-        self._state, estimate = self.estimator.step(self._state, sample.measurement)
+            self._samples = SamplesSoFar(self.ranges)
+            self._before.clear()
+        changed = self._samples.add(sample.measurement)
+        for _ in changed[1:]:
+            self._state = self._before.pop()
+        for each in changed:
+            self._before.append(self._state)
+            self._state, estimate = self.estimator.step(self._state, each)
         self.seconds.append(time.perf_counter() - start)
         return estimate
 

@@ -202,8 +202,6 @@ def live_motion(names: Sequence[str], trajectory: Trajectory, dt: float) -> Live
     """
     made = {name: make_estimator(name, dt=dt, metadata=trajectory.metadata) for name in dict.fromkeys(names)}
     for name, estimator in made.items():
-        if not hasattr(estimator, "step"):
-            raise ValueError(f"{name} needs the whole recording; a live motion needs estimators with steps")
         lacking = [each.name for each in estimator.channels if each.name not in trajectory.measurements]
         if lacking:
             raise ValueError(f"{name} needs {', '.join(lacking)}; there are {', '.join(trajectory.measurements)}")

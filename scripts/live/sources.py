@@ -58,8 +58,13 @@ def check_port(port: int) -> int:
 
 def datagrams(port: int, host: str = "0.0.0.0") -> Iterator[str | None]:
     """Lines of the datagrams that arrive on a UDP port."""
+    check_port(port)
     receiver = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-    receiver.bind((host, check_port(port)))
+    try:
+        receiver.bind((host, port))
+    except OSError as reason:
+        receiver.close()
+        raise OSError(reason.errno, reason.strerror, f"UDP port {port}") from None
     receiver.settimeout(PAUSE)
     return _received(receiver)
 
@@ -77,6 +82,8 @@ def _received(receiver: socket.socket) -> Iterator[str | None]:
 
 def file_lines(path: Path, follow: bool, baud: int) -> Iterator[str | None]:
     """Lines of a file or device."""
+    if os.path.isdir(path):
+        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
     descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NOCTTY", 0))
     if os.isatty(descriptor):
         try:

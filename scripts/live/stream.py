@@ -10,9 +10,10 @@ from __future__ import annotations
 import json
 import socket
 import sys
+import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -25,11 +26,13 @@ from .sources import lines_of
 
 if TYPE_CHECKING:
     from ...filters.core.quantity import Channel, Estimate
-    from .lines import LineReader
+    from .lines import Layout, LineReader
     from .online import StreamClock, Timed
 
 NAMED = 10
 """Bad lines that are named one by one; the others are only counted."""
+CHECKED = 10.0
+"""s from the beginning whose samples are checked for wrong units, signs and axes."""
 HOPELESS = 20
 """Lines from the beginning that may be bad before the stream is refused: a serial line may begin in the middle."""
 
@@ -51,6 +54,8 @@ class Args:
     by default those of a header, of a JSON object, or time, gyr, acc, mag"""
     units: tuple[str, ...] = ()
     """units where they are not SI, as kind=unit (gyr=deg/s acc=g time=ms)"""
+    full_scale: tuple[str, ...] = ()
+    """ranges of sensors as kind=number in the unit of the lines (gyr=2000 acc=16): what reaches them is no sample"""
     format: LineFormat = "auto"
     """of the lines; estimates are written in the same one"""
     follow: bool = False
@@ -137,6 +142,77 @@ def reader_of(args: Any, channels: Sequence[Channel]) -> LineReader:
     return LineReader(args.columns, units, channels, args.format)
 
 
+def ranges_of(texts: Sequence[str], layout: Layout) -> dict[str, float]:
+    """Channel → range in SI units.
+
+    Args:
+        texts: kind=number, in the unit of the lines.
+        layout: what the columns of the lines are.
+
+    Raises:
+        ValueError: an unknown kind, or no positive number.
+    """
+    from ...filters.support.names import unknown
+
+    ranges: dict[str, float] = {}
+    kinds = sorted({name.rpartition("/")[2] for name in layout.channels})
+    for text in texts:
+        kind, _, number = text.partition("=")
+        if kind not in kinds:
+            raise ValueError(f"full_scale: {unknown('kind', kind, kinds)}")
+        try:
+            value = float(number)
+        except ValueError:
+            value = float("nan")
+        if not 0.0 < value < float("inf"):
+            raise ValueError(f"full_scale must be kind=number, a positive one, such as gyr=2000, got {text!r}")
+        ranges |= {name: value * scale for name, (_, scale) in layout.channels.items() if name.endswith(f"/{kind}")}
+    return ranges
+
+
+@dataclass
+class FirstSamples:
+    """The beginning of a stream, which is checked like a recording (:func:`poise.check_recording`).
+
+    Attributes:
+        dt: sampling interval, s.
+    """
+
+    dt: float
+    _samples: list[Timed] = field(default_factory=list, init=False)
+    _thread: threading.Thread | None = field(default=None, init=False)
+
+    def add(self, sample: Timed) -> None:
+        """One more sample; when there are enough, they are checked beside the estimation."""
+        if self._thread is None:
+            self._samples.append(sample)
+            if len(self._samples) * self.dt >= CHECKED:
+                self._thread = threading.Thread(target=self._check, daemon=True)
+                self._thread.start()
+
+    def finish(self) -> None:
+        """Check what there is, if it was not done yet."""
+        if self._thread is None:
+            self._check()
+        else:
+            self._thread.join()
+
+    def _check(self) -> None:
+        import numpy as np
+
+        from ...envs.data.plausibility import check_recording
+        from ...envs.data.trajectory import Trajectory
+
+        # A restart would be a gap.
+        restarts = [place for place, sample in enumerate(self._samples) if sample.restart]
+        whole = self._samples[restarts[-1] if restarts else 0 :]
+        channels = {name: np.array([each.measurement[name] for each in whole]) for name in whole[0].measurement}
+        metadata = {"name": "the stream", "nominal_rate": 1.0 / self.dt}
+        for finding in check_recording(Trajectory(self.dt * np.arange(len(whole)), channels, metadata=metadata)):
+            if finding.severity == "warning":
+                print(f"poise: warning: {finding}", file=sys.stderr, flush=True)
+
+
 def clock_of(rate: float | None) -> StreamClock:
     """The clock of a stream of a rate in Hz.
 
@@ -206,15 +282,10 @@ def as_line(row: Mapping[str, float], as_json: bool) -> str:
 def run(args: Args) -> int:
     """Estimate until the lines end or the command is interrupted."""
     from ...baselines.registry import make_estimator
-    from ...filters.core.offline import Offline
     from .online import OnlineEstimator
 
     check_file("output", args.output, () if args.source == "-" else (Path(args.source),))
     made = make_estimator(args.estimator)
-    if isinstance(made, Offline):
-        raise ValueError(
-            f"{args.estimator} needs the whole recording: use `poise estimate`, or an estimator with steps"
-        )
     reader, clock, counts = reader_of(args, made.channels), clock_of(args.rate), Counts()
     kinds = {quantity.name: quantity.kind for quantity in made.outputs}
     OnlineEstimator(made).warm_up()
@@ -227,7 +298,10 @@ def run(args: Args) -> int:
                     continue
                 if online is None:
                     assert clock.dt is not None
-                    online = OnlineEstimator(made.with_dt(clock.dt))
+                    assert reader.layout is not None
+                    online = OnlineEstimator(made.with_dt(clock.dt), ranges_of(args.full_scale, reader.layout))
+                    first = FirstSamples(clock.dt)
+                first.add(sample)
                 row = estimate_row(sample, online.step(sample), kinds)
                 if len(online.seconds) == 1 and reader.kind == "csv":
                     write(",".join(row))
@@ -236,6 +310,7 @@ def run(args: Args) -> int:
         print(file=sys.stderr)
     if online is None:
         raise ValueError(f"no sample came; {counts.bad} lines were not samples{counts.reason and f': {counts.reason}'}")
+    first.finish()
     print(summary(args.estimator, clock, counts, online.latency()), file=sys.stderr, flush=True)
     return 0
 
@@ -247,8 +322,11 @@ def summary(estimator: str, clock: StreamClock, counts: Counts, latency: Mapping
         f"{counts.samples} samples at {1.0 / clock.dt:.4g} Hz, {clock.missing} missing ones predicted",
         f"{counts.bad} bad lines skipped",
     ]
+    if clock.repeated:
+        parts.append(f"{clock.repeated} repeated samples dropped")
     if clock.restarts:
-        parts.append(f"{clock.restarts} restarts after gaps of more than {clock.longest_gap:g} s")
+        why = f"gaps of more than {clock.longest_gap:g} s or clocks that were set back"
+        parts.append(f"{clock.restarts} restarts after {why}")
     times = ", ".join(
         f"{name.removesuffix(' (µs)')} {value:.0f} µs" for name, value in latency.items() if name != "samples"
     )

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import poise
-from poise.envs.data.glitches import FULL, without_glitches
+from poise.envs.data.glitches import FEWEST, FULL, SamplesSoFar, without_glitches
 from poise.envs.data.trajectory import Trajectory
 from poise.envs.hand.sensing import simulate_hand
 from poise.filters.core import metrics
@@ -77,3 +77,62 @@ def test_a_range_that_is_known_tells_saturated_samples() -> None:
     with pytest.warns(UserWarning, match="saturated"):
         found = without_glitches(told)["imu/gyr"]
     assert np.array_equal(np.isnan(found).any(axis=1), (np.abs(clipped) >= FULL * limit).any(axis=1))
+
+
+def so_far(measurements: dict[str, np.ndarray], ranges: dict[str, float]) -> tuple[dict[str, np.ndarray], np.ndarray]:
+    """What counts in the end, and how many samples each new one decides on."""
+    watch, length = SamplesSoFar(ranges), len(next(iter(measurements.values())))
+    found = {name: np.array(values) for name, values in measurements.items()}
+    decided = np.zeros(length, int)
+    for row in range(length):
+        last = watch.add({name: values[row] for name, values in measurements.items()})
+        decided[row] = len(last)
+        for name, values in found.items():
+            values[row + 1 - len(last) : row + 1] = [each[name] for each in last]
+    return found, decided
+
+
+@pytest.mark.parametrize("length", [1, 5, 9, 12, 400])
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_samples_that_arrive_are_judged_as_those_of_a_recording(seed: int, length: int) -> None:
+    generator = np.random.default_rng(seed)
+    measurements = {name: np.array(KNOWN.measurements[f"imu/{name}"][300 : 300 + length]) for name in ("gyr", "acc")}
+    for name, size in (("gyr", 25.0), ("acc", 120.0)):
+        for row in generator.integers(0, length, 1 + length // 25):
+            measurements[name][row] = size * generator.standard_normal(3)
+            measurements[name][min(row + 3, length - 1)] = generator.choice([0.0, np.nan, size])
+    both = generator.integers(0, length, 2)
+    for values in measurements.values():
+        values[both] = 0.0
+    ranges = {"imu/gyr": 30.0}
+    channels = {f"imu/{name}": values for name, values in measurements.items()}
+    found, decided = so_far(channels, ranges)
+    recording = KNOWN[300 : 300 + length].replace(measurements=channels, metadata={"full_scale": ranges})
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)
+        expected = without_glitches(recording)
+    for name in channels:
+        if length > 1:  # the last one may be withheld until the next one shows what it is
+            np.testing.assert_array_equal(found[name][:-1], expected[name][:-1])
+        np.testing.assert_array_equal(np.isnan(found[name][-1]) | (found[name][-1] == expected[name][-1]), True)
+    assert decided.max() <= FEWEST
+    if length == 400:
+        assert decided.max() > 1
+
+
+@pytest.mark.parametrize("gesture", ["severe", "carried-running", "mixed"])
+def test_nothing_is_withheld_from_motion_and_impacts_that_arrive(gesture: str) -> None:
+    hand = simulate_hand(gesture, seed=3, duration=20.0)
+    inertial = {name: hand.measurements[name] for name in ("imu/gyr", "imu/acc")}
+    found, decided = so_far(inertial, {})
+    assert decided.max() == 1
+    for name, values in inertial.items():
+        np.testing.assert_array_equal(found[name], values)
+
+
+def test_a_glitch_that_arrives_is_withheld_at_once() -> None:
+    glitched = with_samples("gyr", np.array([200]), [20.0, -25.0, 0.0]).measurements
+    watch = SamplesSoFar()
+    last = [watch.add({name: values[row] for name, values in glitched.items()})[-1] for row in range(201)]
+    assert np.isnan(last[200]["imu/gyr"]).all()
+    assert np.isfinite(last[200]["imu/acc"]).all()

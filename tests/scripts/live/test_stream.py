@@ -112,8 +112,8 @@ def test_wrong_columns_are_refused(columns, units, said):
 def placed(clock: StreamClock, stamps: list[float]) -> list[Timed]:
     reader = LineReader()
     found = []
-    for stamp in stamps:
-        sample = reader.read(f"{stamp},1,2,3,4,5,6")
+    for number, stamp in enumerate(stamps):
+        sample = reader.read(f"{stamp},{number},2,3,4,5,6")
         assert sample is not None
         found += clock.add(sample)
     return [*found, *clock.finish()]
@@ -139,7 +139,7 @@ def test_jitter_and_drift_are_no_gaps():
 def test_packets_of_samples_with_one_stamp_are_no_gaps():
     stamps = np.repeat(0.04 * np.arange(1, 100), 4)
     placed(clock := StreamClock(0.01), stamps.tolist())
-    assert clock.missing == 0
+    assert (clock.missing, clock.repeated) == (0, 0)
 
 
 def test_the_rate_is_found_from_the_stamps():
@@ -152,6 +152,94 @@ def test_the_rate_is_found_from_the_stamps():
 def test_time_that_runs_backwards_is_a_bad_line():
     with pytest.raises(BadLineError, match="lies before"):
         placed(StreamClock(0.1), [1.0, 0.9])
+
+
+@pytest.mark.parametrize(
+    ("stamps", "restarts"),
+    [
+        ([0.0, 0.1, 9.0, 0.2, 0.3, 0.4, 0.5], 0),  # one wild stamp
+        ([0.0, 0.1, 1e300, 0.2, 0.3, 0.4, 0.5], 0),
+        ([7.0, 7.1, 7.2, 0.0, 0.1, 0.2, 0.3], 1),  # a device that was started again
+    ],
+)
+def test_wrong_stamps_do_not_end_the_stream(stamps, restarts):
+    clock, reader, found, bad = StreamClock(0.1), LineReader(), [], 0
+    for number, stamp in enumerate(stamps):
+        sample = reader.read(f"{stamp},{number},2,3,4,5,6")
+        assert sample is not None
+        try:
+            for timed in clock.add(sample):
+                found.append(timed)
+        except BadLineError:
+            bad += 1
+    found += clock.finish()
+    assert [timed.measurement["imu/gyr"][0] for timed in found if not timed.predicted][-2:] == [5.0, 6.0]
+    assert sum(timed.restart for timed in found) == clock.restarts == restarts
+    assert bad == (2 if restarts else 1)
+    assert clock.missing <= 1
+
+
+def test_repeated_lines_are_dropped():
+    clock, reader, found = StreamClock(0.1), LineReader(), []
+    for number in np.repeat(np.arange(10), 3):
+        sample = reader.read(f"{0.1 * number},{number},2,3,4,5,6")
+        assert sample is not None
+        found += clock.add(sample)
+    assert len(found) == 10
+    assert (clock.missing, clock.repeated) == (0, 20)
+
+
+@pytest.mark.parametrize("factor", [0.1, 0.5, 2.0, 10.0])
+def test_a_rate_that_contradicts_the_stamps_is_refused(factor):
+    with pytest.raises(ValueError, match=r"rate=.* Hz contradicts the time of the lines: .*, 50 Hz"):
+        placed(StreamClock(factor / RATE), (np.arange(200) / RATE).tolist())
+
+
+@pytest.mark.parametrize("factor", [0.9, 1.0, 1.1])
+def test_lost_samples_do_not_contradict_the_rate(factor):
+    stamps = np.sort(np.random.default_rng(0).choice(400, 150, replace=False)) / RATE
+    assert placed(StreamClock(factor / RATE), stamps.tolist())
+
+
+def test_time_in_milliseconds_is_named():
+    with pytest.raises(ValueError, match="it seems to be in ms"):
+        placed(StreamClock(), (20.0 * np.arange(60)).tolist())
+
+
+def test_glitches_are_estimated_as_in_a_recording(motion, tmp_path):
+    wrong = {name: np.array(values) for name, values in motion.measurements.items()}
+    wrong["imu/gyr"][[60, 150]] = [40.0, -30.0, 20.0]
+    wrong["imu/acc"][[90, 200]] = 0.0
+    wrong["imu/acc"][120] = [100.0, 150.0, -90.0]
+    path, out = tmp_path / "samples.csv", tmp_path / "estimates.csv"
+    path.write_text("\n".join(csv_lines(glitched := motion.replace(measurements=wrong))) + "\n")
+    assert main(["stream", str(path), "--output", str(out)]) == 0
+    table = np.genfromtxt(out, delimiter=",", names=True)
+    up = np.stack([table[f"up_{axis}"] for axis in "xyz"], axis=1)
+    with pytest.warns(UserWarning, match="glitches"):
+        expected = poise.run("bounded-motion", glitched).pose["up"]
+    # After a glitch the estimates are those of a recording as soon as the next samples have shown what it was.
+    np.testing.assert_allclose(up[[65, 100, 130, 170, 250, -1]], expected[[65, 100, 130, 170, 250, -1]], atol=1e-6)
+    apart = np.degrees(np.linalg.norm(up - expected, axis=1))
+    assert apart.max() < 5.0
+
+
+@pytest.mark.parametrize(("units", "said"), [({"gyr": 57.3}, "rates in deg/s"), ({"acc": 1.0 / 9.81}, "readings in g")])
+def test_implausible_units_of_a_stream_are_named(motion, units, said, tmp_path, capsys):
+    wrong = {name: units.get(name[4:], 1.0) * values for name, values in motion.measurements.items()}
+    path = tmp_path / "samples.csv"
+    path.write_text("\n".join(csv_lines(motion.replace(measurements=wrong))) + "\n")
+    assert main(["stream", str(path), "--output", str(tmp_path / "out.csv")]) == 0
+    assert said in capsys.readouterr().err
+
+
+def test_ranges_of_sensors_are_no_samples(motion, tmp_path):
+    path, plain, ranged = (tmp_path / name for name in ("samples.csv", "plain.csv", "ranged.csv"))
+    path.write_text("\n".join(csv_lines(motion)) + "\n")
+    assert main(["stream", str(path), "--output", str(plain)]) == 0
+    largest = str(np.abs(motion.measurements["imu/gyr"]).max())
+    assert main(["stream", str(path), "--output", str(ranged), "--full-scale", f"gyr={largest}"]) == 0
+    assert plain.read_text() != ranged.read_text()
 
 
 def test_stepping_equals_running(motion):
@@ -193,6 +281,10 @@ def test_estimates_of_a_file_equal_those_of_the_recording(motion, tmp_path, caps
         ([], "1,2,3,4,5,6\n" * 60, "--rate"),
         ([], "", "no sample came"),
         ([], "1,2\n", "lines of 2 values without names"),
+        (["--units", "gyr=furlong"], "0,1,2,3,4,5,6\n", "furlong"),
+        (["--estimator", "mekf (offline)"], "0,1,2,3,4,5,6\n", "a smoother needs the whole recording"),
+        (["--full-scale", "gyr=-1", "--rate", "50"], "0,1,2,3,4,5,6\n", "full_scale must be kind=number"),
+        (["--full-scale", "temp=1", "--rate", "50"], "0,1,2,3,4,5,6\n", "full_scale: unknown kind 'temp'"),
     ],
 )
 def test_wrong_input_is_named(words, text, said, tmp_path, capsys):
