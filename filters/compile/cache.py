@@ -138,7 +138,16 @@ def _written(path: Path, text: str) -> Path:
 
 
 def compile_now(function: Any, arguments: tuple[Any, ...], label: str) -> None:
-    """Compile a function of :func:`jit` for the types of ``arguments`` by calling it; say so if that takes long."""
+    """Call a function of :func:`jit`, which is compiled for these types before; say so if that takes long."""
+    if not function.signatures:
+        _compile(function, arguments, label)
+    function(*arguments)
+
+
+def _compile(function: Any, arguments: tuple[Any, ...], label: str) -> None:
+    """Compile a function for the types of ``arguments``, or load it from the cache."""
+    import numba
+
     done = threading.Event()
 
     def tell() -> None:
@@ -152,7 +161,7 @@ def compile_now(function: Any, arguments: tuple[Any, ...], label: str) -> None:
     threading.Thread(target=tell, daemon=True).start()
     try:
         with _alone(function.py_func.__module__):
-            function(*arguments)
+            function.compile(tuple(numba.typeof(argument) for argument in arguments))
     finally:
         done.set()
 
