@@ -23,13 +23,7 @@ from .wrapper import QUARTER_TURN, ExternalPackage
 class AHRSFilter(ExternalPackage):
     """Initialisation, and prediction where a sample is missing; shared by the three filters."""
 
-    package: ClassVar[str] = "ahrs"
-
-    def _filters(self) -> Any:
-        self.load()
-        import ahrs.filters
-
-        return ahrs.filters
+    package: ClassVar[str] = "ahrs.filters"
 
     def _start(self, sample: np.ndarray) -> np.ndarray:
         """Attitude of a first sample, sensor to world."""
@@ -68,7 +62,7 @@ class AHRSMadgwick(AHRSFilter):
         """Memory: the quaternion to north-west-up."""
         gyroscope, f, field = self._parts(sample)
         gain = self.gain_imu if self.axes == 6 else self.gain_marg
-        engine = self._filters().Madgwick(Dt=self.dt, gain=gain)
+        engine = self.load().Madgwick(Dt=self.dt, gain=gain)
         without = field is None
         q = engine.updateIMU(memory, gyroscope, f) if without else engine.updateMARG(memory, gyroscope, f, field)
         q = np.asarray(q, dtype=float)
@@ -101,7 +95,7 @@ class AHRSMahony(AHRSFilter):
         if not f.any():
             # Without a sample the package also omits the bias; here the prediction uses it.
             gyroscope = gyroscope - memory[4:]
-        engine = self._filters().Mahony(Dt=self.dt, k_P=self.k_p, k_I=self.k_i, b0=memory[4:].copy())
+        engine = self.load().Mahony(Dt=self.dt, k_P=self.k_p, k_I=self.k_i, b0=memory[4:].copy())
         if field is None:
             q = engine.updateIMU(memory[:4], gyroscope, f)
         else:
@@ -136,7 +130,7 @@ class AHRSEKF(AHRSFilter):
         """Memory: quaternion, covariance, dip of the field."""
         q, covariance, dip = memory
         gyroscope, f, field = self._parts(sample)
-        engine = self._filters().EKF(
+        engine = self.load().EKF(
             Dt=self.dt,
             frame="ENU",
             magnetic_ref=math.degrees(dip),

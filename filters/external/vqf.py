@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ..core.backend import to_numpy
-from ..core.estimator import check_measurements, run_by_steps
+from ..core.estimator import check_measurements
 from ..core.quantity import GYROSCOPE, Estimate
 from .wrapper import ExternalPackage
 
@@ -52,22 +52,14 @@ class VQF(ExternalPackage):
         q = engine.getQuat9D() if self.axes == 9 else engine.getQuat6D()
         return np.concatenate([q, engine.getBiasEstimate()[0]])
 
-    def run(self, measurements: Mapping[str, Any]) -> Estimate:
-        """As stepping, but with the package's loop over whole sequences where no sample is missing."""
-        arrays = check_measurements(self.channels, measurements, time_axis=True)
-        like = arrays[GYROSCOPE.name]
-        samples = np.concatenate([to_numpy(array) for array in arrays.values()], axis=-1, dtype=float)
+    def follow(self, first: np.ndarray, later: np.ndarray) -> np.ndarray:
+        """One sequence by one engine, by the package's own loop where no sample is missing."""
+        engine, samples = self._engine(), np.concatenate([first[None], later])
         if not np.isfinite(samples).all():
-            return run_by_steps(self, measurements)
-        length, shape = len(samples), (*tuple(like.shape[:-1]), 7)
-        sequences = np.moveaxis(samples.reshape(length, -1, self.axes), 1, 0)
-        outputs = np.empty((length, len(sequences), 7))
-        for index, sequence in enumerate(sequences):
-            parts = [np.ascontiguousarray(sequence[:, start : start + 3]) for start in range(0, self.axes, 3)]
-            result = self._engine().updateBatch(*parts)
-            outputs[:, index, :4] = result["quat9D" if self.axes == 9 else "quat6D"]
-            outputs[:, index, 4:] = result["bias"]
-        return self._estimate(outputs.reshape(shape), like)
+            return np.array([self._update(engine, sample) for sample in samples])
+        parts = [np.ascontiguousarray(samples[:, start : start + 3]) for start in range(0, self.axes, 3)]
+        result = engine.updateBatch(*parts)
+        return np.concatenate([result["quat9D" if self.axes == 9 else "quat6D"], result["bias"]], axis=1)
 
     def smooth(self, measurements: Mapping[str, Any]) -> Estimate:
         """The package's offline form, which uses future samples too. ``(T, *batch, 3)`` in.

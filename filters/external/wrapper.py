@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import importlib
 import math
+import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Literal, NamedTuple, Self
@@ -18,7 +19,7 @@ from typing import Any, ClassVar, Literal, NamedTuple, Self
 import numpy as np
 
 from ..core.backend import Array, constant, to_numpy
-from ..core.estimator import check_measurements, run_by_steps
+from ..core.estimator import check_measurements
 from ..core.quantity import (
     ACCELEROMETER,
     GYROSCOPE,
@@ -55,7 +56,7 @@ class WrapperState(NamedTuple):
 class ExternalPackage:
     """Base class of the wrappers; the package is loaded on first use.
 
-    Subclasses implement ``begin`` and ``advance`` for one sequence.
+    Subclasses implement ``begin`` and ``advance`` for one sequence; ``follow`` is their loop, or a faster one.
     """
 
     dt: float = 0.01
@@ -83,6 +84,9 @@ class ExternalPackage:
         Raises:
             ImportError: it is not installed; the message says how to install it.
         """
+        loaded = sys.modules.get(self.package)  # asked at every sample
+        if loaded is not None:
+            return loaded
         with extra("compare"):
             return importlib.import_module(self.package)
 
@@ -136,7 +140,29 @@ class ExternalPackage:
 
     def run(self, measurements: Mapping[str, Any]) -> Estimate:
         """Estimates of a whole sequence, ``(T, *batch, 3)`` in; equal to stepping."""
-        return run_by_steps(self, measurements)
+        self.load()
+        arrays = check_measurements(self.channels, measurements, time_axis=True)
+        like = arrays[GYROSCOPE.name]
+        samples = np.concatenate([to_numpy(array) for array in arrays.values()], axis=-1, dtype=float)
+        samples = samples.reshape(len(samples), math.prod(like.shape[1:-1]), self.axes)
+        outputs = np.full((*samples.shape[:2], 7 if self.gives_bias else 4), np.nan)
+        for index in range(samples.shape[1]):
+            held = last_readings(samples[:, index])
+            complete = np.isfinite(held).all(axis=1)
+            if complete.any():
+                first = int(complete.argmax())
+                later = np.concatenate([held[first + 1 :, :3], samples[first + 1 :, index, 3:]], axis=1)
+                outputs[first:, index] = self.follow(held[first], later)
+        return self._estimate(outputs.reshape((*tuple(like.shape[:-1]), outputs.shape[-1])), like)
+
+    def follow(self, first: np.ndarray, later: np.ndarray) -> np.ndarray:
+        """Outputs ``(1 + T, 4 or 7)`` of a first complete sample ``(d,)`` and of what follows, ``(T, d)``."""
+        memory, output = self.begin(first)
+        outputs = [output]
+        for sample in later:
+            memory, output = self.advance(memory, sample)
+            outputs.append(output)
+        return np.array(outputs)
 
     def _estimate(self, output: np.ndarray, like: Array) -> Estimate:
         output = constant(output, like)
@@ -145,3 +171,10 @@ class ExternalPackage:
         if self.gives_bias:
             pose["gyroscope_bias"] = output[..., 4:]
         return Estimate({quantity.name: pose[quantity.name] for quantity in self.outputs})
+
+
+def last_readings(samples: np.ndarray) -> np.ndarray:
+    """The last finite value of every element of samples ``(T, d)`` so far, NaN before the first."""
+    latest = np.where(np.isfinite(samples), np.arange(len(samples))[:, None], -1)
+    latest = np.maximum.accumulate(latest, axis=0)
+    return np.where(latest >= 0, np.take_along_axis(samples, np.maximum(latest, 0), axis=0), np.nan)
