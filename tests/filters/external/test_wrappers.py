@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import sys
 
 import numpy as np
 import pytest
@@ -107,6 +108,7 @@ def test_a_missing_package_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -
     def absent(name: str, *rest: object) -> object:
         raise ModuleNotFoundError(name, name=name)
 
+    monkeypatch.delitem(sys.modules, "vqf", raising=False)
     monkeypatch.setattr(importlib, "import_module", absent)
     with pytest.raises(ImportError, match=r"vqf is not installed: pip install 'poise\[compare\]'"):
         VQF().load()
