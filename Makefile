@@ -13,6 +13,9 @@ TYPECHECK := build/typecheck
 ARGS ?=
 WORKERS ?= 2
 
+# pip would compile all that it installs, most of which is never imported; Python compiles what is, once, and keeps it.
+unexport PYTHONDONTWRITEBYTECODE
+
 # The first Python that runs and is new enough: a version manager may put a dead `python3.11` on the path.
 ifeq ($(origin PYTHON), undefined)
 PYTHON = $(shell for p in python3.11 python3 python; do \
@@ -29,7 +32,8 @@ $(STAMP): pyproject.toml constraints.txt
 	@rm -f $@
 	@test -x $(BIN)/pip || "$(PYTHON)" -m venv --clear $(VENV)
 	@echo "Installing into $(VENV) (minutes the first time) …"
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --progress-bar off -c constraints.txt -e '.[all,dev]'
+	@$(BIN)/python -m pip install --no-compile --quiet --disable-pip-version-check --progress-bar off \
+		-c constraints.txt -e '.[all,dev]'
 	@touch $@
 
 benchmark: $(STAMP) ## compare all estimators on all environments, quick form; options in ARGS="…"
@@ -61,7 +65,7 @@ lint: $(STAMP) ## ruff: lint and formatting
 
 # Types are checked on a copy named poise, so that the folder of the clone may have any name.
 types: $(STAMP) ## mypy
-	@rm -rf $(TYPECHECK) build/lib
+	@rm -rf $(TYPECHECK)
 	@$(BIN)/python -c 'import setuptools; setuptools.setup()' --quiet build_py --build-lib $(TYPECHECK)
 	cd $(TYPECHECK) && $(BIN)/python -m mypy --config-file $(CURDIR)/pyproject.toml --cache-dir $(CURDIR)/.mypy_cache -p poise
 
