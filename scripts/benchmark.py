@@ -135,9 +135,17 @@ def tasks_of(args: Args, recorded: list[Trajectory]) -> tuple[list[Task], list[s
     from ..baselines.comparison.data_sets import HAND_CHANNELS, RIDES, contenders, with_other_clocks
     from ..baselines.comparison.recommendation import CORRECTED
     from ..baselines.comparison.tasks import hand_tasks, imu_ride_tasks, recording_tasks
+    from ..baselines.evaluation import AUTO
+    from ..baselines.registry import make_estimator
+    from ..baselines.scoring import ONBOARD
+    from ..envs.sensors.presets import sensor_preset
 
     channels = list(dict.fromkeys([*HAND_CHANNELS, *(name for each in recorded for name in each.measurements)]))
-    contenders(args.estimators, channels)  # an unknown name is refused before anything is simulated
+    # unknown names are refused before anything is simulated
+    contenders(args.estimators, channels)
+    sensor_preset(args.sensors)
+    if args.reference not in (AUTO, ONBOARD):
+        make_estimator(args.reference)
     if args.suite == "rider":
         return [], channels
     tasks = hand_tasks(args.seed, 1 if args.quick else args.episodes, sensors=args.sensors)

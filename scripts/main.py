@@ -35,6 +35,27 @@ USER_ERRORS = (ValueError, OSError, UnregisteredEnv, MissingExtraError)
 """What wrong input raises; shown as one line. Anything else is a defect and keeps its traceback."""
 
 
+LEAST = dict.fromkeys(("seed", "test_seed", "replicate", "trials"), 0) | dict.fromkeys(
+    (
+        *(
+            "processes",
+            "episodes",
+            "trajectories",
+            "training",
+            "points",
+            "steps",
+            "epochs",
+            "units",
+            "subjects",
+            "seeds",
+        ),
+        *("test_episodes", "test_trajectories", "most"),
+    ),
+    1,
+)
+"""Option of any command that is a whole number → its least value."""
+
+
 class Command(NamedTuple):
     """Where a subcommand lives and what it does."""
 
@@ -146,13 +167,27 @@ def run(name: str, words: Sequence[str]) -> int:
         if not stop.code:
             raise
         return fail(unboxed(complaint.getvalue()))
+    check_counts(args)
     return int(module.run(args))
+
+
+def check_counts(args: object) -> None:
+    """Check whole numbers that mean the same in all commands, before one begins to work.
+
+    Raises:
+        ValueError: one is too small.
+    """
+    for option, least in LEAST.items():
+        value = getattr(args, option, None)
+        if isinstance(value, int) and value < least:
+            raise ValueError(f"{option} must be at least {least}, got {value}")
 
 
 def unboxed(complaint: str) -> str:
     """A parser's message in a box of several lines, as one line."""
     frame = str.maketrans(dict.fromkeys("─╭╮╰╯│┌┐└┘", " "))
-    lines = [line.translate(frame).strip() for line in complaint.splitlines()]
+    # A terminal without these characters gets a box of hyphens.
+    lines = [re.sub(r"-{3,}|^[+|]|[+|]$", " ", line.translate(frame)).strip() for line in complaint.splitlines()]
     content = [line for line in lines if line]
     # The first line is the title that its contents repeat.
     return re.sub(

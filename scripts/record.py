@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ast
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -75,6 +75,21 @@ def option(text: str) -> tuple[str, Any]:
         return name, value
 
 
+def options_of(texts: Sequence[str]) -> dict[str, Any]:
+    """Options by name.
+
+    Raises:
+        ValueError: one is no option, or is named twice.
+    """
+    found: dict[str, Any] = {}
+    for text in texts:
+        name, value = option(text)
+        if name in found:
+            raise ValueError(f"option {name!r} is given twice: {found[name]!r} and {value!r}")
+        found[name] = value
+    return found
+
+
 def run(args: Args) -> int:
     """Record and say where the files are."""
     if args.minari is not None:
@@ -106,7 +121,7 @@ def record_minari(args: Args, dataset_id: str) -> int:
 
     if args.recipe is not None:
         raise ValueError("--minari keeps episodes of one environment, and a recipe draws another one for each episode")
-    env = make_environment(environment_id(args.environment), **dict(option(text) for text in args.options))
+    env = make_environment(environment_id(args.environment), **options_of(args.options))
     try:
         dataset = to_minari(env, dataset_id, episodes=args.episodes, seed=args.seed, progress=True)
     finally:
@@ -135,7 +150,7 @@ def recorder(args: Args) -> tuple[Callable[..., list[Path]], str]:
     from ..envs.registration import make_environment
 
     env_id = environment_id(args.environment)
-    options = dict(option(text) for text in args.options)
+    options = options_of(args.options)
     # once, here, where a wrong option is explained in one line
     make_environment(env_id, **options).close()
     return partial(record_episodes, env_id, options=options), env_id

@@ -78,10 +78,13 @@ class Args:
 
 def run(args: Args) -> int:
     """Train, test, and write weights with their card."""
+    from ..baselines.learned.estimator import LearnedEstimator
     from ..baselines.learned.training import train_preset
 
     start = process_times()
     check_file("export", args.export, args.recordings)
+    if args.start is not None:
+        LearnedEstimator.load(args.start)  # raises, before anything is simulated
     preset = chosen(args)
     own = known_recordings(args.recordings) if args.recordings else None
     folder = open_run("train", args, may_differ=("test_episodes", "processes"))

@@ -92,10 +92,10 @@ def run(args: Args) -> int:
     from ..filters.adaptation.tuned import TunedFilter
 
     check_file("export", args.export, args.recordings)
+    if args.agent == "optuna" and args.trials < 1:
+        raise ValueError(f"trials must be at least 1, got {args.trials}")
     config = training_config(args)
     tuned = TunedFilter.of(tunable_filter(args.filter), config.gains)
-    if args.test_trajectories < 1:
-        raise ValueError(f"test_trajectories must be at least 1, got {args.test_trajectories}")
     recorded = known_recordings(args.recordings)
     for each in recorded:
         check_recording(tuned, each)

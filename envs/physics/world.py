@@ -40,6 +40,10 @@ class PhysicsError(RuntimeError):
     """PyBullet refused something, or its world is closed."""
 
 
+class NoDisplayError(PhysicsError, ValueError):
+    """A window was asked for where there is no display."""
+
+
 class Physics:
     """A PyBullet world with gravity along −z, ready for exact rigid-body work.
 
@@ -72,7 +76,7 @@ class Physics:
         self._inertial: dict[tuple[int, int], tuple[np.ndarray, np.ndarray]] = {}
         if gui and sys.platform.startswith("linux") and not os.environ.get("DISPLAY"):
             # PyBullet would end the whole process
-            raise PhysicsError("a window needs a display, but DISPLAY is not set; use render_mode='rgb_array'")
+            raise NoDisplayError("a window needs a display, but DISPLAY is not set; use render_mode='rgb_array'")
         self.client = pybullet.connect(pybullet.GUI if gui else pybullet.DIRECT)
         if self.client < 0:
             raise PhysicsError(f"PyBullet could not {'open a window' if gui else 'start'}")

@@ -232,14 +232,14 @@ def environment(args: Args) -> tuple[str, Any]:
         ValueError: an unknown option.
     """
     from ...envs.registration import make_environment, register_environments
-    from ..record import environment_id, option
+    from ..record import environment_id, options_of
 
     register_environments()
     try:
         env_id = environment_id(args.source)
     except ValueError as reason:
         raise FileNotFoundError(2, f"no such file, and {reason}", args.source) from None
-    return env_id, make_environment(env_id, **dict(option(text) for text in args.options))
+    return env_id, make_environment(env_id, **options_of(args.options))
 
 
 def with_tuned_filter(args: Args, env: Any) -> Args:

@@ -60,9 +60,6 @@ def run(args: Args) -> int:
     from ..experiment import known_recordings, start_run
     from ..tune import results
 
-    for name in ("trajectories", "training", "points"):
-        if getattr(args, name) < 1:
-            raise ValueError(f"{name} must be at least 1, got {getattr(args, name)}")
     config = shipped_config(args.filter)
     shipped = f"{args.filter.replace('-', '_')}_policy"
     names = args.policies or tuple(name for name in (shipped,) if name in list_weights())

@@ -70,8 +70,6 @@ def run(args: Args) -> int:
     check_folder("raw", args.raw)
     if args.raw is not None and not args.simulate:
         raise ValueError("raw is where --simulate leaves its runs: it needs --simulate")
-    if args.seed < 0:
-        raise ValueError(f"seed must be 0 or more, got {args.seed}")
     with Output("calibrate", args) as out:
         earlier = load_calibration(args.record) if args.record.is_file() else CalibrationRecord({})
         found, truth = (frame(args), None) if args.sensor == "frame" else calibrate(args, out)

@@ -33,6 +33,8 @@ def load_all(
     from ...baselines.evaluation import distinct
     from ...envs.data.formats.load import find_recordings, load_recordings
 
+    if not paths:
+        raise ValueError("name at least one file or folder of recordings")
     found: list[Trajectory] = []
     sources: list[Path | None] = []
     passed_over: list[tuple[Path, str]] = []

@@ -36,8 +36,6 @@ def run(args: Args) -> int:
     from ...baselines.evaluation import report_findings
     from .load import load_all, plain_warnings, sensors_of
 
-    if args.most < 1:
-        raise ValueError(f"most must be at least 1, got {args.most}")
     with plain_warnings(), Output("recommend", args) as out:
         loaded, _ = load_all(args.recordings, args.calibration)
         for sensor in (sensor for one in loaded for sensor in sensors_of(one)):

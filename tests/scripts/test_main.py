@@ -188,3 +188,38 @@ def test_every_command_file_is_in_the_table() -> None:
     listed = {command.module[1:] for command in cli.COMMANDS.values()}
     commands = {path.stem for path in folder.glob("*.py") if '    run_command("' in path.read_text(encoding="utf-8")}
     assert commands <= listed
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ("benchmark --seed -1", "seed must be at least 0, got -1"),
+        ("benchmark --processes 0", "processes must be at least 1, got 0"),
+        ("benchmark --episodes 0", "episodes must be at least 1, got 0"),
+        ("benchmark --trials -1", "trials must be at least 0, got -1"),
+        ("benchmark --sensors nosuch", "unknown sensor preset 'nosuch'"),
+        ("benchmark --reference nosuch", "unknown estimator 'nosuch'"),
+        ("record hand-motion --seed -5", "seed must be at least 0, got -5"),
+        ("record hand-motion --options duration=1 duration=2", "option 'duration' is given twice: 1 and 2"),
+        ("train gru --episodes 0", "episodes must be at least 1, got 0"),
+        ("train gru --replicate -1", "replicate must be at least 0, got -1"),
+        ("train gru --start nosuch", "no weights 'nosuch'"),
+        ("tune --agent optuna --trials 0", "trials must be at least 1, got 0"),
+        ("tune --test-trajectories 0", "test_trajectories must be at least 1, got 0"),
+        ("adapt --points 0", "points must be at least 1, got 0"),
+        ("recommend nofile.csv --most 0", "most must be at least 1, got 0"),
+        ("inspect", "name at least one file or folder of recordings"),
+        ("evaluate --seed 1.5", "Error parsing --seed: invalid literal"),
+        ("benchmark --suite foo", "invalid choice 'foo' for argument '--suite'"),
+    ],
+)
+def test_wrong_options_are_one_line_before_any_work(words, said, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert cli.main(words.split()) == 2
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    (line,) = captured.err.splitlines()
+    assert line.startswith("poise: error: ")
+    assert said in line
+    assert "---" not in line
+    assert not list(tmp_path.iterdir())
