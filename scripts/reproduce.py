@@ -147,10 +147,10 @@ def attempts(papers: Sequence[str], settings: dict[str, Any], run: Run) -> Itera
         for paper, error in in_parallel(attempt, jobs, settings["processes"], label="works", unit="work"):
             del waiting[paper]
             yield paper, error
-    except BrokenExecutor as error:
+    except BrokenExecutor as broken:
         # a process was killed, and with it went the results of the others at work
         for paper in waiting:
-            yield paper, None if is_done(paper, run) else f"{type(error).__name__}: {error}".splitlines()[0]
+            yield paper, None if is_done(paper, run) else in_a_line(broken)
 
 
 def attempt(paper: str, settings: dict[str, Any], run: Run) -> tuple[str, str | None]:
@@ -162,9 +162,14 @@ def attempt(paper: str, settings: dict[str, Any], run: Run) -> tuple[str, str | 
         one_study(paper, settings, run)
     except Exception as error:
         write_text(report, traceback.format_exc())
-        return paper, f"{type(error).__name__}: {error}".splitlines()[0]
+        return paper, in_a_line(error)
     report.unlink(missing_ok=True)
     return paper, None
+
+
+def in_a_line(error: BaseException) -> str:
+    """Kind of an error and the first line of what it says."""
+    return f"{type(error).__name__}: {error}".splitlines()[0]
 
 
 def is_done(paper: str, run: Run) -> bool:

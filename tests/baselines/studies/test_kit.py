@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from poise.baselines.studies import PAPERS, find_paper, kit
 from poise.baselines.studies.kit import Study, load_ride
+from poise.envs.bicycle.several_suites import record_suite_files
 from poise.filters.support import resume
 from poise.filters.support.version import code_version
 
@@ -66,6 +69,30 @@ def test_rides_of_one_name_share_the_motion_whatever_the_sensors(study):
         assert set(slow.measurements) == {"bicycle_imu/acc", "bicycle_imu/gyr"}
         np.testing.assert_array_equal(fast.truth["bicycle/position"][::2][:50], slow.truth["bicycle/position"][:50])
     assert not np.allclose(paper[0].truth["bicycle/position"], paper[1].truth["bicycle/position"])
+
+
+def test_rides_of_several_works_are_ridden_once_and_found_by_each(study, tmp_path, monkeypatch):
+    shared = replace(study, rides=tmp_path / "shared", subjects=(0,), seeds=1)
+    settings = {"fidelity": "lumped"}
+    jobs = [job for suite in ("two-gyro", "force-inertial") for job in shared.ride_jobs("outdoor", suite, **settings)]
+    ridden = []
+    monkeypatch.setattr(kit, "record_suite_files", lambda *job: ridden.append(job) or record_suite_files(*job))
+    shared.record_together(jobs)
+    shared.record_together(jobs)
+    assert [[options["suite"] for options in every] for every, _, _ in ridden] == [["two-gyro", "force-inertial"]]
+    monkeypatch.setattr(kit, "record_episode", lambda *job: pytest.fail("it was recorded before"))
+    for suite in ("two-gyro", "force-inertial"):
+        work = replace(shared, folder=tmp_path / suite)
+        (path,) = work.ride_files("outdoor", suite, **settings)
+        assert load_ride(path).name == "outdoor-0-0"
+
+
+def test_a_ride_that_fails_is_left_to_the_work_that_needs_it(study, capsys):
+    jobs = study.ride_jobs("outdoor", "two-gyro", style="nobody's")
+    study.record_together(jobs)
+    assert "outdoor-0-0 is recorded later: ValueError" in capsys.readouterr().err
+    with pytest.raises(ValueError, match="nobody's"):
+        study.ride_files("outdoor", "two-gyro", style="nobody's")
 
 
 def test_recorded_episodes_are_kept_and_lost_ones_are_recorded_again_bit_for_bit(study):
