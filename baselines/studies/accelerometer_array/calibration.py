@@ -126,6 +126,7 @@ def calibration(study: Study, report: Report) -> None:
             )
         ),
         Claim("Appendix B: (B.4) is a rotation", f"determinant {determinant:.3f}", determinant > 0.0),
+        Claim.within("Appendix B: (B.4) is a mirror, and nothing else", determinant, -1.01, -0.99),
     ]
     note = "`poise calibrate` refuses a fit with a negative determinant: one of the two frames is then left-handed."
     report.claims("Chapter 4 and appendix B: what holds here", found_claims, note)

@@ -137,7 +137,12 @@ ITEMS = (
     ),
     Item("Figures 4.17 to 4.19", "back and forth", shown=("Figures 4.17 to 4.19",), decided=((DEVICE, "Figure 4.19"),)),
     Item("Figures 4.20, 4.21", "magnetometer before and after", shown=("Figures 4.20 and 4.21",)),
-    Item("Appendix B", "(B.4) is a rotation", decided=((FOUR, "Appendix B"),)),
+    Item(
+        "Appendix B",
+        "(B.4) is a rotation",
+        decided=((FOUR, "Appendix B: (B.4) is a rotation"),),
+        causes=((FOUR, "Appendix B: (B.4) is a mirror"),),
+    ),
     Item("Figures 5.1, 5.2, 5.12 to 5.17, 5.23", "block diagrams, photographs, windows", because="they show no result"),
     Item("Figures 5.3, 5.4, 5.5", "targets, profile of a move, readings", shown=("Figures 5.3 and 5.4", "Figure 5.5")),
     Item(
