@@ -16,6 +16,7 @@ from ...filters.core.consistency import nees
 from ...filters.core.kalman import KalmanFilter
 from ...filters.core.observer import Observer
 from ...filters.core.quantity import Estimate
+from ...filters.support.rows import cell
 from ..evaluation import COLUMNS
 from .averages import circular_mean, largest, mean_of, mean_rms, rounded, windowed
 from .claims import Claim
@@ -359,9 +360,9 @@ def interval_of_mean(values: Sequence[float]) -> str:
 
     found = np.asarray([value for value in values if np.isfinite(value)])
     if len(found) < 2:
-        return f"{found.mean():.2g}" if len(found) else "–"
-    half = float(t.ppf(0.975, len(found) - 1) * found.std(ddof=1) / np.sqrt(len(found)))
-    return f"{found.mean():.2g} ({max(0.0, found.mean() - half):.2g} … {found.mean() + half:.2g})"
+        return cell(float(found.mean()), 2) if len(found) else "–"
+    mean, half = float(found.mean()), float(t.ppf(0.975, len(found) - 1) * found.std(ddof=1) / np.sqrt(len(found)))
+    return f"{cell(mean, 2)} ({cell(max(0.0, mean - half), 2)} … {cell(mean + half, 2)})"
 
 
 def _settled(ride: Trajectory) -> np.ndarray:
