@@ -13,9 +13,17 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-from ..filters.support.rows import jsonable, records
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from ..filters.support.rows import cell, columns_of, is_numeric, jsonable, records
 from ..filters.support.version import poise_version
-from .tables import print_table
+
+PIPE_WIDTH = 120
+"""Columns of a table that does not go to a terminal."""
+LONGEST_NAME = 60
+"""Characters up to which a text stays on one line of a printed table."""
 
 
 class Output:
@@ -45,7 +53,7 @@ class Output:
             print(json.dumps(jsonable(self.document, lambda value: None), ensure_ascii=False, allow_nan=False))
 
     def table(self, rows: Iterable[Any], title: str, **options: Any) -> None:
-        """Rows for both; see :func:`.tables.print_table` for the options of the printed table."""
+        """Rows for both; see :func:`print_table` for the options of the printed table."""
         found = records(rows)
         self.rows(found, title)
         self.show(found, title, **options)
@@ -73,3 +81,35 @@ class Output:
     def add(self, **fields: Any) -> None:
         """Further fields of the document."""
         self.document.update(fields)
+
+
+def print_table(
+    rows: Iterable[Any],
+    title: str | None = None,
+    columns: Sequence[str] | None = None,
+    digits: int = 3,
+    console: Console | None = None,
+) -> None:
+    """Print rows as a table, numbers to the right.
+
+    Args:
+        rows: see :func:`.records`.
+        title: line above the table.
+        columns: which fields in which order; by default all, in order of first appearance.
+        digits: significant digits of floats.
+        console: where; by default the standard output, of a fixed width if it is not a terminal.
+    """
+    data = records(rows)
+    table = Table(title=title, title_justify="left")
+    names = columns_of(data, columns)
+    for name in names:
+        # Long headings of numbers and sentences break into lines; names stay whole.
+        if is_numeric(data, name):
+            table.add_column(name, justify="right", overflow="fold")
+        else:
+            longest = max((len(cell(record.get(name))) for record in data), default=0)
+            table.add_column(name, no_wrap=longest <= LONGEST_NAME)
+    for record in data:
+        # Text, so that a name in brackets is not markup.
+        table.add_row(*(Text(cell(record.get(name), digits)) for name in names))
+    (console or (Console() if sys.stdout.isatty() else Console(width=PIPE_WIDTH))).print(table)

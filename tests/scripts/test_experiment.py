@@ -19,7 +19,7 @@ import pytest
 from rich.console import Console
 
 from poise.filters.support import rows
-from poise.scripts import experiment, tables
+from poise.scripts import experiment, output
 
 
 class Grade(enum.Enum):
@@ -174,7 +174,7 @@ def test_report(run: experiment.Run) -> None:
 def test_printed_table_holds_every_row_and_no_markup() -> None:
     console = Console(record=True, width=80, file=open("/dev/null", "w"))  # noqa: SIM115
     printed = [{"estimator": "[red]vqf", "error": 1.5}, {"estimator": "mekf", "note": "slow"}]
-    tables.print_table(printed, title="Errors", console=console)
+    output.print_table(printed, title="Errors", console=console)
     text = console.export_text()
     assert "Errors" in text
     assert "[red]vqf" in text
