@@ -26,6 +26,13 @@ VERDICTS = (REPRODUCED, CORRECTED, DIFFERS, IMPOSSIBLE, UNDECIDED, ABSENT)
 COLUMNS = ("item", "content", "verdict", "what decides", "shown in")
 Decided = tuple[str, str]
 """Beginnings of the title of a table of claims and of a statement in it."""
+INDOOR, OUTDOOR = "What holds, indoor", "What holds, outdoor"
+"""Beginnings of the titles of the claims of each course."""
+
+
+def both(statement: str) -> tuple[Decided, ...]:
+    """A claim of both courses."""
+    return ((INDOOR, statement), (OUTDOOR, statement))
 
 
 @dataclass(frozen=True)

@@ -2,15 +2,9 @@
 
 from __future__ import annotations
 
-from ..coverage import Item
+from ..coverage import INDOOR, OUTDOOR, Item, both
 
-INDOOR, OUTDOOR = (f"What holds, {course}" for course in ("indoor_circle", "outdoor"))
 EXACT, BIASES, LIVELY = "Exact synthetic data: what", "Observability: what holds", "Figure 7: what"
-
-
-def both(statement: str) -> tuple[tuple[str, str], ...]:
-    """A claim of both courses."""
-    return ((INDOOR, statement), (OUTDOOR, statement))
 
 
 ITEMS = (

@@ -2,19 +2,9 @@
 
 from __future__ import annotations
 
-from ..coverage import Item
+from ..coverage import INDOOR, OUTDOOR, Item, both
 
-INDOOR, OUTDOOR, BUMPS, EXACT = (
-    "What holds, indoor",
-    "What holds, outdoor",
-    "Figure 11: what holds",
-    "Exact rides: what",
-)
-
-
-def both(statement: str) -> tuple[tuple[str, str], ...]:
-    """A claim of both courses."""
-    return ((INDOOR, statement), (OUTDOOR, statement))
+BUMPS, EXACT = "Figure 11: what holds", "Exact rides: what"
 
 
 ITEMS = (
