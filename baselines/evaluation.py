@@ -327,13 +327,16 @@ def named_estimators(estimators: Estimators) -> dict[str, str | Estimator[Any]]:
     """Label → name or estimator; unlabelled estimators are named after their model.
 
     Raises:
-        ValueError: two of one label.
+        ValueError: two of one label, or a label that is no text.
     """
     items = list(estimators) if isinstance(estimators, list | tuple) else [estimators]
     for item in estimators.values() if isinstance(estimators, Mapping) else items:
         if not isinstance(item, str | Estimator):
             raise ValueError(f"estimators must be names (poise.list_estimators) or estimators, got {item!r}")
     if isinstance(estimators, Mapping):
+        wrong = [label for label in estimators if not isinstance(label, str) or not label]
+        if wrong:
+            raise ValueError(f"labels of estimators must be texts, got {wrong[0]!r}")
         return dict(estimators)
     labels = [item if isinstance(item, str) else label_of(item) for item in items]  # type: ignore[arg-type]
     twice = sorted({label for label in labels if labels.count(label) > 1})

@@ -56,6 +56,8 @@ def run(
             channels; a clock without uniform sampling (:meth:`Trajectory.on_grid`).
     """
     interval = checked_interval(dt)
+    if not isinstance(grid, bool):
+        raise ValueError(f"grid must be True or False, got {grid!r}")
     if not isinstance(estimator, str | Estimator):
         raise ValueError(f"estimator must be a name (poise.list_estimators) or an estimator, got {estimator!r}")
     if isinstance(data, Trajectory):

@@ -44,8 +44,8 @@ def record(
     Raises:
         ValueError: ``steps`` is negative, or the environment does not follow the contract of this package.
     """
-    if steps is not None and steps < 0:
-        raise ValueError(f"steps must not be negative, got {steps}")
+    if steps is not None and (not isinstance(steps, int) or isinstance(steps, bool) or steps < 0):
+        raise ValueError(f"steps must be None or a whole number of at least 0, got {steps!r}")
     seed = root_seed(seed)
     with opened(env) as env, progress_bar(steps, "record", "step", show=progress) as bar:
         suite = getattr(env.unwrapped, "suite", None)
@@ -121,6 +121,8 @@ def opened(env: Any) -> Iterator[Any]:
 
     if isinstance(env, gymnasium.vector.VectorEnv):
         raise ValueError("a vector environment cannot be recorded; record its environments one by one")
+    if not isinstance(env, str | gymnasium.Env):
+        raise ValueError(f"env must be an environment or the id of one, got {env!r}")
     if not isinstance(env, str):
         yield env
         return

@@ -112,6 +112,9 @@ def check_clock(trajectory: Trajectory) -> Iterator[Finding]:
         yield Finding("warning", "time", what, "stamps of arrival, or of several recordings", remedy)
         return
     rate = 1.0 / interval
+    if trajectory.contradicted_rate:
+        cause = "a recording that was thinned out, or another sensor's rate"
+        yield Finding("note", "time", trajectory.contradicted_rate, cause, "The stamps are believed.")
     if rate < PLAUSIBLE_RATES[0]:
         whole = bool(np.all(np.abs(step - np.round(step)) < 1e-6 * interval))
         units = {"sample numbers": 1.0} if whole and interval == 1.0 else {}

@@ -16,12 +16,14 @@ rate is aliased. This suits estimators that use the accelerometer in the attitud
 from __future__ import annotations
 
 from collections.abc import Mapping
+from numbers import Real
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
 from ...filters.core import rotation
 
+MOST_SAMPLES = 10**8
 LONGEST_STEP = 1.5
 """Samples of one sensor that are further apart than so many of its intervals have lost one between them."""
 
@@ -53,10 +55,15 @@ def resampled_fields(
     """
     if sampling not in ("interval", "instant"):
         raise ValueError(f"sampling must be 'interval' or 'instant', got {sampling!r}")
-    if not 0.0 < rate < np.inf:
-        raise ValueError(f"rate must be a positive number of Hz, got {rate}")
+    if isinstance(rate, bool) or not isinstance(rate, Real) or not 0.0 < rate < np.inf:
+        raise ValueError(f"rate must be a positive number of Hz, got {rate!r}")
+    rate = float(rate)
     # The tolerance keeps the last sample when the ratio of the rates is a whole number.
     count = int(np.floor((old[-1] - old[0]) * rate + 1e-6)) + 1
+    if count > MOST_SAMPLES:
+        raise ValueError(
+            f"rate {rate:g} Hz would make {count:.3g} samples of {old[-1] - old[0]:.4g} s; {MOST_SAMPLES:g} at most"
+        )
     new = old[0] + np.arange(count) / rate
     left, right, weight = neighbours(old, new)
     if sampling == "interval":

@@ -10,14 +10,16 @@ import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from numbers import Real
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from ...filters.core import rotation
+from ...filters.support.files import as_path
 from .checks import check_metadata, columns, first, real_array, unit_or_unknown
-from .clock import Clock, check_interval, fit_clock, too_coarse
+from .clock import RATE_RANGE, Clock, check_interval, fit_clock, too_coarse
 from .frames import trajectory_frame
 from .resampling import fill_short_gaps, resampled_fields, shifted
 from .storage import read_trajectory_file, write_trajectory_file
@@ -71,7 +73,13 @@ class Trajectory:
         backwards = np.diff(time) < 0.0 if time[-1] > time[0] else np.diff(time) <= 0.0
         if backwards.any():
             sample = first(backwards) + 1
-            raise ValueError(f"time must increase, got {time[sample]} s at sample {sample} after {time[sample - 1]} s")
+            with np.errstate(over="ignore"):
+                single = time.astype(np.float32)
+            coarse = np.array_equal(single, time) and float(np.spacing(np.abs(single).max())) > 1e-3
+            hint = "; the stamps are of single precision, which is too coarse for times of this size" if coarse else ""
+            raise ValueError(
+                f"time must increase, got {time[sample]} s at sample {sample} after {time[sample - 1]} s{hint}"
+            )
         measurements = columns("measurements", self.measurements, len(time))
         if not measurements:
             raise ValueError("measurements must hold at least one channel, got none")
@@ -114,6 +122,15 @@ class Trajectory:
         return Clock(1.0 / float(rate), float(self.time[0]), np.zeros(1, int), 0.0, 0)
 
     @property
+    def contradicted_rate(self) -> str:
+        """What the stamps say against ``metadata["nominal_rate"]``; empty if they fit to it, or there is none."""
+        nominal = self.metadata.get("nominal_rate")
+        rate = 1.0 / self.clock.interval
+        if nominal is None or abs(rate / float(nominal) - 1.0) <= RATE_RANGE:
+            return ""
+        return f"a nominal rate of {float(nominal):.4g} Hz is named, but the stamps are {rate:.4g} Hz"
+
+    @property
     def dt(self) -> float:
         """Sampling interval, s, fitted to all stamps; of a single sample ``1 / metadata["rate"]``.
 
@@ -146,6 +163,8 @@ class Trajectory:
             return self
         kept = self._without_repeats()
         clock = kept.clock
+        if kept.contradicted_rate:
+            warnings.warn(f"{self.name}: {kept.contradicted_rate}; the stamps are believed", stacklevel=2)
         if any(name.rsplit("/", 1)[-1] in INERTIAL for name in self.measurements):
             check_interval(clock.interval, self.time)
         if kept.uniform:
@@ -192,7 +211,7 @@ class Trajectory:
         Raises:
             ValueError: ``longest`` is not positive; or see :meth:`on_grid`.
         """
-        if not 0.0 < longest < np.inf:
+        if isinstance(longest, bool) or not isinstance(longest, Real) or not 0.0 < longest < np.inf:
             raise ValueError(f"longest must be a positive time in s, got {longest!r}")
         grid = self.on_grid()
         filled = {name: fill_short_gaps(values, longest / grid.dt) for name, values in grid.measurements.items()}
@@ -328,11 +347,11 @@ class Trajectory:
             The path.
 
         Raises:
-            ValueError: a name cannot be stored, such as channels ``a`` and ``a/b`` together.
+            ValueError: a name cannot be stored, such as channels ``a`` and ``a/b`` together; or ``path`` is none.
             OSError: the folder cannot be written.
         """
         return write_trajectory_file(
-            Path(path), self.time, self.mask, {"measurements": self.measurements, "truth": self.truth}, self.metadata
+            as_path(path), self.time, self.mask, {"measurements": self.measurements, "truth": self.truth}, self.metadata
         )
 
 

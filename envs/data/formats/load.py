@@ -149,6 +149,8 @@ def load_recording(
             message names the file and what is accepted. Or an argument is none of those above.
     """
     path = as_path(path, "path of a recording")
+    if not isinstance(sensor, str | None):
+        raise ValueError(f"sensor must be the name of one, got {sensor!r}")
     if path.is_dir() and recognise(path) is None:
         raise FileNotFoundError(
             f"no recording at {path}: it is a folder; poise.load_recordings reads all that are in it"

@@ -20,6 +20,7 @@ from ....filters.core import rotation
 from ....filters.support.names import unknown
 from ....filters.support.parameters import check_parameters
 from ..trajectory import Trajectory
+from .ranges import full_scale
 from .stamps import as_seconds
 from .table import UNITS, Table, factor
 
@@ -248,6 +249,9 @@ def apply_map(table: Table, mapping: RecordingMap, path: Path) -> list[Trajector
         details = {"name": name, "units": units, **clock, **mapping.details}
         if len(sensors) > 1 or sensor != "imu":
             details["sensor"] = sensor
+        ranges = full_scale(table, measurements, name)
+        if ranges:
+            details.setdefault("full_scale", ranges)
         trajectories.append(trajectory_of(seconds, measurements, truth, details))
     return trajectories
 

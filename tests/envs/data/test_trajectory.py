@@ -12,7 +12,9 @@ import h5py
 import numpy as np
 import pytest
 
+import poise
 from poise.envs.data.trajectory import Trajectory, load_trajectory
+from poise.envs.hand.sensing import simulate_hand
 from poise.envs.record import record
 from poise.filters.core import rotation
 
@@ -359,7 +361,7 @@ def test_an_id_is_made_recorded_and_described(tmp_path):
 def test_what_cannot_be_recorded_is_refused():
     with pytest.raises(ValueError, match="no sensor suite"):
         record("CartPole-v1")
-    with pytest.raises(ValueError, match="steps must not be negative, got -1"):
+    with pytest.raises(ValueError, match="steps must be None or a whole number of at least 0, got -1"):
         record(Spinner(), steps=-1)
     with pytest.raises(ValueError, match="vector environment"):
         record(gymnasium.make_vec("CartPole-v1"))
@@ -372,3 +374,38 @@ def test_what_cannot_be_recorded_is_refused():
 
     with pytest.raises(ValueError, match=r"info\['truth'\] changed from \['heading'\] to \[\] at step 1"):
         record(Forgetful())
+
+
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        (lambda one: one.resampled("x"), "rate must be a positive number of Hz, got 'x'"),
+        (lambda one: one.resampled(True), "rate must be a positive number of Hz, got True"),
+        (lambda one: one.resampled(1e9), "would make"),
+        (lambda one: one.interpolated("x"), "longest must be a positive time in s, got 'x'"),
+        (lambda one: one.save(3), "path must be a path"),
+        (lambda one: poise.run("tilt", one, grid="x"), "grid must be True or False, got 'x'"),
+        (lambda one: poise.evaluate({1: "tilt"}, one), "labels of estimators must be texts, got 1"),
+        (lambda one: poise.record(3), "env must be an environment or the id of one, got 3"),
+        (lambda one: poise.record("poise/HandMotion-v0", steps=2.5), "steps must be None or a whole number"),
+        (lambda one: poise.load_recording("x.csv", sensor=3), "sensor must be the name of one, got 3"),
+    ],
+)
+def test_wrong_arguments_of_functions_are_named(call, said):
+    with pytest.raises(ValueError, match=said):
+        call(simulate_hand("slow", seed=0, duration=2.0))
+
+
+def test_stamps_of_single_precision_are_named():
+    stamps = (1.7e9 + np.arange(100) / 100.0).astype(np.float32)
+    with pytest.raises(ValueError, match="the stamps are of single precision"):
+        Trajectory(stamps, {"imu/gyr": np.zeros((100, 3))})
+
+
+@pytest.mark.parametrize("nominal", [5.0, 50.0])
+def test_a_nominal_rate_that_the_stamps_contradict_is_named(nominal):
+    motion = simulate_hand("slow", seed=0, duration=2.0)
+    named = motion.replace(metadata={"nominal_rate": nominal})
+    with pytest.warns(UserWarning, match=f"a nominal rate of {nominal:g} Hz is named, but the stamps are 100 Hz"):
+        assert named.on_grid().dt == pytest.approx(0.01)
+    assert any("is named, but" in str(finding) for finding in poise.check_recording(named))
