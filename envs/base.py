@@ -55,6 +55,29 @@ class Block(NamedTuple):
         return Block(time[part], cut(measurements), cut(pose), cut(truth), scored[part])
 
 
+class Rows:
+    """Arrays ``(n, size)`` by name, row after row: those of one type lie side by side, so that a row is one copy.
+
+    Args:
+        arrays: name → ``(n, size)``.
+    """
+
+    def __init__(self, arrays: Mapping[str, np.ndarray]) -> None:
+        kinds: dict[np.dtype[Any], list[np.ndarray]] = {}
+        self._places: list[tuple[str, int, slice]] = []
+        for name, values in arrays.items():
+            beside = kinds.setdefault(values.dtype, [])
+            begin = sum(each.shape[1] for each in beside)
+            self._places.append((name, list(kinds).index(values.dtype), slice(begin, begin + values.shape[1])))
+            beside.append(values)
+        self._tables = [np.concatenate(beside, axis=1) for beside in kinds.values()]
+
+    def at(self, index: int) -> dict[str, np.ndarray]:
+        """Name → ``(size,)`` of one row, which the caller may change."""
+        rows = [table[index].copy() for table in self._tables]
+        return {name: rows[kind][part] for name, kind, part in self._places}
+
+
 @dataclass(frozen=True)
 class Snapshot:
     """The whole state of an environment between two steps; plain data that can be pickled."""
@@ -240,17 +263,24 @@ class PoseEnv(DrawnEnv):
         """Continue with another block."""
         self._block, self._row = block, 0
         self._seen: Observation = self.suite.observations(block.measurements, len(block.time))
+        self._lay_out()
+
+    def _lay_out(self) -> None:
+        """Prepare the rows of the present block."""
+        assert self._block is not None
+        self._rows = Rows(self._seen), Rows(self._block.pose), Rows(self._block.truth)
 
     def _observe(self) -> Observation:
-        return {name: values[self._row].copy() for name, values in self._seen.items()}
+        return self._rows[0].at(self._row)
 
     def _info(self) -> dict[str, Any]:
         block, row = self._block, self._row
         assert block is not None
+        _, pose, truth = self._rows
         return {
             "time": float(block.time[row]),
-            "pose": {name: values[row].copy() for name, values in block.pose.items()},
-            "truth": {name: values[row].copy() for name, values in block.truth.items()},
+            "pose": pose.at(row),
+            "truth": truth.at(row),
             "scored": bool(block.scored[row]),
         }
 
@@ -279,6 +309,7 @@ class PoseEnv(DrawnEnv):
         self.np_random = copy.deepcopy(snapshot.generator)
         self._step, self._last_step, self._block = snapshot.step, snapshot.last_step, snapshot.block
         self._seen, self._row, self._estimate = snapshot.seen, snapshot.row, snapshot.estimate.copy()
+        self._lay_out()
         self.suite.restore(snapshot.sensors)
         self.restore_source(snapshot.source)
 

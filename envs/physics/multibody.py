@@ -67,8 +67,7 @@ class Multibody:
         self._state, self._frames = np.zeros(BASE_SIZE + 2 * count), np.zeros((count + 1, 18))
         self.forces = np.zeros(6 + count)
         """generalised forces (6 + n,) of :mod:`.kinematics` that :meth:`apply` hands to PyBullet for the next step"""
-        self._pack = struct.Struct(f"{BASE_SIZE + 2 * count}d").pack_into
-        self._rows: Sequence[Sequence[float]] = ()
+        self._pack, self._bytes = struct.Struct(f"{BASE_SIZE + 2 * count}d").pack_into, self._state.data
         self._read_at = self._moved_at = -1
 
     def _tree(self) -> np.ndarray:
@@ -101,9 +100,9 @@ class Multibody:
         """State ``(13 + 2 n,)`` of :mod:`.kinematics` now; overwritten when it is read after a change."""
         if self._read_at != self.physics.changes:
             position, orientation, velocity, turning = self.physics.base_tuples(self.body)
-            self._rows = rows = pybullet.getJointStates(self.body, self._all, self.physics.client)
+            rows = pybullet.getJointStates(self.body, self._all, self.physics.client)
             angles, rates = [row[0] for row in rows], [row[1] for row in rows]
-            self._pack(self._state.data, 0, *position, *orientation, *velocity, *turning, *angles, *rates)
+            self._pack(self._bytes, 0, *position, *orientation, *velocity, *turning, *angles, *rates)
             self._read_at = self.physics.changes
         return self._state
 
@@ -121,10 +120,8 @@ class Multibody:
 
     def joint_tuples(self, links: Sequence[int]) -> list[tuple[float, float]]:
         """Angle (rad) and rate (rad/s) of the joints above ``links``."""
-        if self._read_at != self.physics.changes:
-            _ = self.state
-        rows = self._rows
-        return [(rows[link][0], rows[link][1]) for link in links]
+        angles, rates = self.state[BASE_SIZE:].reshape(2, -1).tolist()
+        return [(angles[link], rates[link]) for link in links]
 
     def set_joint(self, link: int, angle: float, rate: float = 0.0) -> None:
         """Put the joint above ``link`` at an angle with a rate."""
@@ -206,7 +203,7 @@ def connect_points(
         child_point: ``(3,)`` m in that link's body frame.
 
     Returns:
-        The constraint's number, for :func:`constraint_force`.
+        The constraint's number, for :func:`constraint_forces`.
     """
     pivots = []
     for (body, link), point in ((parent, parent_point), (child, child_point)):
@@ -220,7 +217,7 @@ def connect_points(
     return int(constraint)
 
 
-def constraint_force(physics: Physics, constraint: int) -> tuple[float, float, float]:
-    """Force on the child of a point-to-point constraint during the last step, N, world axes."""
-    x, y, z = pybullet.getConstraintState(constraint, physicsClientId=physics.client)[:3]
-    return x, y, z
+def constraint_forces(physics: Physics, constraints: Sequence[int]) -> list[Tuple3]:
+    """Force on the child of each point-to-point constraint during the last step, N, world axes."""
+    client, state = physics.client, pybullet.getConstraintState
+    return [state(each, client)[:3] for each in constraints]

@@ -11,7 +11,6 @@ from __future__ import annotations
 import copy
 import math
 from dataclasses import dataclass, fields, replace
-from itertools import accumulate
 from statistics import NormalDist
 from typing import Literal, Self
 
@@ -286,11 +285,9 @@ class NoiseProcess:
         """First-order recurrence b ← m b + push over the rows of ``pushes`` ``(N, W)``."""
         if self.model.bias_instability == 0.0:
             return np.zeros_like(pushes)
-        memory = self._memory
-        columns = [
-            list(accumulate(column, lambda bias, push: memory * bias + push, initial=first))[1:]
-            for first, column in zip(start.tolist(), pushes.T.tolist(), strict=True)
-        ]
+        memory, columns = self._memory, pushes.T.tolist()
+        for column, bias in zip(columns, start.tolist(), strict=True):
+            column[:] = [bias := memory * bias + push for push in column]
         return np.array(columns).T
 
     def _chain(self, values: np.ndarray, specific_force: np.ndarray | None, errors: np.ndarray) -> np.ndarray:

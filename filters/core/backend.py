@@ -40,6 +40,9 @@ def namespace(*arrays: Any) -> Any:
     Returns:
         The ``numpy`` module, ``array_api_compat.torch``, or the tracer's namespace.
     """
+    # most calls are with plain arrays
+    if all(type(array) is np.ndarray and array.dtype.kind != "O" for array in arrays):
+        return np
     for array in arrays:
         if is_torch(array):
             import array_api_compat.torch as torch_namespace
@@ -50,6 +53,21 @@ def namespace(*arrays: Any) -> Any:
 
         return TracedNamespace
     return np
+
+
+def together(xp: Any, parts: list[Array]) -> Array:
+    """Stack parts ``(...)`` of one shape and type along a new last axis; NumPy's own way takes three times as long.
+
+    Args:
+        xp: their :func:`namespace`.
+        parts: arrays.
+    """
+    if xp is not np:
+        return xp.stack(parts, axis=-1)
+    found = np.empty((*parts[0].shape, len(parts)), parts[0].dtype)
+    for index, part in enumerate(parts):
+        found[..., index] = part
+    return found
 
 
 def expand(parameter: Any, trailing: int) -> Any:

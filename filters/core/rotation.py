@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from .backend import Array, namespace, rows
+from .backend import Array, namespace, rows, together
 
 SMALL_ANGLE_SQUARED = 1e-8
 """Below this squared angle (rad²) sin(x)/x and its kin are taken from their series, exact to double precision."""
@@ -41,14 +41,14 @@ def multiply(p: Array, q: Array) -> Array:
     xp = namespace(p, q)
     pw, px, py, pz = p[..., 0], p[..., 1], p[..., 2], p[..., 3]
     qw, qx, qy, qz = q[..., 0], q[..., 1], q[..., 2], q[..., 3]
-    return xp.stack(
+    return together(
+        xp,
         [
             pw * qw - px * qx - py * qy - pz * qz,
             pw * qx + px * qw + py * qz - pz * qy,
             pw * qy - px * qz + py * qw + pz * qx,
             pw * qz + px * qy - py * qx + pz * qw,
         ],
-        axis=-1,
     )
 
 
@@ -60,15 +60,9 @@ def conjugate(q: Array) -> Array:
 
 def cross(a: Array, b: Array) -> Array:
     """Vector product ``a × b`` of ``(..., 3)`` arrays, broadcasting."""
-    xp = namespace(a, b)
-    return xp.stack(
-        [
-            a[..., 1] * b[..., 2] - a[..., 2] * b[..., 1],
-            a[..., 2] * b[..., 0] - a[..., 0] * b[..., 2],
-            a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0],
-        ],
-        axis=-1,
-    )
+    ax, ay, az = a[..., 0], a[..., 1], a[..., 2]
+    bx, by, bz = b[..., 0], b[..., 1], b[..., 2]
+    return together(namespace(a, b), [ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx])
 
 
 def skew(v: Array) -> Array:

@@ -31,6 +31,7 @@ class SpeedProfile:
 
     def __init__(self, levels: np.ndarray, hold: float = 10.0, dwell: float = 0.0) -> None:
         self.levels, self.hold, self.dwell = np.atleast_1d(levels).astype(float), hold, dwell
+        self._levels: list[float] = self.levels.tolist()
 
     @property
     def mean(self) -> float:
@@ -40,11 +41,12 @@ class SpeedProfile:
     def __call__(self, time: float) -> float:
         """Speed (m/s) at a time (s); the last level stays."""
         place = max(0.0, time / self.hold)
-        index = min(int(place), len(self.levels) - 1)
-        following = min(index + 1, len(self.levels) - 1)
+        levels = self._levels
+        index = min(int(place), len(levels) - 1)
+        following = min(index + 1, len(levels) - 1)
         part = max(0.0, min(1.0, (place - index - self.dwell) / (1.0 - self.dwell)))
         blend = 0.5 - 0.5 * math.cos(math.pi * part)
-        return float(self.levels[index] + blend * (self.levels[following] - self.levels[index]))
+        return levels[index] + blend * (levels[following] - levels[index])
 
 
 @dataclass(frozen=True)

@@ -122,7 +122,6 @@ class Bicycle:
             for wheel, memory in zip(wheels, self._bristles, strict=True)
         ]
         self._tyres = np.stack([each.numbers for each in self.tyres])
-        self.lay(ground)
         self.drivetrain = None if parameters.drive is None else Drivetrain(parameters.drive)
         self.links = self.body.links
         self._turned = [self.links[name] for name in ("front_assembly", *WHEELS, "crank") if name in self.links]
@@ -143,6 +142,7 @@ class Bicycle:
         self._centre = masses @ centres / self._total_mass
         drag, weight = 0.5 * AIR_DENSITY * parameters.drag_area, self._total_mass * physics.gravity
         self._body = np.array([drag, weight, self._centre[0], self._centre[2], parameters.wheelbase])
+        self.lay(ground)
 
     @property
     def tyre_forces(self) -> list[TyreForce]:
@@ -157,6 +157,11 @@ class Bicycle:
     def lay(self, ground: Ground | None) -> None:
         """Put another ground (None: a level plane at height 0) under the wheels; :meth:`start` anew afterwards."""
         self.ground: Ground = FlatGround() if ground is None else ground
+        self.acting = (
+            self._numbers, self._body, self._tyres, self.ground.table, self.physics.time_step, self._chain,
+            self._bristles, self._contacts,
+        )  # fmt: skip
+        """what :func:`.bicycle_forces` takes between the frames and the brake"""
 
     def static_loads(self) -> tuple[float, float]:
         """Weight (N) on the rear and the front tyre, at rest on level ground with the tyres' deflection."""
@@ -245,10 +250,7 @@ class Bicycle:
         """
         body = self.body
         forces, first = body.forces, 6
-        bicycle_forces(
-            body.tree, body.state, body.frames, self._numbers, self._body, self._tyres, self.ground.table,
-            self.physics.time_step, self._chain, self._bristles, brake, self._contacts, forces,
-        )  # fmt: skip
+        bicycle_forces(body.tree, body.state, body.frames, *self.acting, brake, forces)
         if steer_torque or wheel_torque or crank_torque:
             rear, _, front, crank = self._numbers.tolist()
             for link, torque in ((front, steer_torque), (rear, wheel_torque), (crank, crank_torque)):
@@ -258,11 +260,15 @@ class Bicycle:
             forces[first + np.asarray(joints)] += torques
         body.apply()
 
-    def shift(self) -> None:
-        """Change the gear if the cadence requires it."""
-        if self.drivetrain is not None:
-            (wheel, wheel_rate), (crank, _) = self.body.joint_tuples([self._wheels[0], self._turned[3]])
-            self.drivetrain.shift(self.physics.time, crank, wheel, wheel_rate)
+    def shift(self, wheel_rate: float) -> None:
+        """Change the gear if the cadence requires it; ``wheel_rate``: of the rear wheel now, rad/s."""
+        if self.drivetrain is None:
+            return
+        time = self.physics.time
+        ratio = self.drivetrain.next_gear(time, wheel_rate)
+        if ratio is not None:
+            (wheel, _), (crank, _) = self.body.joint_tuples([self._wheels[0], self._turned[3]])
+            self.drivetrain.shift(time, crank, wheel, ratio)
 
     def state(self) -> BicycleState:
         """Present state of the bicycle."""

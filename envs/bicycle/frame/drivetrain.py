@@ -79,17 +79,26 @@ class Drivetrain:
         middle = math.sqrt(self._slow * self._fast)
         return min(self.parameters.gears, key=lambda ratio: abs(math.log(max(1e-3, wheel_rate) / ratio / middle)))
 
-    def shift(self, time: float, crank: float, wheel: float, wheel_rate: float) -> None:
-        """Change the gear by one if the cadence is too slow or fast; the chain falls just taut on the new sprocket."""
-        if time < self.chain[2] + SHIFT_PAUSE:
-            return
-        gears, cadence = self.parameters.gears, wheel_rate / self.ratio
-        index = gears.index(self.ratio)
-        index += 1 if cadence > self._fast else -1 if cadence < self._slow else 0
-        index = max(0, min(len(gears) - 1, index))
-        if gears[index] != self.ratio:
-            self.engage(crank, wheel, gears[index])
-            self.chain[2] = time
+    def next_gear(self, time: float, wheel_rate: float) -> float | None:
+        """Ratio of the next gear if the cadence is too slow or fast; None to stay in the present one.
+
+        Args:
+            time: s.
+            wheel_rate: rad/s.
+        """
+        ratio, _, shifted = self.chain[:3].tolist()
+        cadence = wheel_rate / ratio
+        higher = cadence > self._fast
+        if time < shifted + SHIFT_PAUSE or not (higher or cadence < self._slow):
+            return None
+        gears = self.parameters.gears
+        index = gears.index(ratio) + (1 if higher else -1)
+        return gears[index] if 0 <= index < len(gears) else None
+
+    def shift(self, time: float, crank: float, wheel: float, ratio: float) -> None:
+        """Change to the gear of another ratio at these angles (rad); the chain falls just taut on the new sprocket."""
+        self.engage(crank, wheel, ratio)
+        self.chain[2] = time
 
     def save(self) -> tuple[float, float, float]:
         """Memory."""

@@ -26,7 +26,7 @@ BRAKE_FADE = 0.1
 
 @jit
 def bicycle_forces(  # type: ignore[no-untyped-def]
-    tree, state, frames, links, body, tyres, ground, time_step, chain, bristles, brake, contacts, forces
+    tree, state, frames, links, body, tyres, ground, time_step, chain, bristles, contacts, brake, forces
 ):
     """Tyre forces, air drag, chain and brakes during the next step.
 
@@ -41,9 +41,9 @@ def bicycle_forces(  # type: ignore[no-untyped-def]
         time_step: s.
         chain: of :func:`.chain_torque`; without effect if there is no crank.
         bristles: ``(2, 2)`` of both tyres, advanced by one step.
-        brake: wanted force of both brakes at the ground, N, not negative.
         contacts: ``(2, 7)`` force, point and load of rear and front tyre as of :func:`.tyre_force`, overwritten. When
             called it holds those of the last step, whose loads limit the brakes.
+        brake: wanted force of both brakes at the ground, N, not negative.
         forces: generalised forces of :mod:`poise.envs.physics.kinematics`, added to.
     """
     joints = 13 + (state.shape[0] - 13) // 2

@@ -22,7 +22,19 @@ from ..frame.parameters import AIR_DENSITY, BicycleParameters
 from ..frame.whipple import WhippleModel, whipple_model
 from .preview import PREVIEW_BIN, PREVIEW_BINS, speed_limits
 from .regulator import lateral_model, preview_regulator, sampled
-from .steering import COASTING, DISTANCE, DRIVE, LOWEST_SPEED, MEMORY, OFFSET, TARGET, TORQUE, Piloted, steer_exactly
+from .steering import (
+    AHEAD,
+    COASTING,
+    DISTANCE,
+    DRIVE,
+    LOWEST_SPEED,
+    MEMORY,
+    OFFSET,
+    TARGET,
+    TORQUE,
+    Piloted,
+    steer_exactly,
+)
 
 POSITIVE = ("effort", "largest_torque", "largest_drive", "largest_power", "lateral_acceleration", "braking", "rate")
 """settings that must not be zero"""
@@ -133,7 +145,7 @@ class Pilot:
         self.settings = ControlSettings() if settings is None else settings
         self.model = whipple_model(bicycle, gravity)
         slow, fast = np.arange(LOWEST_SPEED, 0.95, 0.1), np.arange(1.0, highest_speed + 0.25, 0.25)
-        self._grid = [*slow.tolist(), *fast.tolist()]
+        self._grid, self._place = [*slow.tolist(), *fast.tolist()], 1
         self._ahead = PREVIEW_BIN * np.arange(PREVIEW_BINS + 1)
         self._gravity, self._rows = gravity, dict[float, np.ndarray]()
         self.period = 1.0 / self.settings.rate
@@ -184,6 +196,11 @@ class Pilot:
         """Distance to the left of the path, m."""
         return float(self._memory[OFFSET])
 
+    @property
+    def curvature_ahead(self) -> float:
+        """Of the path where the rider will be soon, 1/m, left positive."""
+        return float(self._memory[AHEAD])
+
     def comfortable_speed(self, path: Path, speed: float) -> float:
         """The most of ``speed`` (m/s) with which to begin a path that may turn soon."""
         distances = max(speed, LOWEST_SPEED) * self._ahead
@@ -197,9 +214,11 @@ class Pilot:
 
     def _between(self, speed: float) -> tuple[float, float, float]:
         """The two speeds of the table around one (m/s), and how far between them it lies."""
-        speed = min(max(speed, LOWEST_SPEED), self._grid[-1])
-        index = min(bisect_right(self._grid, speed), len(self._grid) - 1)
-        low, high = self._grid[index - 1], self._grid[index]
+        grid, place = self._grid, self._place
+        speed = min(max(speed, LOWEST_SPEED), grid[-1])
+        if not grid[place - 1] <= speed < grid[place]:
+            self._place = place = min(bisect_right(grid, speed), len(grid) - 1)
+        low, high = grid[place - 1], grid[place]
         return low, high, (speed - low) / (high - low)
 
     def _row(self, speed: float) -> np.ndarray:

@@ -156,12 +156,12 @@ class HumanPilot(Pilot):
         return self._decided()
 
     def _model(self, speed: float) -> tuple[np.ndarray, np.ndarray]:
-        """What the rider knows at a speed (m/s) of the table, packed, and gains."""
+        """What the rider knows at a speed (m/s) of the table: columns of all matrices, and gains."""
         if speed not in self._models:
             model = internal_model(
                 self.bicycle, self.human, self._trunk, self._costs, self._gravity, speed, self.period
             )
-            self._models[speed] = model.packed, model.gains
+            self._models[speed] = model.columns, model.gains
         return self._models[speed]
 
     def save(self) -> PilotMemory:

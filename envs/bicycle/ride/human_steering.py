@@ -9,7 +9,19 @@ import numpy as np
 
 from ....filters.compile.cache import jit
 from .preview import PREVIEW_BINS
-from .steering import DRIVE, LOWEST_SPEED, OFFSET_INTEGRAL, TORQUE, Moving, ahead, drive, follow, piloted_of, turning
+from .steering import (
+    DRIVE,
+    LOWEST_SPEED,
+    OFFSET_INTEGRAL,
+    TORQUE,
+    Moving,
+    ahead,
+    drive,
+    follow,
+    look_ahead,
+    piloted_of,
+    turning,
+)
 
 STATES = 12
 """size of the state of the internal model"""
@@ -77,26 +89,24 @@ class InternalModel(NamedTuple):
     steer and arm torque of the steady turn ahead"""
 
     @property
-    def packed(self) -> np.ndarray:
-        """All matrices side by side ``(12, 33 + 3 Ns + 3 (Ns − Nf))``."""
-        return np.hstack(self[:6])
+    def columns(self) -> np.ndarray:
+        """The columns ``(33 + 3 Ns + 3 (Ns − Nf), 12)`` of all matrices, one after the other."""
+        return np.ascontiguousarray(np.hstack(self[:6]).T)
 
 
 @jit
-def unpacked(packed, gains, delay):  # type: ignore[no-untyped-def]
-    """:class:`InternalModel` of :attr:`InternalModel.packed` and the gains; ``delay``: Ns."""
-    return InternalModel(
-        packed[:, :12], packed[:, 12:15], packed[:, 15:21], packed[:, 21:33],
-        packed[:, 33 : 33 + 3 * delay], packed[:, 33 + 3 * delay :], gains,
-    )  # fmt: skip
+def add_column(total, columns, place, factor):  # type: ignore[no-untyped-def]
+    """Add to ``total`` ``(12,)`` a factor times one column: all rows at once, which the processor does in parallel."""
+    for row in range(STATES):
+        total[row] += columns[place, row] * factor
 
 
 @jit
-def estimate(model, state, inputs, readings, now, present):  # type: ignore[no-untyped-def]
+def estimate(columns, state, inputs, readings, now, present):  # type: ignore[no-untyped-def]
     """One control step of filter and prediction.
 
     Args:
-        model: at the present speed.
+        columns: of the :class:`InternalModel` at the present speed.
         state: ``(12,)`` of the filter, Ns + 1 steps ago.
         inputs: ``(Ns + 1, 3)`` inputs since then, the oldest first.
         readings: ``(Ns + 1, 6)`` of all senses, of Ns steps ago up to the present; the visual ones count at their first
@@ -104,31 +114,27 @@ def estimate(model, state, inputs, readings, now, present):  # type: ignore[no-u
         now: ``(12,)`` state of the filter Ns steps ago, overwritten.
         present: ``(12,)`` expected state at present, overwritten.
     """
-    before = np.empty(STATES)
-    for row in range(STATES):
-        value = 0.0
-        for column in range(STATES):
-            value += model.A[row, column] * state[column]
+    before, delay = np.zeros(STATES), inputs.shape[0] - 1
+    # the order of the columns: A, B, K, carry, inputs, readings
+    for column in range(STATES):
+        add_column(before, columns, column, state[column])
+    for column in range(3):
+        add_column(before, columns, 12 + column, inputs[0, column])
+    now[:] = before
+    for sense in range(6):
+        add_column(now, columns, 15 + sense, readings[0, sense] - before[CHANNELS[sense]])
+    present[:] = 0.0
+    for column in range(STATES):
+        add_column(present, columns, 21 + column, now[column])
+    place = 33
+    for step in range(delay):
         for column in range(3):
-            value += model.B[row, column] * inputs[0, column]
-        before[row] = value
-    for row in range(STATES):
-        value = before[row]
-        for sense in range(6):
-            value += model.K[row, sense] * (readings[0, sense] - before[CHANNELS[sense]])
-        now[row] = value
-    delay, fast = model.inputs.shape[1] // 3, model.readings.shape[1] // 3
-    for row in range(STATES):
-        value = 0.0
-        for column in range(STATES):
-            value += model.carry[row, column] * now[column]
-        for step in range(delay):
-            for column in range(3):
-                value += model.inputs[row, 3 * step + column] * inputs[1 + step, column]
-        for step in range(fast):
-            for column in range(3):
-                value += model.readings[row, 3 * step + column] * readings[1 + step, column]
-        present[row] = value
+            add_column(present, columns, place + column, inputs[1 + step, column])
+        place += 3
+    for step in range((columns.shape[0] - place) // 3):
+        for column in range(3):
+            add_column(present, columns, place + column, readings[1 + step, column])
+        place += 3
 
 
 @jit
@@ -160,7 +166,7 @@ def steer_humanly(  # type: ignore[no-untyped-def]
         stiffness: likewise.
         human: arguments of :func:`human_of`.
         points: ``(n, 4)`` of the path.
-        below: :attr:`InternalModel.packed` and gains at a speed below.
+        below: :attr:`InternalModel.columns` and gains at a speed below.
         above: at a speed above.
         part: how far the speed lies between both, 0 to 1.
         noise: ``(7,)`` standard normal numbers: six senses and the muscles.
@@ -173,8 +179,8 @@ def steer_humanly(  # type: ignore[no-untyped-def]
         readings: ``(Ns + 1, 6)`` remembered, advanced.
     """
     piloted, now = piloted_of(numbers, stiffness), Moving(*seen)
-    person, delay = human_of(human[0], human[1], human[2], human[3]), inputs.shape[0] - 1
-    low, high = unpacked(below[0], below[1], delay), unpacked(above[0], above[1], delay)
+    person = human_of(human[0], human[1], human[2], human[3])
+    low, high = below[1], above[1]
     curvature, offset, heading = follow(points, now, memory)
     readings[:-1] = readings[1:]
     felt = (now.roll_rate, -now.steer, -now.steer_rate, now.roll, -heading, -offset)
@@ -183,8 +189,8 @@ def steer_humanly(  # type: ignore[no-untyped-def]
         readings[-1, sense] = felt[sense] + heed * person.sigma[sense] * noise[sense]
     # filter and predict, between two speeds of the table
     first, second, expected, later = np.empty(STATES), np.empty(STATES), np.empty(STATES), np.empty(STATES)
-    estimate(low, state, inputs, readings, first, expected)
-    estimate(high, state, inputs, readings, second, later)
+    estimate(below[0], state, inputs, readings, first, expected)
+    estimate(above[0], state, inputs, readings, second, later)
     for row in range(STATES):
         state[row] = (1.0 - part) * first[row] + part * second[row]
         expected[row] = (1.0 - part) * expected[row] + part * later[row]
@@ -200,8 +206,8 @@ def steer_humanly(  # type: ignore[no-untyped-def]
     expected[4], expected[5] = heading, offset
     command = torque
     for row in range(STATES):
-        command -= ((1.0 - part) * low.gains[row] + part * high.gains[row]) * expected[row]
-    command -= ((1.0 - part) * low.gains[STATES] + part * high.gains[STATES]) * memory[OFFSET_INTEGRAL]
+        command -= ((1.0 - part) * low[row] + part * high[row]) * expected[row]
+    command -= ((1.0 - part) * low[STATES] + part * high[STATES]) * memory[OFFSET_INTEGRAL]
     changes = np.empty(2 * PREVIEW_BINS)
     limit = ahead(piloted, points, now.speed, memory, changes)
     squared = max(now.speed, LOWEST_SPEED) ** 2
@@ -211,7 +217,7 @@ def steer_humanly(  # type: ignore[no-untyped-def]
         to_roll, to_steer = changes[index], changes[PREVIEW_BINS + index]
         for kind, change in enumerate((to_roll, to_steer, by_roll * to_roll + by_steer * to_steer)):
             place = STATES + 1 + PREVIEW_BINS * kind + index
-            command -= ((1.0 - part) * low.gains[place] + part * high.gains[place]) * change
+            command -= ((1.0 - part) * low[place] + part * high[place]) * change
     command = person.largest_torque * math.tanh(command / person.largest_torque)
     # the path turns the heading; so does what steering does beyond the linear model
     angle = -piloted.tilt * max(-1.2, min(1.2, steer))
@@ -227,3 +233,4 @@ def steer_humanly(  # type: ignore[no-untyped-def]
     for row in range(2):
         state[12 + row] = person.arms[row, 0] * arm + person.arms[row, 1] * rate + person.arms[row, 2] * driven
     memory[DRIVE] = drive(piloted, now, min(wanted, limit), memory)
+    look_ahead(points, now.speed, memory)

@@ -14,7 +14,7 @@ from ..rider.limbs import Limb, LimbPosture, reach_to
 from ..rider.posture import KNEE_OUT, LIMBS, SIDES, SIGNS, two_turns
 from .contact_forces import Contact
 from .ride import Ride
-from .tape import PhysicsStep, Tape, advance
+from .tape import Tape, last_step
 
 
 @dataclass(frozen=True)
@@ -82,28 +82,37 @@ class RideRecorder:
 
     def record(self, samples: int) -> RideLog:
         """Ride on for some samples; stops early after the one in which the rider fell."""
-        first = self.ride.bicycle.body.state if self._tape is None else self._tape.state(self._next)
+        tape, ride, rider, body = self._tape, self.ride, self.ride.rider, self.ride.bicycle.body
+        first = body.state if tape is None else tape.state(self._next)
         states = np.empty((samples * self.steps + 1, len(first)))
         states[0] = first
-        forces, torques, times, fallen, swivels = [], [], [], [], []
+        forces, count = np.empty((samples * self.steps, 4, 3)), 0
+        torques, times, fallen, swivels = [], [], [], []
         for _ in range(samples):
             for _ in range(self.steps):
-                step = self._advance()
-                forces.append(step.forces)
-                states[len(forces)] = step.state
+                if tape is None:
+                    ride.step()
+                    forces[count], states[count + 1] = rider.raw_forces(), body.state
+                else:
+                    step = tape.step(self._next)
+                    forces[count], states[count + 1] = step.forces, step.state
+                    self._next += 1
+                count += 1
+            if tape is None:
+                step = last_step(ride)
             torques.append(step.torques)
             times.append(step.time)
             swivels.append(step.swivel)
             fallen.append(step.fallen)
             if step.fallen:
                 break
-        states = states[: len(forces) + 1]
+        states, forces = states[: count + 1], forces[:count]
         first, rates = BASE_SIZE + np.array(self._joints), (states.shape[1] - BASE_SIZE) // 2
         starts, ends = states[: -1 : self.steps], states[self.steps :: self.steps]
         turned = ends[:, first[2]] - starts[:, first[2]]
         return self._compute(
             self._motion(states),
-            np.array(forces),
+            forces,
             np.stack([ends[:, first], ends[:, first + rates]], axis=-1),
             turned,
             np.array(torques),
@@ -111,13 +120,6 @@ class RideRecorder:
             np.array(fallen),
             np.array(swivels),
         )
-
-    def _advance(self) -> PhysicsStep:
-        """The next physics step, from the tape or ridden."""
-        if self._tape is None:
-            return advance(self.ride)
-        self._next += 1
-        return self._tape.step(self._next - 1)
 
     def _motion(self, states: np.ndarray) -> CentreMotion:
         """Motion of base and links from the states of all physics steps."""

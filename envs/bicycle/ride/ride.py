@@ -25,8 +25,6 @@ from .foot import Foot
 from .human import HumanPilot, leaning_trunk
 from .pilot import IDEAL, PilotParameters, pilot_parameters
 
-PREVIEW = 0.3
-"""s: lead of the rider's lean into turns"""
 COASTING = 5.0
 """N of deceleration force left to drag before the brakes are used"""
 FALLEN = 1.0
@@ -154,17 +152,21 @@ class Ride:
         if self._count % self._each == 0:
             self._control()
         self._count += 1
-        rider.act()
         brake = max(0.0, -self.pilot.command[1] - COASTING)
-        self.foot.push(bicycle, self.state)
-        if self.events.side is not None:
-            self._push_aside(self.events.side(self.physics.time))
-        bicycle.act(brake=brake)
+        side = self.events.side
+        if side is None and self.foot.engaged == 0.0:
+            rider.act_on_bicycle(brake)
+        else:
+            rider.act()
+            self.foot.push(bicycle, self.state)
+            if side is not None:
+                self._push_aside(side(self.physics.time))
+            bicycle.act(brake=brake)
         self.physics.step()
 
     def _control(self) -> None:
         self.state = state = self.bicycle.state()
-        self.bicycle.shift()
+        self.bicycle.shift(state.wheel_rate)
         wanted = self.speed(state.time)
         coasting = self.events.coasts(state.time)
         self.pilot.coast(coasting)
@@ -173,8 +175,7 @@ class Ride:
         torque = self.foot.steer(torque, state)
         if coasting and drive >= -COASTING:
             drive = RESTING
-        ahead = self.path.at(self.pilot.distance + PREVIEW * state.speed)
-        self.rider.plan(state, ahead.curvature, torque, drive)
+        self.rider.plan(state, self.pilot.curvature_ahead, torque, drive)
 
     def _push_aside(self, force: float) -> None:
         """A force (N, to the left) on the frame, at the height of the saddle."""

@@ -1,8 +1,8 @@
 """Steering along a path and the driving force, compiled: :func:`steer_exactly` and :func:`steer_humanly`.
 
-A pilot's memory ``(8,)``: arc length on the path (m), offset to the left of it (m), integral of the offset (m·s),
+A pilot's memory ``(10,)``: arc length on the path (m), offset to the left of it (m), integral of the offset (m·s),
 integral of the speed's error (N), target speed (m/s), its rate (m/s²), steer torque (N·m, left positive) and force at
-the wheels (N) that were decided last.
+the wheels (N) that were decided last, 1 while the legs rest, and the path's curvature a little ahead (1/m).
 
 The model counts roll, steer and offset to the right; a bicycle's state and a path count to the left.
 """
@@ -18,9 +18,11 @@ from ....filters.compile.cache import jit
 from ..course.path import nearest, point_at
 from .preview import PREVIEW_BINS, turns_ahead
 
-DISTANCE, OFFSET, OFFSET_INTEGRAL, SPEED_INTEGRAL, TARGET, ACCELERATION, TORQUE, DRIVE, COASTING = range(9)
+DISTANCE, OFFSET, OFFSET_INTEGRAL, SPEED_INTEGRAL, TARGET, ACCELERATION, TORQUE, DRIVE, COASTING, AHEAD = range(10)
 """places in a pilot's memory"""
-MEMORY = 9
+MEMORY = 10
+PREVIEW = 0.3
+"""s: lead of the rider's lean into turns"""
 LOWEST_SPEED = 0.3
 """m/s: gains are held below"""
 REACTION = 0.2
@@ -128,6 +130,12 @@ def ahead(piloted, points, speed, memory, changes):  # type: ignore[no-untyped-d
 
 
 @jit
+def look_ahead(points, speed, memory):  # type: ignore[no-untyped-def]
+    """Keep the path's curvature :data:`PREVIEW` ahead, at a speed (m/s)."""
+    _, _, _, memory[AHEAD] = point_at(points, memory[DISTANCE] + PREVIEW * speed)
+
+
+@jit
 def drive(piloted, now, wanted, memory):  # type: ignore[no-untyped-def]
     """Force at the wheels (N): for slope, drag and the wanted acceleration, and against the error of the speed.
 
@@ -193,3 +201,4 @@ def steer_exactly(numbers, stiffness, points, low, high, part, seen, wanted, lea
         right -= ((1.0 - part) * low[7 + index] + part * high[7 + index]) * changes[index]
     memory[TORQUE] = max(-p.largest_torque, min(p.largest_torque, -right))
     memory[DRIVE] = drive(p, now, min(wanted, limit), memory)
+    look_ahead(points, now.speed, memory)

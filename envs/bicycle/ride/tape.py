@@ -26,12 +26,11 @@ class PhysicsStep(NamedTuple):
     fallen: bool
 
 
-def advance(ride: Ride) -> PhysicsStep:
-    """Ride one physics step; its ``state`` is overwritten by the next one."""
-    ride.step()
+def last_step(ride: Ride) -> PhysicsStep:
+    """The physics step that the ride took last, in numbers that later ones do not change."""
     rider = ride.rider
     return PhysicsStep(
-        ride.bicycle.body.state, rider.raw_forces(), rider.torques, rider.swivel, ride.physics.time, ride.fallen
+        ride.bicycle.body.state.copy(), rider.raw_forces(), rider.torques, rider.swivel, ride.physics.time, ride.fallen
     )
 
 
@@ -49,8 +48,8 @@ class Tape:
     def step(self, number: int) -> PhysicsStep:
         """The physics step of this number; the first is 0."""
         while len(self._steps) <= number:
-            step = advance(self.ride)
-            self._steps.append(step._replace(state=step.state.copy()))
+            self.ride.step()
+            self._steps.append(last_step(self.ride))
         return self._steps[number]
 
     def state(self, number: int) -> np.ndarray:

@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ....filters.compile.cache import jit
+from ..frame.forces import bicycle_forces
 from .effort import (
     AROUND,
     LARGEST_PEDAL_FORCE,
@@ -31,6 +32,7 @@ from .limb_tables import SHOULDERS_FOLLOW, abductions, legs_on_pedals
 from .limbs import into_pelvis, into_trunk, tip_torques
 from .rigid_limbs import push_between
 from .saddle import SeatContact, press
+from .style import intentions
 
 TRUNK_STIFFNESS, TRUNK_DAMPING = 900.0, 90.0
 """N·m/rad and N·m·s/rad of the lumbar joint's muscles"""
@@ -113,14 +115,19 @@ def build_of(n, arrays):  # type: ignore[no-untyped-def]
 
 
 @jit
-def plan(numbers, arrays, intended, bicycle, steer_torque, drive, ratio, state, links, memory):  # type: ignore[no-untyped-def]
+def plan(  # type: ignore[no-untyped-def]
+    numbers, arrays, table, habits, time, curvature, bicycle, steer_torque, drive, ratio, state, links, memory
+):
     """Decide what the muscles do during the next control period.
 
     Args:
         numbers: of :class:`Build`.
         arrays: likewise.
-        intended: ``(8,)`` change of the trunk's flexion, lean and twist, four swivels (rad), unsteady torque (N·m).
-        bicycle: steer, crank (rad), rates of crank and rear wheel (rad/s).
+        table: of :func:`.intentions`, as of the next three.
+        habits: of the rider.
+        time: s.
+        curvature: of the path a little ahead, 1/m, left positive.
+        bicycle: roll (rad), speed (m/s), steer, crank (rad), rates of crank and rear wheel (rad/s).
         steer_torque: N·m on the handlebar, left positive.
         drive: desired propulsive force at the wheel, N, without braking.
         ratio: of the gear.
@@ -130,7 +137,9 @@ def plan(numbers, arrays, intended, bicycle, steer_torque, drive, ratio, state, 
     """
     build = build_of(numbers, arrays)
     reach, seat = build.reach, build.seat
-    steer, crank, crank_rate, wheel_rate = bicycle
+    lying, speed, steer, crank, crank_rate, wheel_rate = bicycle
+    # change of the trunk's flexion, lean and twist, four swivels (rad), unsteady torque (N·m)
+    intended = intentions(table, habits, time, curvature, lying, crank, speed)
     first, rates, joints = 13, 13 + (state.shape[0] - 13) // 2, (memory.shape[0] - MUSCLES) // 2
     target = memory[TARGET]
     target[0] = build.flexion + intended[0]
@@ -242,3 +251,11 @@ def act(numbers, tree, state, frames, links, rigid, memory, forces):  # type: ig
     forces[6 + links[0]] += forwards
     forces[6 + links[1]] += rightwards
     forces[6 + links[2]] += force
+
+
+@jit
+def act_on_bicycle(numbers, tree, state, frames, links, rigid, memory, acting, brake, forces):  # type: ignore[no-untyped-def]
+    """:func:`act` and :func:`.bicycle_forces` in one call; ``acting``: what the latter takes before the brake (N)."""
+    act(numbers, tree, state, frames, links, rigid, memory, forces)
+    parts, body, tyres, ground, time_step, chain, bristles, contacts = acting
+    bicycle_forces(tree, state, frames, parts, body, tyres, ground, time_step, chain, bristles, contacts, brake, forces)

@@ -15,7 +15,7 @@ from typing import Literal
 import numpy as np
 
 from ....filters.core import rotation
-from ...physics.multibody import connect_points, constraint_force
+from ...physics.multibody import connect_points, constraint_forces
 from ...physics.urdf import Tree
 from ...physics.world import BASE
 from ...sensors.ideal import STANDARD_GRAVITY
@@ -33,7 +33,7 @@ from .links import (
     limb_joints,
     segment_links,
 )
-from .muscles import FEET, HANDS, HANDS_AND_FEET, MUSCLES, SWIVEL, TARGET, WANTED, Build, act, plan
+from .muscles import FEET, HANDS, HANDS_AND_FEET, MUSCLES, SWIVEL, TARGET, WANTED, Build, act, act_on_bicycle, plan
 from .posture import LIMBS, SIDES, SIGNS, Posture
 from .rigid_limbs import rigid_limbs
 from .saddle import AHEAD, ARMS_ON_HANDS, balanced_hand_load, resting_load, seat_contact
@@ -189,11 +189,13 @@ class Rider:
             steer_torque: N·m on the handlebar, left positive.
             drive: desired propulsive force at the wheel, N, without braking.
         """
-        since = state.time - self._began
-        intended = self.motion.intended(since, curvature, state.roll, state.crank, state.speed)
-        bicycle = (state.steer, state.crank, state.crank_rate, state.wheel_rate)
-        ratio, now = self.bicycle.ratio, self.bicycle.body.state
-        plan(self._numbers, self._arrays, intended, bicycle, steer_torque, drive, ratio, now, self._links, self._memory)
+        s, motion = state, self.motion
+        since = motion.checked(s.time - self._began)
+        bicycle = (s.roll, s.speed, s.steer, s.crank, s.crank_rate, s.wheel_rate)
+        plan(
+            self._numbers, self._arrays, motion.table, motion.habits, since, curvature, bicycle, steer_torque, drive,
+            self.bicycle.ratio, self.bicycle.body.state, self._links, self._memory,
+        )  # fmt: skip
 
     def act(self) -> None:
         """Add what muscles and saddle do in the next step to the forces on the bodies.
@@ -202,6 +204,15 @@ class Rider:
         """
         body = self.bicycle.body
         act(self._numbers, body.tree, body.state, body.frames, self._links, self._rigid, self._memory, body.forces)
+
+    def act_on_bicycle(self, brake: float) -> None:
+        """:meth:`act` and :meth:`.Bicycle.act` with brakes (N) in one call, where nothing else acts in this step."""
+        body = self.bicycle.body
+        act_on_bicycle(
+            self._numbers, body.tree, body.state, body.frames, self._links, self._rigid, self._memory,
+            self.bicycle.acting, brake, body.forces,
+        )  # fmt: skip
+        body.apply()
 
     def grips(self) -> np.ndarray:
         """Positions ``(2, 3)`` of left and right hand now, world, m."""
@@ -225,16 +236,15 @@ class Rider:
         ``full``: what the constraints carried in the last step; ``lumped``: what acted in it.
         """
         if self.full:
-            forces = np.array([constraint_force(self.bicycle.physics, number) for number in self.constraints[:2]])
-            return forces, self.grips()
+            return np.array(constraint_forces(self.bicycle.physics, self.constraints[:2])), self.grips()
         frame = self.bicycle.physics.state(self.bicycle.body.body, BASE).orientation
         return rotation.rotate(frame, self._memory[HANDS].reshape(2, 3)), self.grips()
 
     def raw_forces(self) -> Sequence[Sequence[float]]:
-        """Forces of hands and feet in the last step: in world axes (full) or in bicycle axes (lumped)."""
+        """Forces ``(4, 3)`` of hands and feet in the last step: in world axes (full) or in bicycle axes (lumped)."""
         if not self.full:
             return self._memory[HANDS_AND_FEET].reshape(4, 3).tolist()
-        return [constraint_force(self.bicycle.physics, number) for number in self.constraints]
+        return constraint_forces(self.bicycle.physics, self.constraints)
 
     @property
     def swivel(self) -> list[float]:
@@ -251,8 +261,7 @@ class Rider:
         if not self.full:
             frame = self.bicycle.physics.state(self.bicycle.body.body, BASE).orientation
             return rotation.rotate(frame, self._memory[FEET].reshape(2, 3)), self.pedals()
-        forces = np.array([constraint_force(self.bicycle.physics, number) for number in self.constraints[2:]])
-        return forces, self.pedals()
+        return np.array(constraint_forces(self.bicycle.physics, self.constraints[2:])), self.pedals()
 
     def gaps(self) -> np.ndarray:
         """Loop-closure errors ``(4,)`` at hands and feet, m; zeros if lumped."""

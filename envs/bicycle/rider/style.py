@@ -234,12 +234,15 @@ class RiderMotion:
         Raises:
             ValueError: a time outside the duration.
         """
-        values = self.intended(time, curvature, roll, crank, speed)
+        values = intentions(self.table, self.habits, self.checked(time), curvature, roll, crank, speed)
         return values[TRUNK], values[SWIVEL], float(values[HANDS])
 
-    def intended(self, time: float, curvature: float, roll: float, crank: float, speed: float) -> np.ndarray:
-        """All intentions of :meth:`at` in one array ``(8,)``."""
+    def checked(self, time: float) -> float:
+        """The time (s), if it lies in the duration.
+
+        Raises:
+            ValueError: it does not.
+        """
         if not 0.0 <= time <= self.duration:
             raise ValueError(f"time must lie in the {self.duration:g} s of this motion, got {time:g} s")
-        values: np.ndarray = intentions(self.table, self.habits, time, curvature, roll, crank, speed)
-        return values
+        return time

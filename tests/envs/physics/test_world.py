@@ -2,7 +2,7 @@ import numpy as np
 import pybullet
 import pytest
 
-from poise.envs.physics.multibody import Multibody, connect_points, constraint_force
+from poise.envs.physics.multibody import Multibody, connect_points, constraint_forces
 from poise.envs.physics.world import BASE, Physics, PhysicsError, principal_axes
 from poise.envs.sensors.ideal import BodyState
 from poise.filters.core import rotation
@@ -129,7 +129,7 @@ def test_point_to_point_carries_the_weight():
         constraint = connect_points(physics, (anchor, BASE), (0, 0, 0), (body, BASE), (0, 0, 0))
         for _ in range(300):
             physics.step()
-        np.testing.assert_allclose(constraint_force(physics, constraint), [0, 0, 0.3 * 9.81], atol=1e-3)
+        np.testing.assert_allclose(constraint_forces(physics, [constraint])[0], [0, 0, 0.3 * 9.81], atol=1e-3)
         assert np.linalg.norm(physics.state(body).position) < 1e-4
 
 
