@@ -91,9 +91,22 @@ class GainPPO(AfterUpdate, PPO):
     """PPO with a checkpoint after every update."""
 
 
-def lowered(rate: float) -> Callable[[float], float]:
-    """A learning rate that falls linearly to a tenth."""
-    return lambda remaining: rate * (0.1 + 0.9 * remaining)
+def ppo_settings(config: TrainingConfig, logs: Path | None) -> dict[str, Any]:
+    """Arguments of PPO with a memory and without; the learning rate falls linearly to a tenth."""
+    return {
+        "learning_rate": lambda remaining: config.learning_rate * (0.1 + 0.9 * remaining),
+        "n_steps": config.n_steps,
+        "batch_size": min(config.batch_size, config.n_envs * config.n_steps),
+        "n_epochs": config.n_epochs,
+        "gamma": config.gamma,
+        "gae_lambda": config.gae_lambda,
+        "clip_range": 0.2,
+        "ent_coef": 0.0,
+        "target_kl": 0.01,
+        "seed": config.seed,
+        "device": "cpu",
+        "tensorboard_log": None if logs is None else str(logs),
+    }
 
 
 def make_model(config: TrainingConfig, env: VecNormalize, start: np.ndarray, logs: Path | None = None) -> GainPPO:
@@ -108,17 +121,9 @@ def make_model(config: TrainingConfig, env: VecNormalize, start: np.ndarray, log
     model = GainPPO(
         AsymmetricActorCriticPolicy,
         env,
-        learning_rate=lowered(config.learning_rate),
-        n_steps=config.n_steps,
-        batch_size=min(config.batch_size, config.n_envs * config.n_steps),
-        n_epochs=config.n_epochs,
-        gamma=config.gamma,
-        gae_lambda=config.gae_lambda,
-        clip_range=0.2,
-        target_kl=0.01,
+        **ppo_settings(config, logs),
         use_sde=True,
         sde_sample_freq=config.sde_sample_freq,
-        ent_coef=0.0,
         policy_kwargs={
             "seen": spaces.flatdim(env.observation_space) - PRIVILEGED,
             "net_arch": list(config.net_arch),
@@ -126,9 +131,6 @@ def make_model(config: TrainingConfig, env: VecNormalize, start: np.ndarray, log
             # The noise is a linear function of the last hidden layer, whose tanh units have a mean square of about 0.3.
             "log_std_init": float(np.log(config.initial_std / np.sqrt(0.3 * config.net_arch[-1]))),
         },
-        seed=config.seed,
-        device="cpu",
-        tensorboard_log=None if logs is None else str(logs),
     )
     with torch.no_grad():
         output = actor_layers(model)[-1]

@@ -94,23 +94,20 @@ def train_policy(
     if config.agent == "analytic":
         # Its learning rate falls to zero at the end, so another length is another training.
         key["config"]["total_timesteps"] = config.total_timesteps
-        state = load_checkpoint(home / CHECKPOINT, key) if resume and home is not None else None
-        if state is not None:
-            start = state["start"]
-        start = starting_action(config, tuned, motions) if start is None else np.asarray(start, float)
+    state = load_checkpoint(home / CHECKPOINT, key) if resume and home is not None else None
+    if state is not None:
+        start = state["start"]
+    start = starting_action(config, tuned, motions) if start is None else np.asarray(start, float)
+    if config.agent == "analytic":
         return analytic_policy(config, tuned, motions, start, home, key, report, state)
     threads = torch.get_num_threads()
     torch.set_num_threads(1)
     try:
-        if resume and home is not None:
-            state = load_checkpoint(home / CHECKPOINT, key)
-            start = state["start"]
-            training = PolicyTraining(config, tuned, motions, start, home, key, report, validate)
-            training.restore(state)
-        else:
-            start = starting_action(config, tuned, motions) if start is None else np.asarray(start, float)
-            training = PolicyTraining(config, tuned, motions, start, home, key, report, validate)
+        training = PolicyTraining(config, tuned, motions, start, home, key, report, validate)
+        if state is None:
             training.begin()
+        else:
+            training.restore(state)
         return training.finish()
     finally:
         torch.set_num_threads(threads)

@@ -20,7 +20,7 @@ from ....filters.adaptation.tuned import TunedFilter
 from ....filters.core.metrics import error, rms
 from ....filters.support.optional import extra
 from ...weights_io import load_weights, save_weights
-from ..actor_critic import AfterUpdate, lowered
+from ..actor_critic import AfterUpdate, ppo_settings
 from ..config import TrainingConfig
 from ..policy import Layer
 
@@ -137,13 +137,7 @@ def make_recurrent(config: TrainingConfig, env: Any, start: np.ndarray, logs: Pa
     model = GainRecurrentPPO(
         "MlpLstmPolicy",
         env,
-        learning_rate=lowered(config.learning_rate),
-        n_steps=config.n_steps,
-        batch_size=min(config.batch_size, config.n_envs * config.n_steps),
-        n_epochs=config.n_epochs,
-        gamma=config.gamma,
-        gae_lambda=config.gae_lambda,
-        target_kl=0.01,
+        **ppo_settings(config, logs),
         # One LSTM for the actor, with its output layer straight behind it; the critic looks at the observation alone.
         policy_kwargs={
             "lstm_hidden_size": config.lstm_units,
@@ -151,9 +145,6 @@ def make_recurrent(config: TrainingConfig, env: Any, start: np.ndarray, logs: Pa
             "net_arch": {"pi": [], "vf": list(config.net_arch)},
             "log_std_init": float(np.log(config.initial_std)),
         },
-        seed=config.seed,
-        device="cpu",
-        tensorboard_log=None if logs is None else str(logs),
     )
     with torch.no_grad():
         head: Any = model.policy.action_net

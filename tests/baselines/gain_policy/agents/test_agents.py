@@ -1,6 +1,7 @@
 """Every agent learns, exports what it trained, and continues exactly where it was stopped."""
 
 import dataclasses
+from functools import cache
 
 import numpy as np
 import pytest
@@ -70,12 +71,24 @@ def train(agent, trajectories, folder, stop=None, resume=False):
     )
 
 
+@pytest.fixture(scope="module")
+def trained(trajectories, tmp_path_factory):
+    """Agent → its policy, and the folder of its training."""
+
+    @cache
+    def once(agent):
+        folder = tmp_path_factory.mktemp(agent)
+        return train(agent, trajectories, folder), folder
+
+    return once
+
+
 @pytest.mark.parametrize("agent", AGENTS)
-def test_stopped_and_resumed_it_is_the_same_policy(agent, trajectories, tmp_path):
-    whole = train(agent, trajectories, tmp_path / "whole")
+def test_stopped_and_resumed_it_is_the_same_policy(agent, trained, trajectories, tmp_path):
+    whole, _ = trained(agent)
     with pytest.raises(StoppedError):
-        train(agent, trajectories, tmp_path / "stopped", stop=512)
-    resumed = train(agent, trajectories, tmp_path / "stopped", resume=True)
+        train(agent, trajectories, tmp_path, stop=512)
+    resumed = train(agent, trajectories, tmp_path, resume=True)
     assert_same(whole, resumed)
     assert whole.card["chosen_steps"] == resumed.card["chosen_steps"]
     assert whole.card["training"]["agent"] == agent
@@ -117,16 +130,16 @@ def test_before_it_learned_it_acts_about_the_start(agent, trajectories):
     np.testing.assert_allclose(action, np.tile([0.5, -0.5], (3, 1)), atol=0.15)
 
 
-def test_a_checkpoint_of_another_agent_or_without_replay_is_refused(trajectories, tmp_path):
-    train("sac", trajectories, tmp_path)
-    kept = (tmp_path / CHECKPOINT).read_bytes()
+def test_a_checkpoint_of_another_agent_or_without_replay_is_refused(trained, trajectories):
+    _, folder = trained("sac")
+    kept = (folder / CHECKPOINT).read_bytes()
     with pytest.raises(ValueError, match=r"was started with config\.agent sac, not td3"):
-        train("td3", trajectories, tmp_path, resume=True)
-    assert (tmp_path / CHECKPOINT).read_bytes() == kept
+        train("td3", trajectories, folder, resume=True)
+    assert (folder / CHECKPOINT).read_bytes() == kept
 
 
-def test_a_recurrent_policy_is_saved_without_code(trajectories, tmp_path):
-    policy = train("recurrent-ppo", trajectories, tmp_path)
+def test_a_recurrent_policy_is_saved_without_code(trained, trajectories, tmp_path):
+    policy, _ = trained("recurrent-ppo")
     read = RecurrentGainPolicy.load(policy.save(tmp_path / "mine"), policy.tuned)
     assert read.tuned.smoothing == 0.3
     errors = [policy_errors_of(KALMAN, each, trajectories) for each in (policy, read)]
@@ -136,16 +149,14 @@ def test_a_recurrent_policy_is_saved_without_code(trajectories, tmp_path):
         RecurrentGainPolicy.load(tmp_path / "mine", other)
 
 
-def test_pose_errors_and_gains_are_logged(trajectories, tmp_path):
+@pytest.mark.parametrize("agent", ["ppo", "sac"])
+def test_pose_errors_and_gains_are_logged(agent, trained):
     from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
-    train("ppo", trajectories, tmp_path)
-    train("sac", trajectories, tmp_path / "sac")
-    for folder in (tmp_path, tmp_path / "sac"):
-        (log,) = folder.glob("tensorboard*")
-        events = EventAccumulator(str(log)).Reload()
-        assert {"pose/error_deg", "gains/velocity", "gains/process"} <= set(events.Tags()["scalars"])
-        assert all(0.0 < each.value < 90.0 for each in events.Scalars("pose/error_deg"))
+    (log,) = trained(agent)[1].glob("tensorboard*")
+    events = EventAccumulator(str(log)).Reload()
+    assert {"pose/error_deg", "gains/velocity", "gains/process"} <= set(events.Tags()["scalars"])
+    assert all(0.0 < each.value < 90.0 for each in events.Scalars("pose/error_deg"))
 
 
 def test_the_key_names_the_agent(trajectories):
