@@ -17,9 +17,9 @@ import yaml
 
 from poise.filters.support.optional import EXTRAS
 
-ROOT = Path(__file__).resolve().parents[1]
+from .source import FILES, ROOT, TOP, tree_of
+
 PYPROJECT: dict[str, Any] = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
-FLOORS = ("filters", "envs", "baselines", "scripts")
 LINES = 400
 HEAVY = {"pybullet", "torch", "stable_baselines3", "numba", "sympy", "pandas", "matplotlib", "tensorboard"}
 FIVE_WORKS = {
@@ -44,7 +44,7 @@ def project_files() -> list[Path]:
 
 
 def package_folders() -> set[str]:
-    inits = [ROOT / "__init__.py", *(path for floor in FLOORS for path in (ROOT / floor).rglob("__init__.py"))]
+    inits = [path for path in FILES if path.name == "__init__.py"]
     return {".".join(("poise", *path.relative_to(ROOT).parent.parts)) for path in inits}
 
 
@@ -53,9 +53,7 @@ def test_every_package_is_listed() -> None:
 
 
 def test_every_module_lies_in_a_package() -> None:
-    for floor in FLOORS:
-        for path in (ROOT / floor).rglob("*.py"):
-            assert (path.parent / "__init__.py").is_file(), path
+    assert [path for path in FILES if not (path.parent / "__init__.py").is_file()] == []
 
 
 @pytest.fixture(scope="module")
@@ -76,10 +74,10 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> tuple[set[str], set[str]]
 def test_the_wheel_holds_the_package_and_nothing_else(wheel: tuple[set[str], set[str]]) -> None:
     project, packed = wheel
     code = {name for name in packed if not name.split("/")[0].endswith(".dist-info")}
-    wanted = {name for name in project if name.endswith(".py") and name.split("/")[0] in ("__init__.py", *FLOORS)}
+    wanted = {name for name in project if name.endswith(".py") and name.split("/")[0] in ("__init__.py", *TOP)}
     assert {name for name in code if name.endswith(".py")} == {f"poise/{name}" for name in wanted}
     assert {name.split("/")[0] for name in code} == {"poise"}
-    assert {name.split("/")[1] for name in code} <= {*FLOORS, "__init__.py", "py.typed"}
+    assert {name.split("/")[1] for name in code} <= {*TOP, "__init__.py", "py.typed"}
 
 
 def test_the_wheel_holds_the_data_of_the_package(wheel: tuple[set[str], set[str]]) -> None:
@@ -144,8 +142,8 @@ def test_messages_about_missing_packages_name_the_extra_that_brings_them() -> No
 
 def test_every_import_is_a_declared_requirement() -> None:
     names = {IMPORTED.get(name, name.replace("-", "_")) for name in requirements()}
-    for path in (p for floor in FLOORS for p in (ROOT / floor).rglob("*.py")):
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for path in FILES:
+        for node in ast.walk(tree_of(path)):
             modules = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
             if isinstance(node, ast.ImportFrom) and not node.level and node.module:
                 modules = [node.module]

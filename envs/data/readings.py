@@ -62,7 +62,7 @@ def codes(kind: str, values: np.ndarray) -> np.ndarray:
 
 
 def plausible_samples(kind: str, values: np.ndarray) -> np.ndarray:
-    """Samples ``(T, 3)`` with NaN for codes, numbers that are no readings and, except of a gyroscope, for zeros."""
+    """Samples ``(T, 3)`` with NaN for codes, numbers that are not readings and, except of a gyroscope, for zeros."""
     none = codes(kind, values) | (np.abs(values) > UNREADABLE).any(axis=1)
     found = np.where(none[:, None], np.nan, values)
     return found if kind == "gyr" else np.where(found.any(axis=1, keepdims=True), found, np.nan)

@@ -213,7 +213,7 @@ class OnlineEstimator:
 
     Attributes:
         estimator: at the sampling interval of the stream.
-        ranges: channel → range of the sensor in its unit; what reaches it is no sample.
+        ranges: channel → range of the sensor in its unit; what reaches it is not a sample.
         seconds: of every step.
 
     Glitches count as missing, as in :func:`poise.run`: what looks like one does at once, and where later samples show
