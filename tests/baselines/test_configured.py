@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
+import gymnasium
 import numpy as np
 import pandas
 import pytest
@@ -97,7 +98,7 @@ def test_a_recorded_ride_knows_its_rider(ride):
 
 
 def test_a_pushed_fixture_has_the_geometry_of_its_bicycle():
-    push = poise.record("poise/BicycleFixture-v0", seed=0)
+    push = poise.record(gymnasium.make("poise/BicycleFixture-v0", duration=1.0), seed=0)
     assert push.metadata["geometry"]["wheelbase"] == RiderGeometry().wheelbase
     assert RiderGeometry.of({"name": "hand"}) == RiderGeometry()
     with pytest.raises(ValueError, match="unknown geometry"):

@@ -45,6 +45,7 @@ def test_inclinations_are_those_of_the_evaluation():
 def test_the_command_prints_both_tables(monkeypatch, tmp_path, capsys):
     one = ride_checks.Check("weight", "small", "small")
     monkeypatch.setattr(ride_study, "all_checks", lambda: iter([one]))
+    monkeypatch.setattr(ride_study, "levels", dict)
     monkeypatch.setattr(ride_study, "vibration_checks", lambda levels: iter(()))
     monkeypatch.setattr(ride_study, "inclination_rows", lambda: iter([{"scenario": "slow", "tilt": "1.0"}]))
     assert main(["rides", "--checks", "--json", "--runs", str(tmp_path)]) == 0

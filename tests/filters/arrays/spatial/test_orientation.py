@@ -45,11 +45,7 @@ def pointing(array: AccelerometerArray, seed: int, duration: float, field: np.nd
 def errors(model: ArrayOrientation, data: Data, state: Any) -> dict[str, np.ndarray]:
     """Errors in degrees over time: pitch and azimuth of the pointing axis, and the whole rotation."""
     q = tuple(state.orientation[0].tolist())
-    # compiling takes longer than a short run, so only the filter of most tests is compiled
-    compiled = replace(model, start_orientation=q, gravity_sign=1.0, coupling_sign=1.0) == replace(
-        USUAL, start_orientation=q
-    )
-    estimate = KalmanFilter(replace(model, start_orientation=q), compiled, keep_covariance=False).run(data)
+    estimate = KalmanFilter(replace(model, start_orientation=q), keep_covariance=False).run(data)
     angles, true = pointing_angles(estimate.pose["orientation"]), pointing_angles(state.orientation)
     named = dict(
         zip(("pitch", "azimuth"), (rotation.wrap(a - b) for a, b in zip(angles, true, strict=True)), strict=True)
@@ -225,7 +221,7 @@ def test_a_single_imu_and_a_start_from_samples() -> None:
     data, state = pointing(TRIAXIAL, 3, 15.0)
     calm = slice(0, 1)
     data["imu/acc"][calm] = rotation.rotate_back(state.orientation[calm], np.array([0.0, 0.0, G]))
-    estimate = KalmanFilter(ArrayOrientation(array="triaxial"), compiled=False, keep_covariance=False).run(data)
+    estimate = KalmanFilter(ArrayOrientation(array="triaxial"), keep_covariance=False).run(data)
     total = np.degrees(metrics.total_error(estimate.pose["orientation"], state.orientation))
     assert total[0] < 3.0
     assert rms(total) < 5.0
