@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import math
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
     from ..baselines.gain_policy.agents.learners import Trained
     from ..baselines.gain_policy.config import AgentName, TrainingConfig
     from ..baselines.gain_policy.constant_gains import ConstantGains
+    from ..baselines.gain_policy.policy import GainPolicy
     from ..envs.data.trajectory import Trajectory
     from ..filters.adaptation.tuned import TunedFilter
     from ..filters.core.quantity import Quantity
@@ -53,6 +55,9 @@ class Args:
     preset: Literal["quick", "shipped"] = "quick"
     """quick: a minute or two, as a test; shipped: as long as the trainings of the weights in
     the package, whose cards name the commit that repeats them"""
+    policy: str | None = None
+    """file or shipped name of a policy of this filter: nothing is trained; only the largest gyroscope bias that it
+    knows is found, on the motions of the preset, which must be of the kinds that it was trained on"""
     seed: int = 0
     """root seed of motions, sensors and training"""
     steps: int | None = None
@@ -86,6 +91,8 @@ def run(args: Args) -> int:
     """Tune, compare with the published tuning and the best constant gains, and write what was found."""
     if args.report:
         return compare(args)
+    if args.policy is not None and (args.agent in SEARCHES or args.resume is not None):
+        raise ValueError("policy cannot be given with a search of constant gains, nor with resume: nothing is trained")
     from ..baselines.gain_policy.policy import GainPolicy
     from ..envs.gain_reward import scored_quantity
     from ..filters.adaptation.gains import tunable_filter
@@ -109,7 +116,9 @@ def run(args: Args) -> int:
             "published": GainPolicy.neutral(tuned),
             "constant": GainPolicy.constant(tuned, constant.action),
         }
-        if args.agent not in SEARCHES:
+        if args.policy is not None:
+            candidates["policy without limit"], candidates["policy"] = known(args, config, tuned)
+        elif args.agent not in SEARCHES:
             candidates["policy"] = train(args, folder, constant.action)
         errors = errors_of(tuned, candidates, sets, constant)
         write_json(folder.folder / SETS, {group: [each.name for each in some] for group, some in sets.items()})
@@ -231,6 +240,32 @@ def train(args: Args, folder: Run, start: np.ndarray) -> Trained:
     return policy
 
 
+def known(args: Args, config: TrainingConfig, tuned: TunedFilter) -> tuple[GainPolicy, GainPolicy]:
+    """A policy without, and with its limit for the gyroscope bias.
+
+    Raises:
+        ValueError: it is a policy of another filter, or sets other gains.
+    """
+    from ..baselines.gain_policy.known_bias import QUANTILE, WITNESS, bias_limit
+    from ..baselines.gain_policy.policy import GainPolicy
+
+    policy = GainPolicy.load(str(args.policy))
+    if policy.filter != args.filter or policy.ranges != tuned.ranges:
+        raise ValueError(
+            f"policy must set the gains {[part.gain for part in tuned.ranges]} of {args.filter}, got {args.policy!r}, "
+            f"which sets {[part.gain for part in policy.ranges]} of {policy.filter}"
+        )
+    limit = bias_limit(tuned.kalman, config.motions.draw_many(config.seed, config.trajectories))
+    origin = policy.card.get("policy", policy.card)
+    card = {
+        "agent": origin.get("agent"),
+        "policy": origin,
+        "motions": config.describe()["motions"],
+        "bias_limit_by": {"filter": WITNESS, "quantile": QUANTILE, "trajectories": config.trajectories},
+    }
+    return replace(policy, bias_limit=math.inf), replace(policy, bias_limit=limit, card=card)
+
+
 class Curve:
     """The reward per decision over a training, in a file that a resumed training continues.
 
@@ -306,7 +341,7 @@ def card_of(
         "name": f"{args.filter.replace('-', '_')}_policy",
         "description": f"sets the gains of the {args.filter} filter while it runs",
         "agent": args.agent,
-        "command": command_line("tune", args, ("agent", "preset", "seed", "steps", "trajectories", "recipe")),
+        "command": command_line("tune", args, ("agent", "preset", "policy", "seed", "steps", "trajectories", "recipe")),
         "data": "simulated" if args.recipe is None else f"recipe {args.recipe}",
         **policy.card,
         "best_constant": [round(float(value), 4) for value in constant.action],

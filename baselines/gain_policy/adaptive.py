@@ -2,20 +2,33 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ...filters.adaptation.gains import tunable_filter
 from ...filters.adaptation.tuned import TunedFilter, TunedState
 from ...filters.core.estimator import Enclosing, check_measurements
-from ...filters.core.kalman import KalmanFilter
+from ...filters.core.kalman import FilterState, KalmanFilter
 from ...filters.core.quantity import Estimate, Measurement
+from .known_bias import bias_of, witness_of
 from .policy import GainPolicy
+
+
+class WatchedState(NamedTuple):
+    """State of a filter with a policy, and of the filter beside it that estimates the gyroscope bias; arrays only."""
+
+    tuned: TunedState
+    witness: FilterState
+
+
+State = TunedState | WatchedState
+"""Watched where the policy has a limit for the bias."""
 
 
 @dataclass(frozen=True)
@@ -23,8 +36,8 @@ class AdaptiveEstimator(Enclosing):
     """A Kalman filter tuned by a policy: an :class:`~poise.filters.core.estimator.Estimator` on NumPy arrays.
 
     The policy decides once per interval from the samples so far; between decisions the gains are constant. With
-    a neutral policy it is the filter itself, bit by bit. The state holds arrays only. At another
-    sampling interval the time between decisions is kept.
+    a neutral policy it is the filter itself, bit by bit. Where the gyroscope bias is larger than the policy knows, the
+    published gains stay. The state holds arrays only. At another sampling interval the time between decisions is kept.
 
     Attributes:
         filter: in its published tuning, a KalmanFilter (or the name of one).
@@ -68,11 +81,17 @@ class AdaptiveEstimator(Enclosing):
         """The filter with the actions and observations of the policy."""
         return TunedFilter(self.filter, self.policy.ranges, self.policy.features, self.policy.smoothing)
 
-    def init(self, measurement: Measurement) -> TunedState:
-        """Initial state with the batch shape of ``measurement``."""
-        return self.tuned.init(measurement)
+    @cached_property
+    def witness(self) -> KalmanFilter | None:
+        """The filter beside it that estimates the gyroscope bias; None where the policy has no limit."""
+        return witness_of(self.filter) if math.isfinite(self.policy.bias_limit) else None
 
-    def step(self, state: TunedState, measurement: Measurement) -> tuple[TunedState, Estimate]:
+    def init(self, measurement: Measurement) -> State:
+        """Initial state with the batch shape of ``measurement``."""
+        state = self.tuned.init(measurement)
+        return state if self.witness is None else WatchedState(state, self.witness.init(measurement))
+
+    def step(self, state: State, measurement: Measurement) -> tuple[State, Estimate]:
         """Process one sample ``(*batch, size)`` of every channel, NaN where there is none.
 
         Raises:
@@ -88,14 +107,14 @@ class AdaptiveEstimator(Enclosing):
         """Estimates of a whole sequence ``(T, *batch, size)``; equal to stepping."""
         return self.run_from(None, measurements)[0]
 
-    def run_from(self, state: TunedState | None, measurements: Mapping[str, Any]) -> tuple[Estimate, TunedState]:
+    def run_from(self, state: State | None, measurements: Mapping[str, Any]) -> tuple[Estimate, State]:
         """As :meth:`run`, but from ``state`` (None: from the start), and also returns the last state."""
         estimate, state, _ = self.run_with_actions(state, measurements)
         return estimate, state
 
     def run_with_actions(
-        self, state: TunedState | None, measurements: Mapping[str, Any]
-    ) -> tuple[Estimate, TunedState, np.ndarray]:
+        self, state: State | None, measurements: Mapping[str, Any]
+    ) -> tuple[Estimate, State, np.ndarray]:
         """As :meth:`run_from`, with the action ``(T, *batch, k)`` at every sample."""
         arrays = check_measurements(self.channels, measurements, time_axis=True)
         arrays = {name: np.asarray(array) for name, array in arrays.items()}
@@ -104,17 +123,33 @@ class AdaptiveEstimator(Enclosing):
             state = self.init({name: array[0] for name, array in arrays.items()})
         parts, actions, start = [], [], 0
         while start < length:
-            stop = min(length, start + self.tuned.interval_samples - int(state.memory.samples))
+            taken = int(tuned_part(state).memory.samples)
+            stop = min(length, start + self.tuned.interval_samples - taken)
             estimate, state = self._advance(state, {name: array[start:stop] for name, array in arrays.items()})
             parts.append(estimate)
-            actions.append(np.broadcast_to(state.action, (stop - start, *state.action.shape)))
+            action = tuned_part(state).action
+            actions.append(np.broadcast_to(action, (stop - start, *action.shape)))
             start = stop
         return joined(parts), state, np.concatenate(actions)
 
-    def _advance(self, state: TunedState, samples: Mapping[str, np.ndarray]) -> tuple[Estimate, TunedState]:
-        if int(state.memory.samples) == 0:
-            state = self.tuned.decide(state, self.policy(self.tuned.observe(state)))
-        return self.tuned.advance(state, samples)
+    def _advance(self, state: State, samples: Mapping[str, np.ndarray]) -> tuple[Estimate, State]:
+        tuned, witness = tuned_part(state), self.witness
+        if int(tuned.memory.samples) == 0:
+            action = self.policy(self.tuned.observe(tuned))
+            if witness is not None and isinstance(state, WatchedState):
+                beyond = bias_of(witness, state.witness) > self.policy.bias_limit
+                action = np.where(beyond[..., None], 0.0, action)
+            tuned = self.tuned.decide(tuned, action)
+        estimate, tuned = self.tuned.advance(tuned, samples)
+        if witness is None or not isinstance(state, WatchedState):
+            return estimate, tuned
+        seen = {channel.name: samples[channel.name] for channel in witness.channels}
+        return estimate, WatchedState(tuned, witness.run_from(state.witness, seen)[1])
+
+
+def tuned_part(state: State) -> TunedState:
+    """The state of the filter and its features."""
+    return state.tuned if isinstance(state, WatchedState) else state
 
 
 def joined(parts: list[Estimate]) -> Estimate:

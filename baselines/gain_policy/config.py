@@ -49,11 +49,12 @@ UNCALIBRATED_MOTIONS = replace(
 )
 """The same as phones without calibration, half of them carried."""
 
-VARIED_MOTIONS = MixedMotions(
-    (*(replace(TRAINING_MOTIONS, duration=40.0), CALIBRATED_MOTIONS) * 3, UNCALIBRATED_MOTIONS, FLOWN_MOTIONS)
-)
+KNOWN_MOTIONS = MixedMotions((replace(TRAINING_MOTIONS, duration=40.0), CALIBRATED_MOTIONS))
+"""Smooth gestures and calibrated devices, half each: training data of policies for filters without a gyroscope bias."""
+
+VARIED_MOTIONS = MixedMotions((*KNOWN_MOTIONS.parts * 3, UNCALIBRATED_MOTIONS, FLOWN_MOTIONS))
 """Smooth gestures and calibrated devices, three eighths each, devices without calibration, and such as travel and
-shake: training data of the policies for one sensor."""
+shake: training data of the other policies for one sensor."""
 
 AgentName = Literal["ppo", "recurrent-ppo", "sac", "td3", "analytic"]
 """Agents that train a policy."""
@@ -196,7 +197,8 @@ def shipped_config(filter: str) -> TrainingConfig:
     centre = (-0.7, 0.7, -0.7) if filter == "external-acceleration" else None
     return TrainingConfig(
         filter=filter,
-        motions=VARIED_MOTIONS,
+        # With motions of uncalibrated devices a filter without a bias gains in simulation and loses on recordings.
+        motions=KNOWN_MOTIONS if filter == "external-acceleration" else VARIED_MOTIONS,
         trajectories=112,
         # Longer trainings, and less noise on the observations, gain in simulation and lose on recordings.
         total_timesteps=270_000,

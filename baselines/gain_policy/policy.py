@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -34,9 +35,11 @@ class GainPolicy:
         layers: weights and biases; the normalisation of observations is part of the first.
         card: description of the training.
         smoothing: s; the gains follow the actions with this time constant, 0: at once.
+        bias_limit: rad/s; an estimator that follows the policy keeps the published gains while the estimated gyroscope
+            bias is larger (:mod:`.known_bias`). ∞: never.
 
     Raises:
-        ValueError: layers do not fit each other, the observation or the actions.
+        ValueError: layers do not fit each other, the observation or the actions, or the limit is not positive.
     """
 
     filter: str
@@ -45,8 +48,11 @@ class GainPolicy:
     layers: tuple[Layer, ...]
     card: dict[str, Any] = field(default_factory=dict)
     smoothing: float = 0.0
+    bias_limit: float = math.inf
 
     def __post_init__(self) -> None:
+        if not self.bias_limit > 0.0:
+            raise ValueError(f"bias_limit must be a positive rate in rad/s, got {self.bias_limit}")
         layers = tuple((np.asarray(weight, float), np.asarray(bias, float)) for weight, bias in self.layers)
         object.__setattr__(self, "layers", layers)
         width = self.features.size(len(self.ranges))
@@ -110,6 +116,7 @@ class GainPolicy:
             "gains": [{"gain": part.gain, "lower": part.lower, "upper": part.upper} for part in self.ranges],
             "layers": len(self.layers),
             "smoothing": self.smoothing,
+            "bias_limit": self.bias_limit if math.isfinite(self.bias_limit) else None,
         }
         if isinstance(self.features, NamedFeatures):
             own["rows"], own["channels"] = self.features.rows, [list(entry) for entry in self.features.channels]
@@ -139,6 +146,15 @@ class GainPolicy:
                 channels = tuple((str(name), int(size), str(unit)) for name, size, unit in card["channels"])
                 features = NamedFeatures(features.interval, features.scales, int(card["rows"]), channels)
             layers = tuple((arrays[f"{index}.weight"], arrays[f"{index}.bias"]) for index in range(card["layers"]))
-            return cls(card["filter"], ranges, features, layers, card, float(card.get("smoothing", 0.0)))
+            limit = card.get("bias_limit")
+            return cls(
+                card["filter"],
+                ranges,
+                features,
+                layers,
+                card,
+                float(card.get("smoothing", 0.0)),
+                math.inf if limit is None else float(limit),
+            )
         except KeyError as missing:
             raise ValueError(f"{path_or_name}: the {KIND} lacks {missing}") from None

@@ -29,11 +29,12 @@ from ...filters.support.version import package_version
 from ..checkpoint import load_checkpoint, save_checkpoint
 from .config import TrainingConfig
 from .constant_gains import best_constant_gains
+from .known_bias import bias_limit
 from .oracle_warm_start import fit_oracle
+from .policy import GainPolicy
 
 if TYPE_CHECKING:
     from .agents.learners import Trained
-    from .policy import GainPolicy
     from .vec_env import SB3VecEnv
 
 CHECKPOINT = "checkpoint.pt"
@@ -98,8 +99,9 @@ def train_policy(
     if state is not None:
         start = state["start"]
     start = starting_action(config, tuned, motions) if start is None else np.asarray(start, float)
+    limit = bias_limit(filter, motions)
     if config.agent == "analytic":
-        return analytic_policy(config, tuned, motions, start, home, key, report, state)
+        return limited(analytic_policy(config, tuned, motions, start, home, key, report, state), limit)
     threads = torch.get_num_threads()
     torch.set_num_threads(1)
     try:
@@ -108,9 +110,14 @@ def train_policy(
             training.begin()
         else:
             training.restore(state)
-        return training.finish()
+        return limited(training.finish(), limit)
     finally:
         torch.set_num_threads(threads)
+
+
+def limited(policy: Trained, limit: float) -> Trained:
+    """A policy with its limit for the gyroscope bias, rad/s; a recurrent one has none."""
+    return replace(policy, bias_limit=limit) if isinstance(policy, GainPolicy) else policy
 
 
 def analytic_policy(

@@ -8,7 +8,7 @@ one could do without.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
@@ -54,7 +54,7 @@ def observation_groups(policy: GainPolicy) -> dict[str, np.ndarray]:
 
 def mean_observation(kalman: KalmanFilter, policy: GainPolicy, trajectories: Sequence[Trajectory]) -> np.ndarray:
     """Mean ``(n,)`` over all decisions of a policy on trajectories."""
-    watched = Watched(policy.filter, policy.ranges, policy.features, policy.layers, policy.card, policy.smoothing)
+    watched = Watched(**{part.name: getattr(policy, part.name) for part in fields(policy)})
     for trajectory in trajectories:
         AdaptiveEstimator(filter_for(kalman, trajectory), watched).run(trajectory.measurements)
     return np.mean(watched.seen, axis=0)
