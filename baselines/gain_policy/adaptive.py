@@ -16,7 +16,7 @@ from ...filters.adaptation.tuned import TunedFilter, TunedState
 from ...filters.core.estimator import Enclosing, check_measurements
 from ...filters.core.kalman import FilterState, KalmanFilter
 from ...filters.core.quantity import Estimate, Measurement
-from .known_bias import bias_of, witness_of
+from .known_bias import SETTLING, bias_of, witness_of
 from .policy import GainPolicy
 
 
@@ -36,8 +36,9 @@ class AdaptiveEstimator(Enclosing):
     """A Kalman filter tuned by a policy: an :class:`~poise.filters.core.estimator.Estimator` on NumPy arrays.
 
     The policy decides once per interval from the samples so far; between decisions the gains are constant. With
-    a neutral policy it is the filter itself, bit by bit. Where the gyroscope bias is larger than the policy knows, the
-    published gains stay. The state holds arrays only. At another sampling interval the time between decisions is kept.
+    a neutral policy it is the filter itself, bit by bit. Where the gyroscope bias is larger than the policy knows, and
+    in the seconds before it can be told, the published gains stay. The state holds arrays only. At another sampling
+    interval the time between decisions is kept.
 
     Attributes:
         filter: in its published tuning, a KalmanFilter (or the name of one).
@@ -138,7 +139,8 @@ class AdaptiveEstimator(Enclosing):
             action = self.policy(self.tuned.observe(tuned))
             if witness is not None and isinstance(state, WatchedState):
                 beyond = bias_of(witness, state.witness) > self.policy.bias_limit
-                action = np.where(beyond[..., None], 0.0, action)
+                time = tuned.memory.decisions * (self.tuned.interval_samples * self.dt)
+                action = np.where((beyond | (time < SETTLING))[..., None], 0.0, action)
             tuned = self.tuned.decide(tuned, action)
         estimate, tuned = self.tuned.advance(tuned, samples)
         if witness is None or not isinstance(state, WatchedState):

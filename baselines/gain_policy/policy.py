@@ -36,7 +36,7 @@ class GainPolicy:
         card: description of the training.
         smoothing: s; the gains follow the actions with this time constant, 0: at once.
         bias_limit: rad/s; an estimator that follows the policy keeps the published gains while the estimated gyroscope
-            bias is larger (:mod:`.known_bias`). ∞: never.
+            bias is larger or not known yet (:mod:`.known_bias`). ∞: never.
 
     Raises:
         ValueError: layers do not fit each other, the observation or the actions, or the limit is not positive.
