@@ -53,7 +53,7 @@ class Events:
 
     def coasts(self, time: float) -> bool:
         """Whether the legs rest at a time (s)."""
-        return any(begin <= time < end for begin, end in self.coasting)
+        return bool(self.coasting) and any(begin <= time < end for begin, end in self.coasting)
 
 
 def gusts(rng: np.random.Generator, speed: float, duration: float) -> SideForce:

@@ -245,7 +245,8 @@ class Pilot:
         return self._decided()
 
     def _decided(self) -> tuple[float, float]:
-        self.command = float(self._memory[TORQUE]), float(self._memory[DRIVE])
+        torque, drive = self._memory[TORQUE : DRIVE + 1].tolist()
+        self.command = torque, drive
         return self.command
 
     def save(self) -> PilotMemory:

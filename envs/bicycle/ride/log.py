@@ -86,16 +86,18 @@ class RideRecorder:
         first = body.state if tape is None else tape.state(self._next)
         states = np.empty((samples * self.steps + 1, len(first)))
         states[0] = first
-        forces, count = np.empty((samples * self.steps, 4, 3)), 0
-        torques, times, fallen, swivels = [], [], [], []
+        forces: list[float] = []
+        torques, times, fallen, swivels, count = [], [], [], [], 0
         for _ in range(samples):
             for _ in range(self.steps):
                 if tape is None:
                     ride.step()
-                    forces[count], states[count + 1] = rider.raw_forces(), body.state
+                    forces += rider.raw_forces()
+                    states[count + 1] = body.state
                 else:
                     step = tape.step(self._next)
-                    forces[count], states[count + 1] = step.forces, step.state
+                    forces += step.forces
+                    states[count + 1] = step.state
                     self._next += 1
                 count += 1
             if tape is None:
@@ -106,13 +108,13 @@ class RideRecorder:
             fallen.append(step.fallen)
             if step.fallen:
                 break
-        states, forces = states[: count + 1], forces[:count]
+        states = states[: count + 1]
         first, rates = BASE_SIZE + np.array(self._joints), (states.shape[1] - BASE_SIZE) // 2
         starts, ends = states[: -1 : self.steps], states[self.steps :: self.steps]
         turned = ends[:, first[2]] - starts[:, first[2]]
         return self._compute(
             self._motion(states),
-            forces,
+            np.array(forces).reshape(count, 4, 3),
             np.stack([ends[:, first], ends[:, first + rates]], axis=-1),
             turned,
             np.array(torques),

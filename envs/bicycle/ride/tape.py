@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -15,7 +14,7 @@ class PhysicsStep(NamedTuple):
 
     state: np.ndarray
     """state of the bodies after it, see :attr:`poise.envs.physics.multibody.Multibody.state`"""
-    forces: Sequence[Sequence[float]]
+    forces: list[float]
     """of hands and feet in it, see :meth:`.Rider.raw_forces`"""
     torques: list[float]
     """N·m of the rider's muscles in it"""

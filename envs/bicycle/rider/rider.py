@@ -8,7 +8,6 @@ on the handlebar and, oppositely, on the trunk, and those of the feet on the ped
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import Literal
 
@@ -240,11 +239,12 @@ class Rider:
         frame = self.bicycle.physics.state(self.bicycle.body.body, BASE).orientation
         return rotation.rotate(frame, self._memory[HANDS].reshape(2, 3)), self.grips()
 
-    def raw_forces(self) -> Sequence[Sequence[float]]:
-        """Forces ``(4, 3)`` of hands and feet in the last step: in world axes (full) or in bicycle axes (lumped)."""
+    def raw_forces(self) -> list[float]:
+        """Forces ``(12,)`` of hands and feet in the last step, N: in world axes (full) or in bicycle axes (lumped)."""
         if not self.full:
-            return self._memory[HANDS_AND_FEET].reshape(4, 3).tolist()
-        return constraint_forces(self.bicycle.physics, self.constraints)
+            return self._memory[HANDS_AND_FEET].tolist()
+        left_hand, right_hand, left_foot, right_foot = constraint_forces(self.bicycle.physics, self.constraints)
+        return [*left_hand, *right_hand, *left_foot, *right_foot]
 
     @property
     def swivel(self) -> list[float]:
