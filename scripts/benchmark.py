@@ -205,13 +205,22 @@ def show_data_sets(suites: dict[str, Results], args: Args, folder: Run, out: Out
 
 
 def keep(args: Args, folder: Run, kept: dict[str, Any], parts: dict[str, list[dict[str, Any]]]) -> Path:
-    """Write the parts that this run has into the file of ``--save``, each with its source, beside what was there."""
+    """Write what this run has into the file of ``--save``, with its source, beside what was there.
+
+    A run of all estimators replaces all errors of recordings, one of named estimators theirs alone.
+    """
     from ..filters.support.files import write_json
 
     assert args.save is not None
+    from ..baselines.comparison.recommendation import merged
+
     new = {part: rows for part, rows in parts.items() if rows}
+    named = list(new)
+    if args.estimators and kept.get("recordings") and "recordings" in new:
+        new["recordings"] = merged(kept["recordings"], new["recordings"])
+        named = [name for name in named if name != "recordings"] + list(args.estimators)
     source = {key: folder.versions[key] for key in ("poise", "python", "packages")} | {"seed": args.seed}
-    sources = {**kept.get("source", {}), **dict.fromkeys(new, source)}
+    sources = {**kept.get("source", {}), **dict.fromkeys(named, source)}
     return write_json(args.save, {"recordings": [], **kept, **new, "source": sources}, indent=None)
 
 

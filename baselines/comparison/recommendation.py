@@ -114,6 +114,12 @@ def results_of(trajectories: Sequence[Trajectory], table: pandas.DataFrame, suff
     return recordings
 
 
+def merged(kept: Sequence[dict[str, Any]], new: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Results with the errors of some estimators replaced; what is new of recordings that are not kept is left out."""
+    found = {(one["name"], one["dataset"]): one["errors"] for one in new}
+    return [{**one, "errors": one["errors"] | found.get((one["name"], one["dataset"]), {})} for one in kept]
+
+
 def load_results(path: Path = RESULTS) -> dict[str, Any]:
     """Errors of a benchmark.
 

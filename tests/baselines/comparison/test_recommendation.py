@@ -10,6 +10,7 @@ from poise.baselines.comparison.recommendation import (
     Motion,
     dataset_errors,
     load_results,
+    merged,
     motion_of,
     recommend,
     results_of,
@@ -133,6 +134,15 @@ def test_an_estimator_that_missed_a_recording_has_no_mean_there():
         },
     ]
     assert dataset_errors(recordings) == {"y": {"a": 2.0, "b": 4.0}, "x": {"b": 1.0}}
+
+
+def test_errors_of_some_estimators_are_replaced():
+    def row(name, **errors):
+        return {"name": name, "dataset": "a", "errors": {key: {"inclination": value} for key, value in errors.items()}}
+
+    kept, new = [row("1", x=1.0, y=2.0), row("2", x=3.0)], [row("1", y=5.0), row("3", y=7.0)]
+    assert merged(kept, new) == [row("1", x=1.0, y=5.0), row("2", x=3.0)]
+    assert kept[0] == row("1", x=1.0, y=2.0)
 
 
 def test_a_distance_is_that_of_ratios():
