@@ -39,6 +39,8 @@ TEST_SEED, VALIDATION_SEED = 1, 2
 """Children of the root seeds for trajectories that training never sees."""
 PACKAGES = ("numpy", "numba", "torch", "stable-baselines3", "sb3-contrib", "optuna", "scipy")
 """Packages whose versions the card names."""
+NAMES = {"constant": "best constant", "oracle": "hindsight constant (knows the truth)"}
+"""Gains as tables of contenders call them."""
 SEARCHES = ("constant", "optuna")
 """Agents that do not act while the filter runs."""
 
@@ -93,6 +95,7 @@ def run(args: Args) -> int:
         return compare(args)
     if args.policy is not None and (args.agent in SEARCHES or args.resume is not None):
         raise ValueError("policy cannot be given with a search of constant gains, nor with resume: nothing is trained")
+    from ..baselines.gain_policy.compared.contenders import rows_of
     from ..baselines.gain_policy.policy import GainPolicy
     from ..envs.gain_reward import scored_quantity
     from ..filters.adaptation.gains import tunable_filter
@@ -128,8 +131,9 @@ def run(args: Args) -> int:
             for name in [*candidates, "oracle"]
         }
         name = scored_quantity(tuned.kalman, None).name
-        title = f"Error of {args.filter} ({name}), mean of RMS over trajectories, deg"
-        out.table([{"gains": name, **values} for name, values in summary.items()], title)
+        for group, found in errors.items():
+            named = {NAMES.get(each, each): np.radians(values) for each, values in found.items()}
+            out.table(rows_of(named), f"Error of {args.filter} ({name}) on {group} trajectories, RMS of each, deg")
         final = candidates["constant" if args.agent in SEARCHES else "policy"]
         card = card_of(args, final, constant, summary)
         out.say(f"weights: {final.save(folder.folder / 'policy', card)}")
