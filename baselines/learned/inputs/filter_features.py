@@ -15,6 +15,7 @@ from ....filters.core.model import equations_of, parameters_of
 from ....filters.core.quantity import Channel, Estimate, Measurement, Quantity
 from ....filters.core.sampling import FilterState
 from ....filters.registry import make, name_of
+from ..gains.gain_shares import filter_of
 from .front_end import IntervalSums, Seen, check_interval, interval_sums
 
 
@@ -110,10 +111,10 @@ class FilterFeatures:
     @classmethod
     def read(cls, described: Mapping[str, Any], dt: float) -> Self:
         """The inverse of :meth:`describe`."""
-        inner, seen = described["filter"], described.get("channels_seen")
-        kalman = make(inner["name"], dt=dt, **inner.get("parameters", {}))
-        assert isinstance(kalman, KalmanFilter)
-        return cls(kalman, float(described["interval"]), None if seen is None else tuple(seen))
+        seen = described.get("channels_seen")
+        return cls(
+            filter_of(described["filter"], dt), float(described["interval"]), None if seen is None else tuple(seen)
+        )
 
     def init(self, measurement: Measurement) -> FeatureState:
         """See :class:`.front_end.FrontEnd`."""

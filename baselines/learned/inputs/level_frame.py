@@ -15,6 +15,7 @@ from ....filters.core.quantity import ACCELEROMETER, GYROSCOPE, Channel, Estimat
 from ....filters.core.rotation import exp, multiply, rotate
 from ....filters.core.sampling import FilterState
 from ....filters.registry import make, name_of
+from ..gains.gain_shares import filter_of
 from .front_end import Seen, check_interval
 from .gravity_aligned_frame import DUE, FEATURES, GravityAlignedFrame
 
@@ -153,9 +154,7 @@ class LevelFrame:
         settings, inner = dict(described["frame"]), described.get("filter")
         if inner is None:
             return cls(None, GravityAlignedFrame(**settings, dt=dt))
-        kalman = make(inner["name"], dt=dt, **inner.get("parameters", {}))
-        assert isinstance(kalman, KalmanFilter)
-        return cls(kalman, FilterFrame(**settings, dt=dt))
+        return cls(filter_of(inner, dt), FilterFrame(**settings, dt=dt))
 
     def init(self, measurement: Measurement) -> LevelState:
         """See :class:`.front_end.FrontEnd`."""

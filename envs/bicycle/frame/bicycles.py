@@ -12,7 +12,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from .parameters import BENCHMARK, MOUNTAIN_BIKE, BicycleParameters, DriveParameters, RigidPart, WheelParameters
+from .parameters import (
+    BENCHMARK,
+    MOUNTAIN_BIKE,
+    BicycleParameters,
+    DriveParameters,
+    RigidPart,
+    WheelParameters,
+    parallel_axes,
+)
 
 MEASURED = "Moore et al. 2010 ({0}); contact points of the rider, crank, gears, tyres and resistances are round figures"
 
@@ -23,8 +31,7 @@ def without(part: RigidPart, drive: DriveParameters) -> RigidPart:
     centre = (part.mass * np.array(part.centre) - drive.mass * np.array(drive.axle)) / mass
     tensor = part.tensor - np.diag(drive.inertia)
     for weight, place in ((-drive.mass, np.array(drive.axle)), (-mass, centre)):
-        d = place - np.array(part.centre)
-        tensor += weight * (d @ d * np.eye(3) - np.outer(d, d))
+        tensor += parallel_axes(weight, place - np.array(part.centre))
     x, y, z = centre.tolist()
     xx, yy, zz, xz = (float(tensor[place]) for place in ((0, 0), (1, 1), (2, 2), (0, 2)))
     # a flat frame has yy = xx + zz; errors of measurement must not exceed it

@@ -178,6 +178,11 @@ class BicycleParameters:
         return replace(self, rear_frame=combine([self.rear_frame, *extra, *load]), drive=None)
 
 
+def parallel_axes(mass: float, offset: np.ndarray) -> np.ndarray:
+    """Moments of inertia ``(3, 3)``, kg·m², of a mass (kg) in one point about another, ``offset`` ``(3,)`` m away."""
+    return np.asarray(mass * (offset @ offset * np.eye(3) - np.outer(offset, offset)))
+
+
 def combine(parts: Sequence[RigidPart]) -> RigidPart:
     """One rigid body made of several, symmetric about the x-z plane as a whole."""
     mass = sum(part.mass for part in parts)
@@ -185,7 +190,7 @@ def combine(parts: Sequence[RigidPart]) -> RigidPart:
     tensor = np.zeros((3, 3))
     for part in parts:
         d = np.array(part.centre) - centre
-        tensor += part.tensor + part.mass * (d @ d * np.eye(3) - np.outer(d, d))
+        tensor += part.tensor + parallel_axes(part.mass, d)
     x, y, z = centre.tolist()
     inertia = (float(tensor[0, 0]), float(tensor[1, 1]), float(tensor[2, 2]), float(tensor[0, 2]))
     return RigidPart(float(mass), (x, y, z), inertia)

@@ -13,6 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..frame.parameters import parallel_axes
+
 
 class SegmentTable(NamedTuple):
     """One row of the table for one sex."""
@@ -197,8 +199,7 @@ def join(parts: list[Mass]) -> Mass:
     centre = sum((part.mass * part.centre for part in parts), np.zeros(3)) / mass
     tensor = np.zeros((3, 3))
     for part in parts:
-        d = part.centre - centre
-        tensor += part.tensor + part.mass * (d @ d * np.eye(3) - np.outer(d, d))
+        tensor += part.tensor + parallel_axes(part.mass, part.centre - centre)
     return Mass(mass, centre, tensor)
 
 
