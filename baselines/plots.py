@@ -94,7 +94,7 @@ def save_animation(figures: Sequence[Figure], interval: float, path: Path) -> Pa
     frames = []
     for figure in figures:
         figure.canvas.draw()
-        pixels = np.asarray(figure.canvas.buffer_rgba())[..., :3]  # type: ignore[attr-defined]
+        pixels = np.asarray(figure.canvas.buffer_rgba())[..., :3]
         frames.append(Image.fromarray(pixels.copy()).quantize(64))
     frames[0].save(path, save_all=True, append_images=frames[1:], duration=round(1000.0 * interval), loop=0)
     return path
