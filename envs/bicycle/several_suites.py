@@ -26,7 +26,8 @@ def record_suites(options: Sequence[Mapping[str, Any]], seed: int) -> list[Traje
         ValueError: the ride is not the same in all of them.
     """
     with ExitStack() as stack:
-        first, *others = (stack.enter_context(closing(make_environment(ENVIRONMENT, **each))) for each in options)
+        made: list[Any] = [stack.enter_context(closing(make_environment(ENVIRONMENT, **each))) for each in options]
+        first, *others = made
         for other in others:
             other.unwrapped.ride_with(first.unwrapped)
         return [record(env, seed=seed) for env in (first, *others)]
