@@ -106,6 +106,7 @@ def run(args: Args) -> int:
         raise ValueError(f"trials must be at least 1, got {args.trials}")
     config = training_config(args)
     tuned = TunedFilter.of(tunable_filter(args.filter), config.gains)
+    given = None if args.policy is None else loaded(args.policy, tuned)
     recorded = known_recordings(args.recordings)
     for each in recorded:
         check_recording(tuned, each)
@@ -119,8 +120,9 @@ def run(args: Args) -> int:
             "published": GainPolicy.neutral(tuned),
             "constant": GainPolicy.constant(tuned, constant.action),
         }
-        if args.policy is not None:
-            candidates["policy without limit"], candidates["policy"] = known(args, config, tuned)
+        if given is not None:
+            candidates["policy without limit"] = replace(given, bias_limit=math.inf)
+            candidates["policy"] = limited(given, config, tuned)
         elif args.agent not in SEARCHES:
             candidates["policy"] = train(args, folder, constant.action)
         errors = errors_of(tuned, candidates, sets, constant)
@@ -244,21 +246,27 @@ def train(args: Args, folder: Run, start: np.ndarray) -> Trained:
     return policy
 
 
-def known(args: Args, config: TrainingConfig, tuned: TunedFilter) -> tuple[GainPolicy, GainPolicy]:
-    """A policy without, and with its limit for the gyroscope bias.
+def loaded(name: str, tuned: TunedFilter) -> GainPolicy:
+    """A policy of a filter, by file or shipped name.
 
     Raises:
         ValueError: it is a policy of another filter, or sets other gains.
     """
-    from ..baselines.gain_policy.known_bias import QUANTILE, WITNESS, bias_limit
     from ..baselines.gain_policy.policy import GainPolicy
 
-    policy = GainPolicy.load(str(args.policy))
-    if policy.filter != args.filter or policy.ranges != tuned.ranges:
+    policy = GainPolicy.load(name)
+    if policy.filter != tuned.name or policy.ranges != tuned.ranges:
         raise ValueError(
-            f"policy must set the gains {[part.gain for part in tuned.ranges]} of {args.filter}, got {args.policy!r}, "
-            f"which sets {[part.gain for part in policy.ranges]} of {policy.filter}"
+            f"policy must set the gains {[part.gain for part in tuned.ranges]} of {tuned.name}, got {name!r}, which "
+            f"sets {[part.gain for part in policy.ranges]} of {policy.filter}"
         )
+    return policy
+
+
+def limited(policy: GainPolicy, config: TrainingConfig, tuned: TunedFilter) -> GainPolicy:
+    """A policy with its limit for the gyroscope bias, found on motions that it was trained on."""
+    from ..baselines.gain_policy.known_bias import QUANTILE, WITNESS, bias_limit
+
     limit = bias_limit(tuned.kalman, config.motions.draw_many(config.seed, config.trajectories))
     origin = policy.card.get("policy", policy.card)
     card = {
@@ -267,7 +275,7 @@ def known(args: Args, config: TrainingConfig, tuned: TunedFilter) -> tuple[GainP
         "motions": config.describe()["motions"],
         "bias_limit_by": {"filter": WITNESS, "quantile": QUANTILE, "trajectories": config.trajectories},
     }
-    return replace(policy, bias_limit=math.inf), replace(policy, bias_limit=limit, card=card)
+    return replace(policy, bias_limit=limit, card=card)
 
 
 class Curve:

@@ -64,6 +64,9 @@ def test_agents_and_searches_leave_runs_that_a_report_compares(
         (["mekf", "--recipe", "nothing"], "recipe"),
         (["mekf", "--recordings", "missing"], "missing"),
         (["mekf", "--resume", "missing"], "there is no run in missing"),
+        (["mekf", "--policy", "external_acceleration_policy"], "policy must set the gains"),
+        (["mekf", "--policy", "missing"], "missing"),
+        (["mekf", "--agent", "constant", "--policy", "missing"], "policy cannot be given with a search"),
         (["--report", "missing"], "is not a finished run of poise tune"),
     ],
 )
