@@ -60,7 +60,7 @@ def test_agents_and_searches_leave_runs_that_a_report_compares(
         (["mekff"], "did you mean 'mekf'"),
         (["vqf"], "filter must be a Kalman filter with gains"),
         (["mekf", "--test-trajectories", "0"], "test_trajectories must be at least 1"),
-        (["mekf", "--steps", "0"], "total_timesteps must be at least 1"),
+        (["mekf", "--steps", "0"], "poise: error: steps must be at least 1, got 0"),
         (["mekf", "--recipe", "nothing"], "recipe"),
         (["mekf", "--recordings", "missing"], "missing"),
         (["mekf", "--resume", "missing"], "there is no run in missing"),
