@@ -48,7 +48,7 @@ def assert_equal_steps(one, other):
 
 
 def test_stable_baselines3_makes_draws_and_trains_it(identity):
-    envs = make_vec_env(identity, seed=0)
+    envs = make_vec_env(identity, seed=0, env_kwargs=SHORT.get(identity))
     envs.reset()
     picture = envs.render()
     assert picture.shape == (360, 480, 3)

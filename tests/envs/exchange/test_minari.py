@@ -22,9 +22,9 @@ minari = pytest.importorskip("minari")
 SHORT: dict[str, dict[str, Any]] = {
     "poise/HandMotion-v0": {"duration": 1.0, "gesture": "severe"},
     "poise/Replay-v0": {"duration": 1.0},
-    "poise/BicycleFixture-v0": {},
+    "poise/BicycleFixture-v0": {"duration": 1.0},
     "poise/RiderBicycle-v0": {"duration": 0.5, "fidelity": "lumped"},
-    "poise/RiderBicycleGain-v0": {},
+    "poise/RiderBicycleGain-v0": {"duration": 2.0},
     "poise/HandMotionGain-v0": {"duration": 2.0},
     "poise/ReplayGain-v0": {},
 }

@@ -125,7 +125,7 @@ def test_jacobians_are_central_differences(seed: int) -> None:
 def test_ideal_rides_are_followed() -> None:
     rides = [ideal_ride(seed, 1000) for seed in range(8)]
     data = {name: np.stack([ride[0][name] for ride in rides], axis=1) for name in CHANNELS}
-    pose = KalmanFilter(OdometryAided(), compiled=False).run(data).pose
+    pose = KalmanFilter(OdometryAided()).run(data).pose
     angles = np.stack([turned.as_euler("ZYX") for _, turned, _ in rides], axis=1)
     for name, true in (("bicycle/roll", angles[..., 2]), ("bicycle/pitch", angles[..., 1])):
         error = np.degrees(pose[name][..., 0] - true)

@@ -112,7 +112,7 @@ def accuracy():
         attitudes += [motion.truth["orientation"]] * 3
     model = ArrayOrientation(array=CONTROLLER, dt=0.01, array_std=0.1, gyroscope_std=0.01)
     channels = {name: np.stack([run.measurements[name] for run in runs], axis=1) for name in runs[0].measurements}
-    estimate = KalmanFilter(model, compiled=False).run(channels)
+    estimate = KalmanFilter(model).run(channels)
     error = metrics.error(ORIENTATION, estimate.pose["orientation"], np.stack(attitudes, axis=1))
     return np.degrees(np.sqrt(np.mean(error[100:] ** 2, axis=0))).reshape(-1, 3)
 

@@ -156,8 +156,8 @@ def test_filterpy_gives_the_same(model):
         np.testing.assert_allclose(ours.pose[name][-1], value, atol=1e-9)
 
 
-def run(model, ride, compiled=True):
-    estimate, truth = KalmanFilter(model, compiled=compiled).run(ride.measurements), true_angles(ride.truth)
+def run(model, ride):
+    estimate, truth = KalmanFilter(model).run(ride.measurements), true_angles(ride.truth)
     return estimate, {name: rotation.wrap(estimate.pose[name] - truth[name]) / DEG for name in ANGLES}
 
 
@@ -233,7 +233,7 @@ def test_segway():
     motion = replace(circle, roll=lambda time: 0.0 * time, pitch=circle.roll)
     ride = simulate(motion, 40.0, 0.02, Errors(), np.random.default_rng(6))
     model = replace(filter_of(Errors(), 0.02), platform="segway", integration="midpoint", initial_roll=-2.0 * DEG)
-    pitch = KalmanFilter(model, compiled=False).run(ride.measurements).pose["two-gyro/pitch"]
+    pitch = KalmanFilter(model).run(ride.measurements).pose["two-gyro/pitch"]
     error = (pitch - true_angles(ride.truth)["two-gyro/pitch"]) / DEG
     assert np.abs(error[0]) > 2.0
     assert np.sqrt(np.mean(error[1000:] ** 2)) < 0.3
@@ -261,7 +261,7 @@ def test_the_vertical_and_the_biases_are_in_the_axes_of_the_sensors():
 def test_integration_of_ideal_samples_is_exact():
     ride = simulate(MOTIONS["circle"], 10.0, 0.02, IDEAL)
     model = TwoGyroIntegration(dt=0.02, imu_tilt=0.0, initial_roll=float(ride.truth["bicycle/roll"][0, 0]))
-    pose = Observer(model, compiled=False).run(ride.measurements).pose
+    pose = Observer(model).run(ride.measurements).pose
     truth = true_angles(ride.truth)
     for name in ANGLES:
         np.testing.assert_allclose(pose[name], truth[name], atol=1e-9)
@@ -279,7 +279,7 @@ def test_the_platform_alone():
         pitch_rate_noise=1e-3 * DEG,
         imu_tilt=0.0,
     )
-    error = KalmanFilter(model, compiled=False).run(ride.measurements).pose["bicycle/roll"] - ride.truth["bicycle/roll"]
+    error = KalmanFilter(model).run(ride.measurements).pose["bicycle/roll"] - ride.truth["bicycle/roll"]
     # the sample is a mean over the interval that it ends, the roll is that of its end: half a tick times the roll rate
     assert np.sqrt(np.mean(error[500:] ** 2)) / DEG < 0.15
 
@@ -290,7 +290,7 @@ def test_the_constraint_holds_the_roll_whatever_the_camera_says():
     ride = simulate(MOTIONS["frozen"], 40.0, 0.02, errors, np.random.default_rng(9))
     plain = filter_of(Errors(bias=0.05 * DEG), 0.02)
     held = replace(plain, model="sigma1", constraint=True, constraint_noise=0.1 * DEG)
-    rms = [np.sqrt(np.mean(run(model, ride, compiled=False)[1]["bicycle/roll"][500:] ** 2)) for model in (plain, held)]
+    rms = [np.sqrt(np.mean(run(model, ride)[1]["bicycle/roll"][500:] ** 2)) for model in (plain, held)]
     assert rms[1] < 0.5 * rms[0]
     with pytest.raises(ValueError, match="constraint needs"):
         TwoGyro(constraint=True)
