@@ -327,7 +327,7 @@ def named_estimators(estimators: Estimators) -> dict[str, str | Estimator[Any]]:
     """Label → name or estimator; unlabelled estimators are named after their model.
 
     Raises:
-        ValueError: two of one label, or a label that is no text.
+        ValueError: two of one label, or a label other than a text.
     """
     items = list(estimators) if isinstance(estimators, list | tuple) else [estimators]
     for item in estimators.values() if isinstance(estimators, Mapping) else items:
