@@ -19,8 +19,8 @@ import numpy as np
 from ....filters.core import rotation
 from ....filters.support.names import unknown
 from ....filters.support.parameters import check_parameters
+from ..ranges import full_scale
 from ..trajectory import Trajectory
-from .ranges import full_scale
 from .stamps import as_seconds
 from .table import UNITS, Table, factor
 

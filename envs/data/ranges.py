@@ -8,7 +8,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from .table import UNITS, Table, factor, plain
+from .formats.table import UNITS, Table, factor, plain
 
 STATED = re.compile(
     r"\b(?P<kind>gyr(?:o\w*?)?|angular[\s_]*(?:rate|velocity)|acc(?:el\w*?)?)[\W_]*(?:sensor[\W_]*)?"
