@@ -89,12 +89,14 @@ def save(figure: Figure, path: Path) -> Path:
 
 def save_animation(figures: Sequence[Figure], interval: float, path: Path) -> Path:
     """Write figures of equal size as an animated GIF that repeats, ``interval`` s from frame to frame."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from PIL import Image
 
     frames = []
     for figure in figures:
-        figure.canvas.draw()
-        pixels = np.asarray(figure.canvas.buffer_rgba())[..., :3]
+        canvas = FigureCanvasAgg(figure)
+        canvas.draw()
+        pixels = np.asarray(canvas.buffer_rgba())[..., :3]
         frames.append(Image.fromarray(pixels.copy()).quantize(64))
     frames[0].save(path, save_all=True, append_images=frames[1:], duration=round(1000.0 * interval), loop=0)
     return path

@@ -43,6 +43,8 @@ from .geometry import RiderEquations, RiderGeometry
 
 COUNTS = 1024
 """counts per turn of the wheel encoder (256 lines, quadrature)"""
+LARGEST_LEAN = math.radians(60.0)
+"""Beyond it the first specific force is not gravity."""
 ROLL = Quantity("bicycle/roll", "angle", 1, "rad")
 PITCH = Quantity("bicycle/pitch", "angle", 1, "rad")
 BIAS = Quantity("bicycle_imu/gyroscope_bias", "vector", 3, "rad/s")
@@ -131,12 +133,19 @@ class OdometryAided(RiderEquations, Model):
         }
 
     def prior(self, z: Measurement) -> tuple[Array, Array]:
-        """Steady riding along the wheel: specific force less ω × v is gravity; heading and bias zero."""
+        """Steady riding along the wheel: specific force less ω × v is gravity; heading and bias zero.
+
+        Where that leans further than a bicycle rides (a first sample on a bump), the bicycle begins upright.
+        """
         xp = namespace(z["bicycle_imu/acc"])
         rate, f = self._bicycle_axes(z["bicycle_imu/gyr"]), self._bicycle_axes(z["bicycle_imu/acc"])
         wheel, zero = z["wheel/speed"], 0.0 * f
         along = xp.concat([wheel, zero[..., :2]], axis=-1) - cross(rate, self._lever(f))
-        q = level(f - cross(rate, along))
+        up = f - cross(rate, along)
+        length = xp.sqrt(xp.sum(up * up, axis=-1)[..., None] + 1e-30)
+        fallen = xp.less(up[..., 2:3], math.cos(LARGEST_LEAN) * length)
+        none, one = zero[..., :1], 1.0 + zero[..., :1]
+        q = level(xp.where(fallen, xp.concat([none, none, one], axis=-1), up))
         v = rotate(q, along)
         tilt = [self.tilt_prior, self.tilt_prior, 0.0 * self.tilt_prior]
         D = covariance_of([*tilt, *[self.bias_prior] * 3, *[self.velocity_prior] * 3], zero[..., :1])

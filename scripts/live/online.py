@@ -93,14 +93,15 @@ class StreamClock:
             sample = sample._replace(time=0.0 if math.isnan(self._now) else self._now + self.dt)
         assert sample.time is not None
         ahead, self._ahead = self._ahead, None
-        wrong = ahead is not None and sample.time < ahead.time
+        wrong = ahead is not None and ahead.time is not None and sample.time < ahead.time
         if ahead is not None and not wrong:
             yield from self._accept(ahead)
-        if self._last is not None and sample.time == self._last.time and alike(sample, self._last):
-            self.repeated += 1
-            return
-        if self._last is not None and sample.time < self._last.time:
-            self._check_set_back(sample.time, self._last.time)
+        if self._last is not None and self._last.time is not None:
+            if sample.time == self._last.time and alike(sample, self._last):
+                self.repeated += 1
+                return
+            if sample.time < self._last.time:
+                self._check_set_back(sample.time, self._last.time)
         self._behind.clear()
         if self.dt is not None and UNCONFIRMED < sample.time - self._now < math.inf and not wrong:
             self._ahead = sample

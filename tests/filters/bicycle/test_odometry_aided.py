@@ -232,6 +232,16 @@ def test_drop_outs_are_survived(ride: Trajectory) -> None:
         assert np.abs(error[1600:]).max() < 1.5, channel
 
 
+def test_a_ride_that_begins_on_a_bump_begins_upright() -> None:
+    """The wheel equation holds for a bicycle on its head too, so that a wrong start would last."""
+    data, turned, _ = ideal_ride(0, 1000)
+    data["bicycle_imu/acc"][0] = MOUNT.inv().apply([2.0, 1.0, -7.0])
+    roll = run(KalmanFilter(OdometryAided()), data).pose["bicycle/roll"][:, 0]
+    error = np.degrees(roll - turned.as_euler("ZYX")[:, 2])
+    assert np.abs(error).max() < 30.0
+    assert np.abs(error[500:]).max() < 0.3
+
+
 def test_a_wheel_in_the_air_is_not_believed(ride: Trajectory) -> None:
     data = ride.measurements | {"wheel/speed": ride.measurements["wheel/speed"].copy()}
     data["wheel/speed"][1000:1030] += 4.0
