@@ -106,10 +106,7 @@ def train_policy(
     torch.set_num_threads(1)
     try:
         training = PolicyTraining(config, tuned, motions, start, home, key, report, validate)
-        if state is None:
-            training.begin()
-        else:
-            training.restore(state)
+        training.begin() if state is None else training.restore(state)
         return limited(training.finish(), limit)
     finally:
         torch.set_num_threads(threads)

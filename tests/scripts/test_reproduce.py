@@ -190,7 +190,7 @@ def test_rows_are_machine_readable(tmp_path, capsys):
         (["two-gyr"], "did you mean 'two-gyro'"),
         (["small", "--subjects", "7"], "subjects must be numbers from 0 to 4, got [7]"),
         (["small", "--seeds", "0"], "seeds must be at least 1, got 0"),
-        (["small", "--seed", "-1"], "seed must be 0 or more, got -1"),
+        (["small", "--seed", "-1"], "seed must be at least 0, got -1"),
         (["small", "--recordings", "nowhere"], "no recording at nowhere"),
     ],
 )

@@ -7,8 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+import poise
 from poise.envs.data.clock import fit_clock
 from poise.envs.data.trajectory import Trajectory
+from poise.envs.hand.sensing import simulate_hand
 
 N = 6000
 
@@ -179,3 +181,18 @@ def test_grids_of_any_rate_jitter_loss_and_gap(seed):
     assert clock.interval == pytest.approx(1.0 / rate, rel=1e-3)
     # One tick at the start, or one of a gap, may be in doubt.
     assert np.abs(np.diff(clock.index) - np.diff(index)).sum() <= 0.02 * len(index)
+
+
+def test_stamps_of_single_precision_are_named():
+    stamps = (1.7e9 + np.arange(100) / 100.0).astype(np.float32)
+    with pytest.raises(ValueError, match="the stamps are of single precision"):
+        Trajectory(stamps, {"imu/gyr": np.zeros((100, 3))})
+
+
+@pytest.mark.parametrize("nominal", [5.0, 50.0])
+def test_a_nominal_rate_that_the_stamps_contradict_is_named(nominal):
+    motion = simulate_hand("slow", seed=0, duration=2.0)
+    named = motion.replace(metadata={"nominal_rate": nominal})
+    with pytest.warns(UserWarning, match=f"a nominal rate of {nominal:g} Hz is named, but the stamps are 100 Hz"):
+        assert named.on_grid().dt == pytest.approx(0.01)
+    assert any("is named, but" in str(finding) for finding in poise.check_recording(named))

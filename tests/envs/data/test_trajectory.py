@@ -351,10 +351,8 @@ def test_an_id_is_made_recorded_and_described(tmp_path):
     assert len(episode) == 7
     assert episode.name == "PoiseTest/Spinner-v0-1"
     assert episode.metadata["ended"] == "truncated"
-    assert episode.metadata["environment"] == {
-        "id": "PoiseTest/Spinner-v0",
-        "kwargs": {"options": {"type": "Options", "rate": 50.0}},
-    }
+    options = {"options": {"type": "Options", "rate": 50.0}}
+    assert episode.metadata["environment"] == {"id": "PoiseTest/Spinner-v0", "kwargs": options}
     assert_same(load_trajectory(episode.save(tmp_path / "episode.h5")), episode)
 
 
@@ -380,7 +378,6 @@ def test_what_cannot_be_recorded_is_refused():
     ("call", "said"),
     [
         (lambda one: one.resampled("x"), "rate must be a positive number of Hz, got 'x'"),
-        (lambda one: one.resampled(True), "rate must be a positive number of Hz, got True"),
         (lambda one: one.resampled(1e9), "would make"),
         (lambda one: one.interpolated("x"), "longest must be a positive time in s, got 'x'"),
         (lambda one: one.save(3), "path must be a path"),
@@ -394,18 +391,3 @@ def test_what_cannot_be_recorded_is_refused():
 def test_wrong_arguments_of_functions_are_named(call, said):
     with pytest.raises(ValueError, match=said):
         call(simulate_hand("slow", seed=0, duration=2.0))
-
-
-def test_stamps_of_single_precision_are_named():
-    stamps = (1.7e9 + np.arange(100) / 100.0).astype(np.float32)
-    with pytest.raises(ValueError, match="the stamps are of single precision"):
-        Trajectory(stamps, {"imu/gyr": np.zeros((100, 3))})
-
-
-@pytest.mark.parametrize("nominal", [5.0, 50.0])
-def test_a_nominal_rate_that_the_stamps_contradict_is_named(nominal):
-    motion = simulate_hand("slow", seed=0, duration=2.0)
-    named = motion.replace(metadata={"nominal_rate": nominal})
-    with pytest.warns(UserWarning, match=f"a nominal rate of {nominal:g} Hz is named, but the stamps are 100 Hz"):
-        assert named.on_grid().dt == pytest.approx(0.01)
-    assert any("is named, but" in str(finding) for finding in poise.check_recording(named))

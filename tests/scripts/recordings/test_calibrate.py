@@ -89,7 +89,7 @@ def test_wrong_words_are_explained(folder, tmp_path, capsys):
     assert main(["calibrate", "gyroscope", "--simulate", "--record", str(tmp_path)]) == 2
     assert "record must be a file" in capsys.readouterr().err
     assert main(["calibrate", "gyroscope", "--simulate", "--seed", "-1", *record]) == 2
-    assert "seed must be 0 or more" in capsys.readouterr().err
+    assert "seed must be at least 0" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

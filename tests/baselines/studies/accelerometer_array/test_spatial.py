@@ -72,7 +72,11 @@ def canned(device, seed, duration, dip=0.0, methods=()):
 
 
 PRIORS = ("closed prior", "open prior", "open prior, first order")
-SHARES = ("proposed, exact rotation, beyond the arctangent", "tilt sensor, beyond the arcsine")
+SHARES = (
+    "proposed, exact rotation, beyond the arctangent",
+    "tilt sensor, beyond the arcsine",
+    f"{spatial_study.READING}, beyond the arcsine",
+)
 
 
 def canned_curves(device, seed, duration):
