@@ -209,11 +209,10 @@ def keep(args: Args, folder: Run, kept: dict[str, Any], parts: dict[str, list[di
 
     A run of all estimators replaces all errors of recordings, one of named estimators theirs alone.
     """
+    from ..baselines.comparison.recommendation import merged
     from ..filters.support.files import write_json
 
     assert args.save is not None
-    from ..baselines.comparison.recommendation import merged
-
     new = {part: rows for part, rows in parts.items() if rows}
     named = list(new)
     if args.estimators and kept.get("recordings") and "recordings" in new:

@@ -35,24 +35,12 @@ USER_ERRORS = (ValueError, OSError, UnregisteredEnv, MissingExtraError)
 """What wrong input raises; shown as one line. Anything else is a defect and keeps its traceback."""
 
 
-LEAST = dict.fromkeys(("seed", "test_seed", "replicate", "trials"), 0) | dict.fromkeys(
-    (
-        *(
-            "processes",
-            "episodes",
-            "trajectories",
-            "training",
-            "points",
-            "steps",
-            "epochs",
-            "units",
-            "subjects",
-            "seeds",
-        ),
-        *("test_episodes", "test_trajectories", "most"),
-    ),
-    1,
+FROM_ZERO = ("seed", "test_seed", "replicate", "trials")
+FROM_ONE = (
+    *("processes", "episodes", "trajectories", "training", "points", "steps", "epochs", "units", "subjects", "seeds"),
+    *("test_episodes", "test_trajectories", "most"),
 )
+LEAST = dict.fromkeys(FROM_ZERO, 0) | dict.fromkeys(FROM_ONE, 1)
 """Option of any command that is a whole number → its least value."""
 
 

@@ -169,4 +169,6 @@ class SamplesSoFar:
 
 def alike(one: Mapping[str, np.ndarray], other: Mapping[str, np.ndarray]) -> bool:
     """Whether two samples have the same numbers, and NaN in the same places."""
-    return all(np.array_equal(values, other[name], equal_nan=True) for name, values in one.items())
+    return one.keys() == other.keys() and all(
+        np.array_equal(values, other[name], equal_nan=True) for name, values in one.items()
+    )

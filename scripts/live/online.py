@@ -13,7 +13,7 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 
 from ...envs.data.clock import check_interval, fit_clock
-from ...envs.data.glitches import FEWEST, SamplesSoFar
+from ...envs.data.glitches import FEWEST, SamplesSoFar, alike
 from ...filters.core.estimator import Estimator, check_measurements
 from ...filters.core.offline import Offline
 from ...filters.core.quantity import Estimate
@@ -45,13 +45,6 @@ class Timed(NamedTuple):
     """whether the sample is missing"""
     restart: bool
     """whether the gap before it is too long for predictions"""
-
-
-def alike(one: Sample, other: Sample) -> bool:
-    """Whether two samples have the same values, and NaN in the same places."""
-    return one.measurement.keys() == other.measurement.keys() and all(
-        np.array_equal(values, other.measurement[name], equal_nan=True) for name, values in one.measurement.items()
-    )
 
 
 @dataclass
@@ -97,7 +90,7 @@ class StreamClock:
         if ahead is not None and not wrong:
             yield from self._accept(ahead)
         if self._last is not None and self._last.time is not None:
-            if sample.time == self._last.time and alike(sample, self._last):
+            if sample.time == self._last.time and alike(sample.measurement, self._last.measurement):
                 self.repeated += 1
                 return
             if sample.time < self._last.time:

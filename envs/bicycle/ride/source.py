@@ -6,7 +6,7 @@ import copy
 import math
 import uuid
 from dataclasses import replace
-from typing import Any, NamedTuple, cast
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -95,7 +95,8 @@ class RideSource:
         self._settling, self._each = round(SETTLING * physics_rate), round(physics_rate / rate)
         self.ride: Ride | None = None
         self._tape: Tape | None = None
-        self._taped, self._leader = False, cast("RideSource | None", None)
+        self._taped = False
+        self._leader: RideSource | None = None
         self.fallen_at = math.inf
         self._kept: dict[str, RideMemory] = {}
         self._motion_key: tuple[Any, ...]
