@@ -30,6 +30,9 @@ ZERO, MEAN = "always zero", "always the ride's mean"
 """Baselines: what needs no sensor, and the best constant, which only hindsight knows."""
 STRAPDOWN = "integration"
 """Variant that integrates the gyroscopes alone."""
+SHORT = "In short"
+"""Title of the tables with two rows a course, which README takes."""
+ROLL = "bicycle/roll"
 SPACING = 0.25
 """s from sample to sample of the errors over time that are kept of a ride"""
 Samples = Mapping[str, np.ndarray]
@@ -192,7 +195,7 @@ class RideStudy:
             name: {angle: error[::every].tolist() for angle, error in errors[name].items()}
             for name in (first, *self.followed)
         }
-        found["yaw"] = yaw_drift(ride, estimates[first].pose["bicycle/roll"][:, 0])
+        found["yaw"] = yaw_drift(ride, estimates[first].pose[ROLL][:, 0])
         found["nees"] = {
             angle: self.normalised(ride, estimates[first], errors[first], [angle]) for angle in self.states
         }
@@ -252,6 +255,7 @@ class RideStudy:
         if rows:
             report.compare(f"{self.table}, {course}", rows, f"RMS from {SETTLED:g} s on.", interval=STD)
         report.table(f"Skill, {course}, RMS in deg", self.skill(course, results), self.note(results))
+        report.table(f"{SHORT}, {course}, RMS in deg", self.in_short(course, results))
         cells = self.cells or rounded
         methods = [*self.variants, ZERO, MEAN]
         report.table(
@@ -306,14 +310,38 @@ class RideStudy:
             rows.append(row)
         return rows
 
+    def in_short(self, course: str, results: list[dict[str, Any]]) -> list[dict[str, Any]]:
+        """The skill of the filter in two rows: roll of the bicycle, and mean over the other published angles."""
+        first = next(iter(self.variants))
+        printed = {angle: leading(text) for angle, text in self.published.get((course, first), {}).items()}
+        tabled = {angle for (_, name), values in self.published.items() if name == first for angle in values}
+        columns = {
+            "published": printed,
+            "here": mean_rms(results, first),
+            MEAN: mean_rms(results, MEAN),
+            "posterior bound": mean_of(each.get("bound", {}) for each in results),
+        }
+        angles = {
+            "roll of the bicycle": [angle for angle in tabled if self.angles[angle][0] == ROLL],
+            "other angles, mean": [angle for angle in self.angles if angle in tabled and self.angles[angle][0] != ROLL],
+        }
+        return [
+            {"error of": name}
+            | {
+                column: _rounded(float(np.mean([values.get(angle, np.nan) for angle in part])))
+                for column, values in columns.items()
+            }
+            for name, part in angles.items()
+        ]
+
     def claims(self, course: str, results: list[dict[str, Any]]) -> list[Claim]:
         """What holds of the errors of a course: against the paper, the baselines and each other; and of consistency."""
         first = next(iter(self.variants))
         ours, best = mean_rms(results, first), mean_rms(results, MEAN)
         published = self.published.get((course, first), {})
-        ratios = {angle: ours[angle] / float(value.replace("±", " ").split()[0]) for angle, value in published.items()}
+        ratios = {angle: ours[angle] / leading(value) for angle, value in published.items()}
         constant = {angle: error / best[angle] for angle, error in ours.items()}
-        roll = next(angle for angle, (name, _) in self.angles.items() if name == "bicycle/roll")
+        roll = next(angle for angle, (name, _) in self.angles.items() if name == ROLL)
         found = [Claim.every("Every error is at or below the published one", ratios, 1.0, "of it")] if ratios else []
         found += [
             Claim.every("Every angle is estimated better than by the best constant", constant, 1.0, "of its error"),
@@ -352,6 +380,11 @@ SKILL = (
     "*Posterior bound*: {bound}. *NEES*: of the angle alone, 1 if the covariance is right; mean over rides, with the "
     "95 % interval of that mean by the spread between rides, since errors within a ride are correlated."
 )
+
+
+def leading(printed: str) -> float:
+    """Mean of a printed ``mean ± deviation``."""
+    return float(printed.replace("±", " ").split()[0])
 
 
 def interval_of_mean(values: Sequence[float]) -> str:

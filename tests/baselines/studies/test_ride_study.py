@@ -83,6 +83,7 @@ def test_a_course_is_reported(tmp_path):
     assert titles == [
         "Table I, indoor_circle",
         "Skill, indoor_circle, RMS in deg",
+        "In short, indoor_circle, RMS in deg",
         "Variants, indoor_circle, mean RMS in deg",
         "Where errors come from, indoor_circle, mean RMS in deg",
         "Drift, indoor_circle, mean RMS in deg",
@@ -94,5 +95,9 @@ def test_a_course_is_reported(tmp_path):
     assert skill["φ"]["NEES, 95 % interval"] == "2.5"
     assert skill["φ"]["published"] == "0.72 ± 0.22"
     assert skill["θ1"]["posterior bound"] is None
-    assert {row["filter"] for row in report.entries[2].rows} >= {"Σ2", ZERO, MEAN}
+    roll, others = report.entries[2].rows
+    assert (roll["error of"], roll["published"], roll["here"]) == ("roll of the bicycle", 0.72, skill["φ"]["Σ2"])
+    assert others["published"] == pytest.approx((2.11 + 2.62 + 1.98) / 3, abs=0.005)
+    assert others["posterior bound"] is None, "a mean over angles needs all of them"
+    assert {row["filter"] for row in report.entries[3].rows} >= {"Σ2", ZERO, MEAN}
     assert len(report.results) == len(methods) * 4

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from poise.baselines.studies import PAPERS
 from poise.baselines.studies.report import Report
 from poise.scripts.pages.studies import BLOCK, update, updated
 
@@ -61,3 +62,20 @@ def test_blocks_of_the_pages_are_well_formed(page):
     text = (ROOT / "docs" / f"{page}.md").read_text(encoding="utf-8")
     begins, ends = text.count("<!-- study: "), text.count("<!-- end of study -->")
     assert begins == ends == len(BLOCK.findall(text)) > 0
+
+
+def test_tables_in_short_of_all_works_become_one(tmp_path):
+    works = {name: tmp_path / name for name in PAPERS}
+    for work in ("two-gyro", "whole-body"):
+        report = Report(works[work])
+        report.table("In short, indoor_circle, RMS in deg", [{"error of": "roll", "published": 0.72, "here": 0.94}])
+        report.table("In short, outdoor, RMS in deg", [{"error of": "roll", "published": None, "here": 1.5}])
+    page = "<!-- study: all: In short -->\nold\n<!-- end of study -->\n"
+    text = updated(page, works, "")
+    assert "| work | course | error of | published | here |" in text
+    assert "| two-gyro | indoor | roll | 0.72 | 0.94 |" in text
+    assert "| whole-body | outdoor | roll | – | 1.5 |" in text
+    assert "old" not in text
+    assert updated(page, {"two-gyro": works["two-gyro"]}, "") == page, "one work alone does not replace it"
+    with pytest.raises(ValueError, match=r"begins with 'In long'"):
+        updated(page.replace("short", "long"), works, "")
