@@ -67,7 +67,7 @@ TRAINED: dict[str, Entry] = {
     ),
     "bounded-motion+network": Entry(
         "..baselines.learned.estimator:shipped",
-        "bounded-motion-rest in eight tunings, weighed by a recurrent network trained on simulated motion",
+        "bounded-motion-rest in ten tunings, weighed by a recurrent network trained on simulated motion",
         HERE,
         "learned",
         {"weights": "bounded-motion_network"},

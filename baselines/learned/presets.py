@@ -149,8 +149,8 @@ PRESETS: dict[str, Preset] = {
         fit=FitConfig(epochs=6),
     ),
     "bounded-motion+network": Preset(
-        "bounded-motion-rest in eight tunings, weighed by a recurrent network",
-        {"hand-held-prompt": 200, "carried-prompt": 70},
+        "bounded-motion-rest in ten tunings, weighed by a recurrent network",
+        {"hand-held-varying": 200, "carried-varying": 70},
         filter="bounded-motion-rest",
         bank=True,
         units=48,

@@ -9,6 +9,7 @@ import numpy as np
 
 from ...filters.support.ranges import Checked, Range, log_uniform
 from ...filters.support.seeds import named_generator
+from ..sensors.assumptions import WARM_UP
 from ..sensors.noise import NoiseModel
 from ..sensors.presets import SensorPreset
 from ..sensors.timing import PUNCTUAL, Timing
@@ -57,6 +58,10 @@ class VariedSensors(Checked):
     gyroscope_walk: Range = (1e-4 * DEG, 3e-3 * DEG)
     gyroscope_scale: Range = (5e-4, 1e-2)
     gyroscope_misalignment: Range = (5e-4, 1e-2)
+    gyroscope_g_sensitivity: Range | None = None
+    """rad/s per m/s²: with it, and with the temperature, the bias at rest is not that in motion; None: neither"""
+    gyroscope_temperature: Range | None = None
+    """rad/s/K, while the device warms up by :data:`~poise.envs.sensors.assumptions.WARM_UP`"""
     accelerometer_noise: Range = (5e-4, 1e-2)
     accelerometer_bias: Range = (0.01, 0.1)
     accelerometer_scale: Range = (5e-4, 1e-2)
@@ -112,6 +117,12 @@ class VariedSensors(Checked):
             burst_duration=log_uniform(generator, self.pause),
         )
         # descendants by name, which leave the draws above as they are
+        own = named_generator(generator, "bias in motion")
+        varying = (self.gyroscope_g_sensitivity, self.gyroscope_temperature)
+        force, heat = (0.0 if each is None else log_uniform(own, each) for each in varying)
+        gyroscope = replace(
+            gyroscope, g_sensitivity=force, temperature_coefficient=heat, warm_up=WARM_UP if heat else 0.0
+        )
         own = named_generator(generator, "magnetometer")
         magnetometer = NoiseModel(
             white_noise=log_uniform(own, self.magnetometer_noise),

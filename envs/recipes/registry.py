@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 from ...filters.support.files import write_text
 from ...filters.support.names import look_up
 from ..data.trajectory import Trajectory
+from ..sensors.assumptions import CONSUMER, INDUSTRIAL
 from .hand import HandRecipe
 from .recipe import Recipe
 
@@ -34,6 +35,11 @@ PROMPT = {
     "timing": {"late_share": 0.0},
 }
 """Sensors that report at once; a gyroscope may be one whose bias nobody has removed."""
+VARYING = PROMPT | {
+    "gyroscope_g_sensitivity": (INDUSTRIAL.gyroscope.g_sensitivity, CONSUMER.gyroscope.g_sensitivity),
+    "gyroscope_temperature": (INDUSTRIAL.gyroscope.temperature_coefficient, CONSUMER.gyroscope.temperature_coefficient),
+}
+"""The same, whose bias depends on the specific force and on the temperature, from one grade to the other."""
 RECIPES: dict[str, ShippedRecipe] = {
     "hand-held": ShippedRecipe(
         "hand",
@@ -59,6 +65,16 @@ RECIPES: dict[str, ShippedRecipe] = {
         "hand",
         "carried, by the same sensors",
         {"carried_share": 1.0, "carried": {"first_rest": (0.3, 20.0), "running_share": 0.0}, "sensors": PROMPT},
+    ),
+    "hand-held-varying": ShippedRecipe(
+        "hand",
+        "hand-held by the same sensors, whose bias in motion is not that at rest: force and warming change it",
+        {"carried_share": 0.0, "sensors": VARYING},
+    ),
+    "carried-varying": ShippedRecipe(
+        "hand",
+        "carried, by the same sensors",
+        {"carried_share": 1.0, "carried": {"first_rest": (0.3, 20.0), "running_share": 0.0}, "sensors": VARYING},
     ),
     "rider": ShippedRecipe("rider", "rides of anybody anywhere with sensors of several grades", {}),
 }

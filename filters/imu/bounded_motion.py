@@ -84,8 +84,10 @@ class BoundedMotion(Model):
     """τ, s: five samples at 286 Hz; in seconds, so that it is independent of the rate"""
     accelerometer_range: float = 156.0
     """m/s²: samples with a component beyond this count as saturated"""
+    gyroscope_range: float = 34.8
+    """rad/s (1994 °/s), likewise: what is beyond the range was turned, but nobody measured it"""
     clipped_inflation: float = 100.0
-    """factor on σ_a for saturated samples"""
+    """factor on σ_a or σ_g for saturated samples"""
     accelerometer_lag: float = 0.0
     """s: delay of the accelerometer relative to the gyroscope (filters inside the sensor), negative if it is ahead"""
     tilt_prior: float = 0.05
@@ -136,7 +138,8 @@ class BoundedMotion(Model):
         spread = expand(self.acceleration_noise**2 * self.dt, 1) * inflation
         lost = expand(self.velocity_prior**2, 1) + 0.0 * spread
         spread = xp.where(known, spread, lost)
-        Q = process_noise(self.gyroscope_noise**2 * self.dt, self.bias_noise**2 * self.dt, spread)
+        turned = clipped_inflation(z["imu/gyr"], self.gyroscope_range, self.clipped_inflation)[..., 0]
+        Q = process_noise(self.gyroscope_noise**2 * self.dt * turned, self._bias_variance(x, z), spread)
         return xp.concat([after, b, v, x[..., 10:13], x[..., 13:14] + dt, x[..., 14:]], axis=-1), F, Q
 
     def residual(self, x: Array, z: Measurement) -> tuple[Array, Array, Array]:
@@ -187,6 +190,10 @@ class BoundedMotion(Model):
             np.asarray(nis(replace(model, accelerometer_lag=lag), samples)) for lag in (-STEP, 0.0, STEP)
         )
         return replace(self, accelerometer_lag=relative_delay(before, now, after, dt))
+
+    def _bias_variance(self, x: Array, z: Measurement) -> Any:
+        """Of the change of the bias in an interval, (rad/s)², a number or ``(...)``."""
+        return self.bias_noise**2 * self.dt
 
     def _external(self, q: Array, f: Array) -> Array:
         return f - expand(self.gravity, 1) * up_in_body(q)

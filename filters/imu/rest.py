@@ -10,6 +10,15 @@ accelerometer by 0.5 m/s². Then, with the low-pass ω̄ of the gyroscope, the p
 
 is made beside that of the velocity. A rotation as slow and steady as this is taken for a bias only if it is about the
 vertical, since otherwise gravity turns in sensor axes; what the bias may be at most bounds the harm.
+
+The bias at rest is not that in motion, since it depends on the specific force and on the temperature. However long the
+rest, the bias is therefore not known better than to a deviation σ_D: at rest it has a process noise of the density
+σ_D⁴ / σ_R², with which the variance of a bias that is measured with σ_R ends at σ_D². The default is about the root
+mean square of what a turn by 90° and warming by 5 K change in devices that lie, log-uniformly, between the grades
+:data:`~poise.envs.sensors.assumptions.INDUSTRIAL` and :data:`~poise.envs.sensors.assumptions.CONSUMER`.
+
+Since nothing is known of the device and of how it begins, the bias has a wider prior than there, and so has the tilt of
+the first sample: an acceleration that changes the length of the specific force by d turns its direction by about d / g.
 """
 
 from __future__ import annotations
@@ -20,6 +29,7 @@ from typing import ClassVar
 
 from ..core.backend import Array, expand, namespace
 from ..core.matrices import block_diagonal, identity
+from ..core.model import Gain
 from ..core.quantity import Measurement
 from .bounded_motion import BoundedMotion
 
@@ -44,20 +54,25 @@ class RestingBoundedMotion(BoundedMotion):
     """s after which it is rest"""
     largest_bias: float = math.radians(10.0)
     """rad/s: a faster rotation is none of a device at rest"""
+    rest_deviation: float = math.radians(0.05)
+    """σ_D, rad/s: between the bias at rest and that in motion"""
+    bias_prior: float = math.radians(1.5)
+    """rad/s"""
 
     state_size: ClassVar[int] = 22
     residual_size: ClassVar[int] = 6
+    gains: ClassVar[dict[str, Gain]] = BoundedMotion.gains | {
+        "rest": Gain("rest_noise", description="variance σ_R² of the rate at rest as a measurement of the bias")
+    }
 
     def prior(self, z: Measurement) -> tuple[Array, Array]:
-        """As there; the low-passes start at the first samples."""
-        xp = namespace(z["imu/acc"])
+        """As there, less certain of the tilt in motion; the low-passes start at the first samples."""
+        xp, f, g = namespace(z["imu/acc"]), z["imu/acc"], expand(self.gravity, 1)
         x, P = super().prior(z)
+        lean = (xp.sqrt(xp.sum(f * f, axis=-1, keepdims=True)) - g) / g
+        none = 0.0 * lean
+        P = P + block_diagonal([part[..., None] * identity(3, x) for part in (lean * lean, none, none)])
         return xp.concat([x, z["imu/gyr"], z["imu/acc"], 0.0 * x[..., :1]], axis=-1), P
-
-    def predict(self, x: Array, z: Measurement, previous: Measurement) -> tuple[Array, Array, Array]:
-        """As there."""
-        after, F, Q = super().predict(x[..., :15], z, previous)
-        return namespace(x).concat([after, x[..., 15:]], axis=-1), F, Q
 
     def residual(self, x: Array, z: Measurement) -> tuple[Array, Array, Array]:
         """The velocity, and at rest the bias; else NaN: the update is skipped."""
@@ -80,6 +95,13 @@ class RestingBoundedMotion(BoundedMotion):
         smooth = xp.where(known, x[..., 15:21] + share * (both - x[..., 15:21]), x[..., 15:21])
         calm = self._calm(x, z)
         return xp.concat([first, smooth, xp.where(calm, x[..., 21:22] + dt, 0.0 * x[..., 21:22])], axis=-1)
+
+    def _bias_variance(self, x: Array, z: Measurement) -> Array:
+        """As there, and at rest as much as keeps its deviation at that between rest and motion."""
+        xp = namespace(x)
+        usual = expand(self.bias_noise**2 * self.dt, 1) + 0.0 * x[..., :1]
+        known = expand(self.rest_deviation**4 / self.rest_noise**2 * self.dt, 1)
+        return xp.where(self._rests(x, z), usual + known, usual)[..., 0]
 
     def _calm(self, x: Array, z: Measurement) -> Array:
         """Whether this sample is one of rest ``(..., 1)``; a missing one is not."""

@@ -73,7 +73,7 @@ def corrected(x: Array, dx: Array) -> Array:
 
 
 def clipped_inflation(f: Array, limit: Any, factor: Any) -> Array:
-    """Factor on the variance of a velocity increment ``(..., 1)``: ``factor²`` where f exceeds ``limit``."""
+    """Factor on the variance of an increment ``(..., 1)``: ``factor²`` where a component of f exceeds ``limit``."""
     xp = namespace(f)
     clipped = xp.any(xp.greater(xp.abs(f), expand(limit, 1)), axis=-1)[..., None]
     one = 1.0 + 0.0 * f[..., :1]

@@ -26,9 +26,17 @@ from .front_end import Seen
 from .gravity_aligned_frame import SCALARS, VECTORS
 from .level_frame import LevelFrame, LevelState
 
-TUNINGS = (*((0.1, 1.0), (0.3, 1.0), (0.3, 5.0), (1.0, 0.5)), *((1.0, 4.0), (3.0, 1.0), (3.0, 4.0)))
-"""Factors on the deviations σ_g of the gyroscope and σ_V of the velocity of bounded-motion, one pair a candidate. They
-surround the published pair as far as recordings of hands, phones and a drone prefer one of them."""
+GAINS = ("process", "velocity", "rest")
+"""of bounded-motion-rest"""
+IGNORED = 1000.0
+"""Factor on σ_R with which a rest tells nothing."""
+TUNINGS = (
+    *((0.1, 1.0, 1.0), (0.3, 1.0, 1.0), (0.3, 5.0, 1.0), (1.0, 0.5, 1.0), (1.0, 4.0, 1.0), (3.0, 1.0, 1.0)),
+    *((3.0, 4.0, 1.0), (1.0, 1.0, IGNORED), (0.3, 1.0, IGNORED)),
+)
+"""Factors on the deviations σ_g of the gyroscope, σ_V of the velocity and σ_R of rest, one row a candidate. σ_g and σ_V
+surround the published pair as far as recordings of hands, phones and a drone prefer one of them; the last two do not
+believe what a rest tells of the bias."""
 VELOCITY = 1
 """Which of the vectors the directions of the others are told from: the filter's velocity in its level frame."""
 
@@ -52,24 +60,28 @@ class FilterBank:
 
     Attributes:
         level: with the filter.
-        tunings: factors on its deviations ``process`` and ``velocity``, a pair for each of K candidates.
+        tunings: factors on deviations of the filter, a row for each of K candidates.
+        gains: of the filter that are these deviations.
 
     Raises:
         ValueError: no filter, one without these gains, or factors that are not positive.
     """
 
     level: LevelFrame
-    tunings: tuple[tuple[float, float], ...] = TUNINGS
+    tunings: tuple[tuple[float, ...], ...] = TUNINGS
+    gains: tuple[str, ...] = GAINS
 
     kind: ClassVar[str] = "filter-bank"
-    gains: ClassVar[tuple[str, str]] = ("process", "velocity")
 
     def __post_init__(self) -> None:
         if self.level.kalman is None or not set(self.gains) <= set(self.level.kalman.gains):
             raise ValueError(f"level must have a filter with the gains {self.gains}, got {self.level.kalman}")
-        tunings = tuple((float(process), float(velocity)) for process, velocity in self.tunings)
-        if not tunings or not all(0.0 < factor < math.inf for pair in tunings for factor in pair):
-            raise ValueError(f"tunings must be pairs of positive factors, one pair at least, got {self.tunings}")
+        tunings = tuple(tuple(float(factor) for factor in row) for row in self.tunings)
+        fit = all(len(row) == len(self.gains) and all(0.0 < factor < math.inf for factor in row) for row in tunings)
+        if not tunings or not fit:
+            raise ValueError(
+                f"tunings must be rows of positive factors on {self.gains}, one row at least, got {self.tunings}"
+            )
         object.__setattr__(self, "tunings", tunings)
 
     @property
@@ -109,13 +121,15 @@ class FilterBank:
 
     def describe(self) -> dict[str, Any]:
         """See :class:`.front_end.FrontEnd`."""
-        return {**self.level.describe(), "kind": self.kind, "tunings": [list(pair) for pair in self.tunings]}
+        rows = {"gains": list(self.gains), "tunings": [list(row) for row in self.tunings]}
+        return {**self.level.describe(), "kind": self.kind, **rows}
 
     @classmethod
     def read(cls, described: Mapping[str, Any], dt: float) -> Self:
         """The inverse of :meth:`describe`."""
-        tunings = tuple((float(process), float(velocity)) for process, velocity in described["tunings"])
-        return cls(LevelFrame.read(described, dt), tunings)
+        rows = tuple(tuple(row) for row in described["tunings"])
+        # cards of an earlier date name no gains
+        return cls(LevelFrame.read(described, dt), rows, tuple(described.get("gains", GAINS[:2])))
 
     def init(self, measurement: Measurement) -> BankState:
         """See :class:`.front_end.FrontEnd`."""
@@ -143,7 +157,7 @@ class FilterBank:
 
     def _factors(self) -> dict[str, np.ndarray]:
         """Gain → logarithm of its factor ``(K,)``, of the variance."""
-        return {name: 2.0 * np.log([pair[i] for pair in self.tunings]) for i, name in enumerate(self.gains)}
+        return {name: 2.0 * np.log([row[i] for row in self.tunings]) for i, name in enumerate(self.gains)}
 
     def _repeated(self, arrays: Measurement) -> dict[str, Array]:
         """The samples of every channel once for each candidate ``(..., K, size)``."""

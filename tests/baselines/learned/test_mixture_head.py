@@ -51,7 +51,7 @@ def test_its_loss_is_the_ratio_to_the_published_filter() -> None:
 def test_it_learns_which_filter_is_right() -> None:
     """A feature tells which candidate has the truth."""
     rng = np.random.default_rng(2)
-    front_end = FilterBank(LevelFrame(make("bounded-motion")))
+    front_end = FilterBank(LevelFrame(make("bounded-motion-rest")))
     count = len(TUNINGS)
     features = 0.1 * rng.standard_normal((48, 30, front_end.size)).astype(np.float32)
     tilts = rng.normal(0.0, 0.05, (48, 30, count, 2))

@@ -12,7 +12,7 @@ import pytest
 from poise.envs.data.trajectory import Trajectory, load_trajectory
 from poise.envs.hand.hand_held import HandHeld
 from poise.envs.recipes.hand import HandRecipe
-from poise.envs.recipes.registry import RECIPES, rebuilt, recipe, save_recipe
+from poise.envs.recipes.registry import RECIPES, hand_recipe, rebuilt, recipe, save_recipe
 
 SHORT = HandRecipe("short", duration=6.0, carried_share=0.0, held=HandHeld(first_rest=(0.3, 1.0)))
 
@@ -106,3 +106,11 @@ def test_magnetic_surroundings_bring_a_magnetometer_and_change_nothing_else() ->
     assert np.nanstd(strength) > 0.05
     with pytest.raises(ValueError, match=r"magnetics must be among .*got 'moon'"):
         replace(SHORT, magnetics=("moon",))
+
+
+def test_a_bias_that_depends_on_force_and_temperature_changes_nothing_else() -> None:
+    names = ("hand-held-prompt", "hand-held-varying")
+    plain, varying = (hand_recipe(name).sensors.draw(np.random.default_rng(3)) for name in names)
+    assert min(varying.gyroscope.g_sensitivity, varying.gyroscope.warm_up) > 0.0
+    kept = {"g_sensitivity": 0.0, "temperature_coefficient": 0.0, "warm_up": 0.0}
+    assert replace(varying, gyroscope=replace(varying.gyroscope, **kept)) == plain

@@ -78,6 +78,19 @@ def test_clipped_samples_count_less() -> None:
     assert errors[0] < 0.2 * errors[1]
 
 
+def test_clipped_rotation_is_made_up_for() -> None:
+    """Where the gyroscope was saturated the tilt is soon found again: the filter knows that it was turned further."""
+    data = {"imu/gyr": np.zeros((600, 3)), "imu/acc": np.tile(GRAVITY, (600, 1))}
+    data["imu/gyr"][150:160, 0] = 34.9
+    turned = 10 * 0.01 * 38.0
+    data["imu/acc"][160:] = 9.81 * np.array([0.0, np.sin(turned), np.cos(turned)])
+    errors = []
+    for limit in (34.8, 1e3):
+        up = KalmanFilter(BoundedMotion(gyroscope_range=limit)).run(data).pose["up"]
+        errors.append(np.degrees(metrics.direction_error(up, data["imu/acc"]))[400])
+    assert errors[0] < 3.0 < 10.0 < errors[1]
+
+
 def test_a_long_drop_out_is_survived(hand: tuple[dict[str, np.ndarray], np.ndarray, np.ndarray]) -> None:
     data, orientation, _ = hand
     force = data["imu/acc"].copy()

@@ -21,11 +21,13 @@ from poise.filters.core.quantity import ACCELEROMETER, GYROSCOPE, Estimate, Meas
 from poise.filters.registry import make
 
 RATE = 137.0
+PAIR = ("process", "velocity")
+"""Gains of the bank."""
 ENDS: dict[str, FrontEnd] = {
     "raw": RawChannels((GYROSCOPE, ACCELEROMETER), (3.0, 10.0)),
     "level": LevelFrame(),
     "level of a filter": LevelFrame(make("bounded-motion")),
-    "bank": FilterBank(LevelFrame(make("bounded-motion")), ((0.3, 1.0), (1.0, 4.0))),
+    "bank": FilterBank(LevelFrame(make("bounded-motion")), ((0.3, 1.0), (1.0, 4.0)), PAIR),
     "filter": FilterFeatures(make("mekf")),
 }
 
@@ -96,7 +98,7 @@ def test_candidates_are_the_filter_with_other_constants(samples: dict[str, np.nd
     """Each candidate is what a filter made with these constants finds, in the level frame of the published one."""
     dt = 1.0 / RATE
     usual = make("bounded-motion", dt=dt)
-    seen = FilterBank(LevelFrame(usual), ((0.3, 1.0), (1.0, 4.0))).run(samples)
+    seen = FilterBank(LevelFrame(usual), ((0.3, 1.0), (1.0, 4.0)), PAIR).run(samples)
     model: Any = equations_of(usual)
     for index, changed in enumerate(
         ({"gyroscope_noise": 0.3 * model.gyroscope_noise}, {"velocity_bound": 4.0 * model.velocity_bound})
@@ -146,8 +148,8 @@ def test_what_cannot_be_is_refused() -> None:
         LevelFrame(make("external-acceleration"))
     with pytest.raises(ValueError, match="must have a filter with the gains"):
         FilterBank(LevelFrame())
-    with pytest.raises(ValueError, match="pairs of positive factors"):
-        FilterBank(LevelFrame(make("bounded-motion")), ((1.0, 0.0),))
+    with pytest.raises(ValueError, match="rows of positive factors"):
+        FilterBank(LevelFrame(make("bounded-motion")), ((1.0, 0.0),), PAIR)
     with pytest.raises(ValueError, match=r"channels_seen must be channels of the filter"):
         FilterFeatures(make("mekf"), channels_seen=("imu/mag",))
 
