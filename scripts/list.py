@@ -89,25 +89,21 @@ def benchmark_limits() -> Rows:
 def riders(table: str = "error") -> Rows:
     """Errors of the shipped benchmark's riders, deg: mean over the paper's angles [95 % interval over riders]."""
     from ..baselines.comparison.recommendation import load_results
+    from ..baselines.comparison.rider_tables import by_group
 
-    kept = [row for row in load_results().get("riders", []) if row["table"] == table]
+    numbers = load_results().get("riders", [])
+    papers = dict.fromkeys(each["paper"] for each in numbers)
     return [
-        {"name": row["method"], "sensors of": row["paper"]}
-        | {key: value for key, value in row.items() if key not in ("paper", "table", "method")}
-        for row in kept
+        {"name": cells.pop("method"), "sensors of": paper, **cells}
+        for paper in papers
+        for cells in by_group(numbers, paper, table)
     ]
 
 
 def riders_best() -> Rows:
     """The mean errors of what is told apart most easily: the mean, the filter of each paper, and its networks."""
-    found = []
-    for row in riders():
-        paper = row["sensors of"]
-        if row["name"] in ("always the mean", paper, f"{paper}-consistent", f"{paper}+network", f"gru-{paper}"):
-            groups = {key: value for key, value in row.items() if key not in ("name", "sensors of")}
-            means = {group: float(cell.split(" [")[0]) for group, cell in groups.items()}
-            found.append({"name": row["name"], "sensors of": paper, **means})
-    return found
+    kept = ("always the mean", "{}", "{}-consistent", "{}+network", "gru-{}")
+    return [row for row in riders("mean") if row["name"] in [name.format(row["sensors of"]) for name in kept]]
 
 
 def riders_consistency() -> Rows:
