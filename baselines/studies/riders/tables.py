@@ -70,8 +70,8 @@ def told(method: str) -> str:
 def summary(rows: Sequence[Row]) -> list[dict[str, Any]]:
     """Numbers of each paper, method and group, for :mod:`poise.baselines.comparison.rider_tables`, as JSON has them.
 
-    Columns: paper, method, group; ``error``, ``low`` and ``high``: mean of the RMS errors over angles, draws and riders,
-    deg, and its 95 % interval over riders; ``over bound``; ``nees`` and ``coverage`` of the stated 90 %.
+    Columns: paper, method, group; ``error``, ``low`` and ``high``: mean of the RMS errors over angles, draws and
+    riders, deg, and its 95 % interval over riders; ``over bound``; ``nees`` and ``coverage`` of the stated 90 %.
     """
     found = []
     for paper in dict.fromkeys(row.paper for row in rows):

@@ -116,7 +116,10 @@ def test_tables_of_kept_numbers() -> None:
         for method, nees in (("two-gyro", 1.5), ("ridge", None))
         for group in UNSEEN
     ]
-    assert by_group(numbers, "two-gyro", "error")[1] == {"method": "ridge", **dict.fromkeys(UNSEEN, "1.23 [1.00, 2.00]")}
+    assert by_group(numbers, "two-gyro", "error")[1] == {
+        "method": "ridge",
+        **dict.fromkeys(UNSEEN, "1.23 [1.00, 2.00]"),
+    }
     assert by_group(numbers, "two-gyro", "mean")[0] == {"method": "two-gyro", **dict.fromkeys(UNSEEN, 1.234)}
     consistent = [{"method": "two-gyro", **dict.fromkeys(UNSEEN, "1.50, 90 %")}]
     assert by_group(numbers, "two-gyro", "consistency") == consistent, "a regression has no covariance"
