@@ -74,12 +74,10 @@ def draw_angle(
     legend_above(ax)
 
 
-def with_band(
-    ax: Any, time: np.ndarray, error: np.ndarray, estimate: Estimate, color: str, label: str, state: int = 0
-) -> None:
-    """An error, deg, within three of the filter's standard deviations of that element of its state."""
+def with_band(ax: Any, time: np.ndarray, error: np.ndarray, estimate: Estimate, color: str, label: str) -> None:
+    """An error, deg, within three of the filter's standard deviations of the first element of its state."""
     assert estimate.covariance is not None
-    band = 3.0 * np.sqrt(estimate.covariance[: len(time), state, state]) / DEG
+    band = 3.0 * np.sqrt(estimate.covariance[: len(time), 0, 0]) / DEG
     ax.plot(time, error[: len(time)], color=color, linewidth=0.9, label=label)
     ax.plot(time, np.stack([-band, band], axis=-1), color=color, linewidth=0.6, alpha=0.6)
 

@@ -33,6 +33,8 @@ GRAVITY = 9.81
 """m/s²: that of the published benchmark"""
 STARTS: tuple[dict[str, Any], ...] = ({"roll_rate": 2e-3}, {"steer": 1e-3}, {"steer_rate": 5e-3}, {"roll": 1e-3})
 """states from which the four modes are excited"""
+SAMPLE, UNSETTLED = 0.01, 0.1
+"""s: interval of the states from which modes are found, and what is left out of each ride before"""
 
 
 class Check(NamedTuple):
@@ -45,20 +47,12 @@ class Check(NamedTuple):
     """whether what is found is within what is asked; None where nothing is asked"""
 
 
-def measured_eigenvalues(
-    speed: float,
-    duration: float = 1.6,
-    settle: float = 0.1,
-    sample: float = 0.01,
-    tyre: TyreParameters = BENCHMARK_TYRE,
-) -> np.ndarray:
+def measured_eigenvalues(speed: float, duration: float = 1.6, tyre: TyreParameters = BENCHMARK_TYRE) -> np.ndarray:
     """Eigenvalues (4,) of the linear map that best carries each sampled state of four passive rides to the next, 1/s.
 
     Args:
         speed: of the benchmark bicycle, m/s.
         duration: of each ride, s.
-        settle: s that are left out.
-        sample: s.
         tyre: its tyres.
     """
     before, after = [], []
@@ -67,18 +61,18 @@ def measured_eigenvalues(
         for start in STARTS:
             bicycle.start(speed, **start)
             rows = []
-            for _ in range(round(duration / sample)):
-                for _ in range(round(sample / physics.time_step)):
+            for _ in range(round(duration / SAMPLE)):
+                for _ in range(round(SAMPLE / physics.time_step)):
                     bicycle.act()
                     physics.step()
                 s = bicycle.state()
                 rows.append((s.roll, -s.steer, s.roll_rate, -s.steer_rate))
-            states = np.array(rows)[round(settle / sample) :]
+            states = np.array(rows)[round(UNSETTLED / SAMPLE) :]
             scale = np.abs(states).max()
             before.append(states[:-1] / scale)
             after.append(states[1:] / scale)
     matrix = np.linalg.lstsq(np.concatenate(before), np.concatenate(after), rcond=None)[0]
-    return np.log(np.linalg.eigvals(matrix).astype(complex)) / sample
+    return np.log(np.linalg.eigvals(matrix).astype(complex)) / SAMPLE
 
 
 def by_kind(values: np.ndarray) -> tuple[complex, np.ndarray]:
@@ -228,19 +222,13 @@ def lean_checks(duration: float = 20.0) -> Iterator[Check]:
         yield Check(f"load cells there, {style}: mean (5th percentile), N", "pressed", found, bool(min(low) > 0.0))
 
 
-def saddle_checks(duration: float = 40.0, subject: int = 0, seed: int = 3) -> Iterator[Check]:
-    """Cells and centre of pressure of a full and a lumped rider in every scenario.
-
-    Args:
-        duration: of each ride, s.
-        subject: number of the rider.
-        seed: of the rides.
-    """
+def saddle_checks() -> Iterator[Check]:
+    """Cells and centre of pressure of a full and a lumped rider in every scenario."""
     for name in list_scenarios():
         pair = []
         for fidelity in ("full", "lumped"):
-            options = {"subject": subject, "suite": ["seat/load_cells"], "duration": duration, "fidelity": fidelity}
-            pair.append(saddle_statistics(ridden(seed, scenario=name, **options).measurements["seat/load_cells"]))
+            options = {"suite": ["seat/load_cells"], "duration": 40.0, "fidelity": fidelity}
+            pair.append(saddle_statistics(ridden(3, scenario=name, **options).measurements["seat/load_cells"]))
         full, lumped = pair
         # on bumps and rough roads a rider may leave the saddle, on which friction then still acts
         most = 1.0

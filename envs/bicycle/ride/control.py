@@ -36,6 +36,8 @@ from .steering import (
     steer_exactly,
 )
 
+HIGHEST_SPEED = 7.0
+"""m/s: end of the gain table"""
 POSITIVE = ("effort", "largest_torque", "largest_drive", "largest_power", "lateral_acceleration", "braking", "rate")
 """settings that must not be zero"""
 
@@ -129,7 +131,6 @@ class Pilot:
         bicycle: rider included, see :meth:`BicycleParameters.with_load`.
         settings: weights.
         gravity: m/s².
-        highest_speed: highest speed of the gain table, m/s.
         lean_effect: part of a lean of the trunk by which the common mass centre leans.
     """
 
@@ -138,13 +139,12 @@ class Pilot:
         bicycle: BicycleParameters,
         settings: ControlSettings | None = None,
         gravity: float = 9.81,
-        highest_speed: float = 7.0,
         lean_effect: float = 0.0,
     ) -> None:
         self.bicycle, self.lean_effect = bicycle, lean_effect
         self.settings = ControlSettings() if settings is None else settings
         self.model = whipple_model(bicycle, gravity)
-        slow, fast = np.arange(LOWEST_SPEED, 0.95, 0.1), np.arange(1.0, highest_speed + 0.25, 0.25)
+        slow, fast = np.arange(LOWEST_SPEED, 0.95, 0.1), np.arange(1.0, HIGHEST_SPEED + 0.25, 0.25)
         self._grid, self._place = [*slow.tolist(), *fast.tolist()], 1
         self._ahead = PREVIEW_BIN * np.arange(PREVIEW_BINS + 1)
         self._gravity, self._rows = gravity, dict[float, np.ndarray]()

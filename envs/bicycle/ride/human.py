@@ -98,7 +98,6 @@ class HumanPilot(Pilot):
         trunk: what of the rider leans; the rest is rigid.
         settings: weights.
         gravity: m/s².
-        highest_speed: highest speed of the gain table, m/s.
     """
 
     def __init__(
@@ -109,10 +108,9 @@ class HumanPilot(Pilot):
         trunk: TrunkModel = RIGID,
         settings: ControlSettings | None = None,
         gravity: float = 9.81,
-        highest_speed: float = 7.0,
     ) -> None:
         self.human, self._trunk, self._noise = human, trunk, HumanNoise(noise)
-        super().__init__(bicycle, settings, gravity, highest_speed)
+        super().__init__(bicycle, settings, gravity)
         s, step = self.settings, self.period
         self._costs = (s.roll, s.steer, s.roll_rate, s.steer_rate, *(human.care * c for c in (s.heading, s.offset)))
         self._costs += (human.care * s.offset_integral,)
