@@ -114,10 +114,6 @@ class Multibody:
             self._moved_at = self.physics.changes
         return self._frames
 
-    def centre_motion(self, links: Sequence[int]) -> CentreMotion:
-        """Motion of the centre-of-mass frames of links; the base may be among them."""
-        return CentreMotion.of_frames(self.frames[np.array(links) + 1])
-
     def joint_tuples(self, links: Sequence[int]) -> list[tuple[float, float]]:
         """Angle (rad) and rate (rad/s) of the joints above ``links``."""
         angles, rates = self.state[BASE_SIZE:].reshape(2, -1).tolist()
@@ -150,44 +146,6 @@ class Multibody:
     def push(self, link: int, force: Vector, point: Vector) -> None:
         """Add to :attr:`forces` a force (N) on a link at a point (m), world axes."""
         add_force(self.tree, self.frames, link, (*force,), (*point,), self.forces)
-
-
-def newton_euler(
-    before: CentreMotion,
-    after: CentreMotion,
-    masses: np.ndarray,
-    moments: np.ndarray,
-    point: np.ndarray,
-    duration: float,
-    gravity: float,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Total wrench of external contacts on some links, from the rate of change of their momentum.
-
-    Force = Σ m (Δv/Δt − g), moment about ``point`` = Σ (x − point) × m (Δv/Δt − g) + Δ(Σ R I Rᵀ ω)/Δt.
-
-    Args:
-        before: motion before a physics step.
-        after: motion after it; the step's accelerations belong to positions ``before``, as the integrator has it.
-        masses: ``(n,)`` kg.
-        moments: ``(n, 3)`` principal moments of inertia, kg·m².
-        point: ``(..., 3)`` m, world.
-        duration: of the step, s.
-        gravity: m/s², along −z.
-
-    Returns:
-        Force ``(..., 3)`` N and moment ``(..., 3)`` N·m, world axes.
-    """
-    acceleration = (after.velocity - before.velocity) / duration
-    forces = masses[:, None] * (acceleration + np.array((0.0, 0.0, gravity)))
-    spin = (spin_momentum(after, moments) - spin_momentum(before, moments)) / duration
-    arms = before.position - point[..., None, :]
-    return forces.sum(axis=-2), (rotation.cross(arms, forces) + spin).sum(axis=-2)
-
-
-def spin_momentum(motion: CentreMotion, moments: np.ndarray) -> np.ndarray:
-    """Angular momentum ``(..., n, 3)`` of links about their own centres of mass, N·m·s, world axes."""
-    rate = rotation.rotate_back(motion.orientation, motion.angular_velocity)
-    return rotation.rotate(motion.orientation, moments * rate)
 
 
 def connect_points(

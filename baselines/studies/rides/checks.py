@@ -16,7 +16,7 @@ from ....envs.bicycle.frame.bicycle import Bicycle
 from ....envs.bicycle.frame.parameters import AIR_DENSITY, BENCHMARK, MOUNTAIN_BIKE
 from ....envs.bicycle.frame.tyre import BENCHMARK_TYRE, TyreParameters
 from ....envs.bicycle.frame.whipple import whipple_model
-from ....envs.bicycle.ride.contact_forces import contact, rider_motion, saddle_point
+from ....envs.bicycle.ride.contact_forces import contact, place_on
 from ....envs.bicycle.ride.ride import Ride
 from ....envs.bicycle.rider.anthropometry import SUBJECTS
 from ....envs.bicycle.rider.posture import loop_closure_error, sit
@@ -135,19 +135,20 @@ def momentum_residual(fidelity: Any, path: Path, speed: float, steps: int) -> tu
             if step < steps // 3 or step % 100:
                 ride.step()
                 continue
-            before, own, saddle = rider_motion(rider), bicycle.own_motion(), saddle_point(bicycle)
+            before = bicycle.body.frames.copy()
+            saddle = np.array(place_on(before[0], rider.saddle_arm))
             grips, pedals = rider.grips(), rider.pedals()
             velocity = np.array(ride.physics.base_tuples(bicycle.body.body)[2])
             ride.step()
-            hands, feet = rider.hand_forces()[0], rider.foot_forces()[0]
-            found = contact(rider, before, rider_motion(rider), saddle, (hands, grips), (feet, pedals))
-            force, moment = bicycle.own_wrench(own, bicycle.own_motion(), saddle)
+            frames = np.stack([before, bicycle.body.frames])
+            seat, seat_moment, hands, feet = contact(rider, frames, np.reshape(rider.raw_forces(), (1, 4, 3)), 1)
+            force, moment = bicycle.own_wrench(frames[0], frames[1], saddle)
             ground, ground_moment = bicycle.ground_wrench(saddle)
             drag = -0.5 * AIR_DENSITY * MOUNTAIN_BIKE.drag_area * np.linalg.norm(velocity) * velocity
-            limbs, arms = np.concatenate([hands, feet]), np.concatenate([grips, pedals]) - saddle
-            force = force - found.seat_force - limbs.sum(axis=0) - ground - drag
-            moment = moment - found.seat_moment - rotation.cross(arms, limbs).sum(axis=0) - ground_moment
-            moment = moment - rotation.cross(own.position[0] - saddle, drag)
+            limbs, arms = np.concatenate([hands[0], feet[0]]), np.concatenate([grips, pedals]) - saddle
+            force = force - seat[0] - limbs.sum(axis=0) - ground - drag
+            moment = moment - seat_moment[0] - rotation.cross(arms, limbs).sum(axis=0) - ground_moment
+            moment = moment - rotation.cross(before[0, :3] - saddle, drag)
             residuals.append((np.abs(force).max() / weight, np.abs(moment).max() / weight))
     # NaN stays NaN, and a ride too short to be looked at is an error
     worst_force, worst_moment = np.max(residuals, axis=0)

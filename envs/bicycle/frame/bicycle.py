@@ -14,7 +14,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ....filters.core import rotation
-from ...physics.multibody import CentreMotion, Multibody, newton_euler
+from ...physics.momentum import newton_euler
+from ...physics.multibody import Multibody
 from ...physics.urdf import Tree
 from ...physics.world import BASE, Physics
 from ...sensors.ideal import BodyState
@@ -281,14 +282,19 @@ class Bicycle:
         arms = np.array([tyre.point for tyre in self.tyre_forces]) - point
         return forces.sum(axis=0), rotation.cross(arms, forces).sum(axis=0)
 
-    def own_motion(self) -> CentreMotion:
-        """Motion of the bicycle's own links (not the rider's)."""
-        return self.body.centre_motion(self.own_links)
+    def own_wrench(self, before: np.ndarray, after: np.ndarray, point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Wrench of all external forces on the bicycle's own links in the last step, see :func:`newton_euler`.
 
-    def own_wrench(self, before: CentreMotion, after: CentreMotion, point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Wrench of all external forces on the bicycle in the last step; see :func:`newton_euler`."""
-        dt, gravity = self.physics.time_step, self.physics.gravity
-        return newton_euler(before, after, self.own_masses, self.own_moments, point, dt, gravity)
+        Args:
+            before: frames ``(n + 1, 18)`` of the body before it.
+            after: after it.
+            point: ``(3,)`` m, world.
+        """
+        rows, physics = np.array(self.own_links) + 1, self.physics
+        force, moment = newton_euler(
+            before, after, rows, self.own_masses, self.own_moments, point, physics.time_step, physics.gravity
+        )
+        return np.array(force), np.array(moment)
 
     def save(self) -> BicycleMemory:
         """Tyre and chain memory; the rest is in :meth:`Physics.save`."""

@@ -8,11 +8,11 @@ import numpy as np
 
 from ....filters.core import rotation
 from ...physics.kinematics import BASE_SIZE, move_links_of_many
-from ...physics.multibody import CentreMotion, newton_euler
+from ...physics.multibody import CentreMotion
 from ...sensors.ideal import BodyState, Sampling
 from ..rider.limbs import Limb, LimbPosture, reach_to
-from ..rider.posture import KNEE_OUT, LIMBS, SIDES, SIGNS, two_turns
-from .contact_forces import Contact
+from ..rider.posture import KNEE_OUT, LIMBS, two_turns
+from .contact_forces import Contact, contact
 from .ride import Ride
 from .tape import Tape, last_step
 
@@ -112,8 +112,10 @@ class RideRecorder:
         first, rates = BASE_SIZE + np.array(self._joints), (states.shape[1] - BASE_SIZE) // 2
         starts, ends = states[: -1 : self.steps], states[self.steps :: self.steps]
         turned = ends[:, first[2]] - starts[:, first[2]]
+        frames = np.empty((len(states), len(body.links), 18))
+        move_links_of_many(body.tree, states, frames)
         return self._compute(
-            self._motion(states),
+            frames,
             np.array(forces).reshape(count, 4, 3),
             np.stack([ends[:, first], ends[:, first + rates]], axis=-1),
             turned,
@@ -122,13 +124,6 @@ class RideRecorder:
             np.array(fallen),
             np.array(swivels),
         )
-
-    def _motion(self, states: np.ndarray) -> CentreMotion:
-        """Motion of base and links from the states of all physics steps."""
-        tree = self.ride.bicycle.body.tree
-        frames = np.empty((len(states), len(tree) + 1, 18))
-        move_links_of_many(tree, states, frames)
-        return CentreMotion.of_frames(frames[:, [0, *(link + 1 for link in self._links)]])
 
     def _frame(self, index: int, name: str, before: CentreMotion, after: CentreMotion, time: np.ndarray) -> BodyState:
         """Motion of a body frame after the last step, with its accelerations in it."""
@@ -147,7 +142,7 @@ class RideRecorder:
 
     def _compute(
         self,
-        motion: CentreMotion,
+        motion: np.ndarray,
         forces: np.ndarray,
         joints: np.ndarray,
         turned: np.ndarray,
@@ -159,12 +154,13 @@ class RideRecorder:
         rider = self.ride.rider
         names = ["rear_frame", *self._names]
         # the last physics step of each sample
-        before = CentreMotion(*(field[self.steps - 1 : -1 : self.steps] for field in motion))
-        after = CentreMotion(*(field[self.steps :: self.steps] for field in motion))
+        rows = [0, *(link + 1 for link in self._links)]
+        before = CentreMotion.of_frames(motion[self.steps - 1 : -1 : self.steps, rows])
+        after = CentreMotion.of_frames(motion[self.steps :: self.steps, rows])
         frames = {name: self._frame(index, name, before, after, time) for index, name in enumerate(names)}
         angles, rates = joints[..., 0], joints[..., 1]
         steer, crank, trunk = angles[:, 0], angles[:, 1], angles[:, 3:6]
-        contact = self._contact(motion, forces, frames["rear_frame"].orientation)
+        found = contact(rider, motion, forces, self.steps, self.sampling == "instant")
         limbs, pelvis = {}, angles[:, -3:]
         turn = rotation.conjugate(frames["rear_frame"].orientation)
         trunk_turn = rotation.multiply(turn, frames["trunk"].orientation)
@@ -183,7 +179,7 @@ class RideRecorder:
         mean = turned / (self.steps * self.ride.physics.time_step)
         wheel_rate = rates[:, 2] if self.sampling == "instant" else mean
         return RideLog(
-            time, frames, contact, limbs, trunk, pelvis, steer, crank, wheel, rates, wheel_rate, torques, fallen
+            time, frames, found, limbs, trunk, pelvis, steer, crank, wheel, rates, wheel_rate, torques, fallen
         )
 
     def _solve(
@@ -199,46 +195,3 @@ class RideRecorder:
             return LimbPosture(upper, lower, held.angles, rotation.rotate(tip, held.hinge))
         target = in_reach(posture.arm_target(side, steer, trunk, pelvis), posture.arm)
         return reach_to(posture.arm, target, posture.elbow_out(side, trunk), swivel)
-
-    def _contact(self, motion: CentreMotion, forces: np.ndarray, ends: np.ndarray) -> Contact:
-        """Contact forces of each sample; ``ends``: orientations of the bicycle at the samples."""
-        if self.sampling == "instant":
-            last = np.arange(self.steps, len(motion.position), self.steps)
-            before, after = (CentreMotion(*(field[rows] for field in motion)) for rows in (last - 1, last))
-            return self._step_contact(before, after, forces[last - 1])
-        before, after = (CentreMotion(*(field[rows] for field in motion)) for rows in (slice(-1), slice(1, None)))
-        contact = self._step_contact(before, after, forces)
-        axes = self._frame(0, "rear_frame", after, after, np.zeros(len(forces))).orientation
-
-        def mean(vectors: np.ndarray) -> np.ndarray:
-            """Mean in bicycle axes over the steps of each sample, in the world at the sample."""
-            extra = (1,) * (vectors.ndim - 2)
-            local = rotation.rotate_back(axes.reshape(-1, *extra, 4), vectors)
-            local = local.reshape(-1, self.steps, *local.shape[1:]).mean(axis=1)
-            return rotation.rotate(ends.reshape(-1, *extra, 4), local)
-
-        return Contact(*map(mean, contact))
-
-    def _step_contact(self, before: CentreMotion, after: CentreMotion, forces: np.ndarray) -> Contact:
-        """Contact forces in physics steps, from the motion before and after each."""
-        rider, physics = self.ride.rider, self.ride.physics
-        names, unused = ("rear_frame", *self._names[:2]), np.zeros(len(forces))
-        frame, front, crank = (self._frame(index, name, before, before, unused) for index, name in enumerate(names))
-        posture = rider.posture
-        saddle = frame.position + rotation.rotate(frame.orientation, np.array(posture.bicycle.saddle))
-        rows = slice(3, 3 + len(rider.masses))
-        then, now = (CentreMotion(*(field[:, rows] for field in motion)) for motion in (before, after))
-        force, moment = newton_euler(then, now, rider.masses, rider.moments, saddle, physics.time_step, physics.gravity)
-        if not rider.full:
-            forces = rotation.rotate(frame.orientation[:, None], forces)
-        hands, feet = forces[:, :2], forces[:, 2:]
-        drive = posture.bicycle.drive
-        assert drive is not None
-        for index, side in enumerate(SIDES):
-            grip = np.array(posture.bicycle.grip) * (1.0, SIGNS[side], 1.0) - posture.bicycle.steer_origin
-            pedal = posture.pedal(side, 0.0) - np.array(drive.axle)
-            for body, arm, push in ((front, grip, hands[:, index]), (crank, pedal, feet[:, index])):
-                place = body.position + rotation.rotate(body.orientation, arm)
-                force = force + push
-                moment = moment + rotation.cross(place - saddle, push)
-        return Contact(-force, -moment, hands, feet)

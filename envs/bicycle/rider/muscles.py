@@ -208,7 +208,7 @@ def plan(  # type: ignore[no-untyped-def]
 
 
 @jit
-def act(numbers, tree, state, frames, links, rigid, memory, forces):  # type: ignore[no-untyped-def]
+def act(numbers, tree, state, frames, links, holds, memory, forces):  # type: ignore[no-untyped-def]
     """Add what rider and saddle do in the next physics step to the generalised forces.
 
     Args:
@@ -217,7 +217,7 @@ def act(numbers, tree, state, frames, links, rigid, memory, forces):  # type: ig
         state: now.
         frames: now.
         links: see above.
-        rigid: links, arms and axes of :func:`.push_between` for the rigid limbs of a lumped rider.
+        holds: links, arms and axes of :func:`.push_between`: hands and feet of a lumped rider.
         memory: the applied torques are written.
         forces: ``(6 + …,)``, added to.
     """
@@ -245,7 +245,7 @@ def act(numbers, tree, state, frames, links, rigid, memory, forces):  # type: ig
         share = min(HEAVIEST, force / seat.load)
         for number in range(6):
             memory[FEET][number] = memory[PUSHES][number] + share * memory[WEIGHTS][number]
-        push_between(tree, frames, rigid[0], rigid[1], rigid[2], memory[HANDS_AND_FEET].reshape(4, 3), forces)
+        push_between(tree, frames, holds[0], holds[1], holds[2], memory[HANDS_AND_FEET].reshape(4, 3), forces)
     for joint in range(joints):
         forces[6 + links[3 + joint]] += applied[joint]
     forces[6 + links[0]] += forwards
@@ -254,8 +254,8 @@ def act(numbers, tree, state, frames, links, rigid, memory, forces):  # type: ig
 
 
 @jit
-def act_on_bicycle(numbers, tree, state, frames, links, rigid, memory, acting, brake, forces):  # type: ignore[no-untyped-def]
+def act_on_bicycle(numbers, tree, state, frames, links, holds, memory, acting, brake, forces):  # type: ignore[no-untyped-def]
     """:func:`act` and :func:`.bicycle_forces` in one call; ``acting``: what the latter takes before the brake (N)."""
-    act(numbers, tree, state, frames, links, rigid, memory, forces)
+    act(numbers, tree, state, frames, links, holds, memory, forces)
     parts, body, tyres, ground, time_step, chain, bristles, contacts = acting
     bicycle_forces(tree, state, frames, parts, body, tyres, ground, time_step, chain, bristles, contacts, brake, forces)

@@ -9,7 +9,7 @@ import pytest
 from poise.baselines.speed.environments import standing_ride
 from poise.envs.physics.kinematics import move_links_of_many
 from poise.envs.physics.multibody import CentreMotion, Multibody
-from poise.envs.physics.world import BASE, Physics
+from poise.envs.physics.world import Physics
 from poise.filters.core import rotation
 
 ARM = """<robot name="arm">
@@ -56,8 +56,8 @@ def assert_same_motion(ours: CentreMotion, body: Multibody) -> None:
 def test_an_arm_moves_as_pybullet_moves_it():
     with Physics() as physics:
         arm = moved_arm(physics)
-        assert_same_motion(arm.centre_motion([0, 1]), arm)
-        base = arm.centre_motion([BASE])
+        assert_same_motion(CentreMotion.of_frames(arm.frames[1:]), arm)
+        base = CentreMotion.of_frames(arm.frames[:1])
         for ours, theirs in zip(base, physics.base_tuples(arm.body), strict=True):
             np.testing.assert_allclose(ours[0], theirs, atol=1e-14)
 
