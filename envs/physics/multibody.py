@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Sequence
+from operator import itemgetter
 from typing import NamedTuple
 
 import numpy as np
@@ -22,6 +23,7 @@ with extra("sim"):
     import pybullet
 
 Tuple3 = tuple[float, float, float]
+FIRST, SECOND = itemgetter(0), itemgetter(1)
 
 
 class CentreMotion(NamedTuple):
@@ -98,12 +100,13 @@ class Multibody:
     @property
     def state(self) -> np.ndarray:
         """State ``(13 + 2 n,)`` of :mod:`.kinematics` now; overwritten when it is read after a change."""
-        if self._read_at != self.physics.changes:
-            position, orientation, velocity, turning = self.physics.base_tuples(self.body)
-            rows = pybullet.getJointStates(self.body, self._all, self.physics.client)
-            angles, rates = [row[0] for row in rows], [row[1] for row in rows]
+        physics = self.physics
+        if self._read_at != physics.changes:
+            position, orientation, velocity, turning = physics.base_tuples(self.body)
+            rows = pybullet.getJointStates(self.body, self._all, physics.client)
+            angles, rates = map(FIRST, rows), map(SECOND, rows)
             self._pack(self._bytes, 0, *position, *orientation, *velocity, *turning, *angles, *rates)
-            self._read_at = self.physics.changes
+            self._read_at = physics.changes
         return self._state
 
     @property
@@ -113,6 +116,12 @@ class Multibody:
             move_links(self.tree, self.state, self._frames)
             self._moved_at = self.physics.changes
         return self._frames
+
+    def motion(self) -> tuple[np.ndarray, np.ndarray, bool]:
+        """:attr:`state`, :attr:`frames`, and whether the caller must still move these, by :func:`.move_links`."""
+        late = self._moved_at != self.physics.changes
+        self._moved_at = self.physics.changes
+        return self.state, self._frames, late
 
     def joint_tuples(self, links: Sequence[int]) -> list[tuple[float, float]]:
         """Angle (rad) and rate (rad/s) of the joints above ``links``."""
@@ -130,8 +139,7 @@ class Multibody:
 
     def apply(self) -> None:
         """Let :attr:`forces` act during the next step, and begin anew with zeros."""
-        client, values = self.physics.client, self.forces.tolist()
-        centre = self.state[:3].tolist()
+        client, values, centre = self.physics.client, self.forces.tolist(), self.state[:3].tolist()
         pybullet.applyExternalForce(self.body, BASE, values[:3], centre, pybullet.WORLD_FRAME, client)
         pybullet.applyExternalTorque(self.body, BASE, values[3:6], pybullet.WORLD_FRAME, client)
         pybullet.setJointMotorControlArray(
@@ -178,4 +186,4 @@ def connect_points(
 def constraint_forces(physics: Physics, constraints: Sequence[int]) -> list[Tuple3]:
     """Force on the child of each point-to-point constraint during the last step, N, world axes."""
     client, state = physics.client, pybullet.getConstraintState
-    return [state(each, client)[:3] for each in constraints]
+    return [state(each, client) for each in constraints]

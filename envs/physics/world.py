@@ -275,7 +275,7 @@ class Physics:
 
     def step(self) -> None:
         """Advance by one time step; forces applied before act in it and end with it."""
-        pybullet.stepSimulation(physicsClientId=self.client)
+        pybullet.stepSimulation(self.client)
         self.steps += 1
         self.changes += 1
 

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..course.path import Path
-from ..frame.bicycle import BicycleState
+from ..frame.bicycle import SPEED
 from ..frame.parameters import AIR_DENSITY, BicycleParameters
 from ..frame.whipple import WhippleModel, whipple_model
 from .preview import PREVIEW_BIN, PREVIEW_BINS, speed_limits
@@ -227,11 +227,11 @@ class Pilot:
             self._rows[speed] = gain_row(self.bicycle, self.settings, self._gravity, speed)
         return self._rows[speed]
 
-    def update(self, state: BicycleState, speed: float, lean: float = 0.0) -> tuple[float, float]:
+    def update(self, seen: np.ndarray, speed: float, lean: float = 0.0) -> tuple[float, float]:
         """Decide for the next control period.
 
         Args:
-            state: of the bicycle.
+            seen: :attr:`.BicycleState.numbers` of the bicycle now.
             speed: wanted, m/s; less is ridden in and before sharp turns.
             lean: of the trunk to the bicycle that the rider intends, rad, right positive. Who leans to the right keeps
                 the bicycle further to the left.
@@ -239,9 +239,9 @@ class Pilot:
         Returns:
             Steer torque (N·m, left positive) and force at the wheels (N, forward positive, braking negative).
         """
-        low, high, part = self._between(state.speed)
+        low, high, part = self._between(seen.item(SPEED))
         rows, lean = (self._row(low), self._row(high)), self.lean_effect * lean
-        steer_exactly(*self._numbers, self.path.points, *rows, part, moving(state), speed, lean, self._memory)
+        steer_exactly(*self._numbers, self.path.points, *rows, part, seen, speed, lean, self._memory)
         return self._decided()
 
     def _decided(self) -> tuple[float, float]:
@@ -257,9 +257,3 @@ class Pilot:
         """Undo :meth:`save`."""
         self._memory[:] = memory.memory
         self._decided()
-
-
-def moving(state: BicycleState) -> tuple[float, ...]:
-    """Numbers of :class:`.Moving`: what a pilot reads of a bicycle."""
-    s = state
-    return s.x, s.y, s.roll, s.pitch, s.yaw, s.roll_rate, s.speed, s.steer, s.steer_rate

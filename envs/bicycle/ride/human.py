@@ -9,12 +9,12 @@ import numpy as np
 from ....filters.core import rotation
 from ...sensors.ideal import STANDARD_GRAVITY
 from ..course.path import Path
-from ..frame.bicycle import BicycleState
+from ..frame.bicycle import SPEED
 from ..frame.parameters import BicycleParameters
 from ..rider.anthropometry import join
 from ..rider.muscles import TRUNK_DAMPING, TRUNK_STIFFNESS
 from ..rider.posture import Posture
-from .control import ControlSettings, Pilot, PilotMemory, moving
+from .control import ControlSettings, Pilot, PilotMemory
 from .human_steering import STATES, Human, steer_humanly
 from .internal_model import (
     RIGID,
@@ -142,14 +142,14 @@ class HumanPilot(Pilot):
         # of the internal model and of the arms
         self._state, self._count = np.zeros(STATES + 2), 0
 
-    def update(self, state: BicycleState, speed: float, lean: float = 0.0) -> tuple[float, float]:
+    def update(self, seen: np.ndarray, speed: float, lean: float = 0.0) -> tuple[float, float]:
         """As :meth:`.Pilot.update`, steering as a human."""
-        low, high, part = self._between(state.speed)
+        low, high, part = self._between(seen.item(SPEED))
         noise = self._noise.at(self._count)
         self._count += 1
         steer_humanly(
             *self._numbers, self._human, self.path.points, self._model(low), self._model(high), part, noise,
-            moving(state), speed, lean, self._memory, self._state, self._inputs, self._readings,
+            seen, speed, lean, self._memory, self._state, self._inputs, self._readings,
         )  # fmt: skip
         return self._decided()
 

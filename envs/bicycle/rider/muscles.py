@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ....filters.compile.cache import jit
+from ...physics.kinematics import move_links
 from ..frame.forces import bicycle_forces
 from .effort import (
     AROUND,
@@ -116,7 +117,7 @@ def build_of(n, arrays):  # type: ignore[no-untyped-def]
 
 @jit
 def plan(  # type: ignore[no-untyped-def]
-    numbers, arrays, table, habits, time, curvature, bicycle, steer_torque, drive, ratio, state, links, memory
+    numbers, arrays, table, habits, time, curvature, seen, steer_torque, drive, chain, state, links, memory
 ):
     """Decide what the muscles do during the next control period.
 
@@ -127,17 +128,18 @@ def plan(  # type: ignore[no-untyped-def]
         habits: of the rider.
         time: s.
         curvature: of the path a little ahead, 1/m, left positive.
-        bicycle: roll (rad), speed (m/s), steer, crank (rad), rates of crank and rear wheel (rad/s).
+        seen: :attr:`.BicycleState.numbers`.
         steer_torque: N·m on the handlebar, left positive.
         drive: desired propulsive force at the wheel, N, without braking.
-        ratio: of the gear.
+        chain: of :func:`.chain_torque`.
         state: see :mod:`poise.envs.physics.kinematics`.
         links: see above.
         memory: written.
     """
     build = build_of(numbers, arrays)
     reach, seat = build.reach, build.seat
-    lying, speed, steer, crank, crank_rate, wheel_rate = bicycle
+    lying, speed, steer, crank, crank_rate, wheel_rate = seen[3], seen[9], seen[10], seen[12], seen[13], seen[14]
+    ratio = chain[0]
     # change of the trunk's flexion, lean and twist, four swivels (rad), unsteady torque (N·m)
     intended = intentions(table, habits, time, curvature, lying, crank, speed)
     first, rates, joints = 13, 13 + (state.shape[0] - 13) // 2, (memory.shape[0] - MUSCLES) // 2
@@ -254,8 +256,13 @@ def act(numbers, tree, state, frames, links, holds, memory, forces):  # type: ig
 
 
 @jit
-def act_on_bicycle(numbers, tree, state, frames, links, holds, memory, acting, brake, forces):  # type: ignore[no-untyped-def]
-    """:func:`act` and :func:`.bicycle_forces` in one call; ``acting``: what the latter takes before the brake (N)."""
+def act_on_bicycle(numbers, tree, state, frames, late, links, holds, memory, acting, brake, forces):  # type: ignore[no-untyped-def]
+    """:func:`act` and :func:`.bicycle_forces` in one call.
+
+    ``late``: move the frames first; ``acting``: what :func:`.bicycle_forces` takes before the brake (N).
+    """
+    if late:
+        move_links(tree, state, frames)
     act(numbers, tree, state, frames, links, holds, memory, forces)
     parts, body, tyres, ground, time_step, chain, bristles, contacts = acting
     bicycle_forces(tree, state, frames, parts, body, tyres, ground, time_step, chain, bristles, contacts, brake, forces)

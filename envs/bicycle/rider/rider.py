@@ -17,7 +17,7 @@ from ....filters.core import rotation
 from ...physics.multibody import connect_points, constraint_forces
 from ...physics.urdf import Tree
 from ...sensors.ideal import STANDARD_GRAVITY
-from ..frame.bicycle import Bicycle, BicycleState
+from ..frame.bicycle import Bicycle
 from ..frame.parameters import BicycleParameters
 from .effort import reach_of
 from .leg_loads import legs_at_crank
@@ -181,21 +181,20 @@ class Rider:
         """Wanted lean of the trunk relative to the bicycle, rad, right positive."""
         return float(self._memory[1])
 
-    def plan(self, state: BicycleState, curvature: float, steer_torque: float, drive: float) -> None:
+    def plan(self, seen: np.ndarray, curvature: float, steer_torque: float, drive: float) -> None:
         """Compute muscle torques for the next control period.
 
         Args:
-            state: of the bicycle.
+            seen: :attr:`.BicycleState.numbers` of the bicycle now.
             curvature: of the path a little ahead, 1/m, left positive.
             steer_torque: N·m on the handlebar, left positive.
             drive: desired propulsive force at the wheel, N, without braking.
         """
-        s, motion = state, self.motion
-        since = motion.checked(s.time - self._began)
-        bicycle = (s.roll, s.speed, s.steer, s.crank, s.crank_rate, s.wheel_rate)
+        motion, bicycle = self.motion, self.bicycle
+        since = motion.checked(bicycle.physics.time - self._began)
         plan(
-            self._numbers, self._arrays, motion.table, motion.habits, since, curvature, bicycle, steer_torque, drive,
-            self.bicycle.ratio, self.bicycle.body.state, self._links, self._memory,
+            self._numbers, self._arrays, motion.table, motion.habits, since, curvature, seen, steer_torque, drive,
+            bicycle.chain, bicycle.body.state, self._links, self._memory,
         )  # fmt: skip
 
     def act(self) -> None:
@@ -209,9 +208,10 @@ class Rider:
     def act_on_bicycle(self, brake: float) -> None:
         """:meth:`act` and :meth:`.Bicycle.act` with brakes (N) in one call, where nothing else acts in this step."""
         body = self.bicycle.body
+        state, frames, late = body.motion()
         act_on_bicycle(
-            self._numbers, body.tree, body.state, body.frames, self._links, self.holds, self._memory,
-            self.bicycle.acting, brake, body.forces,
+            self._numbers, body.tree, state, frames, late, self._links, self.holds, self._memory, self.bicycle.acting,
+            brake, body.forces,
         )  # fmt: skip
         body.apply()
 
