@@ -153,7 +153,8 @@ def overview(width: int) -> str:
         width: of a line, characters.
     """
     lines = [wrapped(name, [row["name"] for row in LISTS[name]()], width) for name in LISTS if name not in MEASURED]
-    return "\n".join([*lines, "", wrapped("measured", MEASURED, width), "", "poise list NAME … prints these lists as tables, with descriptions or values"])
+    lines += ["", wrapped("measured", MEASURED, width), "", "poise list NAME prints a list with descriptions or values"]
+    return "\n".join(lines)
 
 
 def wrapped(title: str, names: Iterable[str], width: int) -> str:
