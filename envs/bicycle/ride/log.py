@@ -14,7 +14,7 @@ from ..rider.limbs import Limb, LimbPosture, reach_to
 from ..rider.posture import KNEE_OUT, LIMBS, two_turns
 from .contact_forces import Contact, contact
 from .ride import Ride
-from .tape import Tape, last_step
+from .tape import RiderStep, Tape, rider_step
 
 
 @dataclass(frozen=True)
@@ -73,11 +73,11 @@ class RideRecorder:
         self.ride, self.steps, self.sampling = ride, steps, sampling
         self._tape, self._next = tape, begin
         rider, links = ride.rider, ride.bicycle.links
-        self._links = [links["front_assembly"], links["crank"], *rider.mass_links]
-        self._names = ["front_assembly", "crank", "pelvis", "trunk"]
+        self._names = ["rear_frame", "front_assembly", "crank", "pelvis", "trunk"]
         if rider.full:
             kinds = {"arm": ("upper_arm", "forearm"), "leg": ("thigh", "shank")}
             self._names += [f"{part}_{limb[4:]}" for limb in LIMBS for part in kinds[limb[:3]]]
+        self._rows = [links[name] + 1 for name in self._names]
         self._joints = [links["front_assembly"], links["crank"], links["rear_wheel"], *rider.joints, *rider.seat]
 
     def record(self, samples: int) -> RideLog:
@@ -87,7 +87,7 @@ class RideRecorder:
         states = np.empty((samples * self.steps + 1, len(first)))
         states[0] = first
         forces: list[float] = []
-        torques, times, fallen, swivels, count = [], [], [], [], 0
+        ends, count = list[RiderStep](), 0
         for _ in range(samples):
             for _ in range(self.steps):
                 if tape is None:
@@ -100,45 +100,39 @@ class RideRecorder:
                     states[count + 1] = step.state
                     self._next += 1
                 count += 1
-            if tape is None:
-                step = last_step(ride)
-            torques.append(step.torques)
-            times.append(step.time)
-            swivels.append(step.swivel)
-            fallen.append(step.fallen)
-            if step.fallen:
+            ends.append(rider_step(ride) if tape is None else step.rider)
+            if ends[-1].fallen:
                 break
         states = states[: count + 1]
         first, rates = BASE_SIZE + np.array(self._joints), (states.shape[1] - BASE_SIZE) // 2
-        starts, ends = states[: -1 : self.steps], states[self.steps :: self.steps]
-        turned = ends[:, first[2]] - starts[:, first[2]]
+        starts, sampled = states[: -1 : self.steps], states[self.steps :: self.steps]
+        turned = sampled[:, first[2]] - starts[:, first[2]]
         frames = np.empty((len(states), len(body.links), 18))
         move_links_of_many(body.tree, states, frames)
         return self._compute(
             frames,
             np.array(forces).reshape(count, 4, 3),
-            np.stack([ends[:, first], ends[:, first + rates]], axis=-1),
+            np.stack([sampled[:, first], sampled[:, first + rates]], axis=-1),
             turned,
-            np.array(torques),
-            np.array(times),
-            np.array(fallen),
-            np.array(swivels),
+            *map(np.array, zip(*ends, strict=True)),
         )
 
-    def _frame(self, index: int, name: str, before: CentreMotion, after: CentreMotion, time: np.ndarray) -> BodyState:
-        """Motion of a body frame after the last step, with its accelerations in it."""
-        body = self.ride.bicycle.body
-        centre, axes = self.ride.physics.inertial_frame(body.body, body.links[name])
+    def _frames(self, before: CentreMotion, after: CentreMotion, time: np.ndarray) -> dict[str, BodyState]:
+        """Motion of the body frames after the last step, with their accelerations in it."""
+        physics, body = self.ride.physics, self.ride.bicycle.body
+        mounts = [physics.inertial_frame(body.body, body.links[name]) for name in self._names]
+        centres, axes = (np.stack(parts) for parts in zip(*mounts, strict=True))
 
         def carried(motion: CentreMotion) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-            position, orientation, velocity, turning = (field[:, index] for field in motion)
+            position, orientation, velocity, turning = motion
             orientation = rotation.multiply(orientation, rotation.conjugate(axes))
-            lever = rotation.rotate(orientation, centre)
+            lever = rotation.rotate(orientation, centres)
             return position - lever, orientation, velocity - rotation.cross(turning, lever), turning
 
         then, now = carried(before), carried(after)
-        dt = self.ride.physics.time_step
-        return BodyState(time, *now, (now[2] - then[2]) / dt, (now[3] - then[3]) / dt)
+        fields = (*now, (now[2] - then[2]) / physics.time_step, (now[3] - then[3]) / physics.time_step)
+        fields = tuple(np.ascontiguousarray(np.moveaxis(field, 1, 0)) for field in fields)
+        return {name: BodyState(time, *(field[k] for field in fields)) for k, name in enumerate(self._names)}
 
     def _compute(
         self,
@@ -147,17 +141,14 @@ class RideRecorder:
         joints: np.ndarray,
         turned: np.ndarray,
         torques: np.ndarray,
+        swivels: np.ndarray,
         time: np.ndarray,
         fallen: np.ndarray,
-        swivels: np.ndarray,
     ) -> RideLog:
-        rider = self.ride.rider
-        names = ["rear_frame", *self._names]
+        rider, names = self.ride.rider, self._names
         # the last physics step of each sample
-        rows = [0, *(link + 1 for link in self._links)]
-        before = CentreMotion.of_frames(motion[self.steps - 1 : -1 : self.steps, rows])
-        after = CentreMotion.of_frames(motion[self.steps :: self.steps, rows])
-        frames = {name: self._frame(index, name, before, after, time) for index, name in enumerate(names)}
+        before = CentreMotion.of_frames(motion[self.steps - 1 : -1 : self.steps, self._rows])
+        frames = self._frames(before, CentreMotion.of_frames(motion[self.steps :: self.steps, self._rows]), time)
         angles, rates = joints[..., 0], joints[..., 1]
         steer, crank, trunk = angles[:, 0], angles[:, 1], angles[:, 3:6]
         found = contact(rider, motion, forces, self.steps, self.sampling == "instant")
