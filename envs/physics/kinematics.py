@@ -133,10 +133,3 @@ def add_force(tree, frames, link, force, point, forces):  # type: ignore[no-unty
     forces[3] += y * fz - z * fy
     forces[4] += z * fx - x * fz
     forces[5] += x * fy - y * fx
-
-
-@jit
-def move_links_of_many(tree, states, frames):  # type: ignore[no-untyped-def]
-    """:func:`move_links` for several states ``(k, 13 + 2 n)`` → ``(k, n + 1, 18)``."""
-    for index in range(states.shape[0]):
-        move_links(tree, states[index], frames[index])

@@ -135,14 +135,14 @@ def momentum_residual(fidelity: Any, path: Path, speed: float, steps: int) -> tu
             if step < steps // 3 or step % 100:
                 ride.step()
                 continue
-            before = bicycle.body.frames.copy()
+            before, state = bicycle.body.frames.copy(), bicycle.body.state.copy()
             saddle = np.array(place_on(before[0], rider.saddle_arm))
             grips, pedals = rider.grips(), rider.pedals()
             velocity = np.array(ride.physics.base_tuples(bicycle.body.body)[2])
             ride.step()
-            frames = np.stack([before, bicycle.body.frames])
-            seat, seat_moment, hands, feet = contact(rider, frames, np.reshape(rider.raw_forces(), (1, 4, 3)), 1)
-            force, moment = bicycle.own_wrench(frames[0], frames[1], saddle)
+            states, pushes = np.stack([state, bicycle.body.state]), np.reshape(rider.raw_forces(), (1, 4, 3))
+            (seat, seat_moment, hands, feet), _ = contact(rider, states, pushes, 1)
+            force, moment = bicycle.own_wrench(before, bicycle.body.frames, saddle)
             ground, ground_moment = bicycle.ground_wrench(saddle)
             drag = -0.5 * AIR_DENSITY * MOUNTAIN_BIKE.drag_area * np.linalg.norm(velocity) * velocity
             limbs, arms = np.concatenate([hands[0], feet[0]]), np.concatenate([grips, pedals]) - saddle

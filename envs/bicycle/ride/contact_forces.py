@@ -6,12 +6,14 @@ load cells under the saddle share its vertical force and horizontal moments by s
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from ....filters.compile.cache import jit
+from ...physics.kinematics import move_links
 from ...physics.momentum import newton_euler
 from ..rider.rider import Rider
 
@@ -65,35 +67,60 @@ class LoadCells:
         return wanted @ np.linalg.inv(self.matrix).T
 
 
-def contact(rider: Rider, frames: np.ndarray, pushes: np.ndarray, steps: int, last_only: bool = False) -> Contact:
-    """Forces at n samples.
+def contact(
+    rider: Rider, states: np.ndarray, pushes: np.ndarray, steps: int, last_only: bool = False, rows: Sequence[int] = ()
+) -> tuple[Contact, np.ndarray]:
+    """Forces at n samples, and the motion of some links.
 
     Args:
         rider: masses and inertias, and whether hands and feet are held by constraints.
-        frames: ``(n · steps + 1, links + 1, 18)`` of :mod:`poise.envs.physics.kinematics` before and after all physics
-            steps.
+        states: ``(n · steps + 1, …)`` of :mod:`poise.envs.physics.kinematics` before and after all physics steps.
         pushes: ``(n · steps, 4, 3)`` of hands and feet in each of them, see :meth:`.Rider.raw_forces`.
         steps: physics steps per sample.
         last_only: the forces in the last physics step of each sample, instead of their mean over all of them in
             bicycle axes, turned into the world at the end.
+        rows: of the links in frames, the base's 0.
+
+    Returns:
+        The forces, and frames ``(n, 2, rows, 18)`` before and after the last physics step of each sample.
     """
     physics, (links, arms, axes) = rider.bicycle.physics, rider.holds
-    found = np.zeros((len(pushes) // steps, 6, 3))
+    count = len(pushes) // steps
+    found, frames = np.empty((count, 6, 3)), np.empty((count, 2, len(rows), 18))
     sampled_contact(
-        frames, pushes, rider.full, np.array(rider.mass_links) + 1, rider.masses, rider.moments, links[:, 0] + 1, arms,
-        axes, rider.saddle_arm, physics.time_step, physics.gravity, steps, steps - 1 if last_only else 0, found,
+        rider.bicycle.body.tree, states, pushes, rider.full, np.array(rider.mass_links) + 1, rider.masses,
+        rider.moments, links[:, 0] + 1, arms, axes, rider.saddle_arm, physics.time_step, physics.gravity, steps,
+        steps - 1 if last_only else 0, np.array(rows, int), found, frames,
     )  # fmt: skip
-    return Contact(found[:, 0], found[:, 1], found[:, 2:4], found[:, 4:])
+    return Contact(found[:, 0], found[:, 1], found[:, 2:4], found[:, 4:]), frames
 
 
 @jit
 def sampled_contact(  # type: ignore[no-untyped-def]
-    frames, pushes, full, rows, masses, moments, held, arms, axes, saddle, duration, gravity, steps, first, found
+    tree,
+    states,
+    pushes,
+    full,
+    rows,
+    masses,
+    moments,
+    held,
+    arms,
+    axes,
+    saddle,
+    duration,
+    gravity,
+    steps,
+    first,
+    wanted,
+    found,
+    kept,
 ):
     """:func:`contact`, compiled.
 
     Args:
-        frames: as there.
+        tree: of :mod:`poise.envs.physics.kinematics`.
+        states: as there.
         pushes: as there; in world axes (``full``) or in bicycle axes.
         full: likewise.
         rows: ``(k,)`` rows of the rider's masses in the frames, as of the next two in :func:`.newton_euler`.
@@ -107,13 +134,21 @@ def sampled_contact(  # type: ignore[no-untyped-def]
         gravity: m/s².
         steps: physics steps per sample.
         first: of those of a sample from which on the mean is taken.
+        wanted: rows of the frames that are kept.
         found: ``(n, 6, 3)``, overwritten: force and moment of the seat, hands, feet.
+        kept: ``(n, 2, wanted, 18)``, overwritten.
     """
+    frames = np.empty((2, tree.shape[0] + 1, 18))
+    before, after = frames[0], frames[1]
+    move_links(tree, states[0], after)
     vectors, mean, frame = np.empty((6, 3)), np.empty((6, 3)), np.empty((3, 3))
     for sample in range(found.shape[0]):
         mean[:] = 0.0
-        for step in range(sample * steps + first, (sample + 1) * steps):
-            before, after = frames[step], frames[step + 1]
+        for step in range(sample * steps, (sample + 1) * steps):
+            before, after = after, before
+            move_links(tree, states[step + 1], after)
+            if step < sample * steps + first:
+                continue
             bicycle_axes(before[0], axes, frame)
             vectors[2:] = pushes[step]
             if not full:
@@ -136,8 +171,10 @@ def sampled_contact(  # type: ignore[no-untyped-def]
                 for axis in range(3):
                     for i in range(3):
                         mean[row, axis] += frame[i, axis] * vectors[row, i] / (steps - first)
-        bicycle_axes(frames[(sample + 1) * steps, 0], axes, frame)
+        # the last of these axes are those at the sample
         turn(mean, frame, found[sample])
+        for index in range(wanted.shape[0]):
+            kept[sample, 0, index], kept[sample, 1, index] = before[wanted[index]], after[wanted[index]]
 
 
 @jit

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ....filters.core import rotation
-from ...physics.kinematics import BASE_SIZE, move_links_of_many
+from ...physics.kinematics import BASE_SIZE
 from ...physics.multibody import CentreMotion
 from ...sensors.ideal import BodyState, Sampling
 from ..rider.limbs import Limb, LimbPosture, reach_to
@@ -107,11 +107,9 @@ class RideRecorder:
         first, rates = BASE_SIZE + np.array(self._joints), (states.shape[1] - BASE_SIZE) // 2
         starts, sampled = states[: -1 : self.steps], states[self.steps :: self.steps]
         turned = sampled[:, first[2]] - starts[:, first[2]]
-        frames = np.empty((len(states), len(body.links), 18))
-        move_links_of_many(body.tree, states, frames)
+        pushes, last_only = np.array(forces).reshape(count, 4, 3), self.sampling == "instant"
         return self._compute(
-            frames,
-            np.array(forces).reshape(count, 4, 3),
+            *contact(rider, states, pushes, self.steps, last_only, self._rows),
             np.stack([sampled[:, first], sampled[:, first + rates]], axis=-1),
             turned,
             *map(np.array, zip(*ends, strict=True)),
@@ -130,14 +128,14 @@ class RideRecorder:
             return position - lever, orientation, velocity - rotation.cross(turning, lever), turning
 
         then, now = carried(before), carried(after)
-        fields = (*now, (now[2] - then[2]) / physics.time_step, (now[3] - then[3]) / physics.time_step)
-        fields = tuple(np.ascontiguousarray(np.moveaxis(field, 1, 0)) for field in fields)
+        rates = [(now[k] - then[k]) / physics.time_step for k in (2, 3)]
+        fields = [np.ascontiguousarray(np.moveaxis(field, 1, 0)) for field in (*now, *rates)]
         return {name: BodyState(time, *(field[k] for field in fields)) for k, name in enumerate(self._names)}
 
     def _compute(
         self,
+        found: Contact,
         motion: np.ndarray,
-        forces: np.ndarray,
         joints: np.ndarray,
         turned: np.ndarray,
         torques: np.ndarray,
@@ -147,11 +145,9 @@ class RideRecorder:
     ) -> RideLog:
         rider, names = self.ride.rider, self._names
         # the last physics step of each sample
-        before = CentreMotion.of_frames(motion[self.steps - 1 : -1 : self.steps, self._rows])
-        frames = self._frames(before, CentreMotion.of_frames(motion[self.steps :: self.steps, self._rows]), time)
+        frames = self._frames(CentreMotion.of_frames(motion[:, 0]), CentreMotion.of_frames(motion[:, 1]), time)
         angles, rates = joints[..., 0], joints[..., 1]
         steer, crank, trunk = angles[:, 0], angles[:, 1], angles[:, 3:6]
-        found = contact(rider, motion, forces, self.steps, self.sampling == "instant")
         limbs, pelvis = {}, angles[:, -3:]
         turn = rotation.conjugate(frames["rear_frame"].orientation)
         trunk_turn = rotation.multiply(turn, frames["trunk"].orientation)

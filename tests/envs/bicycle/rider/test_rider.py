@@ -105,7 +105,7 @@ def test_contact_forces_balance_the_bicycle(fidelity, path, speed):
         for step in range(2500):
             look = step > 800 and step % 100 == 0
             if look:
-                before = bicycle.body.frames.copy()
+                before, states = bicycle.body.frames.copy(), [bicycle.body.state.copy()]
                 saddle = np.array(place_on(before[0], rider.saddle_arm))
                 grips, pedals = rider.grips(), rider.pedals()
                 velocity = np.array(ride.physics.base_tuples(bicycle.body.body)[2])
@@ -113,10 +113,10 @@ def test_contact_forces_balance_the_bicycle(fidelity, path, speed):
             ride.step()
             if not look:
                 continue
-            frames = np.stack([before, bicycle.body.frames])
-            steps = contact(rider, frames, np.reshape(rider.raw_forces(), (1, 4, 3)), 1)
+            states = np.stack([*states, bicycle.body.state])
+            steps, _ = contact(rider, states, np.reshape(rider.raw_forces(), (1, 4, 3)), 1)
             found = Contact(*(field[0] for field in steps))
-            force, moment = bicycle.own_wrench(frames[0], frames[1], saddle)
+            force, moment = bicycle.own_wrench(before, bicycle.body.frames, saddle)
             ground, ground_moment = bicycle.ground_wrench(saddle)
             drag = -0.5 * AIR_DENSITY * MOUNTAIN_BIKE.drag_area * np.linalg.norm(velocity) * velocity
             limbs = np.concatenate([found.hands, found.feet])
