@@ -116,6 +116,12 @@ def build_of(n, arrays):  # type: ignore[no-untyped-def]
 
 
 @jit
+def added(force, factor, more):  # type: ignore[no-untyped-def]
+    """A force and a factor times another one, N."""
+    return force[0] + factor * more[0], force[1] + factor * more[1], force[2] + factor * more[2]
+
+
+@jit
 def plan(  # type: ignore[no-untyped-def]
     numbers, arrays, table, habits, time, curvature, seen, steer_torque, drive, chain, state, links, memory
 ):
@@ -153,7 +159,7 @@ def plan(  # type: ignore[no-untyped-def]
     # muscles also carry the legs' weight around, half of it each
     wanted = max(0.0, drive) * build.wheel_radius * ratio
     push = min(LARGEST_PEDAL_FORCE, wanted / (reach.crank * MEAN_STROKE))
-    left_weight, right_weight, lift, tip = legs_on_pedals(build.legs, crank)
+    (left_weight, right_weight), lift, tip, swing = legs_on_pedals(build.legs, crank)
     left_phase, right_phase = crank, crank + math.pi
     turning = -math.sin(left_phase) * left_weight[0] - math.cos(left_phase) * left_weight[2]
     turning -= math.sin(right_phase) * right_weight[0] + math.cos(right_phase) * right_weight[2]
@@ -163,14 +169,18 @@ def plan(  # type: ignore[no-untyped-def]
     around = push * AROUND + 0.5 * (pace / reach.crank - turning)
     draw = held_down(seat, rise, rising)
     left, right = pedal_push(push, around, left_phase, draw), pedal_push(push, around, right_phase, draw)
+    # the legs' own weight is part of the balance at rest; drive, brakes and slopes act on the upper body
+    _, forwards = moments_of_feet(reach, crank, left, right)
+    squared = crank_rate * crank_rate
+    if joints > 3:
+        # muscles of hips and knees swing the legs, so that pedals and chain feel only the push
+        left, right = added(left, squared, swing[0]), added(right, squared, swing[1])
     pushes, weights, feet = memory[PUSHES], memory[WEIGHTS], memory[FEET]
     for axis in range(3):
         weights[axis], weights[3 + axis] = left_weight[axis], right_weight[axis]
         feet[axis], feet[3 + axis] = left[axis] + left_weight[axis], right[axis] + right_weight[axis]
-    lift, tip = crank_rate * crank_rate * lift, crank_rate * crank_rate * tip
+    lift, tip = squared * lift, squared * tip
     rightwards, _ = moments_of_feet(reach, crank, (feet[0], feet[1], feet[2]), (feet[3], feet[4], feet[5]))
-    # the legs' own weight is part of the balance at rest; drive, brakes and slopes act on the upper body
-    _, forwards = moments_of_feet(reach, crank, left, right)
     forwards -= reach.pushed_back * drive
     rightwards += tip + reach.trunk_moment * math.sin(target[1])
     difference, common = hands_against(reach, seat, rightwards, forwards, (pitch, pitching, roll, rolling))

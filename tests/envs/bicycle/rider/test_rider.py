@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 
+from poise.envs.bicycle.course.events import Events
 from poise.envs.bicycle.course.path import Path, smooth_curvature
 from poise.envs.bicycle.frame.parameters import AIR_DENSITY, BENCHMARK, MOUNTAIN_BIKE
 from poise.envs.bicycle.ride.contact_forces import Contact, LoadCells, contact, place_on
@@ -179,6 +180,24 @@ def test_legs_pedal_and_the_chain_drives():
         assert ride.state.speed == pytest.approx(3.0, abs=0.08)
         drag = 0.5 * AIR_DENSITY * 0.5 * 9.0 + 0.006 * 93.0 * 9.81
         assert np.mean(torque) / MOUNTAIN_BIKE.rear_wheel.radius == pytest.approx(drag, rel=0.25)
+
+
+def test_the_crank_turns_evenly_and_the_pedals_feel_the_push_alone():
+    """At 84 a minute and little power the swing of the legs would slacken the chain without muscles that make it."""
+    cadence = Events(cadence=9.5)
+    with make_ride(speed=3.0, style="still", events=cadence) as ride:
+        rates, pedals = [], []
+        for step in range(2500):
+            ride.step()
+            if step >= 1500:
+                rates.append(ride.state.crank_rate)
+                pedals.append(ride.rider.foot_forces()[0][:, 2].sum())
+    rate = float(np.mean(rates))
+    assert rate * 30.0 / math.pi > 75.0
+    assert np.std(rates) < 0.02 * rate
+    turns = rate * np.arange(len(pedals)) * ride.physics.time_step
+    fourfold = 2.0 * abs(np.mean((np.array(pedals) - np.mean(pedals)) * np.exp(-4j * turns)))
+    assert fourfold < 8.0
 
 
 @pytest.mark.parametrize("fidelity", ["full", "lumped"])
