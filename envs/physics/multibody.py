@@ -10,13 +10,12 @@ from __future__ import annotations
 import struct
 from collections.abc import Sequence
 from operator import itemgetter
-from typing import NamedTuple
 
 import numpy as np
 
 from ...filters.core import rotation
 from ...filters.support.optional import extra
-from .kinematics import BASE_SIZE, MATRIX, POSITION, TREE_COLUMNS, TURNING, VELOCITY, add_force, move_links
+from .kinematics import BASE_SIZE, TREE_COLUMNS, add_force, move_links
 from .world import BASE, Physics, Vector, floats
 
 with extra("sim"):
@@ -24,25 +23,6 @@ with extra("sim"):
 
 Tuple3 = tuple[float, float, float]
 FIRST, SECOND = itemgetter(0), itemgetter(1)
-
-
-class CentreMotion(NamedTuple):
-    """Motion of the centre-of-mass frames of n links, world axes."""
-
-    position: np.ndarray
-    """(..., n, 3) m"""
-    orientation: np.ndarray
-    """(..., n, 4) principal axes to world"""
-    velocity: np.ndarray
-    """(..., n, 3) m/s"""
-    angular_velocity: np.ndarray
-    """(..., n, 3) rad/s"""
-
-    @classmethod
-    def of_frames(cls, frames: np.ndarray) -> CentreMotion:
-        """From the rows of :mod:`.kinematics` ``(..., n, 18)``."""
-        matrices = frames[..., MATRIX].reshape(*frames.shape[:-1], 3, 3)
-        return cls(frames[..., POSITION], rotation.from_matrix(matrices), frames[..., VELOCITY], frames[..., TURNING])
 
 
 class Multibody:

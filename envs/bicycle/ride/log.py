@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ....filters.core import rotation
-from ...physics.kinematics import BASE_SIZE
-from ...physics.multibody import CentreMotion
+from ...physics.kinematics import BASE_SIZE, TURNING, carry_frames, orientations
 from ...sensors.ideal import BodyState, Sampling
 from ..rider.limbs import Limb, LimbPosture, reach_to
 from ..rider.posture import KNEE_OUT, LIMBS, two_turns
@@ -78,6 +77,8 @@ class RideRecorder:
             kinds = {"arm": ("upper_arm", "forearm"), "leg": ("thigh", "shank")}
             self._names += [f"{part}_{limb[4:]}" for limb in LIMBS for part in kinds[limb[:3]]]
         self._rows = [links[name] + 1 for name in self._names]
+        mounts = [ride.physics.inertial_frame(ride.bicycle.body.body, links[name]) for name in self._names]
+        self._mounts = np.stack([centre for centre, _ in mounts]), np.stack([axes for _, axes in mounts])
         self._joints = [links["front_assembly"], links["crank"], links["rear_wheel"], *rider.joints, *rider.seat]
 
     def record(self, samples: int) -> RideLog:
@@ -115,22 +116,19 @@ class RideRecorder:
             *map(np.array, zip(*ends, strict=True)),
         )
 
-    def _frames(self, before: CentreMotion, after: CentreMotion, time: np.ndarray) -> dict[str, BodyState]:
-        """Motion of the body frames after the last step, with their accelerations in it."""
-        physics, body = self.ride.physics, self.ride.bicycle.body
-        mounts = [physics.inertial_frame(body.body, body.links[name]) for name in self._names]
-        centres, axes = (np.stack(parts) for parts in zip(*mounts, strict=True))
-
-        def carried(motion: CentreMotion) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-            position, orientation, velocity, turning = motion
-            orientation = rotation.multiply(orientation, rotation.conjugate(axes))
-            lever = rotation.rotate(orientation, centres)
-            return position - lever, orientation, velocity - rotation.cross(turning, lever), turning
-
-        then, now = carried(before), carried(after)
-        rates = [(now[k] - then[k]) / physics.time_step for k in (2, 3)]
-        fields = [np.ascontiguousarray(np.moveaxis(field, 1, 0)) for field in (*now, *rates)]
-        return {name: BodyState(time, *(field[k] for field in fields)) for k, name in enumerate(self._names)}
+    def _frames(self, motion: np.ndarray, time: np.ndarray) -> dict[str, BodyState]:
+        """Motion of the body frames after the last steps, with their accelerations in it; ``motion``: of the links."""
+        centres, axes = self._mounts
+        q = rotation.multiply(orientations(motion[:, 1]), rotation.conjugate(axes))
+        found = np.empty((4, len(centres), len(time), 3))
+        carry_frames(motion, rotation.rotate_back(axes, -centres), self.ride.physics.time_step, found)
+        frames = {}
+        for k, name in enumerate(self._names):
+            position, velocity, acceleration, spin = found[:, k]
+            frames[name] = BodyState(
+                time, position, np.ascontiguousarray(q[:, k]), velocity, motion[:, 1, k, TURNING], acceleration, spin
+            )
+        return frames
 
     def _compute(
         self,
@@ -144,8 +142,7 @@ class RideRecorder:
         fallen: np.ndarray,
     ) -> RideLog:
         rider, names = self.ride.rider, self._names
-        # the last physics step of each sample
-        frames = self._frames(CentreMotion.of_frames(motion[:, 0]), CentreMotion.of_frames(motion[:, 1]), time)
+        frames = self._frames(motion, time)
         angles, rates = joints[..., 0], joints[..., 1]
         steer, crank, trunk = angles[:, 0], angles[:, 1], angles[:, 3:6]
         limbs, pelvis = {}, angles[:, -3:]
