@@ -51,6 +51,7 @@ def new_figure(width: float, height: float, rows: int = 1, columns: int = 1) -> 
         ax.spines[["top", "right"]].set_visible(False)
         ax.grid(axis="both", color="#e4e6ea", linewidth=0.7)
         ax.set_axisbelow(True)
+        ax.set_prop_cycle(color=PALETTE)
     return figure, list(axes)
 
 

@@ -60,38 +60,18 @@ def run(
         raise ValueError(f"grid must be True or False, got {grid!r}")
     if not isinstance(estimator, str | Estimator):
         raise ValueError(f"estimator must be a name (poise.list_estimators) or an estimator, got {estimator!r}")
-    if isinstance(data, Trajectory):
-        on_grid = data.on_grid()
-        if interval is not None and not same_interval(interval, on_grid.dt):
-            raise ValueError(
-                f"dt={interval:.6g} s contradicts {data.name!r}, which has {on_grid.dt:.6g} s; leave it out"
-            )
-        made = fitted(estimator, on_grid)
-        estimate = run_on(made, on_grid)
-        reason = without_estimate(made, on_grid.measurements, estimate)
-        if reason:
-            warnings.warn(f"{data.name}: {reason}", stacklevel=2)
-        return estimate if grid or on_grid is data else at_samples(estimate, data, on_grid)
-    if not isinstance(data, Mapping):
-        raise ValueError(f"data must be a Trajectory or a mapping from channel to array, got {type(data).__name__}")
-    if interval is None:
-        raise ValueError(
-            "arrays have no time: pass dt, the sampling interval in s, as poise.run(estimator, arrays, dt=0.01), "
-            "or a poise.Trajectory"
-        )
-    if isinstance(estimator, str):
-        estimator = make_estimator(estimator, dt=interval)
-    elif not same_interval(interval, estimator.dt):
-        raise ValueError(
-            f"dt={interval:.6g} s contradicts the estimator, which was made for {estimator.dt:.6g} s; "
-            f"use estimator.with_dt({interval:.6g})"
-        )
-    estimate = run_sequence(estimator, data)
-    reason = without_estimate(estimator, data, estimate)
-    if reason:
-        warnings.warn(reason, stacklevel=2)
-    length = len(next(iter(estimate.pose.values())))
-    return estimate._replace(time=interval * np.arange(length), layout=layout_of(estimator))
+    if not isinstance(data, Trajectory):
+        made = for_arrays(estimator, data, interval)
+        assert interval is not None
+        estimate = warned_of(run_sequence(made, data), made, data)
+        length = len(next(iter(estimate.pose.values())))
+        return estimate._replace(time=interval * np.arange(length), layout=layout_of(made))
+    on_grid = data.on_grid()
+    if interval is not None and not same_interval(interval, on_grid.dt):
+        raise ValueError(f"dt={interval:.6g} s contradicts {data.name!r}, which has {on_grid.dt:.6g} s; leave it out")
+    made = fitted(estimator, on_grid)
+    estimate = warned_of(run_on(made, on_grid), made, on_grid.measurements, f"{data.name}: ")
+    return estimate if grid or on_grid is data else at_samples(estimate, data, on_grid)
 
 
 def smooth(
@@ -148,10 +128,43 @@ def fitted(estimator: str | Estimator[Any], trajectory: Trajectory) -> Estimator
     return estimator if abs(estimator.dt - trajectory.dt) <= 1e-6 * trajectory.dt else estimator.with_dt(trajectory.dt)
 
 
+def for_arrays(estimator: str | Estimator[Any], data: Any, interval: float | None) -> Estimator[Any]:
+    """An estimator for arrays, whose sampling interval is that of the call.
+
+    Raises:
+        ValueError: see :func:`run`.
+    """
+    if not isinstance(data, Mapping):
+        raise ValueError(f"data must be a Trajectory or a mapping from channel to array, got {type(data).__name__}")
+    if interval is None:
+        raise ValueError(
+            "arrays have no time: pass dt, the sampling interval in s, as poise.run(estimator, arrays, dt=0.01), "
+            "or a poise.Trajectory"
+        )
+    if isinstance(estimator, str):
+        return make_estimator(estimator, dt=interval)
+    if not same_interval(interval, estimator.dt):
+        raise ValueError(
+            f"dt={interval:.6g} s contradicts the estimator, which was made for {estimator.dt:.6g} s; "
+            f"use estimator.with_dt({interval:.6g})"
+        )
+    return estimator
+
+
 def run_on(estimator: Estimator[Any], trajectory: Trajectory) -> Estimate:
     """Run an estimator over a trajectory that is on its grid already, without glitches."""
     estimate = run_sequence(estimator, without_glitches(trajectory))
     return estimate._replace(time=trajectory.time, layout=layout_of(estimator))
+
+
+def warned_of(
+    estimate: Estimate, estimator: Estimator[Any], measurements: Mapping[str, Any], name: str = ""
+) -> Estimate:
+    """The estimate; with a warning, to whoever called :func:`run`, if no sample has one."""
+    reason = without_estimate(estimator, measurements, estimate)
+    if reason:
+        warnings.warn(f"{name}{reason}", stacklevel=3)
+    return estimate
 
 
 def without_estimate(estimator: Estimator[Any], measurements: Mapping[str, Any], estimate: Estimate) -> str:

@@ -211,6 +211,12 @@ FILTERS: dict[str, Entry] = {
         "a rider's trunk, arms and legs from six gyroscopes and the constraints at hands and feet",
         WHOLE_BODY,
     ),
+    "whole-body-consistent": Entry(
+        f"{BICYCLE}.whole_body.consistent:ConsistentWholeBody",
+        "whole-body with biases and errors of the told geometry as states, from the usual posture: its covariance is "
+        "that of its errors",
+        HERE,
+    ),
     "odometry-aided": Entry(
         f"{BICYCLE}.odometry_aided:OdometryAided",
         "roll and pitch of a bicycle from its IMU and the wheel's speed: the wheel rolls and does not slide",

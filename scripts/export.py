@@ -17,7 +17,7 @@ class Args:
     """Arguments of ``poise export``."""
 
     weights: tyro.conf.Positional[str]
-    """name of shipped weights (`poise list weights`), or a file of weights"""
+    """name of shipped weights, such as gru, or a file of weights"""
     onnx: Path
     """file to write: one graph with its memory as input and output, the card of the weights in its metadata"""
     json: bool = False

@@ -7,6 +7,8 @@ Each list is read from the table that the package itself uses. Pages of the docu
 from __future__ import annotations
 
 import re
+import shutil
+import textwrap
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,7 +20,7 @@ from ..filters.core.offline import SUFFIX
 from ..filters.support.optional import MissingExtraError
 from ..filters.support.rows import markdown_table
 from .main import run_command
-from .output import Output
+from .output import PIPE_WIDTH, Output
 
 Rows = list[dict[str, Any]]
 BEGIN, END = "<!-- list: {} -->", "<!-- end of list -->"
@@ -26,6 +28,8 @@ PLACED = re.compile(r"<!-- list: ([a-z-]+) -->\n.*?<!-- end of list -->", re.DOT
 """A list in a page, with its name."""
 BEST = 12
 """Rows of the short table of errors."""
+TITLE_WIDTH = 14
+"""Characters of the column of titles in the overview."""
 
 
 @dataclass
@@ -33,17 +37,15 @@ class Args:
     """Arguments of ``poise list``."""
 
     lists: tyro.conf.Positional[tuple[str, ...]] = ()
-    """which lists: estimators, environments, sensors, sensor-drift, sensor-kinds, timings, magnetics, gestures,
-    scenarios, surfaces, recipes, presets, learned, formats, benchmark, benchmark-best, benchmark-heading,
-    benchmark-limits, riders, riders-best, riders-consistency, riders-bound; all if none is named"""
+    """which lists, by the titles that are printed if none is named"""
     markdown: bool = False
-    """print the tables in Markdown, as the documentation has them"""
+    """print the tables in Markdown, as the documentation has them; all if none is named"""
     update: tuple[Path, ...] = ()
     """pages whose lists are updated, for instance `poise list --update docs/*.md`"""
     environments: Path | None = None
     """folder in which the page of every environment is written anew, for instance docs/environments"""
     json: bool = False
-    """print one JSON document instead of tables"""
+    """print one JSON document instead of tables; of all lists if none is named"""
 
 
 def benchmark(metric: str = "inclination") -> Rows:
@@ -89,25 +91,21 @@ def benchmark_limits() -> Rows:
 def riders(table: str = "error") -> Rows:
     """Errors of the shipped benchmark's riders, deg: mean over the paper's angles [95 % interval over riders]."""
     from ..baselines.comparison.recommendation import load_results
+    from ..baselines.comparison.rider_tables import by_group
 
-    kept = [row for row in load_results().get("riders", []) if row["table"] == table]
+    numbers = load_results().get("riders", [])
+    papers = dict.fromkeys(each["paper"] for each in numbers)
     return [
-        {"name": row["method"], "sensors of": row["paper"]}
-        | {key: value for key, value in row.items() if key not in ("paper", "table", "method")}
-        for row in kept
+        {"name": cells.pop("method"), "sensors of": paper, **cells}
+        for paper in papers
+        for cells in by_group(numbers, paper, table)
     ]
 
 
 def riders_best() -> Rows:
     """The mean errors of what is told apart most easily: the mean, the filter of each paper, and its networks."""
-    found = []
-    for row in riders():
-        paper = row["sensors of"]
-        if row["name"] in ("always the mean", paper, f"{paper}-consistent", f"{paper}+network", f"gru-{paper}"):
-            groups = {key: value for key, value in row.items() if key not in ("name", "sensors of")}
-            means = {group: float(cell.split(" [")[0]) for group, cell in groups.items()}
-            found.append({"name": row["name"], "sensors of": paper, **means})
-    return found
+    kept = ("always the mean", "{}", "{}-consistent", "{}+network", "gru-{}")
+    return [row for row in riders("mean") if row["name"] in [name.format(row["sensors of"]) for name in kept]]
 
 
 def riders_consistency() -> Rows:
@@ -133,6 +131,9 @@ def run(args: Args) -> int:
         write_pages(args.environments)
     if args.update or args.environments is not None:
         return 0
+    if not (args.lists or args.markdown or args.json):
+        print(overview(shutil.get_terminal_size((PIPE_WIDTH, 24)).columns))
+        return 0
     with Output("list", args) as out:
         for name, rows in chosen.items():
             if args.markdown and not args.json:
@@ -143,6 +144,31 @@ def run(args: Args) -> int:
                 out.rows(found, name)
                 out.show(found, name, shown)
     return 0
+
+
+def overview(width: int) -> str:
+    """The names of everything, without descriptions, and which lists hold results.
+
+    Args:
+        width: of a line, characters.
+    """
+    lines = [wrapped(name, [row["name"] for row in LISTS[name]()], width) for name in LISTS if name not in MEASURED]
+    lines += ["", wrapped("measured", MEASURED, width), "", "poise list NAME prints a list with descriptions or values"]
+    return "\n".join(lines)
+
+
+def wrapped(title: str, names: Iterable[str], width: int) -> str:
+    """Names in lines that stand beside a title; a name is never broken."""
+    text = ", ".join(name.replace(" ", "\0") for name in names)
+    indent = " " * TITLE_WIDTH
+    return textwrap.fill(
+        text,
+        width,
+        initial_indent=f"{title:<{TITLE_WIDTH}}",
+        subsequent_indent=indent,
+        break_on_hyphens=False,
+        break_long_words=False,
+    ).replace("\0", " ")
 
 
 def placed(name: str) -> str:
@@ -350,6 +376,8 @@ LISTS: Mapping[str, Callable[[], Rows]] = {
     )
 }
 """Name → rows."""
+MEASURED = ("sensor-drift", "learned", *(name for name in LISTS if name.startswith(("benchmark", "riders"))))
+"""Lists of measured values rather than of what can be used by name."""
 
 
 def first_sentence(text: str | None) -> str:

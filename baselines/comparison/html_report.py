@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
 OTHER = "#8c8c8c"
 """Colour of what has no kind."""
+ROW = 22
+"""Height of an estimator in a plot, pixels."""
 FOOT = {
     "mean": "RMS error over the evaluation mask, mean over trajectories",
     "95 %": "interval of the mean: bootstrap over trajectories",
@@ -108,12 +110,17 @@ def shown_row(row: Mapping[str, Any], more: Mapping[str, Any]) -> dict[str, Any]
         "estimator": row["estimator"],
         "kind": row["kind"],
         "mean": row["mean"],
-        "95 %": f"{row['low']:.3g} – {row['high']:.3g}",
+        "95 %": interval(row["low"], row["high"]),
         "difference": row["difference"],
-        "of it 95 %": f"{row['difference low']:.3g} – {row['difference high']:.3g}",
+        "of it 95 %": interval(row["difference low"], row["difference high"]),
         "better": row["better"],
         "rank": row["rank"],
     } | {name: value for name, value in more.items() if name in FOOT}
+
+
+def interval(low: float, high: float) -> str:
+    """Both ends with three digits, as the numbers of the page."""
+    return " – ".join(f"{end:#.3g}".rstrip(".") if abs(end) < 1e3 else f"{end:.0f}" for end in (low, high))
 
 
 def table_of(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
@@ -155,8 +162,8 @@ def interval_plot(rows: Sequence[Mapping[str, Any]], unit: str) -> dict[str, Any
         "hovertemplate": "%{y}: %{x:.3f}<extra></extra>",
     }
     axis = log_axis(unit)
-    layout = {"title": f"mean and 95 % interval, {unit}", "xaxis": axis, "height": 120 + 22 * len(rows)}
-    return {"data": [trace], "layout": layout}
+    layout = {"title": f"mean and 95 % interval, {unit}", "xaxis": axis, "height": 120 + ROW * len(rows)}
+    return {"data": [trace], "layout": layout, "row": ROW}
 
 
 def trajectory_plot(errors: pandas.DataFrame, kinds: Mapping[str, str], unit: str) -> dict[str, Any]:
@@ -176,7 +183,7 @@ def trajectory_plot(errors: pandas.DataFrame, kinds: Mapping[str, str], unit: st
     ]
     axis = log_axis(unit)
     layout = {"title": f"error of every trajectory, {unit}", "yaxis": axis, "height": 420}
-    return {"data": traces, "layout": layout}
+    return {"data": traces, "layout": layout, "row": 0}
 
 
 DASHES = ("solid", "dash", "dot", "dashdot", "longdash")
@@ -195,10 +202,10 @@ def win_plot(errors: pandas.DataFrame) -> dict[str, Any]:
         "colorscale": [[0.0, "#b2182b"], [0.5, "#f7f7f7"], [1.0, "#2166ac"]],
         "hovertemplate": "%{y} beats %{x} on %{z:.0%}<extra></extra>",
     }
-    size = 180 + 20 * len(names)
+    size = 180 + ROW * len(names)
     layout = {
         "title": "share of trajectories on which the row has the smaller error",
         "yaxis": {"autorange": "reversed"},
         "height": size,
     }
-    return {"data": [trace], "layout": layout}
+    return {"data": [trace], "layout": layout, "row": ROW}

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ...envs.data.trajectory import Trajectory
+from ...filters.compile.cache import cache_folder
 from ...filters.support.parallel import in_parallel
 from ...filters.support.resume import is_kept, keep, kept
 from ...filters.support.seeds import child_seeds
@@ -138,18 +139,30 @@ def run_tasks(
         if not is_kept(folder / task.file, {})
     ]
     if processes > 1 and len(jobs) > 1:
-        labels = list(contenders(names, channels))
-        shares = [(labels[first::processes], tuple(names), tuple(channels), offline) for first in range(processes)]
-        for _ in in_parallel(compile_ahead, shares, processes):
-            pass
+        compile_ahead(names, channels, offline, processes)
     for _ in in_parallel(run_task, jobs, processes, label="compare", unit="task"):
         pass
     suites = dict.fromkeys(task.suite for task in tasks)
     return {suite: collected([folder / task.file for task in tasks if task.suite == suite]) for suite in suites}
 
 
-def compile_ahead(labels: Sequence[str], names: Sequence[str], channels: Sequence[str], offline: bool) -> None:
-    """Compile some of the estimators, which processes that begin with the same task would all do in the same order."""
+def compile_ahead(names: Sequence[str], channels: Sequence[str], offline: bool, processes: int) -> None:
+    """Divide the compiling of all estimators among processes, which each would begin with the same ones.
+
+    A file in the cache says that it was done for this code: what is compiled already need not be run for it.
+    """
+    labels, folder = list(contenders(names, channels)), cache_folder()
+    done, key = None if folder is None else folder / "ahead.json", {"labels": labels, "offline": offline}
+    if done is None or is_kept(done, key):
+        return
+    shares = [(labels[first::processes], tuple(names), tuple(channels), offline) for first in range(processes)]
+    for _ in in_parallel(compile_some, shares, processes):
+        pass
+    keep(done, key, None)
+
+
+def compile_some(labels: Sequence[str], names: Sequence[str], channels: Sequence[str], offline: bool) -> None:
+    """Run some of the estimators on two seconds of motion."""
     (motion,) = hand_episode("mixed", 1, 0, duration=2.0)
     found = contenders(names, channels)
     with warnings.catch_warnings(), suppress(ValueError):

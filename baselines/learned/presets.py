@@ -132,9 +132,13 @@ RIDES = RideSource(rides=80, draws=4, duration=40.0, changes=TRAINED)
 KEPT = 0.3
 """Rides for the best epoch and the covariance, as a share of those of the training; riders differ: 12 are too few."""
 RIDDEN = FitConfig(epochs=14, window=125, learning_rate=3e-3)
-CORRECTED = {"two-gyro": "two-gyro", "force-inertial": "force-inertial-consistent", "whole-body": "whole-body"}
-"""Paper → filter that the network corrects: force-inertial from its consistent form, since the published one diverges
-in some rides; two-gyro from the published one, whose roll errs less on roads that are not level"""
+CORRECTED = {
+    "two-gyro": "two-gyro",
+    "force-inertial": "force-inertial-consistent",
+    "whole-body": "whole-body-consistent",
+}
+"""Paper → filter that the network corrects: the consistent form where the published one diverges in some rides;
+two-gyro from the published one, whose roll errs less on roads that are not level"""
 BICYCLE_SITES = {
     "two-gyro": ("bicycle_imu",),
     "force-inertial": ("bicycle_imu", "wheel"),

@@ -95,7 +95,7 @@ class Report:
         self._add(Entry(title, note.strip(), figure=path))
         return path
 
-    def animation(self, name: str, frames: Sequence[Figure], interval: float, title: str, note: str = "") -> Path:
+    def animation(self, name: str, frames: Sequence[Figure], interval: float, title: str) -> Path:
         """Add a moving picture, written to ``figures/<name>.gif``; returns the file.
 
         Args:
@@ -103,13 +103,12 @@ class Report:
             frames: pictures of equal size.
             interval: s from frame to frame.
             title: heading.
-            note: Markdown beneath.
 
         Raises:
             ValueError: a name or title that another entry has.
         """
         path = save_animation(frames, interval, self._new_file("figures", name, ".gif"))
-        self._add(Entry(title, note.strip(), figure=path))
+        self._add(Entry(title, figure=path))
         return path
 
     def numbers(self, rows: Sequence[Mapping[str, Any]]) -> None:

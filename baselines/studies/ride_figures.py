@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -38,6 +39,7 @@ def ride_figure(
     for ax, angle in zip(axes, shown, strict=True):
         curves = {name: error[angle] for name, error in errors.items() if angle in error}
         draw_angle(ax, ride.time, true_angle(study, truth, angle), curves, angle)
+    legend_above(axes[0])
     axes[-1].set_xlabel("time, s")
     report.figure(title, figure, title, SCALES)
     return ride
@@ -70,16 +72,18 @@ def draw_angle(
     scale = np.concatenate([true, true + list(errors.values())[-1]])
     low, high = np.nanmin(scale), np.nanmax(scale)
     margin = 0.25 * (high - low) + 1.0
-    ax.set(ylabel=f"{label}, deg", ylim=(low - margin, high + margin))
-    legend_above(ax)
+    ax.set(ylabel=f"{symbol(label)}, deg", ylim=(low - margin, high + margin))
 
 
-def with_band(
-    ax: Any, time: np.ndarray, error: np.ndarray, estimate: Estimate, color: str, label: str, state: int = 0
-) -> None:
-    """An error, deg, within three of the filter's standard deviations of that element of its state."""
+def symbol(angle: str) -> str:
+    """An angle of a paper with its index below the line: φ_h, θ1, φr2."""
+    return re.sub(r"^([α-ω])_?(\w+)$", r"$\\mathrm{\1}_{\2}$", angle)
+
+
+def with_band(ax: Any, time: np.ndarray, error: np.ndarray, estimate: Estimate, color: str, label: str) -> None:
+    """An error, deg, within three of the filter's standard deviations of the first element of its state."""
     assert estimate.covariance is not None
-    band = 3.0 * np.sqrt(estimate.covariance[: len(time), state, state]) / DEG
+    band = 3.0 * np.sqrt(estimate.covariance[: len(time), 0, 0]) / DEG
     ax.plot(time, error[: len(time)], color=color, linewidth=0.9, label=label)
     ax.plot(time, np.stack([-band, band], axis=-1), color=color, linewidth=0.6, alpha=0.6)
 
@@ -109,7 +113,7 @@ def spread_figure(results: Sequence[Mapping[str, Any]], angles: Sequence[str]) -
         ax.plot(time, mean, color=DRAWN[-1], linewidth=1.0)
         ax.plot(time, np.stack([mean - deviation, mean + deviation], -1), "--", color=DRAWN[-1], linewidth=0.8)
         ax.axhline(0.0, color=TRUTH_COLOR, linewidth=0.6)
-        ax.set_ylabel(f"error of {angle}, deg", fontsize=8.5)
+        ax.set_ylabel(f"error of {symbol(angle)}, deg", fontsize=8.5)
     axes[-1].set_xlabel("time, s (solid: mean over rides, dashed: one standard deviation)")
     return figure
 

@@ -155,9 +155,10 @@ def main(words: list[str] | None = None) -> list[tuple[int, float]]:
             csv.writer(file).writerows([("steps", "reward"), *curve])
     if args.figure:
         figure, axes = pyplot.subplots(figsize=(5.0, 3.0), layout="constrained")
-        axes.plot(*zip(*curve, strict=True))
-        axes.set(xlabel="steps", ylabel="mean reward of a step", title=" ".join([args.id, *args.option]))
-        axes.title.set_fontsize(9)
+        steps, rewards = zip(*curve, strict=True)
+        axes.plot(np.divide(steps, 1000.0), rewards)
+        axes.set(xlabel="thousand steps", ylabel="mean reward of a step")
+        axes.set_title("\n".join([args.id, " ".join(args.option)]), fontsize=9)
         figure.savefig(args.figure, dpi=120)
     return curve
 

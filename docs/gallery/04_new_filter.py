@@ -55,7 +55,7 @@ class GravityTracker(Model):
         return z["imu/acc"] - expected, expand(self.gravity, 2) * unit, expand(self.accelerometer_noise**2, 2) * unit
 
     def pose(self, x):
-        """What is told."""
+        """The outputs."""
         return {"up": normalize(x)}
 
 

@@ -15,15 +15,21 @@ from __future__ import annotations
 import numpy as np
 
 from ...filters.compile.cache import jit
+from ...filters.core import rotation
 
 BASE_SIZE = 13
 """numbers of a state that belong to the base"""
-POSITION, MATRIX, VELOCITY, TURNING = slice(0, 3), slice(3, 12), slice(12, 15), slice(15, 18)
-"""columns of frames"""
+POSITION, VELOCITY, TURNING = slice(0, 3), slice(12, 15), slice(15, 18)
+"""columns of frames, see also :func:`orientations`"""
 TREE_COLUMNS = 20
 """columns of a tree ``(n, 20)``: index of the parent (−1: the base); 1 if the joint slides, 0 if it turns; its axis, in
 the child's frame; rotation matrix of the child at zero, in the parent's frame; the joint in the parent's frame, m; the
 child's centre from the joint, in the child's frame, m. All frames are those of principal axes in centres of mass."""
+
+
+def orientations(frames: np.ndarray) -> np.ndarray:
+    """Quaternions ``(..., 4)`` of frames ``(..., 18)``: principal axes to world."""
+    return rotation.from_matrix(frames[..., 3:12].reshape(*frames.shape[:-1], 3, 3))
 
 
 @jit
@@ -136,7 +142,30 @@ def add_force(tree, frames, link, force, point, forces):  # type: ignore[no-unty
 
 
 @jit
-def move_links_of_many(tree, states, frames):  # type: ignore[no-untyped-def]
-    """:func:`move_links` for several states ``(k, 13 + 2 n)`` → ``(k, n + 1, 18)``."""
-    for index in range(states.shape[0]):
-        move_links(tree, states[index], frames[index])
+def carry_frames(frames, arms, duration, found):  # type: ignore[no-untyped-def]
+    """Motion of points of links, such as the origins of their body frames, after physics steps.
+
+    Args:
+        frames: ``(n, 2, k, 18)`` before and after each step.
+        arms: ``(k, 3)`` of the points from the centres, in principal axes, m.
+        duration: of a step, s.
+        found: ``(4, k, n, 3)``, overwritten: position (m), velocity (m/s), and over the step acceleration (m/s²) and
+            angular acceleration (rad/s²), world axes.
+    """
+    place, speeds = np.empty(3), np.empty((2, 3))
+    for index in range(frames.shape[0]):
+        for link in range(frames.shape[2]):
+            for side in range(2):
+                here = frames[index, side, link]
+                for i in range(3):
+                    place[i] = here[3 + 3 * i] * arms[link, 0] + here[4 + 3 * i] * arms[link, 1]
+                    place[i] += here[5 + 3 * i] * arms[link, 2]
+                wx, wy, wz = here[15], here[16], here[17]
+                speeds[side, 0] = here[12] + wy * place[2] - wz * place[1]
+                speeds[side, 1] = here[13] + wz * place[0] - wx * place[2]
+                speeds[side, 2] = here[14] + wx * place[1] - wy * place[0]
+            before, after = frames[index, 0, link], frames[index, 1, link]
+            for i in range(3):
+                found[0, link, index, i], found[1, link, index, i] = after[i] + place[i], speeds[1, i]
+                found[2, link, index, i] = (speeds[1, i] - speeds[0, i]) / duration
+                found[3, link, index, i] = (after[15 + i] - before[15 + i]) / duration

@@ -9,38 +9,20 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Sequence
-from typing import NamedTuple
+from operator import itemgetter
 
 import numpy as np
 
 from ...filters.core import rotation
 from ...filters.support.optional import extra
-from .kinematics import BASE_SIZE, MATRIX, POSITION, TREE_COLUMNS, TURNING, VELOCITY, add_force, move_links
+from .kinematics import BASE_SIZE, TREE_COLUMNS, add_force, move_links
 from .world import BASE, Physics, Vector, floats
 
 with extra("sim"):
     import pybullet
 
 Tuple3 = tuple[float, float, float]
-
-
-class CentreMotion(NamedTuple):
-    """Motion of the centre-of-mass frames of n links, world axes."""
-
-    position: np.ndarray
-    """(..., n, 3) m"""
-    orientation: np.ndarray
-    """(..., n, 4) principal axes to world"""
-    velocity: np.ndarray
-    """(..., n, 3) m/s"""
-    angular_velocity: np.ndarray
-    """(..., n, 3) rad/s"""
-
-    @classmethod
-    def of_frames(cls, frames: np.ndarray) -> CentreMotion:
-        """From the rows of :mod:`.kinematics` ``(..., n, 18)``."""
-        matrices = frames[..., MATRIX].reshape(*frames.shape[:-1], 3, 3)
-        return cls(frames[..., POSITION], rotation.from_matrix(matrices), frames[..., VELOCITY], frames[..., TURNING])
+FIRST, SECOND = itemgetter(0), itemgetter(1)
 
 
 class Multibody:
@@ -98,12 +80,13 @@ class Multibody:
     @property
     def state(self) -> np.ndarray:
         """State ``(13 + 2 n,)`` of :mod:`.kinematics` now; overwritten when it is read after a change."""
-        if self._read_at != self.physics.changes:
-            position, orientation, velocity, turning = self.physics.base_tuples(self.body)
-            rows = pybullet.getJointStates(self.body, self._all, self.physics.client)
-            angles, rates = [row[0] for row in rows], [row[1] for row in rows]
+        physics = self.physics
+        if self._read_at != physics.changes:
+            position, orientation, velocity, turning = physics.base_tuples(self.body)
+            rows = pybullet.getJointStates(self.body, self._all, physics.client)
+            angles, rates = map(FIRST, rows), map(SECOND, rows)
             self._pack(self._bytes, 0, *position, *orientation, *velocity, *turning, *angles, *rates)
-            self._read_at = self.physics.changes
+            self._read_at = physics.changes
         return self._state
 
     @property
@@ -114,9 +97,11 @@ class Multibody:
             self._moved_at = self.physics.changes
         return self._frames
 
-    def centre_motion(self, links: Sequence[int]) -> CentreMotion:
-        """Motion of the centre-of-mass frames of links; the base may be among them."""
-        return CentreMotion.of_frames(self.frames[np.array(links) + 1])
+    def motion(self) -> tuple[np.ndarray, np.ndarray, bool]:
+        """:attr:`state`, :attr:`frames`, and whether the caller must still move these, by :func:`.move_links`."""
+        late = self._moved_at != self.physics.changes
+        self._moved_at = self.physics.changes
+        return self.state, self._frames, late
 
     def joint_tuples(self, links: Sequence[int]) -> list[tuple[float, float]]:
         """Angle (rad) and rate (rad/s) of the joints above ``links``."""
@@ -134,8 +119,7 @@ class Multibody:
 
     def apply(self) -> None:
         """Let :attr:`forces` act during the next step, and begin anew with zeros."""
-        client, values = self.physics.client, self.forces.tolist()
-        centre = self.state[:3].tolist()
+        client, values, centre = self.physics.client, self.forces.tolist(), self.state[:3].tolist()
         pybullet.applyExternalForce(self.body, BASE, values[:3], centre, pybullet.WORLD_FRAME, client)
         pybullet.applyExternalTorque(self.body, BASE, values[3:6], pybullet.WORLD_FRAME, client)
         pybullet.setJointMotorControlArray(
@@ -150,44 +134,6 @@ class Multibody:
     def push(self, link: int, force: Vector, point: Vector) -> None:
         """Add to :attr:`forces` a force (N) on a link at a point (m), world axes."""
         add_force(self.tree, self.frames, link, (*force,), (*point,), self.forces)
-
-
-def newton_euler(
-    before: CentreMotion,
-    after: CentreMotion,
-    masses: np.ndarray,
-    moments: np.ndarray,
-    point: np.ndarray,
-    duration: float,
-    gravity: float,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Total wrench of external contacts on some links, from the rate of change of their momentum.
-
-    Force = Σ m (Δv/Δt − g), moment about ``point`` = Σ (x − point) × m (Δv/Δt − g) + Δ(Σ R I Rᵀ ω)/Δt.
-
-    Args:
-        before: motion before a physics step.
-        after: motion after it; the step's accelerations belong to positions ``before``, as the integrator has it.
-        masses: ``(n,)`` kg.
-        moments: ``(n, 3)`` principal moments of inertia, kg·m².
-        point: ``(..., 3)`` m, world.
-        duration: of the step, s.
-        gravity: m/s², along −z.
-
-    Returns:
-        Force ``(..., 3)`` N and moment ``(..., 3)`` N·m, world axes.
-    """
-    acceleration = (after.velocity - before.velocity) / duration
-    forces = masses[:, None] * (acceleration + np.array((0.0, 0.0, gravity)))
-    spin = (spin_momentum(after, moments) - spin_momentum(before, moments)) / duration
-    arms = before.position - point[..., None, :]
-    return forces.sum(axis=-2), (rotation.cross(arms, forces) + spin).sum(axis=-2)
-
-
-def spin_momentum(motion: CentreMotion, moments: np.ndarray) -> np.ndarray:
-    """Angular momentum ``(..., n, 3)`` of links about their own centres of mass, N·m·s, world axes."""
-    rate = rotation.rotate_back(motion.orientation, motion.angular_velocity)
-    return rotation.rotate(motion.orientation, moments * rate)
 
 
 def connect_points(
@@ -220,4 +166,4 @@ def connect_points(
 def constraint_forces(physics: Physics, constraints: Sequence[int]) -> list[Tuple3]:
     """Force on the child of each point-to-point constraint during the last step, N, world axes."""
     client, state = physics.client, pybullet.getConstraintState
-    return [state(each, client)[:3] for each in constraints]
+    return [state(each, client) for each in constraints]

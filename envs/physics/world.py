@@ -29,6 +29,8 @@ with extra("sim"):
 
 BASE = -1
 """Index of the base of a body where a link is asked for."""
+SOLVER_ITERATIONS = 30
+"""Sweeps of the constraint solver, which close the loops of a rider's limbs within 0.1 mm."""
 
 Vector = Sequence[float] | np.ndarray
 Triple = tuple[float, float, float]
@@ -50,7 +52,6 @@ class Physics:
     Args:
         time_step: length of one physics step, s. The integrator is semi-implicit Euler: errors are of first order.
         gravity: m/s².
-        solver_iterations: sweeps of the constraint solver; 30 close the loops of a rider's limbs within 0.1 mm.
         gui: open PyBullet's window.
 
     Raises:
@@ -62,7 +63,6 @@ class Physics:
         *,
         time_step: float = 1e-3,
         gravity: float = STANDARD_GRAVITY,
-        solver_iterations: int = 30,
         gui: bool = False,
     ) -> None:
         self.client = -1
@@ -83,7 +83,7 @@ class Physics:
         pybullet.setGravity(0.0, 0.0, -self.gravity, physicsClientId=self.client)
         pybullet.setPhysicsEngineParameter(
             fixedTimeStep=self.time_step,
-            numSolverIterations=solver_iterations,
+            numSolverIterations=SOLVER_ITERATIONS,
             numSubSteps=0,
             deterministicOverlappingPairs=1,
             physicsClientId=self.client,
@@ -275,7 +275,7 @@ class Physics:
 
     def step(self) -> None:
         """Advance by one time step; forces applied before act in it and end with it."""
-        pybullet.stepSimulation(physicsClientId=self.client)
+        pybullet.stepSimulation(self.client)
         self.steps += 1
         self.changes += 1
 

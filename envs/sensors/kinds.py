@@ -68,15 +68,9 @@ class SiteMotion:
         """``(m, 3)`` m/s², sensor axes, of the last m samples: what an accelerometer reads without gravity.
 
         With ``interval`` the reading has gravity in the attitude half way through the interval, see
-        :func:`.interval_readings`; :attr:`mean_up` is the upward direction there.
+        :func:`.interval_readings`.
         """
         return self._force(0.0)
-
-    @property
-    def mean_up(self) -> np.ndarray:
-        """``(m, 3)`` upward direction, sensor axes, with which specific force − external acceleration = g · up."""
-        orientation = self.now.orientation if self.sampling == "instant" else self._mean[1]
-        return rotation.up_in_body(orientation)
 
     def _force(self, gravity: float) -> np.ndarray:
         if self.sampling == "instant":

@@ -319,14 +319,16 @@ class NoiseProcess:
 
     def _counted(self, rows: np.ndarray) -> np.ndarray:
         """Whole counts; a lost sample takes its counts with it and leaves the carry as it is."""
-        carry, counted = self._state.carry, np.full_like(rows, np.nan)
-        for number, row in enumerate(rows):
-            if not np.isnan(row[0]):
-                whole = row + carry
-                counted[number] = np.rint(whole / self._count) * self._count
-                carry = whole - counted[number]
-        self._state.carry = carry
-        return counted
+        # in plain floats, ten times as fast as in arrays of one value
+        columns, carries = rows.T.tolist(), self._state.carry.tolist()
+        for axis, column in enumerate(columns):
+            for number, value in enumerate(column):
+                if value == value:
+                    whole = value + carries[axis]
+                    column[number] = round(whole / self._count) * self._count
+                    carries[axis] = whole - column[number]
+        self._state.carry = np.array(carries)
+        return np.array(columns).T
 
 
 def error_size(form: Form, size: int) -> int:

@@ -14,6 +14,7 @@ import numpy as np
 from gymnasium import spaces
 
 from ...filters.core.quantity import Channel
+from ...filters.core.sampling import latest
 
 FRESH = "fresh"
 """Key of the flags in an observation."""
@@ -90,7 +91,7 @@ class Sensing:
                 limit, known = self._limits[channel.name], ~np.isnan(values).any(axis=1)
                 fresh[:, index] = known
                 clipped = np.minimum(np.maximum(values, -limit), limit).astype(np.float32)
-                last = np.maximum.accumulate(np.where(known, np.arange(count), -1))
+                last = latest(known)
                 rows = np.where(last[:, None] >= 0, clipped[last], rows)
             seen[channel.name], self.held[channel.name] = rows, rows[-1].copy()
         return {**seen, FRESH: fresh}

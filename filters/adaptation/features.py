@@ -29,6 +29,7 @@ import numpy as np
 from ..core.kalman import KalmanFilter
 from ..core.quantity import GRAVITY, Estimate
 from ..core.rotation import cross
+from ..core.sampling import latest
 from .time_scales import FeatureMemory, Features
 
 STREAMS = ("innovation", "gyr", "acc", "external", "lean")
@@ -144,7 +145,5 @@ def before(values: np.ndarray, held: np.ndarray) -> tuple[np.ndarray, np.ndarray
     row = np.concatenate([held[None], values])
     known = np.isfinite(row).all(axis=-1)
     if not known[1:].all():
-        indices = np.arange(len(row)).reshape(-1, *(1,) * (known.ndim - 1))
-        latest = np.maximum.accumulate(np.where(known, indices, 0), axis=0)
-        row = np.take_along_axis(row, latest[..., None], axis=0)
+        row = np.take_along_axis(row, np.maximum(latest(known), 0)[..., None], axis=0)
     return row[:-1], row[-1]

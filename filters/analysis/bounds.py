@@ -27,7 +27,7 @@ import numpy as np
 from ..core.estimator import check_measurements
 from ..core.kalman import correct
 from ..core.model import Model
-from ..core.sampling import filled, hold, join, split
+from ..core.sampling import filled, join, last_readings, split
 
 
 class Linearisation(NamedTuple):
@@ -78,10 +78,7 @@ def samples_of(model: Model, measurements: Mapping[str, Any]) -> tuple[np.ndarra
     """All channels of a model side by side ``(T, d)``: as recorded, and with the last valid sample held."""
     arrays = check_measurements(model.channels, measurements, time_axis=True)
     samples = np.asarray(join(arrays, model.channels), dtype=float)
-    held = [samples[0]]
-    for sample in samples[1:]:
-        held.append(hold(sample, held[-1]))
-    return samples, np.array(held)
+    return samples, last_readings(samples)
 
 
 def inputs_of_steps(model: Model, held: np.ndarray) -> tuple[dict[str, Any], dict[str, Any]]:

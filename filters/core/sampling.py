@@ -56,6 +56,18 @@ def hold(sample: Array, held: Array) -> Array:
     return xp.where(xp.isfinite(sample), sample, held)
 
 
+def latest(known: np.ndarray) -> np.ndarray:
+    """Index of the last known row at or before each of the rows ``(T, ...)``, −1 before the first."""
+    rows = np.arange(len(known)).reshape(-1, *(1,) * (known.ndim - 1))
+    return np.maximum.accumulate(np.where(known, rows, -1), axis=0)
+
+
+def last_readings(samples: np.ndarray) -> np.ndarray:
+    """The last finite value of every element of samples ``(T, d)`` so far, NaN before the first."""
+    index = latest(np.isfinite(samples))
+    return np.where(index >= 0, np.take_along_axis(samples, np.maximum(index, 0), axis=0), np.nan)
+
+
 def aged(age: Array, sample: Array, channels: tuple[Channel, ...], dt: Array) -> Array:
     """Seconds ``(*batch, channels)`` since each channel's last complete sample, after a time step."""
     xp = namespace(sample)

@@ -34,6 +34,7 @@ from ..core.quantity import (
     Quantity,
 )
 from ..core.rotation import from_euler_zyx, up_in_body
+from ..core.sampling import last_readings
 from ..support.optional import extra
 
 QUARTER_TURN = np.asarray(from_euler_zyx(np.array(0.5 * np.pi), np.array(0.0), np.array(0.0)))
@@ -171,10 +172,3 @@ class ExternalPackage:
         if self.gives_bias:
             pose["gyroscope_bias"] = output[..., 4:]
         return Estimate({quantity.name: pose[quantity.name] for quantity in self.outputs})
-
-
-def last_readings(samples: np.ndarray) -> np.ndarray:
-    """The last finite value of every element of samples ``(T, d)`` so far, NaN before the first."""
-    latest = np.where(np.isfinite(samples), np.arange(len(samples))[:, None], -1)
-    latest = np.maximum.accumulate(latest, axis=0)
-    return np.where(latest >= 0, np.take_along_axis(samples, np.maximum(latest, 0), axis=0), np.nan)

@@ -44,6 +44,7 @@ def rider_settings(estimators: Sequence[str], seed: int, *, quick: bool) -> Ride
 
 def rider_tables(settings: RiderSuite, args: Any, folder: Run, out: Output) -> RiderPart:
     """Errors, each angle, bounds, consistency: printed, and as parts of the report."""
+    from ...baselines.comparison.rider_tables import by_group
     from ...baselines.comparison.tasks import Results
     from ...baselines.error_table import ErrorTable
     from ...baselines.scoring import COLUMNS
@@ -54,14 +55,15 @@ def rider_tables(settings: RiderSuite, args: Any, folder: Run, out: Output) -> R
     learning = f"; references learn from {settings.training} others" if settings.training else ""
     out.say(f"riders: {settings.rides} rides of each group{learning}; rides are simulated once and kept")
     rows = suite.compare(settings, folder.folder / "tasks", processes=args.processes, progress=True)
+    numbers = tables.summary(rows)
     sections = {}
     for paper in settings.papers:
         for title, table in (
-            ("mean over angles, RMS in deg [95 % over riders]", tables.error_table(rows, paper)),
+            ("mean over angles, RMS in deg [95 % over riders]", by_group(numbers, paper, "error")),
             ("each angle, RMS in deg (unseen riders / other scenarios / aggressive riders)",
              tables.angle_table(rows, paper)),
-            ("RMS error in multiples of the posterior bound, mean over angles", tables.bound_table(rows, paper)),
-            ("NEES of an angle, share of errors in the stated 90 %", tables.consistency_table(rows, paper)),
+            ("RMS error in multiples of the posterior bound, mean over angles", by_group(numbers, paper, "bound")),
+            ("NEES of an angle, share of errors in the stated 90 %", by_group(numbers, paper, "consistency")),
         ):  # fmt: skip
             # twenty angles fit into the report, not into a terminal
             if len(table[0]) <= MOST_COLUMNS:
@@ -73,7 +75,7 @@ def rider_tables(settings: RiderSuite, args: Any, folder: Run, out: Output) -> R
     groups = {trajectory: trajectory.split(":")[0] for _, trajectory, *_ in means}
     page = Results(ErrorTable(means, columns=list(COLUMNS)), groups, [])
     found = [{"suite": SUITE, **row} for row in tables.results(rows)]
-    return RiderPart(found, sections, {SUITE: page}, tables.summary(rows))
+    return RiderPart(found, sections, {SUITE: page}, numbers)
 
 
 def rider_sweeps(settings: RiderSuite, args: Any, folder: Run, out: Output) -> dict[str, str]:

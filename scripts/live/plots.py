@@ -55,7 +55,7 @@ def curve_figure(
         red, green, blue = colours.get(label, TRUTH_COLOUR)
         line = {"color": f"rgb({red},{green},{blue})", "width": 1.5, "dash": "dash" if label == TRUTH else "solid"}
         figure.add_trace(Scatter(x=time[::stride], y=values[::stride], name=label, mode="lines", line=line))
-    figure.add_vline(x=now, line={"color": "rgb(120,120,120)", "width": 1})
+    figure.add_vline(x=now, line={"color": "rgb(60,60,60)", "width": 1.2})
     figure.update_layout(
         template="simple_white",
         margin=MARGIN,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -17,7 +18,9 @@ if TYPE_CHECKING:
     from viser import ViserServer
 
 OPACITY = 0.4
-"""of the bodies of estimates"""
+"""of the bodies of a single estimate; those of several are paler, so that the truth keeps its colours behind them"""
+FIELD, ASPECT = 0.9, 1.2
+"""Vertical field of view of the camera, rad, and width over height of the picture beside the controls."""
 TRAIL = 3.0
 """s"""
 TRAIL_POINTS = 60
@@ -56,8 +59,8 @@ class Look:
     """by which the bodies of each further estimate are larger, so that equal ones do not flicker"""
 
 
-RIDE = Look((1.0, -2.9, 0.5), 0.8, 1.1, 0.016, 0.012, 0.5, 0.0, 1.9)
-DEVICE = Look((0.02, -0.68, 0.30), 0.0, 0.20, 0.0025, 0.002, 0.05, -0.25, 0.16, 0.02)
+RIDE = Look((1.0, -2.9, 0.5), 0.8, 1.9, 0.016, 0.012, 0.5, 0.0, 1.9)
+DEVICE = Look((0.02, -0.68, 0.30), 0.0, 0.26, 0.0025, 0.002, 0.05, -0.25, 0.16, 0.02)
 
 
 @dataclass
@@ -144,7 +147,14 @@ class MotionScene:
         self._lowest: float | None = None
         server.initial_camera.look_at = (0.0, 0.0, 0.0)
         server.initial_camera.position = look.camera
-        server.initial_camera.fov = 0.9
+        server.initial_camera.fov = FIELD
+
+    def step_back(self) -> None:
+        """Begin with the camera so far away that all figures are seen side by side."""
+        camera = np.array(self.look.camera)
+        width = 2.0 * np.linalg.norm(camera) * np.tan(0.5 * FIELD) * ASPECT
+        away = max(1.0, len(self.labels) * self.look.beside / width)
+        self.server.initial_camera.position = tuple(float(part) for part in away * camera)
 
     def _add_mesh(self, name: str, mesh: Mesh, label: str, colour: tuple[int, int, int]) -> None:
         own = 255.0 * np.array(mesh.colour)
@@ -156,7 +166,7 @@ class MotionScene:
             mesh.vertices,
             mesh.faces,
             color=(red, green, blue),
-            opacity=None if truth else OPACITY,
+            opacity=None if truth else OPACITY / math.sqrt(len([each for each in self.labels if each != TRUTH])),
             scale=1.0 + self.look.shell * self.labels.index(label),
             cast_shadow=truth,
             receive_shadow=truth,

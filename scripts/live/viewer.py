@@ -196,6 +196,8 @@ class Viewer:
             found = next((title for title in titles if plot in title), None)
             self._choice.value = look_up("plot", plot, titles) if found is None else found
         self._beside.value = beside
+        if beside:
+            self._scene.step_back()
         self._act(lambda: None)
 
     def replace(self, motion: Motion) -> None:

@@ -19,7 +19,7 @@ def results() -> Results:
     generator = np.random.default_rng(0)
     rows = [
         (name, f"ride {number}", "up", metric, scale * generator.uniform(0.8, 1.2), "deg")
-        for name, scale in (("bounded-motion", 0.5), ("vqf", 0.7), ("tilt", 9.0))
+        for name, scale in (("bounded-motion", 0.5), ("vqf", 7.0), ("tilt", 20.0))
         for number in range(6)
         for metric in ("inclination", "inclination largest")
     ]
@@ -54,10 +54,14 @@ def test_page_works_in_a_browser(tmp_path: Path) -> None:
         assert heading.get_attribute("aria-sort") == "descending"
         assert page.locator(".xtitle").first.text_content() == "RMS error, deg"
         assert names.all_inner_texts() == ["tilt", "vqf", "bounded-motion"]
+        page.locator("th", has_text="95 %").first.click()
+        assert names.all_inner_texts() == ["bounded-motion", "vqf", "tilt"]  # 5.6 before 16, as numbers
         page.fill("#filter", "vq tilt")
-        assert names.all_inner_texts() == ["tilt", "vqf"]
+        assert names.all_inner_texts() == ["vqf", "tilt"]
+        plotted = "document.querySelector('.js-plotly-plot').data[0].y"
+        assert page.evaluate(plotted) == ["tilt", "vqf"]
         page.locator("#kinds input").nth(1).click()
-        assert len(names.all_inner_texts()) == 1
+        assert len(names.all_inner_texts()) == len(page.evaluate(plotted)) == 1
         page.locator("summary").nth(2).click()
         page.wait_for_selector(".hm")
         window.close()

@@ -14,6 +14,7 @@ from typing import Any, Self
 import numpy as np
 
 from ....filters.core.backend import Array, constant, namespace
+from ....filters.core.sampling import latest
 
 LARGEST = 25.0
 """what a feature counts at most: five standard deviations, squared"""
@@ -95,7 +96,7 @@ class WithUnlikeness:
         told = self.network.advance(features, due, memory, own)
         found = self.unlikeness(features)
         # the last update that was due, -1 where there was none
-        last = np.maximum.accumulate(np.where(due == 1.0, np.arange(len(due))[:, None], -1), axis=0)
+        last = latest(due == 1.0)
         kept = np.take_along_axis(found, np.maximum(last, 0), axis=0)
         unlike = np.where(last < 0, output[None, :, -1], kept)
         outputs = np.concatenate([told, unlike[..., None]], axis=-1)

@@ -44,7 +44,7 @@ ITEMS = (
         "Cardou's polynomial roots err less than Parsa's method in five of six runs",
         shown=("Table 2.1",),
         decided=((TWO, "Table 2.1: polynomial roots err less"),),
-        causes=((TWO, "With white 0"),),
+        causes=((TWO, "With white 0"), (TWO, "Table 2.1: neither polynomial roots nor Parsa")),
     ),
     Item(
         "Table 2.1", "sizes of the errors", shown=("Table 2.1",), decided=((TWO, "Table 2.1: the weighted error lies"),)
@@ -154,7 +154,7 @@ ITEMS = (
             (FIVE, "controller: tilt sensor"),
             (FIVE, "controller: Marins, σ_q = 0.01"),
         ),
-        causes=((FIVE, "controller: proposed, exact rotation"),),
+        causes=((FIVE, "controller: proposed, exact rotation"), (FIVE, "controller: the first-order transition")),
     ),
     Item("Figure 5.8", "path of the controller", shown=("Figure 5.8",)),
     Item(
@@ -162,7 +162,7 @@ ITEMS = (
         "OCTA without gyroscope: errors within ±3°",
         shown=("Figures 5.9 and 5.10",),
         decided=((FIVE, "octa: proposed, exact rotation, no gyroscope"),),
-        causes=((FIVE, "octa: proposed, exact rotation, with gyroscope"),),
+        causes=((FIVE, "octa: proposed, exact rotation, with gyroscope"), (FIVE, "octa: without a gyroscope")),
     ),
     Item("Figure 5.11", "path of OCTA", shown=("Figure 5.11",)),
     Item(

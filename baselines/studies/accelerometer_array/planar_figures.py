@@ -109,7 +109,8 @@ def more_figures(report: Report, curves: Mapping[str, Any]) -> None:
     legend_above(axes[0])
     report.figure("more-methods", figure, "Figure 3.12: averaging, linear and unscented filter, another walk")
     title = "Figure 3.13: errors of the extended filter alone, another walk"
-    report.figure("extended-alone", error_figure(time, curves["errors"], (EXTENDED,), 15.0), title)
+    largest = 1.05 * float(np.abs(curves["errors"][EXTENDED]).max())
+    report.figure("extended-alone", error_figure(time, curves["errors"], (EXTENDED,), largest), title)
 
 
 def planar_pictures(study: Study, report: Report) -> None:

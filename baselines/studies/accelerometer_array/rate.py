@@ -192,6 +192,13 @@ def claims(rows: list[Row]) -> list[Claim]:
             for kind in ERRORS
             if kind != CALIBRATED and any(row["errors"] == kind for row in rows)
         ),
+        Claim.less(
+            "Table 2.1: neither polynomial roots nor Parsa err by less than two thirds of what a rate of zero does",
+            mean_of(rows, "rms", method=ZERO, errors=CALIBRATED),
+            min(mean["polynomial roots"], mean["Parsa"]),
+            "rad/s",
+            factor=1.5,
+        ),
         Claim.within(published, mean[DEFAULT], min(thesis), max(thesis), "rad/s"),
         Claim.less(noise, white_only[DEFAULT], float(np.mean(thesis)), "rad/s", factor=0.1),
         Claim.less("Estimating biases too lowers the error", mean[WITH_BIASES], mean[DEFAULT], "rad/s"),

@@ -73,8 +73,8 @@ def edges() -> np.ndarray:
     return 0.5 * BOX * np.array([*bottom, *top, *rest], dtype=float)
 
 
-def controller_figure(seed: int) -> Any:
-    """Figure 5.24: the true controller above, the virtual one below, at four moments."""
+def controller_figure(seed: int) -> tuple[Any, float]:
+    """Figure 5.24: the true controller above, the virtual one below, at four moments; half the width of a box, m."""
     trajectory, estimate = shown("pointing", seed)
     figure, axes = new_spatial_figure(10.0, 5.2, 2, len(SHOWN))
     place = trajectory.truth["position"] - trajectory.truth["position"][0]
@@ -93,10 +93,11 @@ def controller_figure(seed: int) -> Any:
             ax.plot(*tip.T, color=DRAWN[1], linewidth=1.0)
             ax.set(xlim=(-limit, limit), ylim=(-limit, limit), zlim=(-limit, limit))
             ax.view_init(ELEVATION, AZIMUTH)
-            ax.set_box_aspect((1.0, 1.0, 1.0), zoom=1.1)
-            ax.tick_params(labelsize=6, pad=-3)
-            ax.set_title(f"{name}, {10.0 + after:g} s", fontsize=9, y=0.98)
-    return figure
+            ax.set_box_aspect((1.0, 1.0, 1.0))
+            # eight small boxes of one size: marks without numbers, and the size in the caption
+            ax.set(xticklabels=(), yticklabels=(), zticklabels=())
+            ax.set_title(f"{name}, {10.0 + after:g} s", fontsize=9, y=1.04)
+    return figure, limit
 
 
 def position_figure(curves: dict[str, Any]) -> Any:
@@ -120,7 +121,9 @@ def virtual(study: Study, report: Report) -> None:
     """Pictures of the virtual controller, and how far its position goes at rest and in motion."""
     seed = study.seed_of("virtual", 0)
     found = {gesture: study.cached(f"virtual {gesture}", positions, gesture, seed) for gesture in ("pointing", "rest")}
-    report.figure("virtual-controller", controller_figure(seed), "Figure 5.24: true and virtual controller")
+    figure, half = controller_figure(seed)
+    note = f"Boxes are {2.0 * half:.2g} m wide; the orange line points along y."
+    report.figure("virtual-controller", figure, "Figure 5.24: true and virtual controller", note)
     title = "Figure 5.24: position of the virtual controller"
     report.figure("virtual-position", position_figure(found["pointing"]), title, "What is twice integrated leaves it.")
     sizes = {

@@ -18,13 +18,12 @@ UNITS = {"gyr": "angular rate, (rad/s)²/Hz", "acc": "acceleration, (m/s²)²/Hz
 COLOURS = (VERMILION, GREEN, PINK, AMBER, SKY)
 
 
-def spectra(simulated: Sequence[Summary], recorded: Mapping[str, Sequence[Summary]], title: str = "") -> Figure:
+def spectra(simulated: Sequence[Summary], recorded: Mapping[str, Sequence[Summary]]) -> Figure:
     """Power spectral densities: range and median of the episodes, and every recording.
 
     Args:
         simulated: of one recipe and site.
         recorded: group → its recordings.
-        title: above the figure.
     """
     known = all("acc" in each.spectra for group in (simulated, *recorded.values()) for each in group)
     shown = ("gyr", "acc" if known else "force")
@@ -53,6 +52,4 @@ def spectra(simulated: Sequence[Summary], recorded: Mapping[str, Sequence[Summar
     axes[-1].set_xlabel("frequency, Hz")
     legend_above(axes[0])
     figure.align_ylabels(axes)
-    if title:
-        figure.suptitle(title, fontsize=10.5, x=0.02, ha="left")
     return figure

@@ -9,7 +9,7 @@ import numpy as np
 from ....envs.data.trajectory import Trajectory
 from ....envs.sensors.ideal import STANDARD_GRAVITY
 from ....filters.core import rotation
-from .spectra import Spectrum, checked, sinusoid_share, spectrum, whole_stretches
+from .spectra import WINDOW, Spectrum, checked, sinusoid_share, spectrum, whole_stretches
 
 UNITS = {
     "gyr_rms": "deg/s",
@@ -71,8 +71,6 @@ def motion_spectra(
     site: str = "imu",
     *,
     orientation: str = "orientation",
-    position: str = "position",
-    part: slice | None = None,
 ) -> MotionSpectra:
     """Spectra of the gyroscope and accelerometer at ``site``.
 
@@ -82,14 +80,11 @@ def motion_spectra(
         trajectory: with the channels ``site/gyr`` in rad/s and ``site/acc`` in m/s².
         site: where the sensor is.
         orientation: name of the true orientation of this sensor.
-        position: name of its true position.
-        part: samples to take; None for all.
 
     Raises:
         ValueError: a channel is missing, or is never sampled for a second on end.
     """
     trajectory = trajectory.on_grid().reference_clock_corrected()
-    trajectory = trajectory if part is None else trajectory[part]
     for kind in ("gyr", "acc"):
         if f"{site}/{kind}" not in trajectory.measurements:
             known = ", ".join(trajectory.measurements)
@@ -106,8 +101,8 @@ def motion_spectra(
     try:
         if "acc" in signals:
             moved = spectrum(signals["acc"], rate)
-        if position in trajectory.truth:
-            slow = velocity_spectrum(trajectory.truth[position], rate)
+        if "position" in trajectory.truth:
+            slow = velocity_spectrum(trajectory.truth["position"], rate)
         return MotionSpectra(
             spectrum(signals["gyr"], rate), spectrum(signals["force"], rate), moved, slow, signals, rate
         )
@@ -123,12 +118,12 @@ def reports_means(trajectory: Trajectory, site: str) -> bool:
     return (sampling or [trajectory.metadata.get("sampling")])[0] == "interval"
 
 
-def velocity_spectrum(position: np.ndarray, rate: float, segment: float = 20.0) -> Spectrum | None:
-    """Spectrum of the velocity of a position ``(T, 3)`` in m; None if it is nowhere known for ``segment`` s."""
+def velocity_spectrum(position: np.ndarray, rate: float) -> Spectrum | None:
+    """Spectrum of the velocity of a position ``(T, 3)`` in m; None if it is nowhere known for :data:`WINDOW` s."""
     velocity = np.gradient(checked(position, rate), 1.0 / rate, axis=0)
-    if not any(True for _ in whole_stretches(velocity, rate, segment)):
+    if not any(True for _ in whole_stretches(velocity, rate, WINDOW)):
         return None
-    return spectrum(velocity, rate, segment)
+    return spectrum(velocity, rate, WINDOW)
 
 
 def statistics_of(spectra: MotionSpectra, bandwidth: float | None = None) -> dict[str, float]:

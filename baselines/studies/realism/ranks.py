@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ....envs.data.formats.load import load_recording
 from ....envs.data.trajectory import Trajectory
 from ....envs.recipes.recipe import Recipe
 from ....envs.recipes.registry import recipe
@@ -33,10 +31,10 @@ DRAWS = 1000
 """bootstrap draws of the episodes, for the interval of τ"""
 
 
-def installed(names: Sequence[str] = ESTIMATORS) -> list[str]:
-    """Those of the estimators whose packages are installed."""
+def installed() -> list[str]:
+    """Those of :data:`ESTIMATORS` whose packages are installed."""
     found = []
-    for name in names:
+    for name in ESTIMATORS:
         try:
             make_estimator(name)
         except (ImportError, MissingExtraError):
@@ -57,11 +55,6 @@ def inclination_errors(trajectory: Trajectory, estimators: Sequence[str]) -> dic
 def episode_errors(described: Mapping[str, Any], seed: int, index: int, estimators: Sequence[str]) -> dict[str, float]:
     """Errors on one episode of a recipe, for :meth:`.Study.map`."""
     return inclination_errors(recipe(described).episode(seed, index), estimators)
-
-
-def recording_errors(path: str, estimators: Sequence[str]) -> dict[str, float]:
-    """Errors on one recording, for :meth:`.Study.map`."""
-    return inclination_errors(load_recording(Path(path)).on_grid(), estimators)
 
 
 def simulated_errors(study: Study, made: Recipe, episodes: int, estimators: Sequence[str]) -> list[dict[str, float]]:

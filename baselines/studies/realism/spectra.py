@@ -14,7 +14,8 @@ LONGEST_GAP = 0.1
 SEGMENT = 8.0
 """s of a segment of Welch's method: a resolution of 0.125 Hz"""
 WINDOW = 20.0
-"""s of a window in which sinusoids are counted"""
+"""s of a window in which sinusoids are counted: a Hann window, under which one is three lines of the periodogram"""
+SINUSOIDS = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,20 +94,16 @@ def spectrum(values: np.ndarray, rate: float, segment: float = SEGMENT) -> Spect
     return Spectrum(np.fft.rfftfreq(length, 1.0 / rate), total / weight)
 
 
-def sinusoid_share(
-    values: np.ndarray, rate: float, *, count: int = 4, low: float = 0.1, high: float = np.inf, window: float = WINDOW
-) -> float:
-    """Share of the variance that the strongest sinusoids of each window and axis have.
+def sinusoid_share(values: np.ndarray, rate: float, *, low: float = 0.1, high: float = np.inf) -> float:
+    """Share of the variance that the four strongest sinusoids of each window and axis have.
 
     A motion made of a few sines has a share near one; broadband noise over ten hertz has about a tenth.
 
     Args:
         values: ``(T, size)``, NaN where missing.
         rate: Hz.
-        count: how many sinusoids a window and axis.
         low: Hz, lower end of the band whose variance counts.
         high: Hz, its upper end.
-        window: s; a Hann window is used, under which a sinusoid is three lines of the periodogram.
 
     Returns:
         The share of the summed variance of all axes, 0 to 1; NaN if no stretch is as long as a window, or there is no
@@ -116,17 +113,17 @@ def sinusoid_share(
         ValueError: ``values`` or ``rate`` has another form.
     """
     values = checked(values, rate)
-    length = round(window * rate)
+    length = round(WINDOW * rate)
     frequency = np.fft.rfftfreq(length, 1.0 / rate)
     inside = (frequency >= low) & (frequency <= high)
     found = total = 0.0
-    for part in whole_stretches(values, rate, window):
+    for part in whole_stretches(values, rate, WINDOW):
         for start in range(0, len(part) - length + 1, length):
             piece = part[start : start + length]
             lines = np.abs(np.fft.rfft((piece - piece.mean(axis=0)) * np.hanning(length)[:, None], axis=0)) ** 2
             lines = lines[inside]
             total += lines.sum()
-            for _ in range(count):
+            for _ in range(SINUSOIDS):
                 top = lines.argmax(axis=0)
                 for axis, line in enumerate(top):
                     near = slice(max(0, line - 1), line + 2)

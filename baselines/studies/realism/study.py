@@ -78,10 +78,11 @@ def containment(study: Study, report: Report, settings: Settings, groups: Sequen
 
 
 def recorded_summaries(groups: Sequence[Recorded]) -> dict[str, list[Summary]]:
-    """Group with its role → summaries of its recordings."""
+    """Group, with its role if that is called otherwise → summaries of its recordings."""
     found: dict[str, list[Summary]] = {}
     for group in groups:
-        found.setdefault(f"{group.group} ({group.role})", []).extend(
+        label = group.group if group.group == group.role else f"{group.group} ({group.role})"
+        found.setdefault(label, []).extend(
             summary(each, "imu", [SHARE_OF_RATE / each.dt], "orientation") for each in group.load()
         )
     return found

@@ -1,4 +1,4 @@
-"""Tables of the comparison: means with intervals over riders, each angle, consistency."""
+"""Numbers of the comparison: means with intervals over riders, consistency, each angle."""
 
 from __future__ import annotations
 
@@ -68,31 +68,26 @@ def told(method: str) -> str:
 
 
 def summary(rows: Sequence[Row]) -> list[dict[str, Any]]:
-    """The cells of the tables of all papers as JSON has them, one row for each paper, method and table.
+    """Numbers of each paper, method and group, for :mod:`poise.baselines.comparison.rider_tables`, as JSON has them.
 
-    Columns: paper, method, table (``error``, ``consistency`` or ``bound``), and the groups.
+    Columns: paper, method, group; ``error``, ``low`` and ``high``: mean of the RMS errors over angles, draws and
+    riders, deg, and its 95 % interval over riders; ``over bound``; ``nees`` and ``coverage`` of the stated 90 %.
     """
-    made = {"error": error_table, "consistency": consistency_table, "bound": bound_table}
-    papers = dict.fromkeys(row.paper for row in rows)
-    return [
-        {"paper": paper, "table": name}
-        | {key: None if isinstance(value, float) and np.isnan(value) else value for key, value in cells.items()}
-        for paper in papers
-        for name, table in made.items()
-        for cells in table(rows, paper)
-    ]
-
-
-def error_table(rows: Sequence[Row], paper: str) -> list[dict[str, str]]:
-    """Method × group: mean of the RMS errors over angles, draws and riders, deg, with 95 % interval over riders."""
-    table = []
-    for method, groups in by_method(rows, paper).items():
-        cells = {"method": told(method)}
-        for group, own in groups.items():
-            found = bootstrap_interval(lambda scores: float(scores.mean()), riders(own), tasks_too=True)
-            cells[group] = f"{found.value:.2f} [{found.low:.2f}, {found.high:.2f}]"
-        table.append(cells)
-    return table
+    found = []
+    for paper in dict.fromkeys(row.paper for row in rows):
+        for method, groups in by_method(rows, paper).items():
+            for group, own in groups.items():
+                error = bootstrap_interval(lambda scores: float(scores.mean()), riders(own), tasks_too=True)
+                numbers = {"error": error.value, "low": error.low, "high": error.high}
+                for name, values in (
+                    ("over bound", [row.over_bound for row in own]),
+                    ("nees", [row.nees for row in own]),
+                    ("coverage", [row.coverage for row in own]),
+                ):
+                    numbers[name] = float(np.mean(values))
+                known = {name: value if np.isfinite(value) else None for name, value in numbers.items()}
+                found.append({"paper": paper, "method": told(method), "group": group, **known})
+    return found
 
 
 def angle_table(rows: Sequence[Row], paper: str) -> list[dict[str, str]]:
@@ -107,27 +102,4 @@ def angle_table(rows: Sequence[Row], paper: str) -> list[dict[str, str]]:
             if np.isfinite([each[index] for each in errors]).all()
         }
         table.append({"method": method, **{name: cells.get(name, "–") for name in names}})
-    return table
-
-
-def consistency_table(rows: Sequence[Row], paper: str) -> list[dict[str, str]]:
-    """Methods with a covariance × group: mean NEES of an angle, and share of errors inside the stated 90 %."""
-    table = []
-    for method, groups in by_method(rows, paper).items():
-        if not all(np.isfinite([row.nees for row in own]).all() for own in groups.values()):
-            continue
-        cells: dict[str, Any] = {"method": method}
-        for group, own in groups.items():
-            nees, covered = np.mean([row.nees for row in own]), np.mean([row.coverage for row in own])
-            cells[group] = f"{nees:.2f}, {100.0 * covered:.0f} %"
-        table.append(cells)
-    return table
-
-
-def bound_table(rows: Sequence[Row], paper: str) -> list[dict[str, Any]]:
-    """Method × group: errors in multiples of the posterior bound, mean over angles, draws and riders."""
-    table = []
-    for method, groups in by_method(rows, paper).items():
-        ratios = {group: float(np.mean([row.over_bound for row in own])) for group, own in groups.items()}
-        table.append({"method": told(method), **ratios})
     return table

@@ -16,7 +16,7 @@ from ....envs.bicycle.frame.bicycle import Bicycle
 from ....envs.bicycle.frame.parameters import AIR_DENSITY, BENCHMARK, MOUNTAIN_BIKE
 from ....envs.bicycle.frame.tyre import BENCHMARK_TYRE, TyreParameters
 from ....envs.bicycle.frame.whipple import whipple_model
-from ....envs.bicycle.ride.contact_forces import contact, rider_motion, saddle_point
+from ....envs.bicycle.ride.contact_forces import contact, place_on
 from ....envs.bicycle.ride.ride import Ride
 from ....envs.bicycle.rider.anthropometry import SUBJECTS
 from ....envs.bicycle.rider.posture import loop_closure_error, sit
@@ -33,6 +33,8 @@ GRAVITY = 9.81
 """m/s²: that of the published benchmark"""
 STARTS: tuple[dict[str, Any], ...] = ({"roll_rate": 2e-3}, {"steer": 1e-3}, {"steer_rate": 5e-3}, {"roll": 1e-3})
 """states from which the four modes are excited"""
+SAMPLE, UNSETTLED = 0.01, 0.1
+"""s: interval of the states from which modes are found, and what is left out of each ride before"""
 
 
 class Check(NamedTuple):
@@ -45,20 +47,12 @@ class Check(NamedTuple):
     """whether what is found is within what is asked; None where nothing is asked"""
 
 
-def measured_eigenvalues(
-    speed: float,
-    duration: float = 1.6,
-    settle: float = 0.1,
-    sample: float = 0.01,
-    tyre: TyreParameters = BENCHMARK_TYRE,
-) -> np.ndarray:
+def measured_eigenvalues(speed: float, duration: float = 1.6, tyre: TyreParameters = BENCHMARK_TYRE) -> np.ndarray:
     """Eigenvalues (4,) of the linear map that best carries each sampled state of four passive rides to the next, 1/s.
 
     Args:
         speed: of the benchmark bicycle, m/s.
         duration: of each ride, s.
-        settle: s that are left out.
-        sample: s.
         tyre: its tyres.
     """
     before, after = [], []
@@ -67,18 +61,18 @@ def measured_eigenvalues(
         for start in STARTS:
             bicycle.start(speed, **start)
             rows = []
-            for _ in range(round(duration / sample)):
-                for _ in range(round(sample / physics.time_step)):
+            for _ in range(round(duration / SAMPLE)):
+                for _ in range(round(SAMPLE / physics.time_step)):
                     bicycle.act()
                     physics.step()
                 s = bicycle.state()
                 rows.append((s.roll, -s.steer, s.roll_rate, -s.steer_rate))
-            states = np.array(rows)[round(settle / sample) :]
+            states = np.array(rows)[round(UNSETTLED / SAMPLE) :]
             scale = np.abs(states).max()
             before.append(states[:-1] / scale)
             after.append(states[1:] / scale)
     matrix = np.linalg.lstsq(np.concatenate(before), np.concatenate(after), rcond=None)[0]
-    return np.log(np.linalg.eigvals(matrix).astype(complex)) / sample
+    return np.log(np.linalg.eigvals(matrix).astype(complex)) / SAMPLE
 
 
 def by_kind(values: np.ndarray) -> tuple[complex, np.ndarray]:
@@ -141,19 +135,20 @@ def momentum_residual(fidelity: Any, path: Path, speed: float, steps: int) -> tu
             if step < steps // 3 or step % 100:
                 ride.step()
                 continue
-            before, own, saddle = rider_motion(rider), bicycle.own_motion(), saddle_point(bicycle)
+            before, state = bicycle.body.frames.copy(), bicycle.body.state.copy()
+            saddle = np.array(place_on(before[0], rider.saddle_arm))
             grips, pedals = rider.grips(), rider.pedals()
             velocity = np.array(ride.physics.base_tuples(bicycle.body.body)[2])
             ride.step()
-            hands, feet = rider.hand_forces()[0], rider.foot_forces()[0]
-            found = contact(rider, before, rider_motion(rider), saddle, (hands, grips), (feet, pedals))
-            force, moment = bicycle.own_wrench(own, bicycle.own_motion(), saddle)
+            states, pushes = np.stack([state, bicycle.body.state]), np.reshape(rider.raw_forces(), (1, 4, 3))
+            (seat, seat_moment, hands, feet), _ = contact(rider, states, pushes, 1)
+            force, moment = bicycle.own_wrench(before, bicycle.body.frames, saddle)
             ground, ground_moment = bicycle.ground_wrench(saddle)
             drag = -0.5 * AIR_DENSITY * MOUNTAIN_BIKE.drag_area * np.linalg.norm(velocity) * velocity
-            limbs, arms = np.concatenate([hands, feet]), np.concatenate([grips, pedals]) - saddle
-            force = force - found.seat_force - limbs.sum(axis=0) - ground - drag
-            moment = moment - found.seat_moment - rotation.cross(arms, limbs).sum(axis=0) - ground_moment
-            moment = moment - rotation.cross(own.position[0] - saddle, drag)
+            limbs, arms = np.concatenate([hands[0], feet[0]]), np.concatenate([grips, pedals]) - saddle
+            force = force - seat[0] - limbs.sum(axis=0) - ground - drag
+            moment = moment - seat_moment[0] - rotation.cross(arms, limbs).sum(axis=0) - ground_moment
+            moment = moment - rotation.cross(before[0, :3] - saddle, drag)
             residuals.append((np.abs(force).max() / weight, np.abs(moment).max() / weight))
     # NaN stays NaN, and a ride too short to be looked at is an error
     worst_force, worst_moment = np.max(residuals, axis=0)
@@ -228,19 +223,13 @@ def lean_checks(duration: float = 20.0) -> Iterator[Check]:
         yield Check(f"load cells there, {style}: mean (5th percentile), N", "pressed", found, bool(min(low) > 0.0))
 
 
-def saddle_checks(duration: float = 40.0, subject: int = 0, seed: int = 3) -> Iterator[Check]:
-    """Cells and centre of pressure of a full and a lumped rider in every scenario.
-
-    Args:
-        duration: of each ride, s.
-        subject: number of the rider.
-        seed: of the rides.
-    """
+def saddle_checks() -> Iterator[Check]:
+    """Cells and centre of pressure of a full and a lumped rider in every scenario."""
     for name in list_scenarios():
         pair = []
         for fidelity in ("full", "lumped"):
-            options = {"subject": subject, "suite": ["seat/load_cells"], "duration": duration, "fidelity": fidelity}
-            pair.append(saddle_statistics(ridden(seed, scenario=name, **options).measurements["seat/load_cells"]))
+            options = {"suite": ["seat/load_cells"], "duration": 40.0, "fidelity": fidelity}
+            pair.append(saddle_statistics(ridden(3, scenario=name, **options).measurements["seat/load_cells"]))
         full, lumped = pair
         # on bumps and rough roads a rider may leave the saddle, on which friction then still acts
         most = 1.0

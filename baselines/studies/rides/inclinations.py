@@ -26,9 +26,6 @@ RIDES = (
 def inclination_rows(
     estimators: Sequence[str] = ESTIMATORS,
     rides: Sequence[tuple[str, str]] = RIDES,
-    *,
-    subject: int = 2,
-    seed: int = 7,
     duration: float = 40.0,
 ) -> Iterator[dict[str, Any]]:
     """Rows: scenario and site of the IMU, then the RMS error of inclination (deg) of each estimator.
@@ -38,16 +35,14 @@ def inclination_rows(
     Args:
         estimators: names of estimators.
         rides: scenario and site of the IMU of each row; rides of one scenario are the same ride.
-        subject: number of the rider, lumped, with the papers' sensors.
-        seed: of the rides.
         duration: s.
     """
     ridden: dict[str, Any] = {}
     for scenario, site in rides:
         if scenario not in ridden:
             suite = ["bicycle_imu/gyr", "bicycle_imu/acc", "trunk_imu/gyr", "trunk_imu/acc"]
-            env = RiderBicycleEnv(scenario, subject, suite=suite, duration=duration, fidelity="lumped")
-            ridden[scenario] = record_once(env, seed)
+            env = RiderBicycleEnv(scenario, 2, suite=suite, duration=duration, fidelity="lumped")
+            ridden[scenario] = record_once(env, 7)
         recording = imu_of(ridden[scenario], site)
         table = evaluate(list(estimators), recording)
         errors = table[(table["metric"] == "inclination")].set_index("estimator")["value"]

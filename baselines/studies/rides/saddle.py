@@ -19,12 +19,11 @@ APART = 15.0
 """mm between the mean centres of pressure of full and lumped riders"""
 
 
-def saddle_statistics(cells: np.ndarray, geometry: LoadCells | None = None) -> dict[str, float]:
-    """Pulls and centre of pressure of one ride.
+def saddle_statistics(cells: np.ndarray) -> dict[str, float]:
+    """Pulls and centre of pressure of one ride on the published saddle.
 
     Args:
         cells: ``(T, 3)`` compression front, rear left, rear right, N.
-        geometry: where they are; None for the published saddle.
 
     Returns:
         ``pulls``: % of the samples in which a cell is below −5 N; ``least``: N; of the centre of pressure ahead and to
@@ -32,7 +31,7 @@ def saddle_statistics(cells: np.ndarray, geometry: LoadCells | None = None) -> d
         ``along_5``, ``along_95``, ``across_5``, ``across_95``, and ``along_mean``, ``along_sd``, ``across_mean``,
         ``across_sd``.
     """
-    geometry = LoadCells() if geometry is None else geometry
+    geometry = LoadCells()
     cells = cells[np.isfinite(cells).all(axis=1)]
     total = cells.sum(axis=1)
     loaded = total > SITTING

@@ -99,10 +99,10 @@ def steered(
     )
 
 
-def by_speed(study: Study, count: int, duration: float = 60.0, pilot: str = DEFAULT) -> dict[float, dict[str, float]]:
-    """Speed (km/h) → means over ``count`` rides by the preset riders in turn."""
+def by_speed(study: Study, count: int) -> dict[float, dict[str, float]]:
+    """Speed (km/h) → means over ``count`` rides of a minute by the preset riders in turn."""
     jobs = [
-        (speed, index % len(SUBJECTS), pilot, study.seed_of("speed", index), duration)
+        (speed, index % len(SUBJECTS), DEFAULT, study.seed_of("speed", index), 60.0)
         for speed in SPEEDS
         for index in range(count)
     ]
@@ -114,14 +114,13 @@ def by_speed(study: Study, count: int, duration: float = 60.0, pilot: str = DEFA
     }
 
 
-def long_rides(study: Study, scenarios: Sequence[str], fidelity: str, persons: int = PERSONS) -> list[dict[str, Any]]:
+def long_rides(study: Study, scenarios: Sequence[str], fidelity: str) -> list[dict[str, Any]]:
     """Every scenario with the preset riders, and with random riders of each skill.
 
     Args:
         study: its duration, root seed and riders.
         scenarios: names.
         fidelity: ``full`` or ``lumped``.
-        persons: number of random riders.
     """
     jobs = []
     for name in scenarios:
@@ -130,7 +129,7 @@ def long_rides(study: Study, scenarios: Sequence[str], fidelity: str, persons: i
         ]
         riders += [
             ("random", pilot, study.seed_of("steered", name, "random", index))
-            for index in range(persons)
+            for index in range(PERSONS)
             for pilot in PILOTS
         ]
         jobs += [(name, subject, pilot, seed, study.duration, fidelity) for subject, pilot, seed in riders]

@@ -15,25 +15,21 @@ from ....envs.bicycle.rider.rider import Fidelity
 from ....envs.record import record_once
 from .checks import Check
 
-RATE = 250.0
-"""Hz"""
+RATE, SPEED = 250.0, 12.0 / 3.6
+"""Hz, and m/s"""
 MEASURED = {"tarmac": (0.9, 1.8), "pavers": (4.5, 7.0)}
 """m/s² vertical root mean square at the seat pan of cargo bicycles at 12 km/h"""
 BANDWIDTH = (19.0, 63.0)
 """Hz: of the same measurements"""
 
 
-def vibration(
-    surface: str | Surface, duration: float = 6.0, speed: float = 12.0 / 3.6, fidelity: Fidelity = "full", seed: int = 3
-) -> tuple[float, float]:
-    """Vertical acceleration of the bicycle at the seat tube while subject 0 rides straight on.
+def vibration(surface: str | Surface, duration: float = 6.0, fidelity: Fidelity = "full") -> tuple[float, float]:
+    """Vertical acceleration of the bicycle at the seat tube while subject 0 rides straight on at 12 km/h.
 
     Args:
         surface: of the road.
         duration: s.
-        speed: m/s.
         fidelity: of the rider.
-        seed: of the ride.
 
     Returns:
         Root mean square (m/s²) without gravity, and the frequency (Hz) below which 95 % of its power lies.
@@ -41,9 +37,9 @@ def vibration(
     Raises:
         RuntimeError: the rider fell.
     """
-    steady = replace(scenario("slow"), name="steady", speed=lambda generator, duration: SpeedProfile(np.array([speed])))
+    steady = replace(scenario("slow"), name="steady", speed=lambda generator, duration: SpeedProfile(np.array([SPEED])))
     env = RiderBicycleEnv(steady, 0, "still", ["bicycle_imu/acc"], "ideal", RATE, duration, fidelity, surface=surface)
-    ride = record_once(env, seed)
+    ride = record_once(env, 3)
     if ride.time[-1] < duration - 1.5 / RATE:
         raise RuntimeError(f"the rider fell on {surface!r} after {ride.time[-1]:.1f} s")
     up = ride.measurements["bicycle_imu/acc"][1:, 2]

@@ -48,6 +48,7 @@ def course_figure(study: RideStudy, report: Report, path: Path, course: str, tit
         else:
             curves = {name: error[panel] for name, error in errors.items() if panel in error}
             draw_angle(ax, ride.time, true_angle(study, truth, panel), curves, panel)
+    legend_above(axes[panels.index("φ")])  # the other panels have the same curves, or fewer
     axes[-1].set_xlabel("time, s")
     report.figure(f"ride {course}", figure, title, f"{SCALES} Thin: three standard deviations.")
     if course == "straight":
@@ -82,7 +83,6 @@ def roll_errors(
     late = time >= 0.1 * time[-1]
     limit = max(np.nanmax(np.abs(errors[methods[-1]]["φ"][late])), 3.0 * np.sqrt(covariance[late, 0, 0].max()) / DEG)
     ax.set(ylabel="error of φ, deg", ylim=(-1.4 * limit, 1.4 * limit))
-    legend_above(ax)
 
 
 def path_figure(ride: Trajectory) -> Any:
@@ -106,5 +106,6 @@ def fixture_figure(push: Trajectory, estimates: Mapping[str, Estimate], study: R
     roll_errors(axes[1], push.time, errors, estimates, methods)
     for ax, angle in zip(axes[2:], THETA, strict=True):
         draw_angle(ax, push.time, true_angle(study, truth, angle), {methods[1]: errors[methods[1]][angle]}, angle)
+    legend_above(axes[0])
     axes[-1].set_xlabel("time, s")
     return drawn

@@ -27,6 +27,8 @@ FILM, FRAME = 4.0, 0.1
 """s: length of the film, and time from frame to frame"""
 LIMITS = ((-0.45, 1.45), (-0.7, 0.7), (0.0, 1.75))
 """m: x, y, z of the picture"""
+GRID = 0.5
+"""m: between lines of the grid"""
 ELEVATION, AZIMUTH = 14.0, -62.0
 """deg: seen from behind on the left"""
 JOINTS = {
@@ -88,13 +90,12 @@ def dress(ax: Any, title: str) -> None:
     """Limits, view and labels of a picture in space."""
     for axis, (low, high) in zip("xyz", LIMITS, strict=True):
         getattr(ax, f"set_{axis}lim")(low, high)
-    ax.set_box_aspect([high - low for low, high in LIMITS], zoom=1.25)
+    ax.set_box_aspect([high - low for low, high in LIMITS], zoom=1.22)
     ax.view_init(ELEVATION, AZIMUTH)
     ax.set_title(title, fontsize=9, y=0.97)
-    ax.tick_params(labelsize=6, pad=-3)
-    ax.set_yticks((-0.5, 0.0, 0.5))
-    ax.set_xticks((0.0, 0.5, 1.0))
-    ax.set_zticks((0.0, 0.5, 1.0, 1.5))
+    # numbers at the edges would be cut off; the grid is the scale
+    for axis, (low, high) in zip("xyz", LIMITS, strict=True):
+        getattr(ax, f"set_{axis}ticks")(np.arange(np.ceil(low / GRID), high / GRID) * GRID, labels=[])
 
 
 def snapshots(scene: Reconstruction) -> Figure:
@@ -140,7 +141,8 @@ def reconstruction(study: RideStudy, report: Report, path: Path, course: str, se
     """
     scene = Reconstruction(study, path)
     note = (
-        "Blue: truth. Orange: estimate. Metres, in the frame that turns with the bicycle; steering and crank are true."
+        f"Black: truth. Blue: estimate. The grid has lines every {GRID:g} m, in the frame that turns with the bicycle; "
+        "steering and crank are true."
     )
     report.figure(f"figure-7-{course}", snapshots(scene), f"Figure 7: rider and bicycle in space, {course}", note)
     title = f"Figure 7: {FILM:g} s of the same ride as a film, {course}"

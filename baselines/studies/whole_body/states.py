@@ -12,6 +12,7 @@ from ....filters.bicycle.whole_body.linkage import ERROR_SIZE, RiderLinkage, tru
 from ....filters.core.backend import Array
 from ....filters.core.model import Recurrence
 from ....filters.core.quantity import Measurement
+from ....filters.core.sampling import latest
 from .angles import ANGLES, STATES
 
 
@@ -65,6 +66,4 @@ def true_states(
 def held_samples(values: np.ndarray) -> np.ndarray:
     """Samples ``(T, size)`` with the last valid row, at the start the first one, where one is missing."""
     valid = np.isfinite(values).all(axis=-1)
-    index = np.maximum.accumulate(np.where(valid, np.arange(len(values)), 0))
-    index[: int(np.argmax(valid))] = int(np.argmax(valid))
-    return values[index]
+    return values[np.maximum(latest(valid), np.argmax(valid))]

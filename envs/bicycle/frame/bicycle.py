@@ -14,7 +14,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ....filters.core import rotation
-from ...physics.multibody import CentreMotion, Multibody, newton_euler
+from ...physics.momentum import newton_euler
+from ...physics.multibody import Multibody
 from ...physics.urdf import Tree
 from ...physics.world import BASE, Physics
 from ...sensors.ideal import BodyState
@@ -54,6 +55,15 @@ class BicycleState(NamedTuple):
     crank_rate: float
     wheel_rate: float
     """rad/s of the rear wheel"""
+
+    @property
+    def numbers(self) -> np.ndarray:
+        """What follows the time ``(15,)``, as compiled functions take it."""
+        return np.array(self[1:])
+
+
+ROLL, SPEED, WHEEL_RATE = (BicycleState._fields.index(name) - 1 for name in ("roll", "speed", "wheel_rate"))
+"""places in :attr:`BicycleState.numbers`"""
 
 
 @dataclass(frozen=True)
@@ -127,8 +137,9 @@ class Bicycle:
         self._turned = [self.links[name] for name in ("front_assembly", *WHEELS, "crank") if name in self.links]
         self._wheels = self._turned[1:3]
         self._numbers = np.array([*self._wheels, self._turned[0], self.links.get("crank", BASE)])
-        self._chain = np.zeros(5) if self.drivetrain is None else self.drivetrain.chain
-        self._contacts, self._seen = np.zeros((2, 7)), np.zeros(15)
+        self.chain = np.zeros(5) if self.drivetrain is None else self.drivetrain.chain
+        """of :func:`.chain_torque`; zeros without a crank"""
+        self._contacts = np.zeros((2, 7))
         centre, axes = physics.inertial_frame(self.body.body)
         self._frame = np.concatenate([rotation.to_matrix(rotation.conjugate(axes)).ravel(), -centre])
         self.own_links = [self.links[name] for name in BICYCLE_LINKS if name in self.links]
@@ -158,7 +169,7 @@ class Bicycle:
         """Put another ground (None: a level plane at height 0) under the wheels; :meth:`start` anew afterwards."""
         self.ground: Ground = FlatGround() if ground is None else ground
         self.acting = (
-            self._numbers, self._body, self._tyres, self.ground.table, self.physics.time_step, self._chain,
+            self._numbers, self._body, self._tyres, self.ground.table, self.physics.time_step, self.chain,
             self._bristles, self._contacts,
         )  # fmt: skip
         """what :func:`.bicycle_forces` takes between the frames and the brake"""
@@ -272,8 +283,14 @@ class Bicycle:
 
     def state(self) -> BicycleState:
         """Present state of the bicycle."""
-        bicycle_state(self.body.frames, self.body.state, self._numbers, self._frame, self._seen)
-        return BicycleState(self.physics.time, *self._seen.tolist())
+        seen = np.zeros(15)
+        self.look(seen)
+        return BicycleState(self.physics.time, *seen.tolist())
+
+    def look(self, seen: np.ndarray) -> None:
+        """Write :attr:`BicycleState.numbers` of the present state into ``seen`` ``(15,)``."""
+        body = self.body
+        bicycle_state(body.frames, body.state, self._numbers, self._frame, seen)
 
     def ground_wrench(self, point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Force (N) of the ground on both tyres in the last step and its moment (N·m) about ``point``, world axes."""
@@ -281,14 +298,19 @@ class Bicycle:
         arms = np.array([tyre.point for tyre in self.tyre_forces]) - point
         return forces.sum(axis=0), rotation.cross(arms, forces).sum(axis=0)
 
-    def own_motion(self) -> CentreMotion:
-        """Motion of the bicycle's own links (not the rider's)."""
-        return self.body.centre_motion(self.own_links)
+    def own_wrench(self, before: np.ndarray, after: np.ndarray, point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Wrench of all external forces on the bicycle's own links in the last step, see :func:`newton_euler`.
 
-    def own_wrench(self, before: CentreMotion, after: CentreMotion, point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Wrench of all external forces on the bicycle in the last step; see :func:`newton_euler`."""
-        dt, gravity = self.physics.time_step, self.physics.gravity
-        return newton_euler(before, after, self.own_masses, self.own_moments, point, dt, gravity)
+        Args:
+            before: frames ``(n + 1, 18)`` of the body before it.
+            after: after it.
+            point: ``(3,)`` m, world.
+        """
+        rows, physics = np.array(self.own_links) + 1, self.physics
+        force, moment = newton_euler(
+            before, after, rows, self.own_masses, self.own_moments, point, physics.time_step, physics.gravity
+        )
+        return np.array(force), np.array(moment)
 
     def save(self) -> BicycleMemory:
         """Tyre and chain memory; the rest is in :meth:`Physics.save`."""

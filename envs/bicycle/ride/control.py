@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..course.path import Path
-from ..frame.bicycle import BicycleState
+from ..frame.bicycle import SPEED
 from ..frame.parameters import AIR_DENSITY, BicycleParameters
 from ..frame.whipple import WhippleModel, whipple_model
 from .preview import PREVIEW_BIN, PREVIEW_BINS, speed_limits
@@ -36,6 +36,8 @@ from .steering import (
     steer_exactly,
 )
 
+HIGHEST_SPEED = 7.0
+"""m/s: end of the gain table"""
 POSITIVE = ("effort", "largest_torque", "largest_drive", "largest_power", "lateral_acceleration", "braking", "rate")
 """settings that must not be zero"""
 
@@ -129,7 +131,6 @@ class Pilot:
         bicycle: rider included, see :meth:`BicycleParameters.with_load`.
         settings: weights.
         gravity: m/s².
-        highest_speed: highest speed of the gain table, m/s.
         lean_effect: part of a lean of the trunk by which the common mass centre leans.
     """
 
@@ -138,13 +139,12 @@ class Pilot:
         bicycle: BicycleParameters,
         settings: ControlSettings | None = None,
         gravity: float = 9.81,
-        highest_speed: float = 7.0,
         lean_effect: float = 0.0,
     ) -> None:
         self.bicycle, self.lean_effect = bicycle, lean_effect
         self.settings = ControlSettings() if settings is None else settings
         self.model = whipple_model(bicycle, gravity)
-        slow, fast = np.arange(LOWEST_SPEED, 0.95, 0.1), np.arange(1.0, highest_speed + 0.25, 0.25)
+        slow, fast = np.arange(LOWEST_SPEED, 0.95, 0.1), np.arange(1.0, HIGHEST_SPEED + 0.25, 0.25)
         self._grid, self._place = [*slow.tolist(), *fast.tolist()], 1
         self._ahead = PREVIEW_BIN * np.arange(PREVIEW_BINS + 1)
         self._gravity, self._rows = gravity, dict[float, np.ndarray]()
@@ -227,11 +227,11 @@ class Pilot:
             self._rows[speed] = gain_row(self.bicycle, self.settings, self._gravity, speed)
         return self._rows[speed]
 
-    def update(self, state: BicycleState, speed: float, lean: float = 0.0) -> tuple[float, float]:
+    def update(self, seen: np.ndarray, speed: float, lean: float = 0.0) -> tuple[float, float]:
         """Decide for the next control period.
 
         Args:
-            state: of the bicycle.
+            seen: :attr:`.BicycleState.numbers` of the bicycle now.
             speed: wanted, m/s; less is ridden in and before sharp turns.
             lean: of the trunk to the bicycle that the rider intends, rad, right positive. Who leans to the right keeps
                 the bicycle further to the left.
@@ -239,9 +239,9 @@ class Pilot:
         Returns:
             Steer torque (N·m, left positive) and force at the wheels (N, forward positive, braking negative).
         """
-        low, high, part = self._between(state.speed)
+        low, high, part = self._between(seen.item(SPEED))
         rows, lean = (self._row(low), self._row(high)), self.lean_effect * lean
-        steer_exactly(*self._numbers, self.path.points, *rows, part, moving(state), speed, lean, self._memory)
+        steer_exactly(*self._numbers, self.path.points, *rows, part, seen, speed, lean, self._memory)
         return self._decided()
 
     def _decided(self) -> tuple[float, float]:
@@ -257,9 +257,3 @@ class Pilot:
         """Undo :meth:`save`."""
         self._memory[:] = memory.memory
         self._decided()
-
-
-def moving(state: BicycleState) -> tuple[float, ...]:
-    """Numbers of :class:`.Moving`: what a pilot reads of a bicycle."""
-    s = state
-    return s.x, s.y, s.roll, s.pitch, s.yaw, s.roll_rate, s.speed, s.steer, s.steer_rate

@@ -33,16 +33,16 @@ class Foot:
         """Begin a ride at a speed, m/s."""
         self.engaged = 1.0 if speed < STOPPING else 0.0
 
-    def update(self, state: BicycleState, wanted: float, period: float) -> None:
+    def update(self, speed: float, wanted: float, period: float) -> None:
         """Set the foot down or lift it, during one control period (s).
 
         Args:
-            state: of the bicycle.
+            speed: of the bicycle, m/s.
             wanted: speed, m/s.
             period: s.
         """
         stopping, held = wanted < STOPPING, self.engaged > 0.0
-        down = state.speed < ROLLING and (stopping or held)
+        down = speed < ROLLING and (stopping or held)
         change = period / SET_IN if down else -period / SET_IN
         self.engaged = max(0.0, min(1.0, self.engaged + change))
 

@@ -9,12 +9,12 @@ import numpy as np
 from ....filters.core import rotation
 from ...sensors.ideal import STANDARD_GRAVITY
 from ..course.path import Path
-from ..frame.bicycle import BicycleState
+from ..frame.bicycle import SPEED
 from ..frame.parameters import BicycleParameters
 from ..rider.anthropometry import join
 from ..rider.muscles import TRUNK_DAMPING, TRUNK_STIFFNESS
 from ..rider.posture import Posture
-from .control import ControlSettings, Pilot, PilotMemory, moving
+from .control import ControlSettings, Pilot, PilotMemory
 from .human_steering import STATES, Human, steer_humanly
 from .internal_model import (
     RIGID,
@@ -98,7 +98,6 @@ class HumanPilot(Pilot):
         trunk: what of the rider leans; the rest is rigid.
         settings: weights.
         gravity: m/s².
-        highest_speed: highest speed of the gain table, m/s.
     """
 
     def __init__(
@@ -109,10 +108,9 @@ class HumanPilot(Pilot):
         trunk: TrunkModel = RIGID,
         settings: ControlSettings | None = None,
         gravity: float = 9.81,
-        highest_speed: float = 7.0,
     ) -> None:
         self.human, self._trunk, self._noise = human, trunk, HumanNoise(noise)
-        super().__init__(bicycle, settings, gravity, highest_speed)
+        super().__init__(bicycle, settings, gravity)
         s, step = self.settings, self.period
         self._costs = (s.roll, s.steer, s.roll_rate, s.steer_rate, *(human.care * c for c in (s.heading, s.offset)))
         self._costs += (human.care * s.offset_integral,)
@@ -144,14 +142,14 @@ class HumanPilot(Pilot):
         # of the internal model and of the arms
         self._state, self._count = np.zeros(STATES + 2), 0
 
-    def update(self, state: BicycleState, speed: float, lean: float = 0.0) -> tuple[float, float]:
+    def update(self, seen: np.ndarray, speed: float, lean: float = 0.0) -> tuple[float, float]:
         """As :meth:`.Pilot.update`, steering as a human."""
-        low, high, part = self._between(state.speed)
+        low, high, part = self._between(seen.item(SPEED))
         noise = self._noise.at(self._count)
         self._count += 1
         steer_humanly(
             *self._numbers, self._human, self.path.points, self._model(low), self._model(high), part, noise,
-            moving(state), speed, lean, self._memory, self._state, self._inputs, self._readings,
+            seen, speed, lean, self._memory, self._state, self._inputs, self._readings,
         )  # fmt: skip
         return self._decided()
 

@@ -14,11 +14,11 @@ from .steering import (
     LOWEST_SPEED,
     OFFSET_INTEGRAL,
     TORQUE,
-    Moving,
     ahead,
     drive,
     follow,
     look_ahead,
+    moving_of,
     piloted_of,
     turning,
 )
@@ -170,7 +170,7 @@ def steer_humanly(  # type: ignore[no-untyped-def]
         above: at a speed above.
         part: how far the speed lies between both, 0 to 1.
         noise: ``(7,)`` standard normal numbers: six senses and the muscles.
-        seen: numbers of :class:`.Moving`.
+        seen: ``(15,)`` of :func:`.moving_of`.
         wanted: speed, m/s.
         lean: of the trunk to the bicycle that the rider intends besides levelling, rad, right positive.
         memory: of the pilot; the decision is written there.
@@ -178,7 +178,7 @@ def steer_humanly(  # type: ignore[no-untyped-def]
         inputs: ``(Ns + 1, 3)`` remembered, advanced.
         readings: ``(Ns + 1, 6)`` remembered, advanced.
     """
-    piloted, now = piloted_of(numbers, stiffness), Moving(*seen)
+    piloted, now = piloted_of(numbers, stiffness), moving_of(seen)
     person = human_of(human[0], human[1], human[2], human[3])
     low, high = below[1], above[1]
     curvature, offset, heading = follow(points, now, memory)

@@ -7,14 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from ....filters.core import rotation
-from ...physics.kinematics import BASE_SIZE, move_links_of_many
-from ...physics.multibody import CentreMotion, newton_euler
+from ...physics.kinematics import BASE_SIZE, TURNING, carry_frames, orientations
 from ...sensors.ideal import BodyState, Sampling
 from ..rider.limbs import Limb, LimbPosture, reach_to
-from ..rider.posture import KNEE_OUT, LIMBS, SIDES, SIGNS, two_turns
-from .contact_forces import Contact
+from ..rider.posture import KNEE_OUT, LIMBS, two_turns
+from .contact_forces import Contact, contact
 from .ride import Ride
-from .tape import Tape, last_step
+from .tape import RiderStep, Tape, rider_step
 
 
 @dataclass(frozen=True)
@@ -73,11 +72,13 @@ class RideRecorder:
         self.ride, self.steps, self.sampling = ride, steps, sampling
         self._tape, self._next = tape, begin
         rider, links = ride.rider, ride.bicycle.links
-        self._links = [links["front_assembly"], links["crank"], *rider.mass_links]
-        self._names = ["front_assembly", "crank", "pelvis", "trunk"]
+        self._names = ["rear_frame", "front_assembly", "crank", "pelvis", "trunk"]
         if rider.full:
             kinds = {"arm": ("upper_arm", "forearm"), "leg": ("thigh", "shank")}
             self._names += [f"{part}_{limb[4:]}" for limb in LIMBS for part in kinds[limb[:3]]]
+        self._rows = [links[name] + 1 for name in self._names]
+        mounts = [ride.physics.inertial_frame(ride.bicycle.body.body, links[name]) for name in self._names]
+        self._mounts = np.stack([centre for centre, _ in mounts]), np.stack([axes for _, axes in mounts])
         self._joints = [links["front_assembly"], links["crank"], links["rear_wheel"], *rider.joints, *rider.seat]
 
     def record(self, samples: int) -> RideLog:
@@ -87,7 +88,7 @@ class RideRecorder:
         states = np.empty((samples * self.steps + 1, len(first)))
         states[0] = first
         forces: list[float] = []
-        torques, times, fallen, swivels, count = [], [], [], [], 0
+        ends, count = list[RiderStep](), 0
         for _ in range(samples):
             for _ in range(self.steps):
                 if tape is None:
@@ -100,71 +101,50 @@ class RideRecorder:
                     states[count + 1] = step.state
                     self._next += 1
                 count += 1
-            if tape is None:
-                step = last_step(ride)
-            torques.append(step.torques)
-            times.append(step.time)
-            swivels.append(step.swivel)
-            fallen.append(step.fallen)
-            if step.fallen:
+            ends.append(rider_step(ride) if tape is None else step.rider)
+            if ends[-1].fallen:
                 break
         states = states[: count + 1]
         first, rates = BASE_SIZE + np.array(self._joints), (states.shape[1] - BASE_SIZE) // 2
-        starts, ends = states[: -1 : self.steps], states[self.steps :: self.steps]
-        turned = ends[:, first[2]] - starts[:, first[2]]
+        starts, sampled = states[: -1 : self.steps], states[self.steps :: self.steps]
+        turned = sampled[:, first[2]] - starts[:, first[2]]
+        pushes, last_only = np.array(forces).reshape(count, 4, 3), self.sampling == "instant"
         return self._compute(
-            self._motion(states),
-            np.array(forces).reshape(count, 4, 3),
-            np.stack([ends[:, first], ends[:, first + rates]], axis=-1),
+            *contact(rider, states, pushes, self.steps, last_only, self._rows),
+            np.stack([sampled[:, first], sampled[:, first + rates]], axis=-1),
             turned,
-            np.array(torques),
-            np.array(times),
-            np.array(fallen),
-            np.array(swivels),
+            *map(np.array, zip(*ends, strict=True)),
         )
 
-    def _motion(self, states: np.ndarray) -> CentreMotion:
-        """Motion of base and links from the states of all physics steps."""
-        tree = self.ride.bicycle.body.tree
-        frames = np.empty((len(states), len(tree) + 1, 18))
-        move_links_of_many(tree, states, frames)
-        return CentreMotion.of_frames(frames[:, [0, *(link + 1 for link in self._links)]])
-
-    def _frame(self, index: int, name: str, before: CentreMotion, after: CentreMotion, time: np.ndarray) -> BodyState:
-        """Motion of a body frame after the last step, with its accelerations in it."""
-        body = self.ride.bicycle.body
-        centre, axes = self.ride.physics.inertial_frame(body.body, body.links[name])
-
-        def carried(motion: CentreMotion) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-            position, orientation, velocity, turning = (field[:, index] for field in motion)
-            orientation = rotation.multiply(orientation, rotation.conjugate(axes))
-            lever = rotation.rotate(orientation, centre)
-            return position - lever, orientation, velocity - rotation.cross(turning, lever), turning
-
-        then, now = carried(before), carried(after)
-        dt = self.ride.physics.time_step
-        return BodyState(time, *now, (now[2] - then[2]) / dt, (now[3] - then[3]) / dt)
+    def _frames(self, motion: np.ndarray, time: np.ndarray) -> dict[str, BodyState]:
+        """Motion of the body frames after the last steps, with their accelerations in it; ``motion``: of the links."""
+        centres, axes = self._mounts
+        q = rotation.multiply(orientations(motion[:, 1]), rotation.conjugate(axes))
+        found = np.empty((4, len(centres), len(time), 3))
+        carry_frames(motion, rotation.rotate_back(axes, -centres), self.ride.physics.time_step, found)
+        frames = {}
+        for k, name in enumerate(self._names):
+            position, velocity, acceleration, spin = found[:, k]
+            frames[name] = BodyState(
+                time, position, np.ascontiguousarray(q[:, k]), velocity, motion[:, 1, k, TURNING], acceleration, spin
+            )
+        return frames
 
     def _compute(
         self,
-        motion: CentreMotion,
-        forces: np.ndarray,
+        found: Contact,
+        motion: np.ndarray,
         joints: np.ndarray,
         turned: np.ndarray,
         torques: np.ndarray,
+        swivels: np.ndarray,
         time: np.ndarray,
         fallen: np.ndarray,
-        swivels: np.ndarray,
     ) -> RideLog:
-        rider = self.ride.rider
-        names = ["rear_frame", *self._names]
-        # the last physics step of each sample
-        before = CentreMotion(*(field[self.steps - 1 : -1 : self.steps] for field in motion))
-        after = CentreMotion(*(field[self.steps :: self.steps] for field in motion))
-        frames = {name: self._frame(index, name, before, after, time) for index, name in enumerate(names)}
+        rider, names = self.ride.rider, self._names
+        frames = self._frames(motion, time)
         angles, rates = joints[..., 0], joints[..., 1]
         steer, crank, trunk = angles[:, 0], angles[:, 1], angles[:, 3:6]
-        contact = self._contact(motion, forces, frames["rear_frame"].orientation)
         limbs, pelvis = {}, angles[:, -3:]
         turn = rotation.conjugate(frames["rear_frame"].orientation)
         trunk_turn = rotation.multiply(turn, frames["trunk"].orientation)
@@ -183,7 +163,7 @@ class RideRecorder:
         mean = turned / (self.steps * self.ride.physics.time_step)
         wheel_rate = rates[:, 2] if self.sampling == "instant" else mean
         return RideLog(
-            time, frames, contact, limbs, trunk, pelvis, steer, crank, wheel, rates, wheel_rate, torques, fallen
+            time, frames, found, limbs, trunk, pelvis, steer, crank, wheel, rates, wheel_rate, torques, fallen
         )
 
     def _solve(
@@ -199,46 +179,3 @@ class RideRecorder:
             return LimbPosture(upper, lower, held.angles, rotation.rotate(tip, held.hinge))
         target = in_reach(posture.arm_target(side, steer, trunk, pelvis), posture.arm)
         return reach_to(posture.arm, target, posture.elbow_out(side, trunk), swivel)
-
-    def _contact(self, motion: CentreMotion, forces: np.ndarray, ends: np.ndarray) -> Contact:
-        """Contact forces of each sample; ``ends``: orientations of the bicycle at the samples."""
-        if self.sampling == "instant":
-            last = np.arange(self.steps, len(motion.position), self.steps)
-            before, after = (CentreMotion(*(field[rows] for field in motion)) for rows in (last - 1, last))
-            return self._step_contact(before, after, forces[last - 1])
-        before, after = (CentreMotion(*(field[rows] for field in motion)) for rows in (slice(-1), slice(1, None)))
-        contact = self._step_contact(before, after, forces)
-        axes = self._frame(0, "rear_frame", after, after, np.zeros(len(forces))).orientation
-
-        def mean(vectors: np.ndarray) -> np.ndarray:
-            """Mean in bicycle axes over the steps of each sample, in the world at the sample."""
-            extra = (1,) * (vectors.ndim - 2)
-            local = rotation.rotate_back(axes.reshape(-1, *extra, 4), vectors)
-            local = local.reshape(-1, self.steps, *local.shape[1:]).mean(axis=1)
-            return rotation.rotate(ends.reshape(-1, *extra, 4), local)
-
-        return Contact(*map(mean, contact))
-
-    def _step_contact(self, before: CentreMotion, after: CentreMotion, forces: np.ndarray) -> Contact:
-        """Contact forces in physics steps, from the motion before and after each."""
-        rider, physics = self.ride.rider, self.ride.physics
-        names, unused = ("rear_frame", *self._names[:2]), np.zeros(len(forces))
-        frame, front, crank = (self._frame(index, name, before, before, unused) for index, name in enumerate(names))
-        posture = rider.posture
-        saddle = frame.position + rotation.rotate(frame.orientation, np.array(posture.bicycle.saddle))
-        rows = slice(3, 3 + len(rider.masses))
-        then, now = (CentreMotion(*(field[:, rows] for field in motion)) for motion in (before, after))
-        force, moment = newton_euler(then, now, rider.masses, rider.moments, saddle, physics.time_step, physics.gravity)
-        if not rider.full:
-            forces = rotation.rotate(frame.orientation[:, None], forces)
-        hands, feet = forces[:, :2], forces[:, 2:]
-        drive = posture.bicycle.drive
-        assert drive is not None
-        for index, side in enumerate(SIDES):
-            grip = np.array(posture.bicycle.grip) * (1.0, SIGNS[side], 1.0) - posture.bicycle.steer_origin
-            pedal = posture.pedal(side, 0.0) - np.array(drive.axle)
-            for body, arm, push in ((front, grip, hands[:, index]), (crank, pedal, feet[:, index])):
-                place = body.position + rotation.rotate(body.orientation, arm)
-                force = force + push
-                moment = moment + rotation.cross(place - saddle, push)
-        return Contact(-force, -moment, hands, feet)

@@ -14,7 +14,7 @@ from ...sensors.ideal import STANDARD_GRAVITY
 from ..course.events import Events
 from ..course.path import Path
 from ..course.terrain import Ground
-from ..frame.bicycle import Bicycle, BicycleMemory
+from ..frame.bicycle import ROLL, SPEED, WHEEL_RATE, Bicycle, BicycleMemory, BicycleState
 from ..frame.tyre import TyreParameters
 from ..rider.muscles import RESTING
 from ..rider.posture import Posture
@@ -99,7 +99,7 @@ class Ride:
         trunk = posture.trunk()
         whole = sum(part.mass * part.centre[2] for part in self._loaded.parts)
         self._lean_effect = trunk.mass * float(trunk.centre[2]) * np.cos(posture.flexion) / whole
-        self.foot = Foot()
+        self.foot, self._seen = Foot(), np.zeros(15)
         self.begin(motion, path, speed, ground=ground, pilot=pilot, noise=noise, events=events, crank=crank)
 
     def begin(
@@ -130,7 +130,7 @@ class Ride:
         self.pilot.start(path, first)
         self.foot.start(first)
         self._count = 0
-        self.state = self.bicycle.state()
+        self._look()
 
     def _pilot(self, name: str | PilotParameters, noise: np.random.SeedSequence | None, motion: RiderMotion) -> Pilot:
         human, gravity = pilot_parameters(name), self.physics.gravity
@@ -141,10 +141,18 @@ class Ride:
         return HumanPilot(self._loaded, human, seed, trunk, self._settings, gravity)
 
     @property
+    def state(self) -> BicycleState:
+        """Of the bicycle, as of the last control step."""
+        return BicycleState(self._looked, *self._seen.tolist())
+
+    def _look(self) -> None:
+        self._looked = self.physics.time
+        self.bicycle.look(self._seen)
+
+    @property
     def fallen(self) -> bool:
         """Whether the bicycle fell or left the ground (as of the last control step)."""
-        roll = self.state.roll
-        return not abs(roll) < FALLEN
+        return not abs(self._seen.item(ROLL)) < FALLEN
 
     def step(self) -> None:
         """Advance by one physics step."""
@@ -165,17 +173,18 @@ class Ride:
         self.physics.step()
 
     def _control(self) -> None:
-        self.state = state = self.bicycle.state()
-        self.bicycle.shift(state.wheel_rate)
-        wanted = self.speed(state.time)
-        coasting = self.events.coasts(state.time)
-        self.pilot.coast(coasting)
-        self.foot.update(state, wanted, self.pilot.period)
-        torque, drive = self.pilot.update(state, wanted, self.rider.intended_lean)
-        torque = self.foot.steer(torque, state)
+        self._look()
+        time, seen, pilot = self._looked, self._seen, self.pilot
+        self.bicycle.shift(seen.item(WHEEL_RATE))
+        wanted, coasting = self.speed(time), self.events.coasts(time)
+        pilot.coast(coasting)
+        self.foot.update(seen.item(SPEED), wanted, pilot.period)
+        torque, drive = pilot.update(seen, wanted, self.rider.intended_lean)
+        if self.foot.engaged:
+            torque = self.foot.steer(torque, self.state)
         if coasting and drive >= -COASTING:
             drive = RESTING
-        self.rider.plan(state, self.pilot.curvature_ahead, torque, drive)
+        self.rider.plan(seen, pilot.curvature_ahead, torque, drive)
 
     def _push_aside(self, force: float) -> None:
         """A force (N, to the left) on the frame, at the height of the saddle."""
@@ -205,7 +214,7 @@ class Ride:
         self.rider.restore(memory.rider)
         self.pilot.restore(memory.pilot)
         self._count, self.foot.engaged = memory.control, memory.foot
-        self.state = self.bicycle.state()
+        self._look()
 
     def forget(self, memory: RideMemory) -> None:
         """Free a saved state."""

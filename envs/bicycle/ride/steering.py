@@ -85,7 +85,7 @@ def piloted_of(numbers, stiffness):  # type: ignore[no-untyped-def]
 
 
 class Moving(NamedTuple):
-    """What a pilot reads of a bicycle; units and signs of :class:`.BicycleState`."""
+    """What a pilot reads of a bicycle; names, units and signs of :class:`.BicycleState`."""
 
     x: float
     y: float
@@ -96,6 +96,12 @@ class Moving(NamedTuple):
     speed: float
     steer: float
     steer_rate: float
+
+
+@jit
+def moving_of(seen):  # type: ignore[no-untyped-def]
+    """:class:`Moving` of :attr:`.BicycleState.numbers`."""
+    return Moving(seen[0], seen[1], seen[3], seen[4], seen[5], seen[6], seen[9], seen[10], seen[11])
 
 
 @jit
@@ -170,12 +176,12 @@ def steer_exactly(numbers, stiffness, points, low, high, part, seen, wanted, lea
         low: gains ``(7 + 2 · PREVIEW_BINS,)`` at a speed below.
         high: gains at a speed above.
         part: how far the speed lies between both, 0 to 1.
-        seen: numbers of :class:`Moving`.
+        seen: ``(15,)`` of :func:`moving_of`.
         wanted: speed, m/s.
         lean: what the rider's lean adds to the roll, rad.
         memory: of the pilot; the decision is written there.
     """
-    p, now = piloted_of(numbers, stiffness), Moving(*seen)
+    p, now = piloted_of(numbers, stiffness), moving_of(seen)
     curvature, offset, heading = follow(points, now, memory)
     memory[OFFSET_INTEGRAL] = max(-2.0, min(2.0, memory[OFFSET_INTEGRAL] + p.period * offset))
     steer = turning(p, curvature, offset)

@@ -9,13 +9,9 @@ import numpy as np
 from .ride import Ride
 
 
-class PhysicsStep(NamedTuple):
-    """What a recorder needs of one physics step."""
+class RiderStep(NamedTuple):
+    """What the rider did in one physics step."""
 
-    state: np.ndarray
-    """state of the bodies after it, see :attr:`poise.envs.physics.multibody.Multibody.state`"""
-    forces: list[float]
-    """of hands and feet in it, see :meth:`.Rider.raw_forces`"""
     torques: list[float]
     """N·m of the rider's muscles in it"""
     swivel: list[float]
@@ -25,12 +21,19 @@ class PhysicsStep(NamedTuple):
     fallen: bool
 
 
-def last_step(ride: Ride) -> PhysicsStep:
-    """The physics step that the ride took last, in numbers that later ones do not change."""
-    rider = ride.rider
-    return PhysicsStep(
-        ride.bicycle.body.state.copy(), rider.raw_forces(), rider.torques, rider.swivel, ride.physics.time, ride.fallen
-    )
+class PhysicsStep(NamedTuple):
+    """What a recorder needs of one physics step."""
+
+    state: np.ndarray
+    """state of the bodies after it, see :attr:`poise.envs.physics.multibody.Multibody.state`"""
+    forces: list[float]
+    """of hands and feet in it, see :meth:`.Rider.raw_forces`"""
+    rider: RiderStep
+
+
+def rider_step(ride: Ride) -> RiderStep:
+    """The rider in the physics step that the ride took last, in numbers that later ones do not change."""
+    return RiderStep(ride.rider.torques, ride.rider.swivel, ride.physics.time, ride.fallen)
 
 
 class Tape:
@@ -47,8 +50,9 @@ class Tape:
     def step(self, number: int) -> PhysicsStep:
         """The physics step of this number; the first is 0."""
         while len(self._steps) <= number:
-            self.ride.step()
-            self._steps.append(last_step(self.ride))
+            ride = self.ride
+            ride.step()
+            self._steps.append(PhysicsStep(ride.bicycle.body.state.copy(), ride.rider.raw_forces(), rider_step(ride)))
         return self._steps[number]
 
     def state(self, number: int) -> np.ndarray:

@@ -9,7 +9,7 @@ import numpy as np
 
 from ....filters.compile.cache import jit
 from ....filters.core import rotation
-from .leg_loads import leg_swing, weight_on_pedal
+from .leg_loads import leg_swing, pedal_of_swing, weight_on_pedal
 from .limbs import reach_to, three_turns
 from .posture import CRANKS, KNEE_OUT, LIMBS, POINTS, Posture
 
@@ -46,8 +46,10 @@ class LimbTables:
             rows.append(np.stack([now[limb][:, 1], *slopes], axis=1))
         # (point, limb, value and slopes)
         self.table = np.stack(rows, axis=1)
-        # (point, weight on the pedal and swing)
-        self.legs = np.column_stack([weight_on_pedal(posture, gravity), leg_swing(posture)])
+        # (point, weight on the pedal, what a swing without muscles does to the body, and the pedal's force in it)
+        pedal = pedal_of_swing(posture)
+        swing = leg_swing(posture), np.concatenate([pedal, pedal[:1]])
+        self.legs = np.column_stack([weight_on_pedal(posture, gravity), *swing])
 
     def angles(
         self,
@@ -114,20 +116,22 @@ def abductions(table, middle, steer, crank, trunk, swivel, found):  # type: igno
 def legs_on_pedals(table, crank):  # type: ignore[no-untyped-def]
     """Forces (N, bicycle axes) of the left and the right leg's own weight on the pedals, and the legs' swing.
 
-    The swing is a force upwards and a moment to the right per (rad/s)² of the crank, see :func:`.leg_swing`.
+    The swing of legs without muscles, per (rad/s)² of the crank: a force upwards and a moment to the right, see
+    :func:`.leg_swing`; forces of the left and the right pedal, see :func:`.pedal_of_swing`.
 
     Args:
         table: :attr:`LimbTables.legs`.
         crank: rad.
     """
     last = table.shape[0] - 1
-    found = np.empty((2, 5))
+    found = np.empty((2, 8))
     for side in range(2):
         place = ((crank + side * math.pi) % (2.0 * math.pi)) / (2.0 * math.pi) * last
         index = min(int(place), last - 1)
-        for column in range(5):
+        for column in range(8):
             first, second = table[index, column], table[index + 1, column]
             found[side, column] = first + (place - index) * (second - first)
     left, right = found[0], found[1]
     weights = (left[0], left[1], left[2]), (right[0], -right[1], right[2])
-    return weights[0], weights[1], left[3] + right[3], left[4] - right[4]
+    pedals = (left[5], left[6], left[7]), (right[5], -right[6], right[7])
+    return weights, left[3] + right[3], left[4] - right[4], pedals

@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ....filters.compile.cache import jit
+from ...physics.kinematics import move_links
 from ..frame.forces import bicycle_forces
 from .effort import (
     AROUND,
@@ -115,8 +116,14 @@ def build_of(n, arrays):  # type: ignore[no-untyped-def]
 
 
 @jit
+def added(force, factor, more):  # type: ignore[no-untyped-def]
+    """A force and a factor times another one, N."""
+    return force[0] + factor * more[0], force[1] + factor * more[1], force[2] + factor * more[2]
+
+
+@jit
 def plan(  # type: ignore[no-untyped-def]
-    numbers, arrays, table, habits, time, curvature, bicycle, steer_torque, drive, ratio, state, links, memory
+    numbers, arrays, table, habits, time, curvature, seen, steer_torque, drive, chain, state, links, memory
 ):
     """Decide what the muscles do during the next control period.
 
@@ -127,17 +134,18 @@ def plan(  # type: ignore[no-untyped-def]
         habits: of the rider.
         time: s.
         curvature: of the path a little ahead, 1/m, left positive.
-        bicycle: roll (rad), speed (m/s), steer, crank (rad), rates of crank and rear wheel (rad/s).
+        seen: :attr:`.BicycleState.numbers`.
         steer_torque: N·m on the handlebar, left positive.
         drive: desired propulsive force at the wheel, N, without braking.
-        ratio: of the gear.
+        chain: of :func:`.chain_torque`.
         state: see :mod:`poise.envs.physics.kinematics`.
         links: see above.
         memory: written.
     """
     build = build_of(numbers, arrays)
     reach, seat = build.reach, build.seat
-    lying, speed, steer, crank, crank_rate, wheel_rate = bicycle
+    lying, speed, steer, crank, crank_rate, wheel_rate = seen[3], seen[9], seen[10], seen[12], seen[13], seen[14]
+    ratio = chain[0]
     # change of the trunk's flexion, lean and twist, four swivels (rad), unsteady torque (N·m)
     intended = intentions(table, habits, time, curvature, lying, crank, speed)
     first, rates, joints = 13, 13 + (state.shape[0] - 13) // 2, (memory.shape[0] - MUSCLES) // 2
@@ -151,7 +159,7 @@ def plan(  # type: ignore[no-untyped-def]
     # muscles also carry the legs' weight around, half of it each
     wanted = max(0.0, drive) * build.wheel_radius * ratio
     push = min(LARGEST_PEDAL_FORCE, wanted / (reach.crank * MEAN_STROKE))
-    left_weight, right_weight, lift, tip = legs_on_pedals(build.legs, crank)
+    (left_weight, right_weight), lift, tip, swing = legs_on_pedals(build.legs, crank)
     left_phase, right_phase = crank, crank + math.pi
     turning = -math.sin(left_phase) * left_weight[0] - math.cos(left_phase) * left_weight[2]
     turning -= math.sin(right_phase) * right_weight[0] + math.cos(right_phase) * right_weight[2]
@@ -161,14 +169,18 @@ def plan(  # type: ignore[no-untyped-def]
     around = push * AROUND + 0.5 * (pace / reach.crank - turning)
     draw = held_down(seat, rise, rising)
     left, right = pedal_push(push, around, left_phase, draw), pedal_push(push, around, right_phase, draw)
+    # the legs' own weight is part of the balance at rest; drive, brakes and slopes act on the upper body
+    _, forwards = moments_of_feet(reach, crank, left, right)
+    squared = crank_rate * crank_rate
+    if joints > 3:
+        # muscles of hips and knees swing the legs, so that pedals and chain feel only the push
+        left, right = added(left, squared, swing[0]), added(right, squared, swing[1])
     pushes, weights, feet = memory[PUSHES], memory[WEIGHTS], memory[FEET]
     for axis in range(3):
         weights[axis], weights[3 + axis] = left_weight[axis], right_weight[axis]
         feet[axis], feet[3 + axis] = left[axis] + left_weight[axis], right[axis] + right_weight[axis]
-    lift, tip = crank_rate * crank_rate * lift, crank_rate * crank_rate * tip
+    lift, tip = squared * lift, squared * tip
     rightwards, _ = moments_of_feet(reach, crank, (feet[0], feet[1], feet[2]), (feet[3], feet[4], feet[5]))
-    # the legs' own weight is part of the balance at rest; drive, brakes and slopes act on the upper body
-    _, forwards = moments_of_feet(reach, crank, left, right)
     forwards -= reach.pushed_back * drive
     rightwards += tip + reach.trunk_moment * math.sin(target[1])
     difference, common = hands_against(reach, seat, rightwards, forwards, (pitch, pitching, roll, rolling))
@@ -208,7 +220,7 @@ def plan(  # type: ignore[no-untyped-def]
 
 
 @jit
-def act(numbers, tree, state, frames, links, rigid, memory, forces):  # type: ignore[no-untyped-def]
+def act(numbers, tree, state, frames, links, holds, memory, forces):  # type: ignore[no-untyped-def]
     """Add what rider and saddle do in the next physics step to the generalised forces.
 
     Args:
@@ -217,7 +229,7 @@ def act(numbers, tree, state, frames, links, rigid, memory, forces):  # type: ig
         state: now.
         frames: now.
         links: see above.
-        rigid: links, arms and axes of :func:`.push_between` for the rigid limbs of a lumped rider.
+        holds: links, arms and axes of :func:`.push_between`: hands and feet of a lumped rider.
         memory: the applied torques are written.
         forces: ``(6 + …,)``, added to.
     """
@@ -245,7 +257,7 @@ def act(numbers, tree, state, frames, links, rigid, memory, forces):  # type: ig
         share = min(HEAVIEST, force / seat.load)
         for number in range(6):
             memory[FEET][number] = memory[PUSHES][number] + share * memory[WEIGHTS][number]
-        push_between(tree, frames, rigid[0], rigid[1], rigid[2], memory[HANDS_AND_FEET].reshape(4, 3), forces)
+        push_between(tree, frames, holds[0], holds[1], holds[2], memory[HANDS_AND_FEET].reshape(4, 3), forces)
     for joint in range(joints):
         forces[6 + links[3 + joint]] += applied[joint]
     forces[6 + links[0]] += forwards
@@ -254,8 +266,13 @@ def act(numbers, tree, state, frames, links, rigid, memory, forces):  # type: ig
 
 
 @jit
-def act_on_bicycle(numbers, tree, state, frames, links, rigid, memory, acting, brake, forces):  # type: ignore[no-untyped-def]
-    """:func:`act` and :func:`.bicycle_forces` in one call; ``acting``: what the latter takes before the brake (N)."""
-    act(numbers, tree, state, frames, links, rigid, memory, forces)
+def act_on_bicycle(numbers, tree, state, frames, late, links, holds, memory, acting, brake, forces):  # type: ignore[no-untyped-def]
+    """:func:`act` and :func:`.bicycle_forces` in one call.
+
+    ``late``: move the frames first; ``acting``: what :func:`.bicycle_forces` takes before the brake (N).
+    """
+    if late:
+        move_links(tree, state, frames)
+    act(numbers, tree, state, frames, links, holds, memory, forces)
     parts, body, tyres, ground, time_step, chain, bristles, contacts = acting
     bicycle_forces(tree, state, frames, parts, body, tyres, ground, time_step, chain, bristles, contacts, brake, forces)

@@ -16,9 +16,8 @@ import numpy as np
 from ....filters.core import rotation
 from ...physics.multibody import connect_points, constraint_forces
 from ...physics.urdf import Tree
-from ...physics.world import BASE
 from ...sensors.ideal import STANDARD_GRAVITY
-from ..frame.bicycle import Bicycle, BicycleState
+from ..frame.bicycle import Bicycle
 from ..frame.parameters import BicycleParameters
 from .effort import reach_of
 from .leg_loads import legs_at_crank
@@ -32,9 +31,9 @@ from .links import (
     limb_joints,
     segment_links,
 )
-from .muscles import FEET, HANDS, HANDS_AND_FEET, MUSCLES, SWIVEL, TARGET, WANTED, Build, act, act_on_bicycle, plan
+from .muscles import HANDS_AND_FEET, MUSCLES, SWIVEL, TARGET, WANTED, Build, act, act_on_bicycle, plan
 from .posture import LIMBS, SIDES, SIGNS, Posture
-from .rigid_limbs import rigid_limbs
+from .rigid_limbs import holds
 from .saddle import AHEAD, ARMS_ON_HANDS, balanced_hand_load, resting_load, seat_contact
 from .style import RiderMotion
 
@@ -105,7 +104,10 @@ class Rider:
         self.mass_links = body.index(names)
         self.masses = np.array([body.masses[name] for name in names])
         self.moments = np.array([body.moments[name] for name in names])
-        self._rigid = rigid_limbs(bicycle, self.posture, self.full)
+        self.holds = holds(bicycle, self.posture)
+        centre, _ = bicycle.physics.inertial_frame(body.body)
+        self.saddle_arm = self.holds[2] @ (np.array(self.posture.bicycle.saddle) - centre)
+        """(3,) m: saddle point from the base's centre in its principal axes"""
         self._links = np.array([*self.seat, *self.joints])
         self._reach = reach_of(self.posture, bicycle.physics.gravity)
         for links in self.limb_links:
@@ -179,21 +181,20 @@ class Rider:
         """Wanted lean of the trunk relative to the bicycle, rad, right positive."""
         return float(self._memory[1])
 
-    def plan(self, state: BicycleState, curvature: float, steer_torque: float, drive: float) -> None:
+    def plan(self, seen: np.ndarray, curvature: float, steer_torque: float, drive: float) -> None:
         """Compute muscle torques for the next control period.
 
         Args:
-            state: of the bicycle.
+            seen: :attr:`.BicycleState.numbers` of the bicycle now.
             curvature: of the path a little ahead, 1/m, left positive.
             steer_torque: N·m on the handlebar, left positive.
             drive: desired propulsive force at the wheel, N, without braking.
         """
-        s, motion = state, self.motion
-        since = motion.checked(s.time - self._began)
-        bicycle = (s.roll, s.speed, s.steer, s.crank, s.crank_rate, s.wheel_rate)
+        motion, bicycle = self.motion, self.bicycle
+        since = motion.checked(bicycle.physics.time - self._began)
         plan(
-            self._numbers, self._arrays, motion.table, motion.habits, since, curvature, bicycle, steer_torque, drive,
-            self.bicycle.ratio, self.bicycle.body.state, self._links, self._memory,
+            self._numbers, self._arrays, motion.table, motion.habits, since, curvature, seen, steer_torque, drive,
+            bicycle.chain, bicycle.body.state, self._links, self._memory,
         )  # fmt: skip
 
     def act(self) -> None:
@@ -202,14 +203,15 @@ class Rider:
         To be called after :meth:`plan`.
         """
         body = self.bicycle.body
-        act(self._numbers, body.tree, body.state, body.frames, self._links, self._rigid, self._memory, body.forces)
+        act(self._numbers, body.tree, body.state, body.frames, self._links, self.holds, self._memory, body.forces)
 
     def act_on_bicycle(self, brake: float) -> None:
         """:meth:`act` and :meth:`.Bicycle.act` with brakes (N) in one call, where nothing else acts in this step."""
         body = self.bicycle.body
+        state, frames, late = body.motion()
         act_on_bicycle(
-            self._numbers, body.tree, body.state, body.frames, self._links, self._rigid, self._memory,
-            self.bicycle.acting, brake, body.forces,
+            self._numbers, body.tree, state, frames, late, self._links, self.holds, self._memory, self.bicycle.acting,
+            brake, body.forces,
         )  # fmt: skip
         body.apply()
 
@@ -229,16 +231,6 @@ class Rider:
         arms = np.stack([self.posture.pedal(side, 0.0) - np.array(drive.axle) for side in SIDES])
         return crank.position + rotation.rotate(crank.orientation, arms)
 
-    def hand_forces(self) -> tuple[np.ndarray, np.ndarray]:
-        """Force ``(2, 3)`` of left and right hand on the handlebar (N) and where it acts (m), world axes.
-
-        ``full``: what the constraints carried in the last step; ``lumped``: what acted in it.
-        """
-        if self.full:
-            return np.array(constraint_forces(self.bicycle.physics, self.constraints[:2])), self.grips()
-        frame = self.bicycle.physics.state(self.bicycle.body.body, BASE).orientation
-        return rotation.rotate(frame, self._memory[HANDS].reshape(2, 3)), self.grips()
-
     def raw_forces(self) -> list[float]:
         """Forces ``(12,)`` of hands and feet in the last step, N: in world axes (full) or in bicycle axes (lumped)."""
         if not self.full:
@@ -255,13 +247,6 @@ class Rider:
     def torques(self) -> list[float]:
         """N·m on the rider's joints in the last step, in the order of :attr:`joints`."""
         return self._memory[MUSCLES + len(self.joints) :].tolist()
-
-    def foot_forces(self) -> tuple[np.ndarray, np.ndarray]:
-        """Force ``(2, 3)`` of left and right foot on the pedals (N) and where it acts (m), as :meth:`hand_forces`."""
-        if not self.full:
-            frame = self.bicycle.physics.state(self.bicycle.body.body, BASE).orientation
-            return rotation.rotate(frame, self._memory[FEET].reshape(2, 3)), self.pedals()
-        return np.array(constraint_forces(self.bicycle.physics, self.constraints[2:])), self.pedals()
 
     def gaps(self) -> np.ndarray:
         """Loop-closure errors ``(4,)`` at hands and feet, m; zeros if lumped."""

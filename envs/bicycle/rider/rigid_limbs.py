@@ -1,4 +1,4 @@
-"""Forces of a lumped rider, whose arms and legs are rigid parts of trunk and pelvis."""
+"""Where hands and feet hold the bicycle, and their forces if arms and legs are rigid parts of trunk and pelvis."""
 
 from __future__ import annotations
 
@@ -11,11 +11,10 @@ from ..frame.bicycle import Bicycle
 from .posture import SIDES, SIGNS, Posture
 
 
-def rigid_limbs(bicycle: Bicycle, posture: Posture, full: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Links, arms and axes of :func:`push_between` for a person on a bicycle: hands and feet.
+def holds(bicycle: Bicycle, posture: Posture) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Links ``(4, 2)``, arms and axes of :func:`push_between` for a person on a bicycle: left and right hand and foot.
 
-    Hands act on the handlebar and, oppositely, on the trunk; feet on the pedals and on the pelvis. Those of a ``full``
-    rider are held by constraints; nothing acts between links.
+    Hands act on the handlebar and, oppositely, on the trunk; feet on the pedals and on the pelvis.
     """
     links, physics, bike = bicycle.links, bicycle.physics, posture.bicycle
     assert bike.drive is not None
@@ -27,9 +26,8 @@ def rigid_limbs(bicycle: Bicycle, posture: Posture, full: bool) -> tuple[np.ndar
     for link, arm in zip(held, (*grips, *pedals), strict=True):
         centre, axes = physics.inertial_frame(bicycle.body.body, link)
         arms.append(rotation.rotate_back(axes, arm - centre))
-    count = 0 if full else len(held)
     axes = rotation.to_matrix(rotation.conjugate(physics.inertial_frame(bicycle.body.body)[1]))
-    return np.array([held[:count], holding[:count]], int).T.copy(), np.array(arms[:count]).reshape(-1, 3), axes
+    return np.array([held, holding]).T.copy(), np.array(arms), axes
 
 
 @jit

@@ -109,17 +109,17 @@ STYLES = {
         RiderStyle("still", 0.0, 0.0, 0.0, 0.0, 0.0, swivel=0.0, unsteadiness=0.0),
         RiderStyle(
             "mild", 0.04, 0.038, 0.05, 0.25, 0.3,
-            pedalling=0.02, posture=0.01, posture_interval=30.0, glance=0.1, glance_interval=40.0, breath=0.004,
+            pedalling=0.025, posture=0.01, posture_interval=30.0, glance=0.1, glance_interval=40.0, breath=0.004,
             gaze=0.2, gaze_interval=5.0,
         ),
         RiderStyle(
             "normal", 0.055, 0.05, 0.055, 0.6, 0.5,
-            pedalling=0.03, posture=0.015, posture_interval=20.0, glance=0.15, glance_interval=25.0, breath=0.006,
+            pedalling=0.04, posture=0.015, posture_interval=20.0, glance=0.15, glance_interval=25.0, breath=0.006,
             gaze=0.3, gaze_interval=3.0,
         ),
         RiderStyle(
             "aggressive", 0.06, 0.05, 0.07, 0.8, 0.6, unsteadiness=0.25,
-            pedalling=0.04, posture=0.015, posture_interval=15.0, glance=0.2, glance_interval=15.0, breath=0.01,
+            pedalling=0.06, posture=0.015, posture_interval=15.0, glance=0.2, glance_interval=15.0, breath=0.01,
             gaze=0.5, gaze_interval=1.5,
         ),
     )

@@ -29,6 +29,7 @@ slip, a pelvis fixed to the frame, and fixed ankles.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal
 
@@ -218,9 +219,8 @@ class WholeBody(RiderLinkage, Model):
         if self.sampling == "instant":
             before = self.rates(previous)
             rates = {name: 0.5 * (now[name] + before[name]) for name in now}
-        bicycle, trunk = rates["bicycle_imu/gyr"], rates["trunk_imu/gyr"]
         # roll (2), block 0
-        parts: dict[int, Array] = {0: x[..., ROLL] + expand(dt, 1) * bicycle[..., :1]}
+        parts: dict[int, Array] = {0: x[..., ROLL] + expand(dt, 1) * rates["bicycle_imu/gyr"][..., :1]}
         F: dict[tuple[int, int], Array] = {(0, 0): one[..., None]}
         Q: dict[tuple[int, int], Array] = {(0, 0): one[..., None] * expand(dt * self.bicycle_gyroscope_noise**2, 2)}
         # Gauss–Markov processes (4)*, (7): ϑ̈ (block 1) and a_ts (block 3)
@@ -234,28 +234,36 @@ class WholeBody(RiderLinkage, Model):
             F[index, index] = keep[..., None] * identity(part.stop - part.start, x)
             spread = expand(deviation**2, 2) * (1.0 - keep * keep)[..., None]
             Q[index, index] = spread * identity(part.stop - part.start, x)
-        # Euler angles of trunk (6), shoulders (10) and hips (15): blocks 2, 4 to 7, each relative to its parent
-        steps: dict[int, Rates] = {}
-        joints = [(2, "zxy", TRUNK, trunk, bicycle)]
-        for side, (arm, leg) in zip(SIDES, ((4, 5), (6, 7)), strict=True):
-            joints.append((arm, "yxy", SHOULDER[side], rates[f"upper_arm_{side}/gyr"], trunk))
-            joints.append((leg, "zxy", HIP[side], rates[f"thigh_{side}/gyr"], bicycle))
-        noise = {
-            name: expand(dt * getattr(self, f"{name}_gyroscope_noise") ** 2, 2) for name in ("bicycle", "trunk", "limb")
-        }
-        for index, sequence, part, child, parent in joints:
-            parts[index], F[index, index], steps[index] = advance(sequence, x[..., part], child, parent, dt)
-            M, G = steps[index].by_child, steps[index].by_parent
-            own, its = ("trunk", "bicycle") if index == 2 else ("limb", "trunk" if index in (4, 6) else "bicycle")
+        noise = {name: expand(dt * deviation**2, 2) for name, deviation in self._gyroscope_noises().items()}
+        steps = self._turned(x, rates)
+        for index, (angles, by_angles, step) in steps.items():
+            parts[index], F[index, index] = angles, by_angles
+            M, G = step.by_child, step.by_parent
+            own = "trunk" if index == 2 else "arm" if index in (4, 6) else "leg"
+            its = "trunk" if own == "arm" else "bicycle"
             Q[index, index] = noise[own] * (M @ M.mT) + noise[its] * (G @ G.mT)
         # the trunk's gyroscope is that of the child for the trunk and of the parent for the arms: cross-covariances
         for row, column in ((2, 4), (2, 6), (4, 6)):
-            first = steps[row].by_child if row == 2 else steps[row].by_parent
-            Q[row, column] = noise["trunk"] * (first @ steps[column].by_parent.mT)
+            first = steps[row][2].by_child if row == 2 else steps[row][2].by_parent
+            Q[row, column] = noise["trunk"] * (first @ steps[column][2].by_parent.mT)
             Q[column, row] = Q[row, column].mT
-        angles = xp.concat([parts[index] for index in range(len(BLOCKS))], axis=-1)
+        error = xp.concat([parts[index] for index in range(len(BLOCKS))], axis=-1)
         memory = self._remember(x, z, now["bicycle_imu/gyr"])
-        return xp.concat([angles, memory], axis=-1), assemble(F, x), assemble(Q, x)
+        return xp.concat([error, memory], axis=-1), assemble(F, x), assemble(Q, x)
+
+    def _gyroscope_noises(self) -> dict[str, float]:
+        """Part of the body → noise of its gyroscope, rad/s/√Hz."""
+        limb = self.limb_gyroscope_noise
+        return {"bicycle": self.bicycle_gyroscope_noise, "trunk": self.trunk_gyroscope_noise, "arm": limb, "leg": limb}
+
+    def _turned(self, x: Array, rates: Mapping[str, Array]) -> dict[int, tuple[Array, Array, Rates]]:
+        """Block of trunk (6), shoulders (10) or hips (15) → result of :func:`.rates.advance` from its parent."""
+        bicycle, trunk = rates["bicycle_imu/gyr"], rates["trunk_imu/gyr"]
+        steps = {2: advance("zxy", x[..., TRUNK], trunk, bicycle, self.dt)}
+        for side, (arm, leg) in zip(SIDES, ((4, 5), (6, 7)), strict=True):
+            steps[arm] = advance("yxy", x[..., SHOULDER[side]], rates[f"upper_arm_{side}/gyr"], trunk, self.dt)
+            steps[leg] = advance("zxy", x[..., HIP[side]], rates[f"thigh_{side}/gyr"], bicycle, self.dt)
+        return steps
 
     def _remember(self, x: Array, z: Measurement, rate: Array) -> Array:
         """Encoders, rate and its derivative, f, speed, shock: last valid samples for the measurement equations."""

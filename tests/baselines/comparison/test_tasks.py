@@ -8,10 +8,11 @@ from pathlib import Path
 import pandas
 import pytest
 
+from poise.baselines.comparison import tasks as tasks_module
 from poise.baselines.comparison.data_sets import HAND_CHANNELS
 from poise.baselines.comparison.html_report import html_report
 from poise.baselines.comparison.recommendation import load_results
-from poise.baselines.comparison.tasks import Task, given, hand_tasks, recording_tasks, run_tasks
+from poise.baselines.comparison.tasks import Task, compile_ahead, given, hand_tasks, recording_tasks, run_tasks
 
 NAMES = ("bounded-motion", "tilt")
 
@@ -31,6 +32,15 @@ def test_results_do_not_depend_on_processes_or_interruptions(tasks: list[Task], 
     pandas.testing.assert_frame_equal(whole, spread, check_exact=True)
     pandas.testing.assert_frame_equal(whole, resumed, check_exact=True)
     assert kept.stat().st_mtime_ns == before, "what was done is not done again"
+
+
+def test_what_is_compiled_is_not_run_ahead_again(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    shares: list[list[str]] = []
+    monkeypatch.setattr(tasks_module, "cache_folder", lambda: tmp_path)
+    monkeypatch.setattr(tasks_module, "compile_some", lambda labels, *_: shares.append(labels))
+    for offline in (False, False, True):
+        compile_ahead(NAMES, HAND_CHANNELS, offline, 1)
+    assert shares == [list(NAMES), list(NAMES)], "once without smoothers and once with them"
 
 
 def test_results_of_other_code_are_done_again(tasks: list[Task], tmp_path: Path) -> None:

@@ -7,8 +7,8 @@ import pybullet
 import pytest
 
 from poise.baselines.speed.environments import standing_ride
-from poise.envs.physics.kinematics import move_links_of_many
-from poise.envs.physics.multibody import CentreMotion, Multibody
+from poise.envs.physics.kinematics import POSITION, TURNING, VELOCITY, carry_frames, orientations
+from poise.envs.physics.multibody import Multibody
 from poise.envs.physics.world import BASE, Physics
 from poise.filters.core import rotation
 
@@ -44,9 +44,14 @@ def link_states(body: Multibody, links) -> list:
     return [(row[0], (row[1][3], *row[1][:3]), row[6], row[7]) for row in rows]
 
 
-def assert_same_motion(ours: CentreMotion, body: Multibody) -> None:
+def motion_of(frames):
+    """Position, quaternion, velocity and angular velocity of frames."""
+    return frames[:, POSITION], orientations(frames), frames[:, VELOCITY], frames[:, TURNING]
+
+
+def assert_same_motion(frames, body: Multibody) -> None:
     theirs = link_states(body, range(len(body.links) - 1))
-    for field, values in enumerate(ours):
+    for field, values in enumerate(motion_of(frames)):
         expected = np.array([state[field] for state in theirs])
         if field == 1:
             values, expected = rotation.positive(values), rotation.positive(expected)
@@ -56,9 +61,8 @@ def assert_same_motion(ours: CentreMotion, body: Multibody) -> None:
 def test_an_arm_moves_as_pybullet_moves_it():
     with Physics() as physics:
         arm = moved_arm(physics)
-        assert_same_motion(arm.centre_motion([0, 1]), arm)
-        base = arm.centre_motion([BASE])
-        for ours, theirs in zip(base, physics.base_tuples(arm.body), strict=True):
+        assert_same_motion(arm.frames[1:], arm)
+        for ours, theirs in zip(motion_of(arm.frames[:1]), physics.base_tuples(arm.body), strict=True):
             np.testing.assert_allclose(ours[0], theirs, atol=1e-14)
 
 
@@ -68,11 +72,24 @@ def test_rider_and_bicycle_move_as_pybullet_moves_them(fidelity):
         for _ in range(100):
             ride.step()
         body = ride.bicycle.body
-        motion = CentreMotion.of_frames(body.frames[1:])
-        assert_same_motion(motion, body)
-        frames = np.empty((2, *body.frames.shape))
-        move_links_of_many(body.tree, np.stack([body.state, body.state]), frames)
-        assert np.array_equal(frames[1], body.frames)
+        assert_same_motion(body.frames[1:], body)
+
+
+def test_body_frames_move_as_pybullet_moves_them():
+    with Physics() as physics:
+        arm = moved_arm(physics)
+        frames, links = [arm.frames.copy()], [BASE, 0, 1]
+        physics.step()
+        frames.append(arm.frames)
+        mounts = [physics.inertial_frame(arm.body, link) for link in links]
+        arms = np.array([rotation.rotate_back(axes, -centre) for centre, axes in mounts])
+        found = np.empty((4, 3, 1, 3))
+        carry_frames(np.array([frames]), arms, physics.time_step, found)
+        expected = physics.states(arm.body, links)
+        np.testing.assert_allclose(found[0, :, 0], expected.position, atol=1e-13)
+        np.testing.assert_allclose(found[1, :, 0], expected.velocity, atol=1e-13)
+        gained = (frames[1][:, TURNING] - frames[0][:, TURNING]) / physics.time_step
+        np.testing.assert_allclose(found[3, :, 0], gained, atol=1e-12)
 
 
 def test_a_force_on_a_link_acts_as_in_pybullet():

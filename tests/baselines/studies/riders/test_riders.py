@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from poise.baselines.comparison.rider_tables import by_group
 from poise.baselines.learned.presets import PRESETS
 from poise.baselines.learned.rides import UNSEEN
 from poise.baselines.studies.averages import circular_mean
@@ -108,6 +109,23 @@ def test_conditions_change_what_they_say() -> None:
     np.testing.assert_array_equal(slow.truth["bicycle/roll"][5], usual.truth["bicycle/roll"][20])
 
 
+def test_tables_of_kept_numbers() -> None:
+    numbers = [
+        {"paper": "two-gyro", "method": method, "group": group, "error": 1.234, "low": 1.0, "high": 2.0}
+        | {"over bound": 3.0, "nees": nees, "coverage": 0.9}
+        for method, nees in (("two-gyro", 1.5), ("ridge", None))
+        for group in UNSEEN
+    ]
+    assert by_group(numbers, "two-gyro", "error")[1] == {
+        "method": "ridge",
+        **dict.fromkeys(UNSEEN, "1.23 [1.00, 2.00]"),
+    }
+    assert by_group(numbers, "two-gyro", "mean")[0] == {"method": "two-gyro", **dict.fromkeys(UNSEEN, 1.234)}
+    consistent = [{"method": "two-gyro", **dict.fromkeys(UNSEEN, "1.50, 90 %")}]
+    assert by_group(numbers, "two-gyro", "consistency") == consistent, "a regression has no covariance"
+    assert by_group(numbers, "whole-body", "bound") == []
+
+
 def test_settings_that_cannot_be_are_refused() -> None:
     with pytest.raises(ValueError, match="papers must be some of"):
         suite.RiderSuite(("mekf",))
@@ -129,21 +147,17 @@ def test_the_comparison_of_one_paper(monkeypatch: pytest.MonkeyPatch, tmp_path: 
     before = files[0].stat().st_mtime_ns
     assert str(suite.compare(settings, tmp_path)) == str(rows), "an interrupted comparison ends with the same rows"
     assert files[0].stat().st_mtime_ns == before
-    found = {cells["method"]: cells for cells in tables.error_table(rows, "two-gyro")}
+    summary = json.loads(json.dumps(tables.summary(rows), allow_nan=False))
+    found = {cells["method"]: cells for cells in by_group(summary, "two-gyro", "error")}
     assert {"two-gyro", "two-gyro+network", suite.MEAN, suite.RIDGE, suite.BIAS} <= set(found)
     assert all(float(cells["unseen riders"].split()[0]) > 0.0 for cells in found.values())
     oracle, published = (np.mean([row.mean for row in rows if row.method == name]) for name in (
         f"two-gyro, {suite.ORACLE}", "two-gyro"))  # fmt: skip
     assert oracle <= published
-    consistent = {cells["method"] for cells in tables.consistency_table(rows, "two-gyro")}
+    consistent = {cells["method"] for cells in by_group(summary, "two-gyro", "consistency")}
     assert {"two-gyro", "two-gyro+network"} <= consistent
     assert len(tables.results(rows)) == len(rows) * 8
-    summary = json.loads(json.dumps(tables.summary(rows), allow_nan=False))
-    assert [one["unseen riders"] for one in summary if one["table"] == "error"] == [
-        cells["unseen riders"] for cells in found.values()
-    ]
-    assert {one["table"] for one in summary} == {"error", "consistency", "bound"}
-    ratios = {cells["method"]: cells["unseen riders"] for cells in tables.bound_table(rows, "two-gyro")}
+    ratios = {cells["method"]: cells["unseen riders"] for cells in by_group(summary, "two-gyro", "bound")}
     assert ratios["two-gyro"] > 1.0
     means = tables.ride_means(rows, "two-gyro")
     assert {row[3] for row in means} == {"angle", "angle over bound", "nees", "coverage of 90 %"}

@@ -148,11 +148,11 @@ def test_momentum_changes_by_the_ground_and_gravity_alone():
         bicycle.start(4.0, roll_rate=0.3, steer=0.05)
         weight = bicycle.body.mass * physics.gravity
         for _ in range(400):
-            before = bicycle.own_motion()
+            before = bicycle.body.frames.copy()
             bicycle.act(steer_torque=0.3)
             physics.step()
-            point = before.position[0]
-            force, moment = bicycle.own_wrench(before, bicycle.own_motion(), point)
+            point = before[0, :3]
+            force, moment = bicycle.own_wrench(before, bicycle.body.frames, point)
             ground_force, ground_moment = bicycle.ground_wrench(point)
             assert np.abs(force - ground_force).max() < 1e-4 * weight
             assert np.abs(moment - ground_moment).max() < 1e-3 * weight

@@ -31,7 +31,7 @@ def ride(bike, path, speed, duration, roll_rate=0.0):
         for step in range(round(duration / physics.time_step)):
             if step % 4 == 0:
                 state = bicycle.state()
-                torque, drive = pilot.update(state, speed)
+                torque, drive = pilot.update(state.numbers, speed)
                 rows.append((state.roll, state.steer, state.speed, pilot.offset, torque))
             bicycle.act(torque, drive * bike.rear_wheel.radius)
             physics.step()

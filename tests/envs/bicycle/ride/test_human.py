@@ -97,7 +97,7 @@ def test_nothing_is_done_about_a_push_before_the_senses_report_it():
         time = step / 250.0
         rate = 0.05 if step >= 10 else 0.0
         seen = BicycleState(time, 3.0 * time, *5 * (0.0,), rate, 0.0, 0.0, 3.0, *4 * (0.0,), 9.0)
-        torques.append(abs(pilot.update(seen, 3.0)[0]))
+        torques.append(abs(pilot.update(seen.numbers, 3.0)[0]))
     late = 10 + delays(quiet, 1.0 / 250.0)[1]
     assert max(torques[:late]) < 0.02
     assert max(torques[late + 10 :]) > 0.2
@@ -144,7 +144,7 @@ def test_no_muscle_pulls_beyond_its_limit():
     pilot.start(STRAIGHT, 3.0)
     for step in range(250):
         seen = BicycleState(step / 250.0, 0.0, *2 * (0.0,), 0.5, *2 * (0.0,), 2.0, 0.0, 0.0, 3.0, *4 * (0.0,), 9.0)
-        torque = abs(pilot.update(seen, 3.0)[0])
+        torque = abs(pilot.update(seen.numbers, 3.0)[0])
     assert 0.9 < torque / pilot.human.largest_torque < 1.05
 
 

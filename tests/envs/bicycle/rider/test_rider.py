@@ -7,9 +7,10 @@ import math
 import numpy as np
 import pytest
 
+from poise.envs.bicycle.course.events import Events
 from poise.envs.bicycle.course.path import Path, smooth_curvature
 from poise.envs.bicycle.frame.parameters import AIR_DENSITY, BENCHMARK, MOUNTAIN_BIKE
-from poise.envs.bicycle.ride.contact_forces import LoadCells, contact, rider_motion, saddle_point
+from poise.envs.bicycle.ride.contact_forces import Contact, LoadCells, contact, place_on
 from poise.envs.bicycle.ride.ride import Ride
 from poise.envs.bicycle.rider.anthropometry import MEN, SUBJECTS, WOMEN, RiderBody, random_body, rider_body
 from poise.envs.bicycle.rider.limbs import Limb, forward, reach_to, three_angles, three_turns, tip_torques
@@ -105,25 +106,25 @@ def test_contact_forces_balance_the_bicycle(fidelity, path, speed):
         for step in range(2500):
             look = step > 800 and step % 100 == 0
             if look:
-                before, own, saddle = rider_motion(rider), bicycle.own_motion(), saddle_point(bicycle)
+                before, states = bicycle.body.frames.copy(), [bicycle.body.state.copy()]
+                saddle = np.array(place_on(before[0], rider.saddle_arm))
                 grips, pedals = rider.grips(), rider.pedals()
                 velocity = np.array(ride.physics.base_tuples(bicycle.body.body)[2])
                 roll_axes = ride.physics.state(bicycle.body.body).orientation
             ride.step()
             if not look:
                 continue
-            hands = rider.hand_forces()[0]
-            found = contact(
-                rider, before, rider_motion(rider), saddle, (hands, grips), (rider.foot_forces()[0], pedals)
-            )
-            force, moment = bicycle.own_wrench(own, bicycle.own_motion(), saddle)
+            states = np.stack([*states, bicycle.body.state])
+            steps, _ = contact(rider, states, np.reshape(rider.raw_forces(), (1, 4, 3)), 1)
+            found = Contact(*(field[0] for field in steps))
+            force, moment = bicycle.own_wrench(before, bicycle.body.frames, saddle)
             ground, ground_moment = bicycle.ground_wrench(saddle)
             drag = -0.5 * AIR_DENSITY * MOUNTAIN_BIKE.drag_area * np.linalg.norm(velocity) * velocity
             limbs = np.concatenate([found.hands, found.feet])
             arms = np.concatenate([grips, pedals]) - saddle
             expected = found.seat_force + limbs.sum(axis=0) + ground + drag
             expected_moment = found.seat_moment + np.cross(arms, limbs).sum(axis=0) + ground_moment
-            expected_moment += np.cross(own.position[0] - saddle, drag)
+            expected_moment += np.cross(before[0, :3] - saddle, drag)
             worst_force = max(worst_force, np.abs(force - expected).max())
             worst_moment = max(worst_moment, np.abs(moment - expected_moment).max())
             worst_gap = max(worst_gap, rider.gaps().max())
@@ -141,7 +142,7 @@ def test_steer_torque_comes_through_the_hands():
     with make_ride(style="still", speed=4.0) as ride:
         for _ in range(1000):
             ride.step()
-        forces, places = ride.rider.hand_forces()
+        forces, places = np.reshape(ride.rider.raw_forces(), (4, 3))[:2], ride.rider.grips()
         link = ride.bicycle.links["front_assembly"]
         front = ride.physics.state(ride.bicycle.body.body, link)
         axis = rotation.rotate(front.orientation, MOUNTAIN_BIKE.steer_axis)
@@ -179,6 +180,24 @@ def test_legs_pedal_and_the_chain_drives():
         assert ride.state.speed == pytest.approx(3.0, abs=0.08)
         drag = 0.5 * AIR_DENSITY * 0.5 * 9.0 + 0.006 * 93.0 * 9.81
         assert np.mean(torque) / MOUNTAIN_BIKE.rear_wheel.radius == pytest.approx(drag, rel=0.25)
+
+
+def test_the_crank_turns_evenly_and_the_pedals_feel_the_push_alone():
+    """At 84 a minute and little power the swing of the legs would slacken the chain without muscles that make it."""
+    cadence = Events(cadence=9.5)
+    with make_ride(speed=3.0, style="still", events=cadence) as ride:
+        rates, pedals = [], []
+        for step in range(2500):
+            ride.step()
+            if step >= 1500:
+                rates.append(ride.state.crank_rate)
+                pedals.append(ride.rider.foot_forces()[0][:, 2].sum())
+    rate = float(np.mean(rates))
+    assert rate * 30.0 / math.pi > 75.0
+    assert np.std(rates) < 0.02 * rate
+    turns = rate * np.arange(len(pedals)) * ride.physics.time_step
+    fourfold = 2.0 * abs(np.mean((np.array(pedals) - np.mean(pedals)) * np.exp(-4j * turns)))
+    assert fourfold < 8.0
 
 
 @pytest.mark.parametrize("fidelity", ["full", "lumped"])
