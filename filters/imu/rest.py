@@ -57,8 +57,8 @@ class RestingBoundedMotion(BoundedMotion):
     rest_deviation: float = math.radians(0.05)
     """σ_D, rad/s: between the bias at rest and that in motion"""
     bias_prior: float = math.radians(1.0)
-    """rad/s; wider priors find large biases sooner and cost accuracy where the bias is small: on simulated gestures of a
-    device of 0.2 °/s this is the widest with which no gesture is worse than with that of bounded-motion"""
+    """rad/s; wider priors find large biases sooner and cost accuracy where the bias is small: of 0.5, 1 and 1.5 °/s the
+    widest with which no simulated gesture (device of 0.2 °/s) is worse than by bounded-motion"""
 
     state_size: ClassVar[int] = 22
     residual_size: ClassVar[int] = 6
