@@ -24,7 +24,7 @@ def still(seconds: float, rate: float = 100.0) -> dict[str, np.ndarray]:
 
 
 def bias(name: str, data: dict[str, np.ndarray]) -> np.ndarray:
-    estimator: Any = make(name, dt=0.01, bias_prior=np.radians(1.0))
+    estimator: Any = make(name, dt=0.01, bias_prior=np.radians(1.5))
     return np.asarray(estimator.run(data).pose["gyroscope_bias"])
 
 
@@ -39,7 +39,7 @@ def test_a_rest_tells_the_bias() -> None:
 def test_a_rest_of_any_length_leaves_the_doubt_about_motion() -> None:
     """The deviation of the bias ends at σ_D about each axis; with a σ_R that tells nothing it stays where it was."""
     data = still(8.0)
-    for parameters, lowest, highest in (({}, 0.045, 0.055), ({"rest_noise": 20.0}, 0.7, 1.1)):
+    for parameters, lowest, highest in (({}, 0.045, 0.055), ({"rest_noise": 20.0}, 0.9, 1.6)):
         estimator: Any = make("bounded-motion-rest", dt=0.01, **parameters)
         spread = np.sqrt(np.diagonal(estimator.run(data).covariance[-1, 3:6, 3:6]))
         # gravity tells the rest of it about the horizontal axes
