@@ -98,8 +98,7 @@ class Equations:
 
     @property
     def supposed_field(self) -> int:
-        """Where the state has the unit magnetic field in the world that these equations found at their start and keep;
-        −1 without one."""
+        """Where the state has the unit field in the world that was found at the start and is kept; −1 without one."""
         return -1
 
     @classmethod

@@ -84,8 +84,8 @@ def watch(memory: Array, inputs: Array) -> Array:
 
     Args:
         memory: ``(..., 15)``; zeros at the start.
-        inputs: ``(..., 20)`` or ``(..., 21)``; force and field NaN where there is no sample, the vertical NaN for that of the
-            orientation.
+        inputs: ``(..., 20)`` or ``(..., 21)``; force and field NaN where there is no sample, the vertical NaN for
+            that of the orientation.
     """
     xp = namespace(memory, inputs)
     rate, up, q = inputs[..., :3], inputs[..., 9:12], inputs[..., 12:16]
@@ -171,15 +171,15 @@ def watch(memory: Array, inputs: Array) -> Array:
 
 @dataclass(frozen=True)
 class Places:
-    """Where the inputs of :func:`watch` are found: first element in a sample, a pose or (of the field that equations
-    suppose in the world) a state; −1 for what there is not."""
+    """Where the inputs of :func:`watch` are found: first element in a sample, a pose or a state; −1 for what is not there."""
 
     rate: int
     force: int
     field: int
     up: int
     orientation: int
-    supposed: int = -1
+    supposed: int
+    """in the state: the unit field in the world that equations keep"""
 
 
 def places_of(model: Equations) -> Places | None:

@@ -18,9 +18,7 @@ ZONES |= {"CST": -6, "CDT": -5, "MST": -7, "MDT": -6, "PST": -8, "PDT": -7}
 """Name of a time zone → hours east of Greenwich."""
 CLOCK = r"\d\d?:\d\d(:\d\d([.,:]\d+)?|[.,]\d+)?(\s*[ap]\.?m\.?)?"
 CALENDAR = r"(\d{4}([-/.]\d\d[-/.]\d\d|\d{4})|\d\d?[-/. ](\d\d?|[a-z]{3,9})[-/. ](\d{4}|\d\d))"
-DATE = re.compile(
-    rf"({CALENDAR}(T|_|,?\s+))?{CLOCK}\s*(Z|UTC|GMT|{'|'.join(ZONES)}|[-+]\d\d:?\d\d)?", re.IGNORECASE
-)
+DATE = re.compile(rf"({CALENDAR}(T|_|,?\s+))?{CLOCK}\s*(Z|UTC|GMT|{'|'.join(ZONES)}|[-+]\d\d:?\d\d)?", re.IGNORECASE)
 """A date with a time, a time of the day of 24 or twice 12 hours, or minutes, seconds and their fraction; with a time
 zone or without."""
 HOUR, DAY = 3600, 86_400
@@ -42,7 +40,7 @@ WRAPS = (
     DAY * 10**6,
     DAY * 10**9,
 )
-"""Ends of counters after which they start again at 0; minutes and seconds do every hour, a time of the day at midnight."""
+"""Ends of counters after which they start again at 0: minutes and seconds every hour, a time of the day at midnight."""
 FURTHEST_BACK = 2.5
 """Intervals by which rows may be out of order."""
 EPOCHS = {1.0: (3e8, 4e9), 1e-3: (3e11, 4e12), 1e-6: (3e14, 4e15), 1e-7: (1.2e17, 1.5e17), 1e-9: (3e17, 4e18)}

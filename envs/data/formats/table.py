@@ -112,7 +112,7 @@ def factor(kind: str, unit: str) -> float:
 
 
 def split_unit(name: str) -> tuple[str, str]:
-    """Name and unit of ``name (unit)``, ``name [unit]``, ``name/unit``, ``name, unit``, ``name_unit``, ``time in unit``.
+    """Name and unit of ``name (unit)``, ``name [unit]``, ``name/unit``, ``name, unit``, ``name_unit``, ``t in unit``.
 
     An index like ``Mat[1]`` is of the name.
     """

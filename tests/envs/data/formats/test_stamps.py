@@ -111,7 +111,8 @@ def test_a_time_of_the_day_goes_on_after_midnight(tmp_path, stamps, unit):
     time = f"Time [{unit}]" if unit else "Time"
     rows = [f"{time},gyr_x [rad/s],gyr_y [rad/s],gyr_z [rad/s],acc_x [g],acc_y [g],acc_z [g]"]
     rows += [f"{stamp},0.1,0.2,0.3,0,0,1" for stamp in stamps]
-    np.testing.assert_allclose(load_recording(written(tmp_path, "\n".join(rows))).time, np.arange(1000) / 100, atol=1e-9)
+    recording = load_recording(written(tmp_path, "\n".join(rows)))
+    np.testing.assert_allclose(recording.time, np.arange(1000) / 100, atol=1e-9)
 
 
 @pytest.mark.parametrize("form", ["%d.%m.%Y %H:%M:%S.%f", "%Y-%m-%d %H:%M:%S.%f", "%I:%M:%S.%f %p"])
