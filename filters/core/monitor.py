@@ -171,7 +171,7 @@ def watch(memory: Array, inputs: Array) -> Array:
 
 @dataclass(frozen=True)
 class Places:
-    """Where the inputs of :func:`watch` are found: first element in a sample, a pose or a state; −1 where there is none."""
+    """Where the inputs of :func:`watch` are found: first element in a sample, a pose or a state; −1 for none."""
 
     rate: int
     force: int
