@@ -89,7 +89,7 @@ _REALIGNED = f"""
 
 _WATCHED = """
             if restart and started[b]:
-                watch(monitor[b], present, z, pose_now, age[b], p)"""
+                watch(monitor[b], present, z, state, pose_now, age[b], p)"""
 
 # ``record`` is ``run`` with further lines in place of the comments: it keeps what the way back needs.
 _RECORDED = {
@@ -237,7 +237,7 @@ def _recursion(traced: Equations, tape: Tape, names: list[str]) -> tuple[dict[st
     channels, places = [channel.name for channel in traced.channels], places_of(traced)
     begins = [*starts_of(traced.channels).values(), sum(channel.size for channel in traced.channels)]
     parts = {"starts": begins, "dt": names.index("dt"), "lost": "False", "rejected": "", "realigned": "", "watched": ""}
-    p, age = tape.inputs("p", len(names)), tape.inputs("age", len(channels))
+    p, age, x = tape.inputs("p", len(names)), tape.inputs("age", len(channels)), tape.inputs("x", traced.state_size)
     present, current, z = (tape.inputs(name, begins[-1]) for name in ("present", "current", "z"))
 
     def grow() -> Any:
@@ -250,9 +250,9 @@ def _recursion(traced: Equations, tape: Tape, names: list[str]) -> tuple[dict[st
         of_rate, of_force = (age[i : i + 1] for i in map(channels.index, (GYROSCOPE.name, ACCELEROMETER.name)))
         functions["reject(z, memory, age)"] = ("z",), lambda: without_impacts(places, z, memory, of_force)
         functions["realign(current, memory, p)"] = (("current",), lambda: realigned(places, current, memory, traced.dt))
-        functions["watch(memory, present, z, posed, age, p)"] = (
+        functions["watch(memory, present, z, x, posed, age, p)"] = (
             ("memory",),
-            lambda: watch(memory, inputs_of(traced, places, present, z, posed, of_rate)),
+            lambda: watch(memory, inputs_of(traced, places, present, z, x, posed, of_rate)),
         )
         lost = f"restart and monitor[b, {LOST}] > 0.5"
         parts |= {"lost": lost, "rejected": _REJECTED, "realigned": _REALIGNED, "watched": _WATCHED}

@@ -96,6 +96,11 @@ class Equations:
         """The same equations for another sampling interval."""
         return replace(self, dt=float(dt))
 
+    @property
+    def supposed_field(self) -> int:
+        """Where the state has the unit field in the world that was found at the start and is kept; −1 without one."""
+        return -1
+
     @classmethod
     def parameters_from(cls, metadata: Mapping[str, Any]) -> dict[str, Any]:
         """The parameters that a recording's metadata determine, by field: of the person, the vehicle or the device.

@@ -11,7 +11,9 @@ free fall. An estimate that contradicts a trusted average by more than any accel
 :data:`PATIENCE` is lost: it starts anew, from the averages. So neither a bad first sample nor a long gap decides for
 good. The heading is watched until it has been confirmed once; after that the field may be disturbed, and only the
 estimator decides. The inclination of a method without covariance is watched until then, too: what it makes of its drift
-later is its own.
+later is its own. Equations that keep the field of their start for good, dip included, are watched more closely until
+then: a wrong dip turns their estimate for ever, and an error about the field's direction, which their magnetometer does
+not see, hardly decays. Their dip and their east are compared with those of both averages.
 
 Two rules need no patience. An average of a few samples that the next one contradicts starts anew with that sample, and
 so does the estimator, until a start has been confirmed. After these few a sample that points elsewhere decides
@@ -39,6 +41,8 @@ LARGEST_LEAN, LARGEST_LEAN_AT_START = math.radians(40.0), math.radians(20.0)
 agreed, to half the latter, for :data:`CONFIRMED`."""
 LARGEST_TURN = math.radians(15.0)
 """The same for the heading, which is watched until then only."""
+LARGEST_ERROR = math.radians(10.0)
+"""The same for dip and east of equations that keep the field of their start."""
 PATIENCE = 1.5
 """s for which they must do so."""
 CONFIRMED = 2.0
@@ -65,7 +69,8 @@ INFLATION = 4.0
 
 INPUTS = 20
 """Of :func:`watch`: rate (3), force (3), field (3), up (3), orientation (4), age of the rate, dt, declination, and
-whether the inclination is watched for good (1) or until it was confirmed (0)."""
+whether the inclination is watched for good (1) or until it was confirmed (0). One more where equations keep the field
+of their start: its vertical component."""
 MEMORY = 15
 """Of :func:`watch`: average force (3), mean square, time, time of contradiction; the same of the field (3, 1, 1, 1);
 times of agreement of the heading and of the inclination; zero, or if the estimate is lost the factor on the covariance
@@ -79,8 +84,8 @@ def watch(memory: Array, inputs: Array) -> Array:
 
     Args:
         memory: ``(..., 15)``; zeros at the start.
-        inputs: ``(..., 20)``; force and field NaN where there is no sample, the vertical NaN for that of the
-            orientation.
+        inputs: ``(..., 20)`` or ``(..., 21)``; force and field NaN where there is no sample, the vertical NaN for
+            that of the orientation.
     """
     xp = namespace(memory, inputs)
     rate, up, q = inputs[..., :3], inputs[..., 9:12], inputs[..., 12:16]
@@ -138,6 +143,18 @@ def watch(memory: Array, inputs: Array) -> Array:
     # A heading counts as right with a right inclination only: a wrong one turns it while it is corrected.
     agreeing = xp.logical_and(standing, xp.greater(along, math.cos(0.5 * LARGEST_TURN) * horizontal))
     agreeing = xp.logical_and(heading, agreeing)
+    if inputs.shape[-1] > INPUTS:
+        supposed = inputs[..., INPUTS : INPUTS + 1]
+        force_square, field_square = (xp.sum(part * part, axis=-1)[..., None] + 1e-30 for part in (force, field))
+        sine = xp.sum(force * field, axis=-1)[..., None] / xp.sqrt(force_square * field_square)
+        cosine = xp.sqrt(1.0 + 1e-9 - sine * sine)
+        supposed_cosine = xp.sqrt(1.0 + 1e-9 - supposed * supposed)
+        dip = sine * supposed + cosine * supposed_cosine
+        eastwards = rotate(q, cross(field, force)) / (cosine * xp.sqrt(force_square * field_square))
+        about = eastwards[..., :1] * c - eastwards[..., 1:2] * s
+        least = xp.where(xp.less(dip, about), dip, about)
+        turned = xp.logical_or(turned, xp.logical_and(heading, xp.less(least, math.cos(LARGEST_ERROR))))
+        agreeing = xp.logical_and(agreeing, xp.greater(least, math.cos(0.5 * LARGEST_ERROR)))
     off = xp.where(turned, memory[..., 11:12] + dt, xp.where(heading, zero, memory[..., 11:12]))
     agreed = xp.where(agreeing, memory[..., 12:13] + dt, memory[..., 12:13])
 
@@ -154,13 +171,15 @@ def watch(memory: Array, inputs: Array) -> Array:
 
 @dataclass(frozen=True)
 class Places:
-    """Where the inputs of :func:`watch` are found: first element in a sample or in a pose; −1 for what there is not."""
+    """Where the inputs of :func:`watch` are found: first element in a sample, a pose or a state; −1 for none."""
 
     rate: int
     force: int
     field: int
     up: int
     orientation: int
+    supposed: int
+    """in the state: the unit field in the world that equations keep"""
 
 
 def places_of(model: Equations) -> Places | None:
@@ -175,7 +194,8 @@ def places_of(model: Equations) -> Places | None:
     if not ({GYROSCOPE.name, ACCELEROMETER.name} <= samples.keys() and max(up, orientation) >= 0):
         return None
     field = samples[MAGNETOMETER.name] if heading else -1
-    return Places(samples[GYROSCOPE.name], samples[ACCELEROMETER.name], field, up, orientation)
+    supposed = model.supposed_field if heading else -1
+    return Places(samples[GYROSCOPE.name], samples[ACCELEROMETER.name], field, up, orientation, supposed)
 
 
 def starts_of(parts: Sequence[Channel | Quantity]) -> dict[str, int]:
@@ -184,14 +204,17 @@ def starts_of(parts: Sequence[Channel | Quantity]) -> dict[str, int]:
     return {part.name: sum(sizes[:index]) for index, part in enumerate(parts)}
 
 
-def inputs_of(model: Equations, places: Places, held: Array, sample: Array, pose: Array, age: Array) -> Array:
-    """The inputs ``(..., 20)`` of :func:`watch`.
+def inputs_of(
+    model: Equations, places: Places, held: Array, sample: Array, state: Array, pose: Array, age: Array
+) -> Array:
+    """The inputs of :func:`watch`.
 
     Args:
         model: the equations.
         places: of :func:`places_of`.
         held: ``(..., d)`` last samples, side by side.
         sample: ``(..., d)`` of this time step; NaN where there is none.
+        state: ``(..., n)``.
         pose: ``(..., p)`` outputs of the model, side by side.
         age: ``(..., 1)`` s since the gyroscope's last sample.
     """
@@ -204,8 +227,9 @@ def inputs_of(model: Equations, places: Places, held: Array, sample: Array, pose
     declination = expand(getattr(model, "declination", 0.0), 1)
     parts = [part(held, places.rate, 3), part(sample, places.force, 3), part(sample, places.field, 3)]
     parts += [part(pose, places.up, 3), part(pose, places.orientation, 4), age]
-    always = zero + float(model.error_size > 0)
-    return xp.concat([*parts, zero + expand(model.dt, 1), zero + declination, always], axis=-1)
+    parts += [zero + expand(model.dt, 1), zero + declination, zero + float(model.error_size > 0)]
+    parts += [state[..., places.supposed + 2 : places.supposed + 3]] if places.supposed >= 0 else []
+    return xp.concat(parts, axis=-1)
 
 
 def without_impacts(places: Places, sample: Array, memory: Array, age: Array) -> Array:

@@ -227,7 +227,7 @@ class Recursion:
         if places is not None and bool(xp.any(started)):
             outputs = xp.concat([pose[quantity.name] for quantity in self.outputs], axis=-1)
             ages = age[..., names.index(GYROSCOPE.name)][..., None]
-            seen = watch(memory, inputs_of(model, places, filled(current), sample, outputs, ages))
+            seen = watch(memory, inputs_of(model, places, filled(current), sample, x, outputs, ages))
             memory = xp.where(started[..., None], seen, memory)
         if not bool(xp.all(started)):
             pose = {name: xp.where(started[..., None], value, value + xp.nan) for name, value in pose.items()}

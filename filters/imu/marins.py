@@ -108,6 +108,11 @@ class Marins(Model):
             if getattr(self, name) <= 0.0:
                 raise ValueError(f"{name} must be positive, got {getattr(self, name)}")
 
+    @property
+    def supposed_field(self) -> int:
+        """The unit field in the world, unless it is given."""
+        return 7 if self.field == "start" else -1
+
     def prior(self, z: Measurement) -> tuple[Array, Array]:
         """At rest: inclination from the accelerometer, heading from the field; ω₀ is the gyroscope's sample."""
         xp, field, rate = namespace(z["imu/mag"]), z["imu/mag"], z["imu/gyr"]

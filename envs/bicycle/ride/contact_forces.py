@@ -84,37 +84,19 @@ def contact(
     Returns:
         The forces, and frames ``(n, 2, rows, 18)`` before and after the last physics step of each sample.
     """
-    physics, (links, arms, axes) = rider.bicycle.physics, rider.holds
-    count = len(pushes) // steps
+    physics, count, bodies = rider.bicycle.physics, len(pushes) // steps, np.array(rider.mass_links) + 1
     found, frames = np.empty((count, 6, 3)), np.empty((count, 2, len(rows), 18))
     sampled_contact(
-        rider.bicycle.body.tree, states, pushes, rider.full, np.array(rider.mass_links) + 1, rider.masses,
-        rider.moments, links[:, 0] + 1, arms, axes, rider.saddle_arm, physics.time_step, physics.gravity, steps,
-        steps - 1 if last_only else 0, np.array(rows, int), found, frames,
+        rider.bicycle.body.tree, states, pushes, rider.full, (bodies, rider.masses, rider.moments), rider.holds,
+        rider.saddle_arm, physics.time_step, physics.gravity, steps, steps - 1 if last_only else 0,
+        np.array(rows, int), found, frames,
     )  # fmt: skip
     return Contact(found[:, 0], found[:, 1], found[:, 2:4], found[:, 4:]), frames
 
 
 @jit
 def sampled_contact(  # type: ignore[no-untyped-def]
-    tree,
-    states,
-    pushes,
-    full,
-    rows,
-    masses,
-    moments,
-    held,
-    arms,
-    axes,
-    saddle,
-    duration,
-    gravity,
-    steps,
-    first,
-    wanted,
-    found,
-    kept,
+    tree, states, pushes, full, bodies, holds, saddle, duration, gravity, steps, first, wanted, found, kept
 ):
     """:func:`contact`, compiled.
 
@@ -123,12 +105,8 @@ def sampled_contact(  # type: ignore[no-untyped-def]
         states: as there.
         pushes: as there; in world axes (``full``) or in bicycle axes.
         full: likewise.
-        rows: ``(k,)`` rows of the rider's masses in the frames, as of the next two in :func:`.newton_euler`.
-        masses: ``(k,)`` kg.
-        moments: ``(k, 3)`` kg·m².
-        held: ``(4,)`` rows of what hands and feet hold.
-        arms: ``(4, 3)`` where, from its centre in its principal axes, m.
-        axes: ``(3, 3)`` bicycle axes to the principal axes of the base.
+        bodies: rows of the rider's masses in the frames, masses and moments of inertia, see :func:`.newton_euler`.
+        holds: :attr:`.Rider.holds`.
         saddle: :attr:`.Rider.saddle_arm`.
         duration: of a physics step, s.
         gravity: m/s².
@@ -138,6 +116,7 @@ def sampled_contact(  # type: ignore[no-untyped-def]
         found: ``(n, 6, 3)``, overwritten: force and moment of the seat, hands, feet.
         kept: ``(n, 2, wanted, 18)``, overwritten.
     """
+    (rows, masses, moments), (links, arms, axes) = bodies, holds
     frames = np.empty((2, tree.shape[0] + 1, 18))
     before, after = frames[0], frames[1]
     move_links(tree, states[0], after)
@@ -160,7 +139,7 @@ def sampled_contact(  # type: ignore[no-untyped-def]
             for tip in range(4):
                 # reactions of handlebar and pedals
                 px, py, pz = vectors[2 + tip]
-                x, y, z = place_on(before[held[tip]], arms[tip])
+                x, y, z = place_on(before[links[tip, 0] + 1], arms[tip])
                 x, y, z = x - point[0], y - point[1], z - point[2]
                 fx, fy, fz = fx + px, fy + py, fz + pz
                 mx, my, mz = mx + y * pz - z * py, my + z * px - x * pz, mz + x * py - y * px

@@ -105,6 +105,7 @@ class Rider:
         self.masses = np.array([body.masses[name] for name in names])
         self.moments = np.array([body.moments[name] for name in names])
         self.holds = holds(bicycle, self.posture)
+        """links, arms and axes of :func:`.push_between`: left and right hand and foot"""
         centre, _ = bicycle.physics.inertial_frame(body.body)
         self.saddle_arm = self.holds[2] @ (np.array(self.posture.bicycle.saddle) - centre)
         """(3,) m: saddle point from the base's centre in its principal axes"""

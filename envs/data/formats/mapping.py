@@ -22,7 +22,7 @@ from ....filters.support.parameters import check_parameters
 from ..ranges import full_scale
 from ..trajectory import Trajectory
 from .stamps import as_seconds
-from .table import UNITS, Table, factor
+from .table import UNITS, Table, factor, split_unit
 
 Columns = str | Sequence[str | int]
 SIZES = {"gyr": 3, "acc": 3, "mag": 3}
@@ -35,6 +35,9 @@ FRAMES = {
     "y-up": (np.sqrt(0.5), np.sqrt(0.5), 0.0, 0.0),
 }
 """World axes of a reference → quaternion to east, north, up."""
+FRACTIONS = {"nanosec": 1, "nsecs": 1, "nsec": 1, "nanosecs": 1, "ns": 1, "usec": 10**3, "us": 10**3, "msec": 10**6}
+FRACTIONS |= {"usecs": 10**3, "msecs": 10**6, "millis": 10**6, "ms": 10**6}
+"""End of the name of a column that holds fractions of seconds → its unit in ns."""
 CODES = (99.0, 888.0, 999.0, 8888.0, 9999.0, 32767.0, 32768.0, 65535.0, 99999.0, 999999.0, 9999999.0)
 """Magnitudes that loggers write where there is no value."""
 
@@ -360,9 +363,10 @@ def recording_time(table: Table, mapping: RecordingMap) -> tuple[np.ndarray, dic
         name = str(mapping.time)
         unit = mapping.units.get("time") or table.units.get(name, "")
         values = table.column(name)
+        name = name if name in table else split_unit(name)[0]
         rest = fraction_column(name, table)
         if rest is not None:
-            values, unit = values.astype(np.int64) * 10**9 + table.column(rest).astype(np.int64), "ns"
+            values, unit = values.astype(np.int64) * 10**9 + table.column(rest[0]).astype(np.int64) * rest[1], "ns"
         stamps = as_seconds(values, unit, name)
         check_labels(table, stamps.elapsed)
         return stamps.elapsed, details | {"clock_start": stamps.first}
@@ -374,7 +378,18 @@ def recording_time(table: Table, mapping: RecordingMap) -> tuple[np.ndarray, dic
     return np.arange(length) / mapping.rate, details
 
 
-def fraction_column(name: str, table: Table) -> str | None:
-    """The column of nanoseconds beside one of whole seconds (ROS's ``stamp.secs`` and ``stamp.nsecs``), or None."""
-    stem = re.sub(r"secs?$", "", name)
-    return next((rest for end in ("nanosec", "nsecs", "nsec", "nanosecs") if (rest := stem + end) in table), None)
+def fraction_column(name: str, table: Table) -> tuple[str, int] | None:
+    """The column of the fraction beside one of whole seconds, and its unit in ns; None if there is none.
+
+    Such are ROS's ``stamp.secs`` and ``stamp.nsecs``, and ``sec`` and ``msec`` of data loggers.
+    """
+    stem, seconds = re.sub(r"(secs?|seconds?|s)$", "", name), table.arrays.get(name)
+    if table.units.get(name) == "s":
+        stem = f"{name}_"  # the unit was cut off
+    if stem == name or seconds is None or not np.array_equal(seconds, np.rint(seconds)):
+        return None
+    for end, unit in FRACTIONS.items():
+        rest = table.arrays.get(stem + end)
+        if rest is not None and rest.ndim == 1 and rest.min() >= 0 and rest.max() < 10**9 // unit:
+            return stem + end, unit
+    return None

@@ -13,11 +13,15 @@ from .table import UNITS, factor
 if TYPE_CHECKING:
     import pandas
 
-CLOCK = r"\d\d?:\d\d(:\d\d([.,:]\d+)?)?(\s*[ap]\.?m\.?)?"
+ZONES = {"WET": 0, "BST": 1, "WEST": 1, "CET": 1, "CEST": 2, "EET": 2, "EEST": 3, "JST": 9, "EST": -5, "EDT": -4}
+ZONES |= {"CST": -6, "CDT": -5, "MST": -7, "MDT": -6, "PST": -8, "PDT": -7}
+"""Name of a time zone → hours east of Greenwich."""
+CLOCK = r"\d\d?:\d\d(:\d\d([.,:]\d+)?|[.,]\d+)?(\s*[ap]\.?m\.?)?"
 CALENDAR = r"(\d{4}([-/.]\d\d[-/.]\d\d|\d{4})|\d\d?[-/. ](\d\d?|[a-z]{3,9})[-/. ](\d{4}|\d\d))"
-DATE = re.compile(rf"({CALENDAR}(T|_|,?\s+))?{CLOCK}\s*(Z|UTC|GMT|[-+]\d\d:?\d\d)?", re.IGNORECASE)
-"""A date with a time, or a time of the day of 24 or twice 12 hours; with a time zone or without."""
-DAY = 86_400
+DATE = re.compile(rf"({CALENDAR}(T|_|,?\s+))?{CLOCK}\s*(Z|UTC|GMT|{'|'.join(ZONES)}|[-+]\d\d:?\d\d)?", re.IGNORECASE)
+"""A date with a time, a time of the day of 24 or twice 12 hours, or minutes, seconds and their fraction; with a time
+zone or without."""
+HOUR, DAY = 3600, 86_400
 WRAPS = (
     100,
     2**8,
@@ -31,15 +35,18 @@ WRAPS = (
     2**32,
     10**6,
     60 * 10**6,
+    HOUR * 10**9,
     DAY * 10**3,
     DAY * 10**6,
     DAY * 10**9,
 )
-"""Ends of counters after which they start again at 0; a time of the day does at midnight."""
+"""Ends of counters after which they start again at 0: minutes and seconds every hour, a time of the day at midnight."""
 FURTHEST_BACK = 2.5
 """Intervals by which rows may be out of order."""
 EPOCHS = {1.0: (3e8, 4e9), 1e-3: (3e11, 4e12), 1e-6: (3e14, 4e15), 1e-7: (1.2e17, 1.5e17), 1e-9: (3e17, 4e18)}
-"""s per unit → stamps in that unit since 1970 (since 1601 in 100 ns, as Windows counts) of the years 1980 to 2090."""
+EPOCHS |= {86_400.0: (2.9e4, 7.7e5)}
+"""s per unit → stamps in that unit since 1970 (since 1601 in 100 ns, as Windows counts; since 1900 or the year 0 in
+days, as Excel and MATLAB do) of the years 1980 to 2090."""
 PLAUSIBLE = (2e-4, 0.2)
 """s; an interval in these bounds tells the unit of stamps without one: they are a thousand times apart."""
 
@@ -142,10 +149,14 @@ def nanoseconds(texts: pandas.Series) -> np.ndarray | None:
     plain = plain.str.replace(r"(\d)_(\d)", r"\1 \2", regex=True).str.replace(r"(\d)\.(\s)", r"\1\2", regex=True)
     plain = plain.str.replace(r"([ap])\.?m\.?$", r"\1m", regex=True, case=False)
     plain = plain.str.replace(r"(:\d\d:\d\d):(\d+)", r"\1.\2", regex=True)
+    for zone, hours in ZONES.items():
+        plain = plain.str.replace(rf"\s*\b{zone}$", f"{hours:+03d}:00", regex=True, case=False)
     first = str(plain.iloc[0])
     if re.fullmatch(CLOCK, first, re.IGNORECASE):
         if not first.lower().endswith("m"):
-            return whole(pandas.to_timedelta(plain, errors="coerce"))
+            of_day = re.match(r"\d\d?:\d\d\.", first) is None
+            found = whole(pandas.to_timedelta(plain if of_day else "00:" + plain, errors="coerce"))
+            return with_one_clock(found) if of_day else found
         plain = "2000-01-01 " + plain
     readings: list[np.ndarray] = []
     for day_first in (True, False) if not re.match(r"\d{4}", first) else (False,):
@@ -155,7 +166,27 @@ def nanoseconds(texts: pandas.Series) -> np.ndarray | None:
             read = pandas.to_datetime(plain, errors="coerce", utc=True, format="mixed", dayfirst=day_first)
         found = whole(read - read.iloc[0].normalize()) if read.notna().all() else None
         readings += [] if found is None else [found]
-    return min(readings, key=lambda stamps: int(np.ptp(stamps)), default=None)
+    earliest = min(readings, key=lambda stamps: int(np.ptp(stamps)), default=None)
+    return earliest if re.search(r"(Z|[-+]\d\d:?\d\d)$", first) else with_one_clock(earliest)
+
+
+def with_one_clock(stamps: np.ndarray | None) -> np.ndarray | None:
+    """Local times ``(N,)`` in ns without the hour by which clocks change in spring and autumn, with a warning.
+
+    Such a change is a step of an hour, forwards or back, to a full hour.
+    """
+    if stamps is None or len(stamps) < 3:
+        return stamps
+    steps = np.diff(stamps)
+    near, hour = max(int(3 * np.median(np.abs(steps))), 1), HOUR * 10**9
+    changes = (np.abs(np.abs(steps) - hour) <= near) & (stamps[1:] % hour <= near)
+    if changes.sum() != 1:
+        return stamps
+    row = int(np.flatnonzero(changes)[0]) + 1
+    warnings.warn(f"the local time steps by one hour in row {row}: taken for a change of the clocks", stacklevel=6)
+    stamps = stamps.copy()
+    stamps[row:] -= np.sign(steps[row - 1]) * hour
+    return stamps
 
 
 def whole(times: pandas.Series) -> np.ndarray | None:

@@ -26,6 +26,8 @@ SPELLED |= {
 """Units within names of columns, ``gyr_x_dps`` or ``acc_mps2_x``."""
 ONLY_OF = {"g": "acc", "t": "^m", "s": "^time", "rad": "^gyr"}
 """Short ones that are units only within names that match."""
+QUOTIENT = re.compile(r"^(?P<name>.*?(?:[xyz]|time|\bt))\s*(?:/|:| - )\s*(?P<unit>\S+)$", re.IGNORECASE)
+"""Quantity over unit as ISO 80000 writes it, ``acc_x/(m/s²)`` or ``t/s``, and the same with a colon or a dash."""
 SUFFIX = re.compile(rf"^(?P<name>\w*?[a-z])_(?P<unit>{'|'.join(SPELLED)})(?P<axis>_[xyz]|\[\d\])?$", re.IGNORECASE)
 STANDARD_GRAVITY = 9.80665
 
@@ -110,10 +112,13 @@ def factor(kind: str, unit: str) -> float:
 
 
 def split_unit(name: str) -> tuple[str, str]:
-    """Name and unit of ``name (unit)``, ``name [unit]``, ``name, unit``, ``name_unit`` and ``time in unit``.
+    """Name and unit of ``name (unit)``, ``name [unit]``, ``name/unit``, ``name, unit``, ``name_unit``, ``t in unit``.
 
     An index like ``Mat[1]`` is of the name.
     """
+    quotient = QUOTIENT.match(name.strip())
+    if quotient is not None and plain(quotient["unit"].strip("()[]")) in KNOWN_UNITS - {"1"}:
+        return quotient["name"], quotient["unit"].strip("()[]")
     match = UNIT.match(name.strip())
     suffix = SUFFIX.match(name.strip())
     indexed = match is None or bool(match["b"] and match["b"].isdigit())
@@ -151,6 +156,7 @@ class Table:
         named: whether the columns have names of their own.
         unreadable: name → row and content of the first cell that is not a number.
         labels: name → texts of a column that change from row to row, such as names of sensors.
+        texts: name → first content of a column that holds no numbers.
     """
 
     arrays: dict[str, np.ndarray]
@@ -160,6 +166,7 @@ class Table:
     named: bool = True
     unreadable: dict[str, tuple[int, str]] = field(default_factory=dict)
     labels: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    texts: dict[str, str] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return max((len(values) for values in self.arrays.values()), default=0)
@@ -236,4 +243,6 @@ class Table:
         """What the file holds, in one sentence."""
         names = list(self.arrays)
         listed = ", ".join(names[:24]) + (f", … ({len(names)} in all)" if len(names) > 24 else "")
-        return f"{self.kind}; {len(self)} rows; columns {listed if self.named else f'{len(names)} without names'}"
+        texts = ", ".join(f"{name or 'a column'} ({text!r} …)" for name, text in list(self.texts.items())[:4])
+        listed = listed if self.named else f"{len(names)} without names"
+        return f"{self.kind}; {len(self)} rows; columns {listed}{f'; texts, not numbers, in {texts}' if texts else ''}"

@@ -179,12 +179,14 @@ def table_of(text: str, name: str) -> Table:
     if twice:
         warnings.warn(f"{name}: names of columns occur more than once; the later ones are called {twice}", stacklevel=4)
     used = {number for number, _ in heads}
-    arrays, unreadable, labels = {}, {}, {}
+    arrays, unreadable, labels, texts = {}, {}, {}, {}
     for column, name in enumerate(names):
         values, wrong = numeric(frame[column])
         told = labels_of(name, frame[column], values)
         if told:
             labels[name] = told
+        if values is None and frame[column].notna().any():
+            texts[name] = str(frame[column].dropna().iloc[0])[:40]
         if values is None or (column >= len(names) - 2 and not name and np.isnan(values.astype(float)).all()):
             continue
         arrays[name or str(column)] = values
@@ -206,6 +208,7 @@ def table_of(text: str, name: str) -> Table:
         named=bool(heads),
         unreadable=unreadable,
         labels=labels,
+        texts=texts,
     )
 
 

@@ -190,6 +190,11 @@ class ArrayOrientation(ArrayEquations, Model):
         vectors = 0 if self.method == "integration" else self.geometry.size + 3
         return vectors + 3 * self.has_rate_rows + 6
 
+    @property
+    def supposed_field(self) -> int:
+        """The unit field in the world, unless it is given."""
+        return 15 if self.field == "start" else -1
+
     def prior(self, z: Measurement) -> tuple[Array, Array]:
         """At rest: inclination from readings, heading from the field; or as given. α₀ = 0, ω₀ from the gyroscope."""
         readings, field = z[self.readings.name], self._body_field(z)

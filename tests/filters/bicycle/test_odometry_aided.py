@@ -242,6 +242,18 @@ def test_a_ride_that_begins_on_a_bump_begins_upright() -> None:
     assert np.abs(error[500:]).max() < 0.3
 
 
+@pytest.mark.parametrize("bias", [(0.17, -0.22, -0.17), (-0.2, 0.2, 0.2)])
+def test_a_gyroscope_with_a_large_offset_is_found_out(bias: tuple[float, ...]) -> None:
+    """Several times the offset of a data sheet, as a cheap gyroscope without calibration has it."""
+    for seed in range(3):
+        data, turned, _ = ideal_ride(seed, 1200)
+        data["bicycle_imu/gyr"] = data["bicycle_imu/gyr"] + bias
+        pose = run(KalmanFilter(OdometryAided()), data).pose
+        error = np.degrees(pose["bicycle/roll"][:, 0] - turned.as_euler("ZYX")[:, 2])
+        assert np.abs(error[500:]).max() < 5.0, seed
+        assert np.abs(error[1000:]).max() < 3.0, seed
+
+
 def test_a_wheel_in_the_air_is_not_believed(ride: Trajectory) -> None:
     data = ride.measurements | {"wheel/speed": ride.measurements["wheel/speed"].copy()}
     data["wheel/speed"][1000:1030] += 4.0

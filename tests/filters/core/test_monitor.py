@@ -89,6 +89,23 @@ def test_bad_first_samples_of_references_decide_nothing(name: str, kind: str) ->
         assert turn < max(15.0, usual_turn + 3.0), count
 
 
+@pytest.mark.parametrize("gesture", ["slow", "mixed"])
+@pytest.mark.parametrize("name", ["marins", "array-orientation-imu"])
+def test_a_wrong_start_of_equations_that_keep_its_field_is_left_within_ten_seconds(name: str, gesture: str) -> None:
+    """Their magnetometer does not see an error about the direction of the field, and a wrong dip stays."""
+    trajectory, estimator = motion(gesture), make(name, dt=0.01)
+    q = trajectory.truth["orientation"]
+
+    def error(data: dict[str, np.ndarray]) -> float:
+        found: Any = estimator.run(data)  # type: ignore[attr-defined]
+        angle = rotation.angle(rotation.multiply(found.pose["orientation"], rotation.conjugate(q)))
+        return float(np.degrees(np.sqrt(np.mean(angle[1000:1500] ** 2))))
+
+    usual = error(dict(trajectory.measurements))
+    for kind, count in [("random", 5), ("reversed", 20), ("reversed", 100), ("force", 100), ("random", 100)]:
+        assert error(corrupted(dict(trajectory.measurements), kind, count, 3)) < usual + 5.0, (kind, count)
+
+
 @pytest.mark.parametrize("glitch", [400.0, 1e3, 1.9e3])
 @pytest.mark.parametrize("name", [*FILTERS, *REFERENCES])
 def test_a_force_that_no_motion_explains_is_no_sample(name: str, glitch: float) -> None:
@@ -141,7 +158,7 @@ def test_nothing_happens_on_ordinary_data(name: str) -> None:
             np.testing.assert_array_equal(one, other)
 
 
-@pytest.mark.parametrize("name", ["mekf-9", "bounded-motion", "mahony-9", "gyroscope-integration"])
+@pytest.mark.parametrize("name", ["mekf-9", "bounded-motion", "mahony-9", "gyroscope-integration", "marins"])
 @pytest.mark.parametrize("kind", ["reversed", "random"])
 def test_a_restart_is_the_same_in_every_form(name: str, kind: str) -> None:
     data, _ = upside_down(motion("slow"))

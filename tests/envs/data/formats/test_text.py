@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from datetime import datetime, timedelta
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +10,6 @@ import pytest
 from poise.envs.data.formats.arrays import read_table
 from poise.envs.data.formats.load import load_recording
 from poise.envs.data.formats.names import classify, groups, time_column
-from poise.envs.data.formats.stamps import as_seconds
 from poise.envs.data.formats.table import factor, split_unit
 
 VALUES = np.round(np.random.default_rng(5).standard_normal((50, 4)), 4)
@@ -112,89 +110,11 @@ def test_what_holds_no_table_is_refused(tmp_path, content):
         table_of(tmp_path / "a", content)
 
 
-@pytest.mark.parametrize(
-    "stamp",
-    [
-        lambda k: f"2024-05-01T12:00:{k / 100:09.6f}Z",
-        lambda k: f"2024-05-01 12:00:{k / 100:06.3f}",
-        lambda k: f"2024-05-01T12:00:{k / 100:06.3f}+02:00",
-        lambda k: f"2024-05-01 12:00:{k / 100:09.6f} UTC",
-        lambda k: f"31/05/2024 12:00:{k / 100:06.3f}",
-        lambda k: f"12:00:{k / 100:06.3f}",
-        lambda k: f"2024-05-01T23:59:{k / 100 + 59.8:06.3f}Z" if k < 20 else f"2024-05-02T00:00:{k / 100 - 0.2:06.3f}Z",
-        *(
-            lambda k, form=form: (datetime(2024, 3, 12, 23, 59, 59, 800000) + k * timedelta(milliseconds=10)).strftime(
-                form
-            )
-            for form in (
-                "%m/%d/%Y %I:%M:%S.%f %p",
-                "%d/%m/%Y %I:%M:%S.%f %p",
-                "%d/%m/%y %H:%M:%S.%f",
-                "%d-%b-%Y %H:%M:%S.%f",
-                "%Y%m%d %H:%M:%S.%f",
-                "%Y%m%d_%H:%M:%S:%f",
-                "%Y/%m/%d %I:%M:%S.%f%p",
-                "%d.%m.%Y %H:%M:%S.%f",
-            )
-        ),
-        lambda k: (
-            f"11:{59 + (k >= 20)}:{(k / 100 + 59.8) % 60:06.3f} AM" if k < 20 else f"12:00:{k / 100 - 0.2:06.3f} p.m."
-        ),
-    ],
-)
-def test_dates_are_times(tmp_path, stamp):
-    rows = "".join(f"{stamp(k)},{k},1,2\n" for k in range(50))
-    table = table_of(tmp_path / "a.csv", "timestamp,x,y,z\n" + rows)
-    seconds = as_seconds(table.column("timestamp"), table.units["timestamp"]).elapsed
-    np.testing.assert_allclose(seconds, np.arange(50) / 100.0, atol=1e-6)
-
-
-@pytest.mark.parametrize("form", ["%Y%m%d%H%M%S%f", "%H%M%S.%f"])
-def test_digits_of_a_calendar_are_times(form):
-    moments = [datetime(2024, 3, 5, 11, 59, 59) + k * timedelta(milliseconds=20) for k in range(100)]
-    stamps = [moment.strftime(form)[: 17 if "Y" in form else None] for moment in moments]
-    values = np.array([int(stamp) if "Y" in form else float(stamp) for stamp in stamps])
-    np.testing.assert_allclose(as_seconds(values, "").elapsed, 0.02 * np.arange(100.0), atol=1e-9)
-
-
 def test_a_header_between_the_rows_is_left_out_with_a_warning(tmp_path):
     head, rows = "time,gx,gy,gz", [f"{k / 100},{k},1,2" for k in range(60)]
     with pytest.warns(UserWarning, match="header stands 2 more times"):
         table = table_of(tmp_path / "a.csv", "\n".join([head, *rows[:20], head, *rows[20:40], head, *rows[40:]]) + "\n")
     np.testing.assert_array_equal(table.column("gx"), np.arange(60))
-
-
-def test_whole_nanoseconds_keep_their_digits(tmp_path):
-    start = 1403715273262142976
-    rows = "".join(f"{start + 5_000_001 * k},1,2,3\n" for k in range(50))
-    table = table_of(tmp_path / "a.csv", "#timestamp [ns],x,y,z\n" + rows)
-    stamps = as_seconds(table.column("timestamp"), table.units["timestamp"])
-    np.testing.assert_allclose(np.diff(stamps.elapsed), 5.000001e-3, rtol=1e-9)
-    assert stamps.first == start
-    assert stamps.since(start - 1_000_000_000)[0] == 1.0
-
-
-@pytest.mark.parametrize(("end", "step"), [(2**16, 1), (2**32, 16667), (256, 1), (2**16, 3)])
-def test_counters_wrap(end, step):
-    count = (end - 20 * step + step * np.arange(50)) % end
-    np.testing.assert_array_equal(as_seconds(count, "s").elapsed, step * np.arange(50.0))
-
-
-def test_times_that_run_backwards_are_refused_and_neighbours_may_change_places():
-    for stamps in (np.r_[0:50, 20:70] / 100.0, np.r_[0:50, 0:50] / 100.0):
-        with pytest.raises(ValueError, match=r"column time must increase, got .* set back, or several recordings"):
-            as_seconds(stamps, "s")
-    assert as_seconds(np.r_[0:10, 11, 10, 12:50] / 100.0, "s").elapsed[11] == pytest.approx(0.10)
-    with pytest.raises(ValueError, match="column time holds no time in row 3"):
-        as_seconds(np.array([0.0, 1.0, 2.0, np.nan]), "s")
-
-
-@pytest.mark.parametrize(("unit", "scale"), [("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9)])
-@pytest.mark.parametrize("rate", [25.0, 100.0, 1000 / 3])
-def test_the_unit_of_stamps_without_one_is_told_by_their_interval(unit, scale, rate):
-    with pytest.warns(UserWarning, match=rf"taken for {unit} \({rate:.4g} Hz\)"):
-        stamps = as_seconds(np.arange(100) / rate / scale, "")
-    assert stamps.scale == scale
 
 
 @pytest.mark.parametrize(
@@ -273,20 +193,20 @@ def test_every_cell_in_quotes_however_long_the_file(tmp_path, delimiter, decimal
     np.testing.assert_allclose(recording.measurements["imu/gyr"][:50], 2.0 * np.pi * VALUES[:, :3])
 
 
-@pytest.mark.parametrize(
-    ("stamps", "unit"),
-    [
-        ([f"{(23 + (3595 + k // 100) // 3600) % 24:02d}:{(3595 + k // 100) // 60 % 60:02d}:{(3595 + k // 100) % 60:02d}"
-          f".{k % 100:02d}" for k in range(1000)], ""),
-        ([str((86_399_000 + 10 * k) % 86_400_000) for k in range(1000)], "ms"),
-        ([str((86_399_000_000 + 10_000 * k) % 86_400_000_000) for k in range(1000)], "us"),
-    ],
-)  # fmt: skip
-def test_a_time_of_the_day_goes_on_after_midnight(tmp_path, stamps, unit):
-    rows = [",".join([stamp, *row[1:]]) for stamp, row in zip(stamps, ROWS, strict=True)]
-    header = HEADER.replace(" [s]", f" [{unit}]" if unit else "")
-    (tmp_path / "night.csv").write_text("\n".join([header, *rows]) + "\n")
-    np.testing.assert_allclose(load_recording(tmp_path / "night.csv").time, np.arange(1000) / 100, atol=1e-9)
+@pytest.mark.parametrize("form", ["{}/{}", "{}/({})", "{} / {}", "{}:{}", "{} - {}"])
+def test_a_unit_may_stand_after_its_quantity(tmp_path, form):
+    units = {"gyr": "deg/s", "acc": "m/s^2"}
+    names = [form.format("time", "s")]
+    names += [form.format(f"{kind}_{axis}", unit) for kind, unit in units.items() for axis in "xyz"]
+    (tmp_path / "a.csv").write_text("\n".join([",".join(names), *(",".join(row) for row in ROWS)]) + "\n")
+    recording = load_recording(tmp_path / "a.csv")
+    np.testing.assert_allclose(recording.measurements["imu/gyr"][:50], np.radians(VALUES[:, :3]), atol=1e-9)
+    np.testing.assert_allclose(recording.measurements["imu/acc"][0], [0.0, 0.0, 1.0])
+
+
+@pytest.mark.parametrize("name", ["Right Foot/Acceleration/X", "seat/g", "Mat[1][2]", "imu/gyr/x"])
+def test_a_path_of_names_is_no_unit(name):
+    assert split_unit(name) == (name, "")
 
 
 def test_names_that_occur_twice_are_named(tmp_path):
