@@ -71,9 +71,9 @@ def run(args: Args) -> int:
         raise ValueError("errors can only be given for simulated rides: recordings and hand motions keep theirs")
     shipped = f"{args.filter.replace('-', '_')}_policy"
     names = args.policies or tuple(name for name in (shipped,) if name in list_weights())
-    policies = {f"policy {Path(name).stem}": GainPolicy.load(name) for name in names}
+    policies = {"policy" if name == shipped else f"policy {Path(name).stem}": GainPolicy.load(name) for name in names}
     unlimited = {
-        f"{name} without its bias limit": replace(policy, bias_limit=math.inf)
+        f"{name} without limit": replace(policy, bias_limit=math.inf)
         for name, policy in policies.items()
         if math.isfinite(policy.bias_limit)
     }
