@@ -27,13 +27,14 @@ help: ## list the targets
 
 install: $(STAMP) ## make .venv with the tested versions of everything (again only when the requirements change)
 
+# rl-zoo3 brings imageio-ffmpeg, whose wheel holds 164 MB of video coder that nothing here calls; its source has none.
 $(STAMP): pyproject.toml constraints.txt
 	@test -n "$(PYTHON)" || { echo "make: no Python 3.11 or newer found; name one with PYTHON=…" >&2; exit 1; }
 	@rm -f $@
 	@test -x $(BIN)/pip || "$(PYTHON)" -m venv --clear $(VENV)
 	@echo "Installing into $(VENV) (minutes the first time) …"
 	@$(BIN)/python -m pip install --no-compile --quiet --disable-pip-version-check --progress-bar off \
-		-c constraints.txt -e '.[all,dev]'
+		--no-binary imageio-ffmpeg -c constraints.txt -e '.[all,dev]'
 	@touch $@
 
 benchmark: $(STAMP) ## compare all estimators on all environments, quick form; options in ARGS="…"

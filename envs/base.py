@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import copy
 import functools
+import itertools
 import math
+import operator
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -63,19 +65,23 @@ class Rows:
     """
 
     def __init__(self, arrays: Mapping[str, np.ndarray]) -> None:
-        kinds: dict[np.dtype[Any], list[np.ndarray]] = {}
-        self._places: list[tuple[str, int, slice]] = []
+        kinds: dict[np.dtype[Any], dict[str, np.ndarray]] = {}
         for name, values in arrays.items():
-            beside = kinds.setdefault(values.dtype, [])
-            begin = sum(each.shape[1] for each in beside)
-            self._places.append((name, list(kinds).index(values.dtype), slice(begin, begin + values.shape[1])))
-            beside.append(values)
-        self._tables = [np.concatenate(beside, axis=1) for beside in kinds.values()]
+            kinds.setdefault(values.dtype, {})[name] = values
+        self._tables = []
+        for beside in kinds.values():
+            ends = np.cumsum([values.shape[1] for values in beside.values()]).tolist()
+            parts = [slice(begin, end) for begin, end in itertools.pairwise([0, *ends])]
+            # one slice more: itemgetter gives a tuple for several only
+            cut = operator.itemgetter(*parts, slice(0))
+            self._tables.append((tuple(beside), cut, np.concatenate(list(beside.values()), axis=1)))
 
     def at(self, index: int) -> dict[str, np.ndarray]:
         """Name → ``(size,)`` of one row, which the caller may change."""
-        rows = [table[index].copy() for table in self._tables]
-        return {name: rows[kind][part] for name, kind, part in self._places}
+        found: dict[str, np.ndarray] = {}
+        for names, cut, table in self._tables:
+            found.update(zip(names, cut(table[index].copy()), strict=False))
+        return found
 
 
 @dataclass(frozen=True)
@@ -232,10 +238,11 @@ class PoseEnv(DrawnEnv):
 
     def _checked(self, action: np.ndarray) -> np.ndarray:
         estimate = np.array(action, dtype=float)
-        if estimate.shape != self.action_space.shape or not all(map(math.isfinite, estimate.tolist())):
+        values = estimate.tolist()
+        if estimate.shape != self.action_space.shape or not all(map(math.isfinite, values)):
             raise ValueError(f"action must hold {self._parts[-1].stop} finite numbers, got {action!r}")
         for quantity, part in zip(self.quantities, self._parts, strict=True):
-            if quantity.kind in UNIT_ENTRY and not estimate[part].any():
+            if quantity.kind in UNIT_ENTRY and not any(values[part]):
                 estimate[part][UNIT_ENTRY[quantity.kind]] = 1.0
         return estimate
 

@@ -24,6 +24,8 @@ PIPE_WIDTH = 120
 """Columns of a table that does not go to a terminal."""
 LONGEST_NAME = 60
 """Characters up to which a text stays on one line of a printed table."""
+SENTENCE = 20
+"""Characters that a column of sentences needs at least"""
 
 
 class Output:
@@ -100,16 +102,20 @@ def print_table(
         console: where; by default the standard output, of a fixed width if it is not a terminal.
     """
     data = records(rows)
+    console = console or (Console() if sys.stdout.isatty() else Console(width=PIPE_WIDTH))
     table = Table(title=title, title_justify="left")
     names = columns_of(data, columns)
+    widths = {name: max((len(cell(record.get(name), digits)) for record in data), default=0) for name in names}
+    # Names that do not break would take the place of numbers where there is too little; sentences need not have it all.
+    whole = sum(width if width <= LONGEST_NAME else SENTENCE for width in widths.values())
+    room = whole + 3 * len(names) + 1 <= console.width
     for name in names:
         # Long headings of numbers and sentences break into lines; names stay whole.
         if is_numeric(data, name):
             table.add_column(name, justify="right", overflow="fold")
         else:
-            longest = max((len(cell(record.get(name))) for record in data), default=0)
-            table.add_column(name, no_wrap=longest <= LONGEST_NAME)
+            table.add_column(name, overflow="fold", no_wrap=room and widths[name] <= LONGEST_NAME)
     for record in data:
         # Text, so that a name in brackets is not markup.
         table.add_row(*(Text(cell(record.get(name), digits)) for name in names))
-    (console or (Console() if sys.stdout.isatty() else Console(width=PIPE_WIDTH))).print(table)
+    console.print(table)

@@ -129,12 +129,12 @@ def run(args: Args) -> int:
         write_json(folder.folder / SETS, {group: [each.name for each in some] for group, some in sets.items()})
         folder.write_results(results(errors, sets, scored_quantity(tuned.kalman, None)))
         summary = {
-            name: {group: round(float(np.mean(found[name])), 4) for group, found in errors.items()}
+            name: {group: round(float(np.degrees(np.mean(found[name]))), 4) for group, found in errors.items()}
             for name in [*candidates, "oracle"]
         }
         name = scored_quantity(tuned.kalman, None).name
         for group, found in errors.items():
-            named = {NAMES.get(each, each): np.radians(values) for each, values in found.items()}
+            named = {NAMES.get(each, each): values for each, values in found.items()}
             out.table(rows_of(named), f"Error of {args.filter} ({name}) on {group} trajectories, RMS of each, deg")
         final = candidates["constant" if args.agent in SEARCHES else "policy"]
         card = card_of(args, final, constant, summary)
@@ -314,7 +314,7 @@ def errors_of(
     constant: ConstantGains,
     points: int = 32,
 ) -> dict[str, dict[str, np.ndarray]]:
-    """Set of trajectories → gains → error on each trajectory, deg.
+    """Set of trajectories → gains → error on each trajectory, rad.
 
     The ``oracle`` takes the best of ``points`` constant gains on each trajectory, chosen with the truth known: a bound,
     not a method.
@@ -327,18 +327,24 @@ def errors_of(
     for group, trajectories in sets.items():
         found = {name: policy_errors_of(tuned.kalman, policy, trajectories) for name, policy in candidates.items()}
         found["oracle"] = np.min([constant_errors(tuned, trajectories, action) for action in actions], axis=0)
-        table[group] = {name: np.degrees(values) for name, values in found.items()}
+        table[group] = found
     return table
 
 
 def results(
     errors: Mapping[str, Mapping[str, np.ndarray]], sets: Mapping[str, Sequence[Trajectory]], quantity: Quantity
 ) -> list[dict[str, Any]]:
-    """The same as rows of results."""
+    """The same as rows of results, in degrees.
+
+    Args:
+        errors: set of trajectories → gains → error on each trajectory, rad.
+        sets: the trajectories.
+        quantity: what is scored.
+    """
     metric = "inclination" if quantity.kind == "direction" else "rmse"
     common = {"quantity": quantity.name, "metric": metric, "unit": "deg"}
     return [
-        {"estimator": name, "trajectory": trajectory.name, "value": float(value), **common}
+        {"estimator": name, "trajectory": trajectory.name, "value": math.degrees(value), **common}
         for group, found in errors.items()
         for name, values in found.items()
         for trajectory, value in zip(sets[group], values, strict=True)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...filters.adaptation.gains import filter_name, gain_ranges
-from ...filters.adaptation.rules import AccelerationRule, GuardedInnovationRule, InnovationRule, PitchRateRule, Rule
+from ...filters.adaptation.rules import AccelerationRule, InnovationRule, PitchRateRule, Rule, TurningRule
 from ...filters.core.kalman import KalmanFilter
 from ...filters.registry import make
 from ...filters.support.names import look_up
@@ -18,7 +18,7 @@ from .policy import GainPolicy
 RULES: dict[str, Rule] = {
     "pitch-rate": PitchRateRule(),
     "innovation": InnovationRule(),
-    "guarded-innovation": GuardedInnovationRule(),
+    "turning": TurningRule(),
     "acceleration": AccelerationRule(),
 }
 """Name → rule, with constants chosen on simulated motion and rides."""
@@ -49,14 +49,15 @@ def ruled(filter: KalmanFilter, gain: str, rule: Rule) -> AdaptiveEstimator:
     Args:
         filter: in its published tuning.
         gain: name of the gain.
-        rule: what sets it; action 1 is the end of the gain's range.
+        rule: what sets it; actions 1 and −1 are the ends of the gain's range.
 
     Raises:
         ValueError: the filter has no such gain.
     """
     (part,) = gain_ranges(filter, (gain,))
-    features = replace(rule, largest=part.upper)
-    if isinstance(features, InnovationRule | AccelerationRule) and part.lower == -part.upper:
+    features = replace(rule, largest=part.upper, reach=max(-part.lower, 1e-9))
+    # Nothing lowers the variance of what is only believed but a rule that sees when it holds.
+    if isinstance(features, InnovationRule | AccelerationRule) and gain == "measurement":
         features = replace(features, smallest=part.lower)
     layers = ((np.array([[1.0, 0.0]]), np.zeros(1)),)
     return AdaptiveEstimator(filter, GainPolicy(filter_name(filter), (part,), features, layers))

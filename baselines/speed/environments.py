@@ -60,7 +60,7 @@ def rider_speeds(fidelity: Literal["full", "lumped"]) -> Iterator[Speed]:
         bare = measure(fall, STEPS) / per_step
     yield Speed(group, f"bare stepSimulation of the same bodies, {per_step} a step", bare, "steps/s", 1.0)
     options = {"fidelity": fidelity, "suite": "all", "rate": RIDER_RATE, "physics_rate": RIDER_PHYSICS}
-    # rides that end with the last step that is counted: an environment simulates up to 4 s ahead of its steps
+    # rides that end with the last step that is counted: an environment simulates seconds ahead of its steps
     rate = environment_rate(RIDER, options | {"duration": STEPS / RIDER_RATE})
     yield Speed(group, "RiderBicycle", rate, "steps/s", rate / bare)
     yield Speed(group, "RiderBicycle, real-time factor", rate / RIDER_RATE, "s of riding/s")

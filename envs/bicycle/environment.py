@@ -40,7 +40,7 @@ from .sensors.readings import RideQuantities
 from .sensors.suites import CHANNELS, suite_channels
 from .sensors.worn import WornSensors, WornState
 
-FIRST_BLOCK, BLOCK = 20, 400
+FIRST_BLOCK, BLOCK = 20, 500
 """time steps computed at once: by a reset, and later; the numbers do not depend on it"""
 
 

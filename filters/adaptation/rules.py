@@ -3,8 +3,8 @@ r"""Rules by hand that set one gain of a filter while it runs: what a trained po
 A rule is written as the features of a policy that hands its only feature on. The pitch rate and the innovations raise
 the variance of the pseudo-measurement "the bicycle does not pitch" (:mod:`poise.filters.bicycle.platform_gyro`; the
 constraint of :class:`poise.filters.bicycle.two_gyro.filter.TwoGyro`), which is right on level ground and wrong on ramps
-and bumps. The innovations alone make any filter innovation-adaptive, and the excess of the specific force that of one
-inertial sensor adaptive to shaking.
+and bumps, and says nothing of the roll where the bicycle goes straight. The innovations alone make any filter
+innovation-adaptive, and the excess of the specific force that of one inertial sensor adaptive to shaking.
 """
 
 from __future__ import annotations
@@ -22,14 +22,16 @@ from .time_scales import FeatureMemory, Features
 
 @dataclass(frozen=True)
 class Rule(Features):
-    """A log factor λ from means over the last interval; the feature is λ in units of the largest one.
+    """A log factor λ from means over the last interval; the feature is the action that sets it.
 
     Attributes:
         largest: log factor of action 1, of a variance.
+        reach: less the log factor of action −1.
     """
 
     scales: tuple[float, ...] = (0.0,)
     largest: float = 1.0
+    reach: float = 1.0
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -42,7 +44,8 @@ class Rule(Features):
 
     def observe(self, memory: FeatureMemory, kalman: KalmanFilter, action: np.ndarray) -> np.ndarray:
         """The feature and the action of the last interval: float32 ``(*batch, 1 + k)``."""
-        factor = np.clip(self.factor(memory.averages[..., 0, :]) / self.largest, -1.0, 1.0)
+        factor = self.factor(memory.averages[..., 0, :])
+        factor = np.clip(factor / np.where(factor < 0.0, self.reach, self.largest), -1.0, 1.0)
         return np.concatenate([factor[..., None], action], axis=-1).astype(np.float32)
 
     def factor(self, averages: np.ndarray) -> np.ndarray:
@@ -121,40 +124,53 @@ class InnovationRule(Rule):
 
 
 @dataclass(frozen=True)
-class GuardedInnovationRule(InnovationRule):
-    """The larger of :class:`InnovationRule`'s λ and :class:`PitchRateRule`'s.
+class TurningRule(Rule):
+    r"""λ = 4 ln(v / (θ (|ω_z| + ω_0))), with v the variance of the pitch rate and ω_z the mean yaw rate.
 
-    Innovations of the pseudo-measurement grow where the roll is wrong as well as where the road is not level; on bumps
-    they are small again before the pitching ends. The pitch rate distinguishes the two.
+    The pseudo-measurement sees the roll as far as the bicycle turns: tan φ = ω_y / ω_z. The pitch rate enters its
+    derivative by φ as well, and so drives the roll away from zero in proportion to v − ω_z²: on cobbles without a turn
+    to ±90°, however small the gain. The variance is that of the samples, shaking included. Before the first of them
+    nothing is believed.
 
     Attributes:
-        pitching: the rule for the pitch rate; its λ is added to the published constant, not to the λ of the
-            innovations.
+        channel: gyroscope whose y and z axes are the bicycle's.
+        scale: θ, rad/s; with the others chosen on simulated rides.
+        least_rate: ω_0, rad/s.
+        decay: s, time constant of the averages.
+        smallest: log factor below which λ does not fall.
     """
 
-    pitching: PitchRateRule = PitchRateRule()
+    channel: str = "bicycle_imu/gyr"
+    scale: float = math.radians(2.0)
+    least_rate: float = math.radians(1.0)
+    decay: float = 0.5
+    smallest: float = -2.0
 
     def init(self, kalman: KalmanFilter, batch: tuple[int, ...] = ()) -> FeatureMemory:
-        """Empty memory of both."""
+        """Empty memory."""
         return self.empty(batch, 4)
 
     def moments(
         self, memory: FeatureMemory, kalman: KalmanFilter, measurements: Mapping[str, np.ndarray], estimate: Estimate
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Those of both rules ``(T, *batch, 4)``."""
-        mine, previous = super().moments(memory, kalman, measurements, estimate)
-        return np.concatenate(
-            [mine, self.pitching.moments(memory, kalman, measurements, estimate)[0]], axis=-1
-        ), previous
+        """Known or not, pitch rate, its square, yaw rate ``(T, *batch, 4)``."""
+        rate = np.asarray(measurements[self.channel], dtype=float)[..., 1:3]
+        known = np.isfinite(rate).all(axis=-1)
+        y, z = np.moveaxis(np.where(known[..., None], rate, 0.0), -1, 0)
+        return np.stack([known, y, y * y, z], axis=-1), memory.previous
 
     def averaged(self, averages: np.ndarray, means: np.ndarray, duration: float) -> np.ndarray:
-        """Those of both rules ``(*batch, 1, 4)``."""
-        mine = super().averaged(averages[..., :2], means[..., :2], duration)
-        return np.concatenate([mine, self.pitching.averaged(averages[..., 2:], means[..., 2:], duration)], axis=-1)
+        """All of them over the last ``decay`` seconds."""
+        return averages - math.expm1(-duration / self.decay) * (means[..., None, :] - averages)
 
     def factor(self, averages: np.ndarray) -> np.ndarray:
-        """The larger λ."""
-        return np.maximum(super().factor(averages[..., :2]), self.pitching.factor(averages[..., 2:]))
+        """λ; 0 before the first sample."""
+        there = averages[..., 0] > 0.0
+        mean, square, turning = np.moveaxis(
+            averages[..., 1:] / np.where(there, averages[..., 0], 1.0)[..., None], -1, 0
+        )
+        ratio = (square - mean * mean) / (self.scale * (np.abs(turning) + self.least_rate))
+        return np.where(there, np.maximum(4.0 * np.log(np.maximum(ratio, 1e-8)), self.smallest), 0.0)
 
 
 @dataclass(frozen=True)

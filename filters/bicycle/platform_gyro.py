@@ -68,7 +68,11 @@ class PlatformGyro(RiderEquations, Model):
     held_inputs: ClassVar = (ridden("bicycle_imu/gyr", "gyroscope_noise"),)
     gains: ClassVar[dict[str, Gain]] = {
         "process": Gain("process_scale", description="process variance"),
-        "measurement": Gain("pitch_rate_noise", description="variance of what violates the pseudo-measurement"),
+        "measurement": Gain(
+            "pitch_rate_noise",
+            description="variance of what violates the pseudo-measurement",
+            bounds=(0.1 * DEG, 100.0 * DEG),
+        ),
     }
 
     def __post_init__(self) -> None:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from .cache import jit
-from .kernel import fill, finite
+from .kernel import fill, finite, symmetric
 
 
 @jit
@@ -146,14 +146,6 @@ def correct_back(H, P, rows, count, A, W, y, gdx, gP, gnis, glogarithm, gr, gH, 
             for a in range(count):
                 gP[i, j] += gA[i, a] * H[rows[a], j]
     symmetric(gP)
-
-
-@jit
-def symmetric(matrix):  # type: ignore[no-untyped-def]
-    """M ← (M + Mᵀ) / 2."""
-    for i in range(matrix.shape[0]):
-        for j in range(i):
-            matrix[i, j] = matrix[j, i] = 0.5 * (matrix[i, j] + matrix[j, i])
 
 
 @jit

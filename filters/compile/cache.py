@@ -1,4 +1,4 @@
-"""Cache of compiled code: the folder, the compiler that writes to it, and the printed modules in it.
+"""Cache of compiled code: the folder, and the compiler that writes to it.
 
 The folder is ``compiled`` below the one that the environment variable ``POISE_CACHE`` names, or below the user's cache
 folder. Machine code is stored with a checksum, so that a damaged file is compiled anew. Where no folder can be written,
@@ -18,12 +18,9 @@ import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
-import numpy as np
-
-from ..support.files import user_cache, write_text
+from ..support.files import user_cache
 from ..support.version import ROOT
 
 _LOCK = threading.RLock()
@@ -33,7 +30,7 @@ PATIENCE = 1.0
 
 
 def cache_folder() -> Path | None:
-    """Folder of the printed and compiled filters; None, with one warning, where it cannot be written."""
+    """Folder of what is compiled; None, with one warning, where it cannot be written."""
     folder = user_cache("compiled")
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -56,7 +53,7 @@ def _digest(layer: str) -> str:
     digest = hashlib.sha256()
     for path in sorted((ROOT / layer).rglob("*.py")):
         source = path.read_bytes()
-        if b"compile.cache import" in source:
+        if b"cache import" in source:
             digest.update(path.relative_to(ROOT).as_posix().encode() + b"\0" + source + b"\0")
     return digest.hexdigest()[:12]
 
@@ -64,8 +61,8 @@ def _digest(layer: str) -> str:
 def jit(function: Callable[..., Any]) -> Any:
     """The function compiled by numba on first use, kept in :func:`cache_folder`.
 
-    Numba compiles a function anew when its own file changes. Simulators call compiled functions of other files too,
-    so theirs are kept in a folder that is named by the digest of all of them.
+    Numba compiles a function anew when its own file changes. Compiled functions call those of other files too, so
+    those of a layer are kept in a folder that is named by the digest of all of them.
     """
     numba: Any = importlib.import_module("numba")
     options = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
@@ -73,8 +70,9 @@ def jit(function: Callable[..., Any]) -> Any:
     if folder is None:
         return numba.njit(**options)(function)
     source = Path(function.__code__.co_filename)
-    if source.is_relative_to(ROOT / "envs"):
-        folder = folder / f"envs_{_digest('envs')}"
+    if source.is_relative_to(ROOT):
+        layer = source.relative_to(ROOT).parts[0]
+        folder = folder / f"{layer}_{_digest(layer)}"
     with _LOCK:
         # numba reads the place when it decorates; other code that uses numba keeps its own.
         before, numba.config.CACHE_DIR = numba.config.CACHE_DIR, str(folder)
@@ -98,43 +96,27 @@ def _checked(files: Any) -> type:
                 return {}
 
         def _save_data(self, name: str, data: Any) -> None:
-            content = self._dump(data)
             with self._open_for_write(self._data_path(name)) as file:
-                file.write(hashlib.sha256(content).digest() + content)
+                file.write(sealed(self._dump(data)))
 
         def _load_data(self, name: str) -> Any:
-            content = Path(self._data_path(name)).read_bytes()
-            if hashlib.sha256(content[32:]).digest() != content[:32]:
+            content = opened(Path(self._data_path(name)).read_bytes())
+            if content is None:
                 raise OSError(f"{name} is damaged")
-            return pickle.loads(content[32:])
+            return pickle.loads(content)
 
     return Checked
 
 
-def load(text: str, label: str) -> ModuleType:
-    """Import a printed module; its text lies in the cache folder, under the hash of it and of what it is built on."""
-    import numba
-
-    versions = f"{numba.__version__} {np.__version__} {sys.version}"
-    here = Path(__file__)
-    foundation = "".join(
-        here.with_name(f"{name}.py").read_text(encoding="utf-8") for name in ("kernel", "smoothing", "emit")
-    )
-    name = f"{label}_{hashlib.sha256(f'{versions}{foundation}{text}'.encode()).hexdigest()[:20]}"
-    folder = cache_folder()
-    path = f"<{name}>" if folder is None else str(_written(folder / f"{name}.py", text))
-    module = ModuleType(f"poise_compiled_{name}")
-    module.__file__ = path
-    sys.modules[module.__name__] = module
-    exec(compile(text, path, "exec"), module.__dict__)
-    return module
+def sealed(content: bytes) -> bytes:
+    """Content behind its checksum."""
+    return hashlib.sha256(content).digest() + content
 
 
-def _written(path: Path, text: str) -> Path:
-    """The path, with exactly this text in it."""
-    if not path.exists() or path.read_bytes() != text.encode():
-        write_text(path, text)
-    return path
+def opened(content: bytes) -> bytes | None:
+    """The content of :func:`sealed`; None if it is damaged."""
+    digest, content = content[:32], content[32:]
+    return content if hashlib.sha256(content).digest() == digest else None
 
 
 def compile_now(function: Any, arguments: tuple[Any, ...], label: str) -> None:

@@ -18,153 +18,22 @@ from ..core.model import Model, parameters_of, with_parameters
 from ..core.quantity import Measurement
 from ..core.sampling import FilterState, join, split
 from .adjoint import gradient
-from .cache import compile_now, load
+from .cache import compile_now
 from .emit import print_function
-from .printer import print_model
 from .run import CompiledEquations, compiled_equations
 from .trace import Tape
 
-_HEAD = """
-import numpy as np
-from numba.extending import intrinsic
 
-from poise.filters.compile.adjoint_kernel import correct_back, gain_times, innovation, propagate_back, symmetric
-from poise.filters.compile.cache import jit
-from poise.filters.compile.emit import native
-from poise.filters.compile.kernel import begin, copy, copy_matrix, correct, fill, propagate, scratch, take, zeros
-from {primal} import F_column, F_first, H_column, H_first, finish, grow, pose, predict, prior, residual, retract
-
-starts = np.array({starts})
-"""
-
-_LOOPS = """
-@jit
-def follow(x, P, held, age, started, Z, parameters, poses, covariances, whites, nis, logarithms,
-           stages, xs, Ps, presents, befores, ages):
-    # Forward; what the way back needs is kept: the state before each sample, and the samples as they were used.
-    sizes = x.shape[1], P.shape[1], whites.shape[2], Z.shape[2], parameters.shape[2]
-    vectors, square, measured, rows = scratch(*sizes)
-    current, present, before, x1, x0, r, dx, noise = vectors
-    P0, F, Q, work = square
-    H, R, S, HP, K = measured
-    for t in range(Z.shape[0]):
-        for b in range(Z.shape[1]):
-            p = parameters[t if parameters.shape[0] > 1 else 0, b if parameters.shape[1] > 1 else 0]
-            z, state, P1, white = Z[t, b], x[b], P[b], whites[t, b]
-            copy(state, xs[t, b])
-            copy_matrix(P1, Ps[t, b])
-            take(z, held[b], age[b], starts, p[{dt}], current, present, before)
-            copy(present, presents[t, b])
-            copy(before, befores[t, b])
-            copy(age[b], ages[t, b])
-            logarithms[t, b] = 0.0
-            if started[b]:
-                grow(p, age[b], present, noise)
-                predict(state, present, before, noise, x1, F, Q)
-                propagate(F, P1, Q, work, F_first, F_column)
-                residual(x1, z, p, r, H, R)
-                for a in range(r.shape[0]):
-                    S[a, a] = 1.0
-                nis[t, b] = correct(r, H, R, P1, dx, white, rows, S, HP, K, H_first, H_column)
-                if nis[t, b] != 0.0:
-                    for a in range(r.shape[0]):
-                        logarithms[t, b] += 2.0 * np.log(S[a, a])
-                retract(x1, dx, p, x0)
-                finish(x0, z, p, state)
-                stages[t, b] = 2
-            else:
-                prior(current, p, x0, P0)
-                nis[t, b] = 0.0
-                fill(white, 0.0)
-                started[b] = begin(x0, P0, 1.0, state, P1)
-                stages[t, b] = 1 if started[b] else 0
-            pose(state, p, poses[t, b])
-            if not started[b]:
-                fill(poses[t, b], np.nan)
-            copy_matrix(P1, covariances[t, b])
-
-
-@jit
-def back(Z, parameters, stages, xs, Ps, presents, befores, ages, gposes, gcovariances, gnis, glogarithms,
-         gx, gP, gparameters):
-    # Backward; gx and gP, in: of the last state, out: of the first.
-    n, e, m, w = xs.shape[2], Ps.shape[2], {m}, parameters.shape[2]
-    x1, x2, x3, r, dx, noise, y = (
-        np.empty(n), np.empty(n), np.empty(n), np.empty(m), np.empty(e), np.empty(w), np.empty(m)
-    )
-    F, Q, P1, square, H, R = zeros(e, e), zeros(e, e), zeros(e, e), zeros(e, e), zeros(m, e), zeros(m, m)
-    A, S, W, factor = zeros(e, m), zeros(m, m), zeros(m, m), zeros(m, m)
-    rows = np.empty(m, np.int64)
-    gr, gH, gR, gdx, gF = np.empty(m), zeros(m, e), zeros(m, m), np.empty(e), zeros(e, e)
-    more, passed, gp = np.empty(n), np.empty(n), np.empty({k})
-    work = zeros(e, m), zeros(e, m), zeros(m, m), np.empty(m)
-    for back in range(Z.shape[0]):
-        t = Z.shape[0] - 1 - back
-        for b in range(Z.shape[1]):
-            if stages[t, b] == 0:
-                continue
-            if stages[t, b] == 1:
-                fill(gx[b], 0.0)
-                for i in range(e):
-                    fill(gP[b, i], 0.0)
-                continue
-            p = parameters[t if parameters.shape[0] > 1 else 0, b if parameters.shape[1] > 1 else 0]
-            z, present, before = Z[t, b], presents[t, b], befores[t, b]
-            # the sample again
-            grow(p, ages[t, b], present, noise)
-            predict(xs[t, b], present, before, noise, x1, F, Q)
-            copy_matrix(Ps[t, b], P1)
-            propagate(F, P1, Q, square, F_first, F_column)
-            residual(x1, z, p, r, H, R)
-            count, _ = innovation(r, H, R, P1, rows, A, S, W, y, factor)
-            gain_times(A, y, count, dx)
-            retract(x1, dx, p, x2)
-            finish(x2, z, p, x3)
-            # and back
-            pose_back(x3, p, gposes[t, b], more)
-            for i in range(n):
-                gx[b, i] += more[i]
-            for i in range(e):
-                for j in range(e):
-                    gP[b, i, j] += gcovariances[t, b, i, j]
-            symmetric(gP[b])
-            finish_back(x2, z, p, gx[b], passed, gp)
-            for i in range({k}):
-                gparameters[t, b, i] += gp[i]
-            retract_back(x1, dx, p, passed, more, gdx, gp)
-            for i in range({k}):
-                gparameters[t, b, i] += gp[i]
-            correct_back(
-                H, P1, rows, count, A, W, y, gdx, gP[b], gnis[t, b], glogarithms[t, b], gr, gH, gR, work
-            )
-            if count > 0:
-                residual_back(x1, z, p, gr, gH, gR, passed, gp)
-                for i in range(n):
-                    more[i] += passed[i]
-                for i in range({k}):
-                    gparameters[t, b, i] += gp[i]
-            for i in range(e):
-                copy(gP[b, i], Q[i])
-            propagate_back(F, Ps[t, b], gP[b], gF, square)
-            predict_back(xs[t, b], present, before, noise, more, gF, Q, gx[b], gp)
-            for i in range(e):
-                fill(Q[i], 0.0){share}
-            for i in range({k}):
-                gparameters[t, b, i] += gp[i]
-"""
-
-_SHARE = """
-            if noise[{i}] > 0.0:
-                gp[{g}] *= p[{i}] / noise[{i}]"""
-
-
-def print_back(model: Model, primal: str, gains: Sequence[str]) -> str:
-    """Print the module that runs a model forward and backward.
+def print_back(model: Model, gains: Sequence[str]) -> tuple[dict[str, str], list[int]]:
+    """Print the derivatives of a model's functions.
 
     Args:
         model: the equations.
-        primal: name of the module of :func:`.printer.print_model`.
         gains: with respect to which the derivatives are taken.
+
+    Returns:
+        Name → printed function; pairs one after the other: a parameter that grows with the age of a sample, and its
+        gain.
     """
     tape = Tape()
     names = list(parameters_of(model))
@@ -205,16 +74,18 @@ def print_back(model: Model, primal: str, gains: Sequence[str]) -> str:
         ),
         "pose_back(x, p, gout, gx)": ((posed,), (tape.inputs("gout", len(posed)),), {"gx": list(x)}, ""),
     }
-    begins = [0, *np.cumsum([channel.size for channel in model.channels]).tolist()]
-    dt = names.index("dt")
-    share = ""
-    for i in {names.index(item.parameter): None for item in model.held_inputs}:
-        share += "".join(_SHARE.format(i=i, g=g) for g, place in enumerate(places) if place == i)
-    text = [_HEAD.format(primal=primal, starts=begins)]
+    shares = [
+        number
+        for i in {names.index(item.parameter): None for item in model.held_inputs}
+        for g, place in enumerate(places)
+        if place == i
+        for number in (i, g)
+    ]
     sizes = {"x": n, "dx": e, "p": len(names), "gx": n, "gdx": e, "gp": len(tuned), "gxn": n, "gr": m}
     sizes |= dict.fromkeys(("z", "previous"), width) | {"gout": len(posed)}
     shapes: dict[str, tuple[int, ...]] = {name: (size,) for name, size in sizes.items()}
     shapes |= {"gF": (e, e), "gQ": (e, e), "gH": (m, e), "gR": (m, m)}
+    printed = {}
     for signature, (outputs, given, wanted, unknown) in functions.items():
         arrays = [np.asarray(array, dtype=object) for array in outputs]
         inputs = [item for part in wanted.values() for item in part]
@@ -224,9 +95,8 @@ def print_back(model: Model, primal: str, gains: Sequence[str]) -> str:
             parts[name] = found[start : start + len(part)]
             start += len(part)
         name, _, arguments = signature.rstrip(")").partition("(")
-        text.append(print_function(name, {argument: shapes[argument] for argument in arguments.split(", ")}, parts))
-    text.append(_LOOPS.format(share=share, dt=dt, m=m, k=len(places)))
-    return "\n".join(text)
+        printed[name] = print_function(name, {argument: shapes[argument] for argument in arguments.split(", ")}, parts)
+    return printed, shares
 
 
 class Followed(NamedTuple):
@@ -262,8 +132,13 @@ class DifferentiableEquations:
         self.base = np.array([*parameters_of(self.model).values()])
         self.scaled = [self.model.gains[name] for name in self.gains]
         self.columns = [form.names.index(gain.parameter) for gain in self.scaled]
-        primal = load(print_model(self.model), type(self.model).__name__).__name__
-        self.module = load(print_back(self.model, primal, self.gains), f"{type(self.model).__name__}_back")
+        # numba is imported here, since commands that run no filter need not wait for it
+        from . import adjoint_loops, native
+
+        self.loops = adjoint_loops
+        printed, shares = print_back(self.model, self.gains)
+        found = native.addresses(printed, f"{type(self.model).__name__}_back")
+        self.own = np.array([*(found[name] for name in adjoint_loops.BACK), *shares], np.int64)
 
     def with_model(self, model: Model) -> Self:
         """The same passes with the constants of another model of the same class and structure."""
@@ -298,11 +173,8 @@ class DifferentiableEquations:
         outputs: list[np.ndarray] = [np.empty((length, count, *shape)) for shape in shapes]
         sizes = ((n,), (e, e), (d,), (d,), (age.shape[-1],))
         records = [np.zeros((length, count), np.int64), *(np.empty((length, count, *size)) for size in sizes)]
-        compile_now(
-            self.module.follow,
-            (x, P, held, age, started, Z, table, *outputs, *records),
-            f"{type(self.model).__name__} (derivatives)",
-        )
+        forward = x, P, held, age, started, Z, table, *outputs, tuple(records), self.form.plan
+        compile_now(self.loops.follow, forward, "the filters' derivatives")
         poses, covariances, whites, nis, logarithms = outputs
         followed = Followed(poses, covariances, whites, nis, logarithms, (Z, table, *records))
         return followed, FilterState(x, P, held, age, monitor, started)
@@ -330,10 +202,9 @@ class DifferentiableEquations:
         """
         Z, table, *records = followed.records
         gx, gP, found = np.array(x), np.array(P), np.zeros((*Z.shape[:2], len(self.gains)))
-        given = [np.ascontiguousarray(part, dtype=float) for part in (poses, covariances, nis, logarithms)]
-        compile_now(
-            self.module.back, (Z, table, *records, *given, gx, gP, found), f"{type(self.model).__name__} (derivatives)"
-        )
+        given = tuple(np.ascontiguousarray(part, dtype=float) for part in (poses, covariances, nis, logarithms))
+        backward = Z, table, tuple(records), given, gx, gP, found, self.form.plan, self.own
+        compile_now(self.loops.back, backward, "the filters' derivatives")
         for index, (gain, column) in enumerate(zip(self.scaled, self.columns, strict=True)):
             values = table[:, :, column]
             found[..., index] *= np.where(values < gain.maximum, gain.power * values, 0.0)

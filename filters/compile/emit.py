@@ -1,4 +1,4 @@
-"""Recorded equations → LLVM code, and the call of it from functions that numba compiles.
+"""Recorded equations → LLVM code.
 
 A recording is straight-line code on numbers whose types are known. Numba would find this out again, statement by
 statement, which takes longer than to make machine code of it; so the code is printed as what numba would arrive at.
@@ -6,11 +6,9 @@ statement, which takes longer than to make machine code of it; so the code is pr
 
 from __future__ import annotations
 
-import hashlib
 import math
 import struct
 from collections.abc import Iterator, Mapping
-from typing import Any
 
 import numpy as np
 
@@ -27,46 +25,23 @@ TRUTHS = {*_COMPARISONS, *_LOGIC, "not", "isfinite"}
 
 
 def print_function(name: str, arguments: Mapping[str, tuple[int, ...]], outputs: Mapping[str, np.ndarray]) -> str:
-    """Print a function of a recording as text of a compiled module: an intrinsic of numba that holds LLVM code.
+    """Print a function of a recording.
 
     Args:
         name: of the function.
-        arguments: name → shape of the arrays of floats, each in one piece, that it takes in this order.
+        arguments: name → shape of the arrays of floats, each in one piece, to whose first elements it takes pointers.
         outputs: argument → object array, of its shape, of what to write into it. Vectors are written whole; elements
             of matrices that are exactly zero are not: the caller clears matrices once.
     """
     body = "\n".join(_Emitter(arguments).function(outputs))
-    names = ", ".join(arguments)
-    # Modules of a process share one space of names, in which equal names must mean equal code.
-    symbol = f"poise_{name}_{hashlib.sha256(f'{names}{body}'.encode()).hexdigest()[:20]}"
     pointers = ", ".join(f"ptr %{argument}" for argument in arguments)
-    code = f"define weak_odr void @{symbol}({pointers}) nounwind {{\n{body}\n  ret void\n}}\n{_declarations(body)}"
-    return f'@intrinsic\ndef {name}(context, {names}):\n    return native("{symbol}", """\n{code}""", {names})\n'
+    return f"define void @{name}({pointers}) nounwind {{\n{body}\n  ret void\n}}\n"
 
 
-def native(symbol: str, code: str, *arrays: Any) -> tuple[Any, Any]:
-    """Signature and code generator of an intrinsic that calls a printed function with the first elements of arrays.
-
-    Raises:
-        TypeError: an argument is not an array of floats in one piece.
-    """
-    import llvmlite.binding as binding
-    from llvmlite import ir
-    from numba.core import cgutils, types
-
-    for array in arrays:
-        if not (isinstance(array, types.Array) and array.dtype == types.float64 and array.layout == "C"):
-            raise TypeError(f"{symbol} takes arrays of floats, each in one piece, got {array}")
-
-    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-        context.active_code_library.add_llvm_module(binding.parse_assembly(code))
-        pairs = zip(signature.args, values, strict=True)
-        pointers = [context.make_array(kind)(context, builder, value).data for kind, value in pairs]
-        kind = ir.FunctionType(ir.VoidType(), [pointer.type for pointer in pointers])
-        builder.call(cgutils.get_or_insert_function(builder.module, kind, symbol), pointers)
-        return context.get_dummy_value()
-
-    return types.void(*arrays), generate
+def module_of(functions: Mapping[str, str], triple: str) -> str:
+    """Text of a module of printed functions for a kind of machine."""
+    bodies = "".join(functions.values())
+    return f'target triple = "{triple}"\n{bodies}{_declarations(bodies)}'
 
 
 def _declarations(body: str) -> str:

@@ -1,6 +1,6 @@
-"""The Kalman recursion as plain loops: the part of the compiled filter that is the same for every model.
+"""The steps of the Kalman recursion as plain loops, the same for every model.
 
-Printed models (:mod:`.printer`) import it. F and H of most models are mostly zeros, so products run over lists of the
+F and H of most models are mostly zeros, so products run over lists of the
 elements that can be other: line i has ``column[first[i]:first[i + 1]]``. Sums over several columns or rows at a time
 stay in registers; each is formed in the order in which it is written.
 """
@@ -31,6 +31,14 @@ def copy_matrix(source, target):  # type: ignore[no-untyped-def]
     """A matrix into another."""
     for i in range(source.shape[0]):
         copy(source[i], target[i])
+
+
+@jit
+def symmetric(matrix):  # type: ignore[no-untyped-def]
+    """M ← (M + Mᵀ) / 2."""
+    for i in range(matrix.shape[0]):
+        for j in range(i):
+            matrix[i, j] = matrix[j, i] = 0.5 * (matrix[i, j] + matrix[j, i])
 
 
 @jit
@@ -249,3 +257,16 @@ def correct(r, H, R, P, dx, white, rows, S, HP, K, first, column):  # type: igno
             P[i, j] = total
             P[j, i] = total
     return nis
+
+
+@jit
+def remember(K, S, rows, gain, factor, used):  # type: ignore[no-untyped-def]
+    """Keep what :func:`correct` has left behind, for the way back."""
+    for a in range(rows.shape[0]):
+        used[a] = rows[a]
+        if rows[a] < 0:
+            break
+        for j in range(K.shape[1]):
+            gain[a, j] = K[a, j]
+        for b in range(a + 1):
+            factor[a, b] = S[a, b]

@@ -1,179 +1,46 @@
-"""Equations → text of a module whose function ``run`` runs them over time, and ``record`` and ``smooth`` back again.
+"""Equations → printed functions, and the places in F and H that can be other than zero.
 
 A model runs once on recorded scalars (:mod:`.trace`), which become machine code without numba's analysis
-(:mod:`.emit`); its floats stay parameters, so one printed module serves every tuning, sampling interval and gain. What
-is the same for every model is imported from :mod:`.kernel`. A method without covariance is a Kalman filter whose error
-state and measurement are empty.
+(:mod:`.emit`); its floats stay parameters, so one form serves every tuning, sampling interval and gain. The loops that
+call these functions are the same for every model (:mod:`.loops`, :mod:`.smoothing`). A method without covariance is a
+Kalman filter whose error state and measurement are empty.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..core.held_inputs import grown_parameters
 from ..core.model import Equations, Model, Recurrence, parameters_of, with_parameters
-from ..core.monitor import LOST, MEMORY, inputs_of, places_of, realigned, starts_of, watch, without_impacts
+from ..core.monitor import MEMORY, inputs_of, places_of, realigned, starts_of, watch, without_impacts
 from ..core.quantity import ACCELEROMETER, GYROSCOPE
 from ..core.sampling import split
 from .emit import print_function
 from .trace import Expression, Tape
 
-_HEAD = """
-import numpy as np
-from numba.extending import intrinsic
 
-from poise.filters.compile.cache import jit
-from poise.filters.compile.emit import native
-from poise.filters.compile.kernel import begin, copy, correct, fill, keep, propagate, scratch, take, zeros
-from poise.filters.compile.smoothing import remember, update_back
-"""
+class Printed(NamedTuple):
+    """A model as compiled loops need it."""
 
-WIDTH = 10
-"""Columns of a product that are summed at a time."""
-
-_RUN = """
-starts = np.array({starts})
+    functions: dict[str, str]
+    """name → printed function: the equations, what the recursion needs besides, and ``store``, ``fetch``, ``constants``
+    of the elements of F and H that vary"""
+    lists: tuple[list[int], ...]
+    """first elements of the channels in a sample; of F and of H the lists of elements that can be other than zero"""
+    dt: int
+    """place of the sampling interval among the parameters"""
+    entries: int
+    """number of elements of F and H that vary"""
 
 
-@jit
-def run(x, P, held, age, monitor, started, Z, parameters, restart, poses, covariances, whites, nis):
-    # All time steps of all sequences of a batch; the state, x to started, is changed in place.
-    sizes = x.shape[1], P.shape[1], whites.shape[2], Z.shape[2], parameters.shape[2]
-    vectors, square, measured, rows = scratch(*sizes)
-    current, present, before, x1, x0, r, dx, grown = vectors
-    P0, F, Q, work = square
-    H, R, S, HP, K = measured
-    for t in range(Z.shape[0]):
-        for b in range(Z.shape[1]):
-            p = parameters[t if parameters.shape[0] > 1 else 0, b if parameters.shape[1] > 1 else 0]
-            z, state, P1, white, pose_now = Z[t, b], x[b], P[b], whites[t, b], poses[t, b]{rejected}
-            missing = take(z, held[b], age[b], starts, p[{dt}], current, present, before)
-            lost = {lost}
-            if started[b] and not lost:
-                noise = p
-                if missing:
-                    grow(p, age[b], present, grown)
-                    noise = grown
-                predict(state, present, before, noise, x1, F, Q)
-                if P1.shape[0] > 0:
-                    propagate(F, P1, Q, work, F_first, F_column)
-                    residual(x1, z, p, r, H, R)
-                    nis[t, b] = correct(r, H, R, P1, dx, white, rows, S, HP, K, H_first, H_column)
-                    # corrected
-                retract(x1, dx, p, x0)
-                # updated
-                finish(x0, z, p, state)
-            else:
-                factor = 1.0{realigned}
-                prior(current, p, x0, P0)
-                nis[t, b] = 0.0
-                fill(white, 0.0)
-                started[b] = begin(x0, P0, factor, state, P1) or started[b]
-                # begun
-            pose(state, p, pose_now){watched}
-            if covariances.shape[0] > 0 or not started[b]:
-                keep(started[b], P1, pose_now, covariances, t, b)
-"""
-
-_REJECTED = """
-            if restart and started[b]:
-                reject(z, monitor[b], age[b])"""
-
-_REALIGNED = f"""
-                if lost:
-                    realign(current, monitor[b], p)
-                    factor = monitor[b, {LOST}]"""
-
-_WATCHED = """
-            if restart and started[b]:
-                watch(monitor[b], present, z, state, pose_now, age[b], p)"""
-
-# ``record`` is ``run`` with further lines in place of the comments: it keeps what the way back needs.
-_RECORDED = {
-    "def run(": "def record(",
-    "whites, nis):": "whites, nis, stage, updated, entries, gains, factors, used):",
-    "# corrected": "store(F, H, entries[t, b])\n"
-    + " " * 20
-    + "remember(K, S, rows, gains[t, b], factors[t, b], used[t, b])",
-    "# updated": "stage[t, b] = 2\n                copy(x0, updated[t, b])",
-    "# begun": "stage[t, b] = 1 if started[b] else 0\n                copy(x0, updated[t, b])",
-}
-
-_SMOOTH = '''
-@jit
-def smooth_sample(P, vector, information, error, work):
-    # The smoothed error δ = P λ and covariance P − P Λ P, in place of P, after the measurement update.
-    e = P.shape[0]
-    for i in range(e):
-        total = 0.0
-        for k in range(e):
-            total += P[i, k] * vector[k]
-        error[i] = total
-    product(information, P, work)
-    reduce(P, work)
-    for i in range(e):
-        for j in range(i):
-            P[i, j] = P[j, i] = 0.5 * (P[i, j] + P[j, i])
-
-
-@jit
-def predict_back(F, vector, information, moved, work):
-    # Fᵀ λ and Fᵀ Λ F: from before the measurement update of a sample to after that of the one before, in place.
-    e = F.shape[0]
-    fill(moved, 0.0)
-    for k in range(e):
-        for c in range(e):
-            moved[c] += F[k, c] * vector[k]
-    copy(moved, vector)
-    product(information, F, work)
-    transposed_product(F, work, information)
-    for i in range(e):
-        for j in range(i):
-            information[i, j] = information[j, i] = 0.5 * (information[i, j] + information[j, i])
-
-
-@jit
-def smooth(Z, parameters, whites, records, later, covariances, poses):
-    """Backward over a recorded stretch; covariances (in: those of the filter) and ``later`` are changed in place."""
-    stage, updated, entries, gains, factors, used = records
-    vector, information = later
-    n, m, e = updated.shape[2], used.shape[2], vector.shape[1]
-    x0, x1, error, V, B, y = np.empty(n), np.empty(n), np.empty(e), zeros(m, e), np.empty((2, m, m)), np.empty(m)
-    F, H, work, moved = zeros(e, e), zeros(m, e), zeros(e, e), np.empty(e)
-    constants(F, H)
-    for back in range(Z.shape[0]):
-        t = Z.shape[0] - 1 - back
-        for b in range(Z.shape[1]):
-            if stage[t, b] == 0:
-                fill(poses[t, b], np.nan)
-                continue
-            p = parameters[t if parameters.shape[0] > 1 else 0, b if parameters.shape[1] > 1 else 0]
-            smooth_sample(covariances[t, b], vector[b], information[b], error, work)
-            retract(updated[t, b], error, p, x1)
-            if stage[t, b] == 2:
-                finish(x1, Z[t, b], p, x0)
-                fetch(entries[t, b], F, H)
-                measured = gains[t, b], factors[t, b], used[t, b], whites[t, b]
-                update_back(H, H_first, H_column, *measured, vector[b], information[b], V, B, y)
-                predict_back(F, vector[b], information[b], moved, work)
-            else:
-                copy(x1, x0)
-                fill(vector[b], 0.0)
-                for i in range(e):
-                    fill(information[b, i], 0.0)
-            pose(x0, p, poses[t, b])
-'''
-
-
-def _lists(name: str, array: np.ndarray) -> list[str]:
-    """The places in a matrix that can be other than zero, line by line, as two constants of a printed module."""
+def _lists(array: np.ndarray) -> tuple[list[int], list[int]]:
+    """The places in a matrix that can be other than zero: line i has ``column[first[i]:first[i + 1]]``."""
     lines = [[j for j, item in enumerate(line) if _number_of(item) != 0.0] for line in array]
     first = np.concatenate([[0], np.cumsum([len(line) for line in lines], dtype=int)])
-    flat = [j for line in lines for j in line]
-    return [f"{name}_first = np.array({first.tolist()}, np.int64)", f"{name}_column = np.array({flat}, np.int64)"]
+    return first.tolist(), [j for line in lines for j in line]
 
 
 def _number_of(item: Any) -> float | None:
@@ -181,7 +48,9 @@ def _number_of(item: Any) -> float | None:
     return item.value if isinstance(item, Expression) else float(item)
 
 
-def _print_entries(tape: Tape, F: np.ndarray, H: np.ndarray, shapes: dict[str, tuple[int, ...]]) -> list[str]:
+def _print_entries(
+    tape: Tape, F: np.ndarray, H: np.ndarray, shapes: dict[str, tuple[int, ...]]
+) -> tuple[dict[str, str], int]:
     """Functions that keep and restore the elements of F and H that vary, and the number of these."""
     varying = {"F": np.zeros(F.shape, dtype=object), "H": np.zeros(H.shape, dtype=object)}
     constants = {"F": varying["F"].copy(), "H": varying["H"].copy()}
@@ -196,47 +65,23 @@ def _print_entries(tape: Tape, F: np.ndarray, H: np.ndarray, shapes: dict[str, t
             else:
                 constants[name][place] = value
     shapes = {"kept": (len(kept),)} | shapes
-    functions = [
-        print_function("store", {name: shapes[name] for name in ("F", "H", "kept")}, {"kept": np.array(kept)}),
-        print_function("fetch", {name: shapes[name] for name in ("kept", "F", "H")}, varying),
-        print_function("constants", {name: shapes[name] for name in ("F", "H")}, constants),
-    ]
-    return [*functions, f"ENTRIES = {len(kept)}"]
-
-
-def _print_products(e: int) -> list[str]:
-    """Products of ``(e, e)`` matrices: C ← A B, C ← Aᵀ B, and A ← A − A B. The sums of a row stay in registers."""
-    text = []
-    for head, factor, target, sign in (
-        ("product(A, B, C)", "A[i, k]", "C", "+"),
-        ("transposed_product(A, B, C)", "A[k, i]", "C", "+"),
-        ("reduce(A, B)", "A[i, k]", "A", "-"),
-    ):
-        text += ["", "", "@jit", f"def {head}:", f"    for i in range({e}):"]
-        for start in range(0, e, WIDTH):
-            columns = range(start, min(start + WIDTH, e))
-            text += [f"        s{j} = {f'A[i, {j}]' if sign == '-' else '0.0'}" for j in columns]
-            text += [f"        for k in range({e}):", f"            f = {factor}"]
-            text += [f"            s{j} {sign}= f * B[k, {j}]" for j in columns]
-            if sign == "+":
-                text += [f"        {target}[i, {j}] = s{j}" for j in columns]
-        if sign == "-":
-            text += [f"        {target}[i, {j}] = s{j}" for j in range(e)]
-    return text
+    both = {name: shapes[name] for name in ("F", "H")}
+    keeping = {"kept": shapes["kept"]}
+    functions = {
+        "store": print_function("store", both | keeping, {"kept": np.array(kept)}),
+        "fetch": print_function("fetch", keeping | both, varying),
+        "constants": print_function("constants", both, constants),
+    }
+    return functions, len(kept)
 
 
 class UntraceableError(TypeError):
     """A method of a model that computes something that cannot be recorded."""
 
 
-def _recursion(traced: Equations, tape: Tape, names: list[str]) -> tuple[dict[str, Any], str]:
-    """What the recursion needs beside a model's equations, and the loop over time.
-
-    Returns the functions as in :func:`print_model`.
-    """
+def _recursion(traced: Equations, tape: Tape, names: list[str], begins: list[int]) -> dict[str, Any]:
+    """What the recursion needs beside a model's equations: functions as in :func:`print_model`."""
     channels, places = [channel.name for channel in traced.channels], places_of(traced)
-    begins = [*starts_of(traced.channels).values(), sum(channel.size for channel in traced.channels)]
-    parts = {"starts": begins, "dt": names.index("dt"), "lost": "False", "rejected": "", "realigned": "", "watched": ""}
     p, age, x = tape.inputs("p", len(names)), tape.inputs("age", len(channels)), tape.inputs("x", traced.state_size)
     present, current, z = (tape.inputs(name, begins[-1]) for name in ("present", "current", "z"))
 
@@ -254,13 +99,11 @@ def _recursion(traced: Equations, tape: Tape, names: list[str]) -> tuple[dict[st
             ("memory",),
             lambda: watch(memory, inputs_of(traced, places, present, z, x, posed, of_rate)),
         )
-        lost = f"restart and monitor[b, {LOST}] > 0.5"
-        parts |= {"lost": lost, "rejected": _REJECTED, "realigned": _REALIGNED, "watched": _WATCHED}
-    return functions, _RUN.format(**parts)
+    return functions
 
 
-def print_model(model: Equations) -> str:
-    """Trace equations and print the module that runs them.
+def print_model(model: Equations) -> Printed:
+    """Trace equations and print them.
 
     Args:
         model: the equations.
@@ -304,8 +147,9 @@ def print_model(model: Equations) -> str:
         raise TypeError(f"{kind} is neither a Model nor a Recurrence")
     equations["finish(x, z, p, xn)"] = (("xn",), lambda: traced.finish(x, z))
     equations["pose(x, p, posed)"] = (("posed",), posed)
-    more, run = _recursion(traced, tape, names)
-    text, jacobians = [_HEAD, ""], {"F": np.zeros((e, e)), "H": np.zeros((m, e))}
+    begins = [*starts_of(model.channels).values(), width]
+    more = _recursion(traced, tape, names, begins)
+    functions, jacobians = {}, {"F": np.zeros((e, e)), "H": np.zeros((m, e))}
     for signature, (outputs, compute) in (equations | more).items():
         name, _, arguments = signature.rstrip(")").partition("(")
         where = f"{kind}.{name}"
@@ -321,11 +165,11 @@ def print_model(model: Equations) -> str:
                 raise ValueError(f"{where}: {output} must have shape {shapes[output]}, got {array.shape}")
         jacobians |= {output: arrays[output] for output in ("F", "H") if output in arrays}
         # Matrices keep their zeros between calls.
-        text.append(print_function(name, {argument: shapes[argument] for argument in arguments.split(", ")}, arrays))
-    text += [*_lists("F", jacobians["F"]), *_lists("H", jacobians["H"]), run]
+        functions[name] = print_function(
+            name, {argument: shapes[argument] for argument in arguments.split(", ")}, arrays
+        )
+    F, H, entries = jacobians["F"], jacobians["H"], 0
     if isinstance(traced, Model):
-        recorded = run
-        for mark, line in _RECORDED.items():
-            recorded = recorded.replace(mark, line)
-        text += [*_print_entries(tape, jacobians["F"], jacobians["H"], shapes), *_print_products(e), recorded, _SMOOTH]
-    return "\n".join(text)
+        kept, entries = _print_entries(tape, F, H, shapes)
+        functions |= kept
+    return Printed(functions, (begins, *_lists(F), *_lists(H)), names.index("dt"), entries)

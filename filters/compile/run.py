@@ -1,4 +1,4 @@
-"""Run printed and compiled equations on NumPy data: one call for a sample, a sequence, or a batch of sequences."""
+"""Run compiled equations on NumPy data: one call for a sample, a sequence, or a batch of sequences."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ..core.model import Equations, parameters_of, structure_of
 from ..core.quantity import Estimate, Measurement
 from ..core.sampling import FilterState, Gains, empty_state, gains_over_time, join
 from ..support.parallel import processors
-from .cache import compile_now, load
+from .cache import compile_now
 from .printer import UntraceableError, print_model
 
 _COMPILED: dict[tuple[Any, ...], CompiledEquations | None] = {}
@@ -48,8 +48,12 @@ class CompiledEquations:
     """The compiled recursion of one class of equations; parameters are passed at every call."""
 
     def __init__(self, model: Equations) -> None:
-        self.module = load(print_model(model), type(model).__name__)
-        self.kernel = self.module.run
+        # numba is imported here, since commands that run no filter need not wait for it
+        from . import loops, native, plan, smoothing
+
+        self.loops, self.smoothing = loops, smoothing
+        self.printed = print_model(model)
+        self.plan = plan.plan_of(self.printed, native.addresses(self.printed.functions, type(model).__name__))
         self.names = tuple(parameters_of(model))
         self.columns: dict[str, slice] = {}
         start = 0
@@ -60,7 +64,7 @@ class CompiledEquations:
         width = sum(channel.size for channel in model.channels)
         state = empty_state(model, np.empty((0, width)))
         samples = [np.empty((0, 0, width)), self._parameters(model, None, 0, ()), True]
-        compile_now(self.kernel, (*state, *samples, *self._outputs(model, 0, 0, 0)), type(model).__name__)
+        compile_now(loops.run, (*state, *samples, *self._outputs(model, 0, 0, 0), self.plan), "the filters' recursion")
 
     def _parameters(self, model: Equations, gains: Gains | None, length: int, batch: tuple[int, ...]) -> np.ndarray:
         """Parameters ``(T or 1, B or 1, count)`` with the gains applied."""
@@ -96,7 +100,8 @@ class CompiledEquations:
         after = FilterState(*(np.array(array) for array in state))
         flat = [array.reshape(count, *array.shape[len(batch) :]) for array in after]
         outputs = self._outputs(model, 1, count, 1)
-        self.kernel(*flat, z.reshape(1, count, -1), self._parameters(model, gains, 1, batch), restart, *outputs)
+        parameters = self._parameters(model, gains, 1, batch)
+        self.loops.run(*flat, z.reshape(1, count, -1), parameters, restart, *outputs, self.plan)
         shaped = [array.reshape((*batch, *array.shape[2:])) for array in outputs]
         return after, self._estimate(model, shaped[0], *shaped[1:])
 
@@ -147,7 +152,7 @@ class CompiledEquations:
         count = math.prod(batch)
         Z = np.require(Z.reshape(length, count, Z.shape[-1]), requirements=["C", "W"])
         parameters = self._parameters(model, gains, length, batch)
-        shapes = (n,), (self.module.ENTRIES,), (m, e), (m, m)
+        shapes = (n,), (self.printed.entries,), (m, e), (m, m)
         each = max(64, RECORDED // (count * (e * e + sum(map(math.prod, shapes)))))
         stretches = [slice(start, min(start + each, length)) for start in range(0, length, each)]
         states = [np.array(part) for part in empty_state(model, Z[0])]
@@ -158,19 +163,18 @@ class CompiledEquations:
             if len(stretches) > 1:
                 own = parameters if len(parameters) == 1 else parameters[stretch]
                 size = stretch.stop - stretch.start
-                self.kernel(*states, Z[stretch], own, restart, *self._outputs(model, size, count, 0))
+                self.loops.run(*states, Z[stretch], own, restart, *self._outputs(model, size, count, 0), self.plan)
         later = np.zeros((count, e)), np.zeros((count, e, e))
-        label = f"{type(model).__name__} (smoother)"
+        label = "the filters' smoother"
         for stretch, start in zip(reversed(stretches), reversed(starts), strict=True):
             size, own = stretch.stop - stretch.start, parameters if len(parameters) == 1 else parameters[stretch]
             covariance = covariances[stretch] if keep_covariance else np.empty((size, count, e, e))
             outputs = poses[stretch], covariance, whites[stretch], nis[stretch]
             kept = (np.empty((size, count, *shape)) for shape in shapes)
             records = np.zeros((size, count), np.int64), *kept, np.empty((size, count, m), np.int64)
-            compile_now(self.module.record, (*start, Z[stretch], own, restart, *outputs, *records), label)
-            compile_now(
-                self.module.smooth, (Z[stretch], own, outputs[2], records, later, covariance, outputs[0]), label
-            )
+            compile_now(self.loops.record, (*start, Z[stretch], own, restart, *outputs, self.plan, records), label)
+            backward = Z[stretch], own, outputs[2], records, later, covariance, outputs[0], self.plan
+            compile_now(self.smoothing.smooth, backward, label)
         shaped = [array.reshape((len(array), *batch, *array.shape[2:])) for array in (poses, covariances, whites, nis)]
         return self._estimate(model, shaped[0], shaped[1] if keep_covariance else None, *shaped[2:])
 
@@ -180,7 +184,7 @@ class CompiledEquations:
         """Call the kernel, in threads for large batches; sequences are independent, so the results are the same."""
         threads = min(processors(), Z.shape[1])
         if threads < 2 or Z.shape[0] * Z.shape[1] < PARALLEL_WORK:
-            self.kernel(*states, Z, parameters, restart, *outs)
+            self.loops.run(*states, Z, parameters, restart, *outs, self.plan)
             return
 
         def work(first: int, last: int) -> None:
@@ -188,7 +192,8 @@ class CompiledEquations:
             part = slice(first, last)
             own = np.ascontiguousarray(parameters[:, part]) if parameters.shape[1] > 1 else parameters
             mine = [np.empty(out[:, part].shape) for out in outs]
-            self.kernel(*(state[part] for state in states), np.ascontiguousarray(Z[:, part]), own, restart, *mine)
+            samples = np.ascontiguousarray(Z[:, part])
+            self.loops.run(*(state[part] for state in states), samples, own, restart, *mine, self.plan)
             for out, filled in zip(outs, mine, strict=True):
                 out[:, part] = filled
 

@@ -14,20 +14,12 @@ others determine, need no care. The smoothed state is that of the filter, correc
 
 from __future__ import annotations
 
+import numpy as np
+
 from .cache import jit
-
-
-@jit
-def remember(K, S, rows, gain, factor, used):  # type: ignore[no-untyped-def]
-    """Keep what :func:`poise.filters.compile.kernel.correct` has left behind, for ``carry_back``."""
-    for a in range(rows.shape[0]):
-        used[a] = rows[a]
-        if rows[a] < 0:
-            break
-        for j in range(K.shape[1]):
-            gain[a, j] = K[a, j]
-        for b in range(a + 1):
-            factor[a, b] = S[a, b]
+from .kernel import copy, fill, symmetric, zeros
+from .native import call
+from .plan import CONSTANTS, FETCH, FINISH, POSE, RETRACT, part
 
 
 @jit
@@ -122,3 +114,113 @@ def update_back(H, first, column, K, S, rows, white, vector, information, V, B, 
                 information[c, j] -= h * V[a, j]
             for j in range(e):
                 information[j, c] -= h * V[a, j]
+
+
+@jit
+def multiply_transposed(A, B, C):  # type: ignore[no-untyped-def]
+    """C ← Aᵀ B of square matrices, four columns at a time."""
+    n = A.shape[0]
+    for i in range(n):
+        j = 0
+        while j + 4 <= n:
+            s0 = s1 = s2 = s3 = 0.0
+            for k in range(n):
+                f = A[k, i]
+                s0 += f * B[k, j]
+                s1 += f * B[k, j + 1]
+                s2 += f * B[k, j + 2]
+                s3 += f * B[k, j + 3]
+            C[i, j], C[i, j + 1], C[i, j + 2], C[i, j + 3] = s0, s1, s2, s3
+            j += 4
+        while j < n:
+            s0 = 0.0
+            for k in range(n):
+                s0 += A[k, i] * B[k, j]
+            C[i, j] = s0
+            j += 1
+
+
+@jit
+def reduce(A, B, row):  # type: ignore[no-untyped-def]
+    """A ← A − A B of square matrices, four columns at a time. Scratch: row ``(n,)``."""
+    n = A.shape[0]
+    for i in range(n):
+        j = 0
+        while j + 4 <= n:
+            s0, s1, s2, s3 = A[i, j], A[i, j + 1], A[i, j + 2], A[i, j + 3]
+            for k in range(n):
+                f = A[i, k]
+                s0 -= f * B[k, j]
+                s1 -= f * B[k, j + 1]
+                s2 -= f * B[k, j + 2]
+                s3 -= f * B[k, j + 3]
+            row[j], row[j + 1], row[j + 2], row[j + 3] = s0, s1, s2, s3
+            j += 4
+        while j < n:
+            s0 = A[i, j]
+            for k in range(n):
+                s0 -= A[i, k] * B[k, j]
+            row[j] = s0
+            j += 1
+        copy(row, A[i])
+
+
+@jit
+def smooth_sample(P, vector, information, error, work, row):  # type: ignore[no-untyped-def]
+    """The smoothed error δ = P λ and covariance P − P Λ P, in place of P, after the measurement update."""
+    e = P.shape[0]
+    for i in range(e):
+        total = 0.0
+        for k in range(e):
+            total += P[i, k] * vector[k]
+        error[i] = total
+    multiply(information, e, P, work)
+    reduce(P, work, row)
+    symmetric(P)
+
+
+@jit
+def predict_back(F, vector, information, moved, work):  # type: ignore[no-untyped-def]
+    """Fᵀ λ and Fᵀ Λ F, in place: from before the measurement update of a sample to after that of the one before."""
+    e = F.shape[0]
+    fill(moved, 0.0)
+    for k in range(e):
+        for c in range(e):
+            moved[c] += F[k, c] * vector[k]
+    copy(moved, vector)
+    multiply(information, e, F, work)
+    multiply_transposed(F, work, information)
+    symmetric(information)
+
+
+@jit
+def smooth(Z, parameters, whites, records, later, covariances, poses, plan):  # type: ignore[no-untyped-def]
+    """Backward over a recorded stretch; covariances (in: those of the filter) and ``later`` are changed in place."""
+    stage, updated, entries, gains, factors, used = records
+    vector, information = later
+    n, m, e = updated.shape[2], used.shape[2], vector.shape[1]
+    x0, x1, error, V, B, y = np.empty(n), np.empty(n), np.empty(e), zeros(m, e), np.empty((2, m, m)), np.empty(m)
+    F, H, work, moved = zeros(e, e), zeros(m, e), zeros(e, e), np.empty(e)
+    H_first, H_column = part(plan, 3), part(plan, 4)
+    call(plan[CONSTANTS], (F, H))
+    for back in range(Z.shape[0]):
+        t = Z.shape[0] - 1 - back
+        for b in range(Z.shape[1]):
+            if stage[t, b] == 0:
+                fill(poses[t, b], np.nan)
+                continue
+            p = parameters[t if parameters.shape[0] > 1 else 0, b if parameters.shape[1] > 1 else 0]
+            smooth_sample(covariances[t, b], vector[b], information[b], error, work, moved)
+            call(plan[RETRACT], (updated[t, b], error, p, x1))
+            if stage[t, b] == 2:
+                call(plan[FINISH], (x1, Z[t, b], p, x0))
+                call(plan[FETCH], (entries[t, b], F, H))
+                measured = gains[t, b], factors[t, b], used[t, b], whites[t, b]
+                update_back(H, H_first, H_column, *measured, vector[b], information[b], V, B, y)
+                predict_back(F, vector[b], information[b], moved, work)
+            else:
+                copy(x1, x0)
+                fill(vector[b], 0.0)
+                for i in range(e):
+                    fill(information[b, i], 0.0)
+            call(plan[POSE], (x0, p, poses[t, b]))

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import tyro
 
@@ -30,6 +32,9 @@ class Args:
     """shipped names or files of policies (default: the filter's shipped one)"""
     trajectories: int = 24
     """simulated ones, without recordings"""
+    errors: float = 1.0
+    """factor on the errors of sensors and of their placement in simulated rides that are compared on: 0.01 shows what
+    of the error gains alone can move"""
     training: int = 24
     """simulated trajectories on which the best constants are searched"""
     points: int = 32
@@ -51,6 +56,7 @@ def run(args: Args) -> int:
     from ...baselines.gain_policy.compared.explained import gains_by_motion, gains_figure
     from ...baselines.gain_policy.config import shipped_config
     from ...baselines.gain_policy.constant_gains import best_constant_gains
+    from ...baselines.gain_policy.motions import RiddenMotions
     from ...baselines.gain_policy.policy import GainPolicy
     from ...baselines.plots import save
     from ...baselines.weights_io import list_weights
@@ -61,9 +67,16 @@ def run(args: Args) -> int:
     from ..tune import results
 
     config = shipped_config(args.filter)
+    if args.errors != 1.0 and (args.recordings or not isinstance(config.motions, RiddenMotions)):
+        raise ValueError("errors can only be given for simulated rides: recordings and hand motions keep theirs")
     shipped = f"{args.filter.replace('-', '_')}_policy"
     names = args.policies or tuple(name for name in (shipped,) if name in list_weights())
-    policies = {f"policy {Path(name).stem}": GainPolicy.load(name) for name in names}
+    policies = {"policy" if name == shipped else f"policy {Path(name).stem}": GainPolicy.load(name) for name in names}
+    unlimited = {
+        f"{name} without limit": replace(policy, bias_limit=math.inf)
+        for name, policy in policies.items()
+        if math.isfinite(policy.bias_limit)
+    }
     tuned = TunedFilter.of(tunable_filter(args.filter), config.gains)
     quantity = scored_quantity(tuned.kalman, None)
     sets: dict[str, list[Trajectory]] = {
@@ -84,7 +97,7 @@ def run(args: Args) -> int:
                 tuned,
                 trajectories,
                 constant.action,
-                policies=policies,
+                policies=policies | unlimited,
                 twins=twins,
                 leave_out=bool(args.recordings),
                 points=args.points,
@@ -115,11 +128,24 @@ def simulated(args: Args, motions: object) -> tuple[dict[str, list[Trajectory]],
     seed = child_seed(args.seed, TEST_SEED)
     if not isinstance(motions, RiddenMotions):
         return {"simulated": motions.draw_many(seed, args.trajectories)}, []  # type: ignore[attr-defined]
-    source = replace(motions.source, draws=2)
+    source = replace(motions.source, draws=2, changes=smaller_errors(motions.source.changes, args.errors))
     pairs = [drawn(source, seed, index) for index in range(args.trajectories)]
     lasting = [pair for pair in pairs if pair[0].mask.any()]
     # Left and right may be exchanged between the two draws; the schedule of gains does not depend on the side.
     return {"simulated": [pair[0] for pair in lasting]}, [pair[1] for pair in lasting]
+
+
+def smaller_errors(changes: Mapping[str, Any], factor: float) -> dict[str, Any]:
+    """Changes of a recipe of rides, with a factor on the errors of sensors and of their placement.
+
+    Raises:
+        ValueError: a factor that is not a positive number.
+    """
+    if not 0.0 < factor < math.inf:
+        raise ValueError(f"errors must be a positive factor, got {factor}")
+    sensors = dict(changes["sensors"])
+    sensors["noise_scale"] = [factor * value for value in sensors["noise_scale"]]
+    return {**changes, "placement_errors": factor, "sensors": sensors}
 
 
 if __name__ == "__main__":

@@ -207,6 +207,7 @@ def test_every_command_file_is_in_the_table() -> None:
         ("tune --agent optuna --trials 0", "trials must be at least 1, got 0"),
         ("tune --test-trajectories 0", "test_trajectories must be at least 1, got 0"),
         ("adapt --points 0", "points must be at least 1, got 0"),
+        ("adapt --errors 0.1", "errors can only be given for simulated rides"),
         ("recommend nofile.csv --most 0", "most must be at least 1, got 0"),
         ("inspect", "name at least one file or folder of recordings"),
         ("evaluate --seed 1.5", "Error parsing --seed: invalid literal"),

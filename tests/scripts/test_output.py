@@ -27,6 +27,24 @@ def test_people_get_tables_and_sentences(capsys: pytest.CaptureFixture[str]) -> 
     assert said.err == ""
 
 
+def test_numbers_stay_whole_beside_long_names(capsys: pytest.CaptureFixture[str]) -> None:
+    saved = dict.fromkeys(("saved", "saved of the others"), "-572 % (-672 to -223)")
+    rows = [
+        {
+            "gains by": "a policy whose name has no more than sixty characters, or so",
+            "mean": 1.25,
+            "median": 33.5,
+            **saved,
+        }
+    ]
+    with Output("x", SimpleNamespace(seed=3)) as out:
+        out.table(rows, "Errors")
+    said = capsys.readouterr().out
+    assert "1.25" in said
+    assert "33.5" in said
+    assert "or so" in said
+
+
 def test_programs_get_one_document(capsys: pytest.CaptureFixture[str]) -> None:
     with Output("x", SimpleNamespace(json=True, seed=3)) as out:
         out.say("working")

@@ -37,7 +37,7 @@ def applicable_rules(tuned: TunedFilter) -> tuple[str, ...]:
     channels = {channel.name for channel in tuned.kalman.channels}
     names = ["innovation"]
     if "bicycle_imu/gyr" in channels:
-        names += ["pitch-rate", "guarded-innovation"]
+        names += ["pitch-rate", "turning"]
     if "imu/acc" in channels:
         names.append("acceleration")
     return tuple(names)

@@ -95,12 +95,14 @@ ITEMS = (
         "φ_h that starts more than 30° wrong converges within 6 s",
         shown=("Figure 10: wrong starts, indoor_circle", "Convergence from a wrong start"),
         decided=both("φ_h that starts 35° off"),
+        causes=both("Nine of ten such starts"),
     ),
     Item(
         "Figure 11",
         "the dynamic torque matches what is read",
         shown=("Figure 11: torques over time, indoor_circle", "Torques at the true pose"),
         decided=both("The dynamic torque is nearer"),
+        causes=both("In most rides the dynamic torque"),
     ),
     Item(
         "Figure 11",

@@ -16,16 +16,19 @@ from ...core.held_inputs import pedalled
 from ...core.matrices import block_diagonal, block_matrix, diagonal, diagonal_matrix, zeros
 from ...core.model import Gain, check_positive
 from ...core.quantity import Measurement
+from ...core.rotation import euler_matrix
 from ..geometry import Point, RiderGeometry
 from .blocks import BLOCKS
 from .filter import CONSTRAINTS, WholeBody
-from .linkage import ERROR_SIZE, GYROSCOPES, SIDES, STEER, TRUNK
+from .linkage import CRANK, ERROR_SIZE, GYROSCOPES, HIP, SHOULDER, SIDES, STEER, TRUNK
 
 DEG = math.pi / 180.0
 PUBLISHED = WholeBody.state_size
 BIASES, ROLL_BIAS, TRUNK_OFFSET, CONSTRAINED = slice(0, 15), slice(15, 16), slice(16, 19), slice(19, 31)
 """What lasts, in its order after the published state."""
 ADDED = CONSTRAINED.stop
+MIRRORED = 60.0 * DEG
+"""Angle between an upper segment and its direction with elbows out or knees forward; mirrored postures are beyond."""
 
 
 @dataclass(frozen=True)
@@ -204,6 +207,22 @@ class ConsistentWholeBody(WholeBody):
         H = xp.concat([xp.concat([H, pick], axis=-1), xp.concat(by_trunk, axis=-1)], axis=-2)
         spread = diagonal([each**2 / self.dt for each in self.posture_noise], zero)
         return xp.concat([r - shift, xp.concat(usual, axis=-1) - angles], axis=-1), H, block_diagonal([R, spread])
+
+    def finish(self, x: Array, z: Measurement) -> Array:
+        """A limb whose upper segment is beyond :data:`MIRRORED` from elbows out or knees forward begins there anew.
+
+        Its constraints have a mirrored solution, into which one linear update may lead after a gap of the gyroscope.
+        """
+        xp, trunk = namespace(x), x[..., TRUNK]
+        usual = self.limb_angles(trunk, x[..., STEER], x[..., CRANK])
+        found = []
+        for side in SIDES:
+            for joint, part, sequence in (("shoulder", SHOULDER[side], "yxy"), ("hip", HIP[side], "zxy")):
+                angles = usual[f"{joint}_{side}"]
+                now, then = (euler_matrix(sequence, each)[..., :, 1] for each in (x[..., part], angles))
+                away = xp.less(xp.sum(now * then, axis=-1)[..., None], math.cos(MIRRORED))
+                found.append(xp.where(away, angles, x[..., part]))
+        return xp.concat([x[..., : SHOULDER["right"].start], *found, x[..., ERROR_SIZE:]], axis=-1)
 
     def retract(self, x: Array, dx: Array) -> Array:
         """As published; what lasts is corrected additively."""

@@ -190,8 +190,21 @@ class RiderLinkage(RiderEquations):
         xp = namespace(steer)
         zero = 0.0 * steer
         trunk = xp.concat([zero - self.trunk_flexion, zero, zero], axis=-1)
-        R = euler_matrix("zxy", trunk)
-        parts = {"trunk": trunk}
+        parts = self.limb_angles(trunk, steer, crank)
+        limbs = [parts[f"{joint}_{side}"] for side in SIDES for joint in ("shoulder", "hip")]
+        x = xp.concat([zero, zero, trunk, zero, zero, zero, *limbs, steer, crank], axis=-1)
+        present = xp.concat([z[name] for name in (*GYROSCOPES, "bicycle_imu/acc")], axis=-1)
+        return xp.where(xp.all(xp.isfinite(present), axis=-1)[..., None], x, xp.nan)
+
+    def limb_angles(self, trunk: Array, steer: Array, crank: Array) -> dict[str, Array]:
+        """``shoulder_right`` … ``hip_left`` → angles ``(..., 3)`` by inverse kinematics: elbows out, knees forward.
+
+        Args:
+            trunk: ``(..., 3)`` angles Θ.
+            steer: ``(..., 1)``, rad.
+            crank: ``(..., 1)``, rad.
+        """
+        R, zero, parts = euler_matrix("zxy", trunk), 0.0 * steer, {}
         for side in SIDES:
             root = (
                 self.point(self.trunk_pivot, "left", steer)
@@ -211,10 +224,7 @@ class RiderLinkage(RiderEquations):
                 "leg",
             )
             parts[f"hip_{side}"] = limb_constraints.hip_angles(frame)
-        limbs = [parts[f"{joint}_{side}"] for side in SIDES for joint in ("shoulder", "hip")]
-        x = xp.concat([zero, zero, trunk, zero, zero, zero, *limbs, steer, crank], axis=-1)
-        present = xp.concat([z[name] for name in (*GYROSCOPES, "bicycle_imu/acc")], axis=-1)
-        return xp.where(xp.all(xp.isfinite(present), axis=-1)[..., None], x, xp.nan)
+        return parts
 
     def pose(self, x: Array) -> dict[str, Array]:
         """Roll, angles of trunk, shoulders and hips from the state, elbows by C4, knees by C8."""

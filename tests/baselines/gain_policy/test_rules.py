@@ -11,7 +11,7 @@ from poise.envs.bicycle.environment import RiderBicycleEnv
 from poise.envs.gain_episode import filter_for
 from poise.envs.gain_reward import true_values
 from poise.filters.adaptation.gains import tunable_filter
-from poise.filters.adaptation.rules import InnovationRule, PitchRateRule
+from poise.filters.adaptation.rules import InnovationRule, PitchRateRule, TurningRule
 from poise.filters.bicycle.two_gyro.filter import TwoGyro
 from poise.filters.core.estimator import run_by_steps
 from poise.filters.core.metrics import error
@@ -49,7 +49,7 @@ def test_the_gain_follows_the_peak_of_the_pitch_rate(ride):
 
 def test_stepping_equals_running(ride):
     short = {name: values[:150] for name, values in ride.measurements.items()}
-    for rule in (PitchRateRule(), InnovationRule()):
+    for rule in (PitchRateRule(), InnovationRule(), TurningRule()):
         estimator = ruled(filter_for(PLATFORM, ride), "measurement", rule)
         stepped, roll = run_by_steps(estimator, short), estimator.outputs[0].name
         np.testing.assert_array_equal(stepped.pose[roll], estimator.run(short).pose[roll])
@@ -65,15 +65,34 @@ def test_too_large_innovations_raise_the_variance_and_small_ones_lower_it(ride):
     assert last_action(1.0) < -0.2
 
 
-def test_on_a_ramp_the_rule_keeps_the_roll(ride):
+def test_on_a_ramp_the_rules_keep_the_roll(ride):
     kalman = filter_for(LEVEL, ride)
-    ruled_error, plain = (
-        roll_error(estimator, ride)
-        for estimator in (
-            ruled(kalman, "constraint", rule) for rule in (PitchRateRule(), PitchRateRule(threshold=100.0))
-        )
+    by_pitch, by_turning, plain = (
+        roll_error(ruled(kalman, "constraint", rule), ride)
+        for rule in (PitchRateRule(), TurningRule(), PitchRateRule(threshold=100.0))
     )
-    assert ruled_error < 0.5 * plain
+    assert by_pitch < 0.5 * plain
+    assert by_turning < 0.5 * plain
+
+
+def test_shaking_without_a_turn_turns_the_belief_off_and_a_calm_turn_strengthens_it():
+    # straight ahead on cobbles: the pitch rate has no mean but shakes, and (5) drives the roll to 90 degrees
+    time, rng = np.arange(3000) / 100.0, np.random.default_rng(2)
+    shaken = np.zeros((3000, 3))
+    shaken[:, 1] = np.radians(30.0) * rng.standard_normal(3000)
+    shaken[:, 0] = np.radians(1.0) * np.cos(time)
+    roll = np.radians(1.0) * np.sin(time)
+    plain, by_turning = (
+        np.degrees(np.abs(each.run({"bicycle_imu/gyr": shaken}).pose["bicycle/roll"][:, 0] - roll)).max()
+        for each in (PLATFORM, ruled(PLATFORM, "measurement", TurningRule()))
+    )
+    assert plain > 30.0
+    assert by_turning < 3.0
+    calm = np.broadcast_to(np.radians([0.0, 0.0, 20.0]), (300, 3))
+    estimator = ruled(PLATFORM, "measurement", TurningRule())
+    (part,) = estimator.policy.ranges
+    _, _, actions = estimator.run_with_actions(None, {"bicycle_imu/gyr": calm})
+    assert actions[-1, 0] * -part.lower == pytest.approx(TurningRule().smallest)
 
 
 def test_filters_without_the_gain_are_refused():

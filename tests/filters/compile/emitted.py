@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
+import ctypes
 from collections.abc import Callable, Mapping
 from typing import Any
 
-import numba
 import numpy as np
-from numba.extending import intrinsic
 
-from poise.filters.compile.emit import native, print_function
+from poise.filters.compile.emit import print_function
+from poise.filters.compile.native import addresses
 
 
 def emitted(arguments: Mapping[str, tuple[int, ...]], outputs: Mapping[str, np.ndarray]) -> Callable[..., Any]:
     """The function that computes recorded outputs; it takes its arguments by position."""
-    names = ", ".join(arguments)
-    scope: dict[str, Any] = {"intrinsic": intrinsic, "native": native}
-    exec(print_function("computed", arguments, outputs), scope)
-    exec(f"def call({names}):\n    computed({names})", scope)
-    return numba.njit(scope["call"])
+    (address,) = addresses({"computed": print_function("computed", arguments, outputs)}, "Computed").values()
+    function = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * len(arguments))(address)
+    return lambda *arrays: function(*(array.ctypes.data for array in arrays))

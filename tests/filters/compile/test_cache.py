@@ -8,28 +8,38 @@ import subprocess
 import sys
 import tempfile
 import warnings
+from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from poise.filters.compile import cache
+from poise.filters.compile.trace import Tape
 
-TEXT = """
-from poise.filters.compile.cache import jit
+from .emitted import emitted
 
-@jit
-def run(x):
+
+def double(x: float) -> float:
     return 2.0 * x
-"""
 
 
 def compiled(folder: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[int, int]:
-    """Load and call a function as a new process would; hits and misses of the cache."""
+    """Make and call a compiled function as a new process would; hits and misses of the cache."""
     monkeypatch.setenv("POISE_CACHE", str(folder))
-    module = cache.load(TEXT, "double")
-    cache.compile_now(module.run, (0.0,), "double")
-    assert module.run(3.0) == 6.0
-    return len(module.run.stats.cache_hits), len(module.run.stats.cache_misses)
+    function = cache.jit(double)
+    cache.compile_now(function, (0.0,), "double")
+    assert function(3.0) == 6.0
+    return len(function.stats.cache_hits), len(function.stats.cache_misses)
+
+
+def printed(folder: Path, monkeypatch: pytest.MonkeyPatch) -> float:
+    """Translate a printed function and call it."""
+    monkeypatch.setenv("POISE_CACHE", str(folder))
+    tape = Tape()
+    call, found = emitted({"x": (1,), "out": (1,)}, {"out": 2.0 * tape.inputs("x", 1)}), np.empty(1)
+    call(np.array([3.0]), found)
+    return float(found[0])
 
 
 def test_a_line_tells_what_takes_long_and_only_then(
@@ -49,13 +59,16 @@ def test_a_line_tells_what_takes_long_and_only_then(
 def test_processes_that_need_the_same_code_compile_it_once(tmp_path: Path) -> None:
     script = f"""
 import sys
+sys.path.insert(0, {str(tmp_path)!r})
 from poise.filters.compile import cache
-module = cache.load({TEXT!r}, "double")
+from doubled import double
+function = cache.jit(double)
 print("ready", flush=True)
 sys.stdin.readline()
-cache.compile_now(module.run, (0.0,), "double")
-print(len(module.run.stats.cache_misses))
+cache.compile_now(function, (0.0,), "double")
+print(len(function.stats.cache_misses))
 """
+    (tmp_path / "doubled.py").write_text("def double(x):\n    return 2.0 * x\n")
     environment = {**os.environ, "POISE_CACHE": str(tmp_path)}
     pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True, "env": environment}
     both = [subprocess.Popen([sys.executable, "-c", script], **pipes) for _ in range(2)]  # type: ignore[call-overload]
@@ -66,27 +79,36 @@ print(len(module.run.stats.cache_misses))
     assert sorted(int(one.communicate()[0]) for one in both) == [0, 1]
 
 
-@pytest.mark.parametrize("damage", ["cut", "empty", "garbage", "flipped"])
-@pytest.mark.parametrize("suffix", [".py", ".nbi", ".nbc"])
+DAMAGES: dict[str, Callable[[bytes], bytes]] = {
+    "cut": lambda content: content[: len(content) // 2],
+    "empty": lambda content: b"",
+    "garbage": lambda content: b"garbage",
+    "flipped": lambda content: content[:99] + bytes([content[99] ^ 255]) + content[100:],
+}
+
+
+@pytest.mark.parametrize("damage", DAMAGES)
+@pytest.mark.parametrize("suffix", [".nbi", ".nbc"])
 def test_a_damaged_entry_is_made_anew(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, suffix: str, damage: str
 ) -> None:
     compiled(tmp_path, monkeypatch)
-    (path,) = (path for path in (tmp_path / "compiled").rglob(f"double*{suffix}"))
-    content = path.read_bytes()
-    middle = len(content) // 2
-    path.write_bytes(
-        {
-            "cut": content[:middle],
-            "empty": b"",
-            "garbage": b"garbage",
-            "flipped": content[:middle] + bytes([content[middle] ^ 255]) + content[middle + 1 :],
-        }[damage]
-    )
+    (path,) = (tmp_path / "compiled").rglob(f"*{suffix}")
+    path.write_bytes(DAMAGES[damage](path.read_bytes()))
     compiled(tmp_path, monkeypatch)
     assert compiled(tmp_path, monkeypatch) == (1, 0)
-    if suffix == ".py":
-        assert path.read_bytes() == content
+
+
+@pytest.mark.parametrize("damage", DAMAGES)
+def test_damaged_machine_code_of_a_model_is_made_anew(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, damage: str
+) -> None:
+    assert printed(tmp_path, monkeypatch) == 6.0
+    (path,) = (tmp_path / "compiled").glob("*.o")
+    content = path.read_bytes()
+    path.write_bytes(DAMAGES[damage](content))
+    assert printed(tmp_path, monkeypatch) == 6.0
+    assert path.read_bytes() == content
 
 
 def test_without_a_folder_there_is_one_warning_and_nothing_is_left(

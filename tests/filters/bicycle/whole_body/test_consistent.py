@@ -12,7 +12,7 @@ from poise.baselines.studies.whole_body.motion import IDEAL, ExactRide
 from poise.envs.data.trajectory import Trajectory
 from poise.filters.bicycle.whole_body.consistent import ADDED, BIASES, PUBLISHED, ConsistentWholeBody
 from poise.filters.bicycle.whole_body.filter import WholeBody
-from poise.filters.bicycle.whole_body.linkage import ERROR_SIZE, GYROSCOPES, OUTPUTS, paper_axes
+from poise.filters.bicycle.whole_body.linkage import ERROR_SIZE, GYROSCOPES, HIP, OUTPUTS, SHOULDER, paper_axes
 from poise.filters.core import metrics
 from poise.filters.core.kalman import KalmanFilter
 from poise.filters.registry import FILTERS, name_of
@@ -101,6 +101,17 @@ def test_biases_of_gyroscopes_are_found_and_no_longer_turn_arms_and_trunk(ideal:
     found = np.asarray(state.x[PUBLISHED:][BIASES]).reshape(5, 3)
     told = np.array([paper_axes(bias) for bias in biases.values()])
     assert np.sqrt(np.mean((found - told) ** 2)) < 0.5 * np.sqrt(np.mean(told**2))
+
+
+def test_a_limb_in_its_mirrored_posture_begins_anew(ideal: Trajectory) -> None:
+    model = FORMS["complete"]
+    z = samples(ideal, 200)
+    x = model.prior(z)[0]
+    np.testing.assert_array_equal(model.finish(x, z), x)
+    folded = x.copy()
+    folded[HIP["left"]] -= [80.0 * DEG, 0.0, 0.0]
+    folded[SHOULDER["right"]] += [10.0 * DEG, 70.0 * DEG, 0.0]
+    np.testing.assert_allclose(model.finish(folded, z), x, atol=1e-9)
 
 
 def test_the_usual_posture_is_that_of_the_rider() -> None:

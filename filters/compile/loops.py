@@ -1,0 +1,108 @@
+"""The loop over time steps and sequences, the same for every model, whose equations it calls by their addresses."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .cache import jit
+from .kernel import begin, copy, correct, fill, keep, propagate, remember, scratch, take
+from .native import call
+from .plan import (
+    DT,
+    FINISH,
+    GROW,
+    POSE,
+    PREDICT,
+    PRIOR,
+    REALIGN,
+    REJECT,
+    RESIDUAL,
+    RETRACT,
+    STORE,
+    WATCH,
+    WHERE_LOST,
+    part,
+)
+
+
+@jit
+def loop(  # type: ignore[no-untyped-def]
+    x, P, held, age, monitor, started, Z, parameters, restart, poses, covariances, whites, nis, plan, recorded, records
+):
+    """All time steps of all sequences of a batch; the state, x to started, is changed in place."""
+    stage, updated, entries, gains, factors, used = records
+    sizes = x.shape[1], P.shape[1], whites.shape[2], Z.shape[2], parameters.shape[2]
+    vectors, square, measured, rows = scratch(*sizes)
+    current, present, before, x1, x0, r, dx, grown = vectors
+    P0, F, Q, work = square
+    H, R, S, HP, K = measured
+    starts, F_first, F_column = part(plan, 0), part(plan, 1), part(plan, 2)
+    H_first, H_column = part(plan, 3), part(plan, 4)
+    watched = restart and plan[WATCH] != 0
+    for t in range(Z.shape[0]):
+        for b in range(Z.shape[1]):
+            p = parameters[t if parameters.shape[0] > 1 else 0, b if parameters.shape[1] > 1 else 0]
+            z, state, P1, white, pose_now = Z[t, b], x[b], P[b], whites[t, b], poses[t, b]
+            if watched and started[b]:
+                call(plan[REJECT], (z, monitor[b], age[b]))
+            missing = take(z, held[b], age[b], starts, p[plan[DT]], current, present, before)
+            lost = watched and monitor[b, plan[WHERE_LOST]] > 0.5
+            if started[b] and not lost:
+                noise = p
+                if missing:
+                    call(plan[GROW], (p, age[b], present, grown))
+                    noise = grown
+                call(plan[PREDICT], (state, present, before, noise, x1, F, Q))
+                if P1.shape[0] > 0:
+                    propagate(F, P1, Q, work, F_first, F_column)
+                    call(plan[RESIDUAL], (x1, z, p, r, H, R))
+                    nis[t, b] = correct(r, H, R, P1, dx, white, rows, S, HP, K, H_first, H_column)
+                    if recorded:
+                        call(plan[STORE], (F, H, entries[t, b]))
+                        remember(K, S, rows, gains[t, b], factors[t, b], used[t, b])
+                call(plan[RETRACT], (x1, dx, p, x0))
+                if recorded:
+                    stage[t, b] = 2
+                    copy(x0, updated[t, b])
+                call(plan[FINISH], (x0, z, p, state))
+            else:
+                factor = 1.0
+                if lost:
+                    call(plan[REALIGN], (current, monitor[b], p))
+                    factor = monitor[b, plan[WHERE_LOST]]
+                call(plan[PRIOR], (current, p, x0, P0))
+                nis[t, b] = 0.0
+                fill(white, 0.0)
+                started[b] = begin(x0, P0, factor, state, P1) or started[b]
+                if recorded:
+                    stage[t, b] = 1 if started[b] else 0
+                    copy(x0, updated[t, b])
+            call(plan[POSE], (state, p, pose_now))
+            if watched and started[b]:
+                call(plan[WATCH], (monitor[b], present, z, state, pose_now, age[b], p))
+            if covariances.shape[0] > 0 or not started[b]:
+                keep(started[b], P1, pose_now, covariances, t, b)
+
+
+@jit
+def run(x, P, held, age, monitor, started, Z, parameters, restart, poses, covariances, whites, nis, plan):  # type: ignore[no-untyped-def]
+    """Forward over a sequence."""
+    counts, cube, more = np.empty((0, 0), np.int64), np.empty((0, 0, 0)), np.empty((0, 0, 0, 0))
+    nothing = counts, cube, cube, more, more, np.empty((0, 0, 0), np.int64)
+    loop(
+        x, P, held, age, monitor, started, Z, parameters, restart, poses, covariances, whites, nis, plan, False, nothing
+    )
+
+
+@jit
+def record(  # type: ignore[no-untyped-def]
+    x, P, held, age, monitor, started, Z, parameters, restart, poses, covariances, whites, nis, plan, records
+):
+    """Forward over a sequence, keeping what the way back needs of every sample.
+
+    ``records``: stage, state after the update, elements of F and H, gain, factor of the innovations' covariance, and
+    rows that were used.
+    """
+    loop(
+        x, P, held, age, monitor, started, Z, parameters, restart, poses, covariances, whites, nis, plan, True, records
+    )
