@@ -25,7 +25,7 @@ FIELD, ASPECT = 0.9, 1.2
 """Vertical field of view of the camera, rad, and width over height of the picture beside the controls."""
 TRAIL = 3.0
 """s"""
-TRAIL_POINTS = 60
+TRAIL_POINTS = 150
 TINT = 0.75
 """Share of its own colour in the colour of the bodies of an estimate."""
 FORCE_COLOUR = (200, 40, 120)
