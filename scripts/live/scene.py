@@ -19,11 +19,13 @@ if TYPE_CHECKING:
 
 OPACITY = 0.4
 """of the bodies of a single estimate; those of several are paler, so that the truth keeps its colours behind them"""
+APART = 0.7
+"""Opacity of the bodies of estimates that stand beside the truth"""
 FIELD, ASPECT = 0.9, 1.2
 """Vertical field of view of the camera, rad, and width over height of the picture beside the controls."""
 TRAIL = 3.0
 """s"""
-TRAIL_POINTS = 60
+TRAIL_POINTS = 150
 TINT = 0.75
 """Share of its own colour in the colour of the bodies of an estimate."""
 FORCE_COLOUR = (200, 40, 120)
@@ -107,6 +109,9 @@ class MotionScene:
     ) -> None:
         self.server, self.look = server, look
         self.labels = list(motion.figures)
+        self._pale = OPACITY / math.sqrt(max(1, len(set(self.labels) - {TRUTH})))
+        self._opacity = self._pale
+        self._translucent: list[Any] = []
         scene = server.scene
         scene.set_up_direction("+z")
         scene.world_axes.visible = False
@@ -161,16 +166,25 @@ class MotionScene:
         truth = label == TRUTH
         shown = own if truth else (1.0 - TINT) * own + TINT * np.array(colour)
         red, green, blue = (int(part) for part in shown)
-        self.server.scene.add_mesh_simple(
+        handle = self.server.scene.add_mesh_simple(
             name,
             mesh.vertices,
             mesh.faces,
             color=(red, green, blue),
-            opacity=None if truth else OPACITY / math.sqrt(len([each for each in self.labels if each != TRUTH])),
+            opacity=None if truth else self._opacity,
             scale=1.0 + self.look.shell * self.labels.index(label),
             cast_shadow=truth,
             receive_shadow=truth,
         )
+        if not truth:
+            self._translucent.append(handle)
+
+    def _set_opacity(self, opacity: float) -> None:
+        """How opaque the bodies of estimates are."""
+        if opacity != self._opacity:
+            self._opacity = opacity
+            for handle in self._translucent:
+                handle.opacity = opacity
 
     def _lay_road(self, motion: Motion) -> None:
         """The road so far, where the truth knows one that is not level."""
@@ -198,6 +212,7 @@ class MotionScene:
         world = rotation.exp(np.array([0.0, 0.0, -heading])) if options.turn else np.array([1.0, 0.0, 0.0, 0.0])
         raised = focus + np.array([0.0, 0.0, self.look.height])
         with self.server.atomic():
+            self._set_opacity(APART if options.beside else self._pale)
             self._world.wxyz = world
             self._world.position = -rotation.rotate(world, raised)
             self._lay_road(motion)
