@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from .cache import jit
-from .kernel import begin, copy, correct, fill, keep, propagate, remember, scratch, take
+from .kernel import all_new, all_older, begin, copy, correct, fill, keep, propagate, remember, scratch, take
 from .native import call
 from .plan import (
     DT,
     FINISH,
     GROW,
+    LONGEST,
     POSE,
     PREDICT,
     PRIOR,
@@ -41,6 +42,7 @@ def run(  # type: ignore[no-untyped-def]
     H, R, S, HP, K = measured
     starts, F_first, F_column = part(plan, 0), part(plan, 1), part(plan, 2)
     H_first, H_column = part(plan, 3), part(plan, 4)
+    inputs, longest = part(plan, 5), plan[LONGEST] / 1e6
     watched = restart and plan[WATCH] != 0
     for t in range(Z.shape[0]):
         for b in range(Z.shape[1]):
@@ -48,9 +50,10 @@ def run(  # type: ignore[no-untyped-def]
             z, state, P1, white, pose_now = Z[t, b], x[b], P[b], whites[t, b], poses[t, b]
             if watched and started[b]:
                 call(plan[REJECT], (z, monitor[b], age[b]))
+            outlasted = restart and all_older(age[b], inputs, longest)
             missing = take(z, held[b], age[b], starts, p[plan[DT]], current, present, before)
             lost = watched and monitor[b, plan[WHERE_LOST]] > 0.5
-            if started[b] and not lost:
+            if started[b] and not lost and not (outlasted and all_new(age[b], inputs)):
                 noise = p
                 if missing:
                     call(plan[GROW], (p, age[b], present, grown))
