@@ -15,8 +15,8 @@ FUNCTIONS = (
 PRIOR, PREDICT, RESIDUAL, RETRACT, FINISH, POSE, GROW, REJECT, REALIGN, WATCH, STORE, FETCH, CONSTANTS = range(13)
 DT, WHERE_LOST, LONGEST, LISTS = 13, 14, 15, 16
 """Places in a plan: addresses of the functions (0 where a model has none), the place of the sampling interval among the
-parameters, that of the mark of a lost filter in the monitor's memory, the longest gap of all inputs in µs, and from here
-where the six lists begin."""
+parameters, that of the mark of a lost filter in the monitor's memory, the longest gap of all inputs in µs, and from
+here where the six lists begin."""
 
 
 def plan_of(printed: Printed, addresses: dict[str, int]) -> np.ndarray:
