@@ -121,7 +121,7 @@ def the_readme_is_right() -> None:
 
 def the_rest_says_what_it_needs() -> None:
     """One line that names the extra; an ImportError from Python."""
-    status, out, err = command("list")
+    status, out, err = command("list", "environments")
     assert status == 0, err
     assert "pip install 'poise[sim]'" in out
     for words, extra in (

@@ -32,6 +32,8 @@ STRAPDOWN = "integration"
 """Variant that integrates the gyroscopes alone."""
 SHORT = "In short"
 """Title of the tables with two rows a course, which README takes."""
+COMMON = ("indoor", "outdoor")
+"""Beginnings of the names of courses that every work has."""
 ROLL = "bicycle/roll"
 SPACING = 0.25
 """s from sample to sample of the errors over time that are kept of a ride"""
@@ -255,7 +257,8 @@ class RideStudy:
         if rows:
             report.compare(f"{self.table}, {course}", rows, f"RMS from {SETTLED:g} s on.", interval=STD)
         report.table(f"Skill, {course}, RMS in deg", self.skill(course, results), self.note(results))
-        report.table(f"{SHORT}, {course}, RMS in deg", self.in_short(course, results))
+        if course.startswith(COMMON):
+            report.table(f"{SHORT}, {course}, RMS in deg", self.in_short(course, results))
         cells = self.cells or rounded
         methods = [*self.variants, ZERO, MEAN]
         report.table(

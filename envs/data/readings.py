@@ -23,6 +23,12 @@ RARELY = 0.05
 """Share of samples that repeat the one before, up to which a sensor shows noise."""
 OVERFLOW = 0.8
 """Share of the largest reading beyond which a jump to the other sign is the overflow of a counter."""
+SLOWER = 0.8
+"""Share of values that stand equally long, from which on a sensor is slower than its table."""
+BETWEEN = 0.01
+"""Share of readings in the middle third of a range, below which they are unsigned numbers of a signed sensor."""
+FEWEST_JUMPS = 5
+"""Of such readings, from one end of the range to the other."""
 CLIPPED, OFTEN_CLIPPED = 1e-3, 5e-3
 """Share of saturated samples that is told, and of which a gyroscope's rotation is lost."""
 
@@ -135,6 +141,12 @@ def check_repeats(channel: str, values: np.ndarray, dt: float | None) -> Iterato
     """Long runs of one sample in a channel whose samples differ otherwise."""
     repeats = np.append(False, (values[1:] == values[:-1]).all(axis=1) & values[1:].any(axis=1))
     runs = np.diff(np.flatnonzero(~np.append(repeats, False)))
+    usual = int(np.median(runs)) if len(runs) else 1
+    if dt is not None and usual > 1 and len(runs) >= 20 and float((runs == usual).mean()) > SLOWER:
+        what = f"every sample stands {usual} times: the sensor runs at {1.0 / (usual * dt):.4g} Hz"
+        cause = "a recorder that is faster than the sensor"
+        yield Finding("note", channel, what, cause, "Replace the repeated samples by NaN, or keep every first one.")
+        return
     if dt is None or not len(runs) or float(runs.max()) * dt < HELD or runs.max() < 10:
         return
     long = runs * dt >= HELD
@@ -150,6 +162,13 @@ def check_range(channel: str, samples: np.ndarray) -> Iterator[Finding]:
     """Saturation, and counters that overflow."""
     if len(samples) < 3:
         return
+    unsigned = [axis for axis in range(3) if is_unsigned(samples[:, axis])]
+    if unsigned:
+        axes, largest = ", ".join("xyz"[axis] for axis in unsigned), samples[:, unsigned].max()
+        what = f"readings of {axes} lie near 0 and near {largest:.4g}, none between"
+        remedy = "Read the counts as signed numbers: of 16 bits, those from 32768 on less 65536."
+        yield Finding("warning", channel, what, "signed numbers that were read as unsigned", remedy)
+        return
     clipped = clipped_share(samples)
     if clipped > CLIPPED:
         what = f"{100 * clipped:.1f} % of the samples stand at the extreme value {np.abs(samples).max():.4g}"
@@ -164,6 +183,15 @@ def check_range(channel: str, samples: np.ndarray) -> Iterator[Finding]:
         what = f"{jumps} jumps from one end of the range to the other"
         remedy = "Choose a larger range of the sensor, or read the counts as signed numbers."
         yield Finding("warning", channel, what, "numbers that overflow", remedy)
+
+
+def is_unsigned(values: np.ndarray) -> bool:
+    """Whether readings ``(T,)`` jump between the ends of a range without negative numbers, and avoid its middle."""
+    if values.min() < 0.0 or values.max() <= 0.0:
+        return False
+    low, high = values < values.max() / 3.0, values > values.max() * 2.0 / 3.0
+    jumps = int((low[1:] & high[:-1]).sum() + (high[1:] & low[:-1]).sum())
+    return bool(jumps >= FEWEST_JUMPS and 1.0 - low.mean() - high.mean() < BETWEEN)
 
 
 def clipped_share(samples: np.ndarray) -> float:

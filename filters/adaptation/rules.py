@@ -128,9 +128,9 @@ class TurningRule(Rule):
     r"""λ = 4 ln(v / (θ (|ω_z| + ω_0))), with v the variance of the pitch rate and ω_z the mean yaw rate.
 
     The pseudo-measurement sees the roll as far as the bicycle turns: tan φ = ω_y / ω_z. The pitch rate enters its
-    derivative by φ as well, and so drives the roll away from zero in proportion to v − ω_z²: on cobbles without a turn
-    to ±90°, however small the gain. The variance is that of the samples, shaking included. Before the first of them
-    nothing is believed.
+    derivative by φ as well, and so drives the roll away from zero in proportion to v − ω_z²: straight ahead on rough
+    ground to ±90°, however small the gain. The variance is that of the samples, shaking included. Before the first of
+    them nothing is believed.
 
     Attributes:
         channel: gyroscope whose y and z axes are the bicycle's.

@@ -56,8 +56,9 @@ class OdometryAided(RiderEquations, Model):
 
     State: q (4), b (3), v (3), seconds since the last accelerometer sample.
 
-    If accelerometer samples are missing for longer than ``hold``, the velocity is constant up to ``lost_noise`` and is
-    updated by (1), and the gyroscope alone gives the attitude. Without the wheel, the other two rows of (1) remain.
+    If accelerometer samples are missing for longer than ``hold``, the velocity is constant in bicycle axes up to
+    ``lost_noise`` and is updated by (1), and the gyroscope alone gives the attitude. Without the wheel, the other two
+    rows of (1) remain.
     """
 
     gyroscope_noise: float = 2e-3
@@ -166,11 +167,22 @@ class OdometryAided(RiderEquations, Model):
         one = 1.0 + 0.0 * q[..., :1]
         felt = xp.where(known, one, 0.0 * one)
         F = transition(q, force, expand(self.dt, 2), felt[..., None], one[..., None])
+        # A bicycle whose accelerometer is silent keeps its velocity in its own axes: it turns with the attitude, and
+        # so with all errors of that. Otherwise its course would seem to tell the attitude after a gap.
+        carried = rotate(after, rotate_back(q, v))
+        turned, across, unit = to_matrix(after) @ to_matrix(q).mT, skew(carried), identity(3, f)
+        none = 0.0 * unit
+        kept = [across @ (turned - unit), expand(self.dt, 2) * (across @ to_matrix(q)), turned]
+        turning = block_matrix([[unit, -expand(self.dt, 2) * to_matrix(q), none], [none, unit, none], kept])
+        F = xp.where(known[..., None], F, turning)
         inflation = clipped_inflation(sample, self.accelerometer_range, self.clipped_inflation)
         spread = expand(self.acceleration_noise**2 * self.dt, 1) * inflation
         spread = xp.where(known, spread, expand(self.lost_noise**2 * self.dt, 1) + 0.0 * spread)
         Q = process_noise(self.gyroscope_noise**2 * self.dt, self.bias_noise**2 * self.dt, spread)
-        v = xp.where(known, accelerated(v, force, dt, self.gravity), v)
+        coupling = xp.where(known[..., None], none, -across)
+        L = block_matrix([[unit, none, none], [none, unit, none], [coupling, none, unit]])
+        Q = L @ Q @ L.mT
+        v = xp.where(known, accelerated(v, force, dt, self.gravity), carried)
         return xp.concat([after, b, v, x[..., 10:]], axis=-1), F, Q
 
     def residual(self, x: Array, z: Measurement) -> tuple[Array, Array, Array]:

@@ -91,6 +91,24 @@ def take(z, held, age, starts, dt, current, present, before):  # type: ignore[no
 
 
 @jit
+def all_older(age, channels, limit):  # type: ignore[no-untyped-def]
+    """Whether the last samples of all of some channels are older than a limit; False of none."""
+    for c in channels:
+        if age[c] <= limit:
+            return False
+    return len(channels) > 0
+
+
+@jit
+def all_new(age, channels):  # type: ignore[no-untyped-def]
+    """Whether all of some channels have a sample at this time step."""
+    for c in channels:
+        if age[c] > 0.0:
+            return False
+    return True
+
+
+@jit
 def begin(x0, P0, factor, x, P):  # type: ignore[no-untyped-def]
     """Start from a prior if it is finite, with a factor on its covariance; returns whether it is."""
     if not finite(x0):

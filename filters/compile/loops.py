@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from .cache import jit
-from .kernel import begin, copy, correct, fill, keep, propagate, remember, scratch, take
+from .kernel import all_new, all_older, begin, copy, correct, fill, keep, propagate, remember, scratch, take
 from .native import call
 from .plan import (
     DT,
     FINISH,
     GROW,
+    LONGEST,
     POSE,
     PREDICT,
     PRIOR,
@@ -26,11 +25,16 @@ from .plan import (
 
 
 @jit
-def loop(  # type: ignore[no-untyped-def]
-    x, P, held, age, monitor, started, Z, parameters, restart, poses, covariances, whites, nis, plan, recorded, records
+def run(  # type: ignore[no-untyped-def]
+    x, P, held, age, monitor, started, Z, parameters, restart, poses, covariances, whites, nis, plan, records
 ):
-    """All time steps of all sequences of a batch; the state, x to started, is changed in place."""
+    """All time steps of all sequences of a batch; the state, x to started, is changed in place.
+
+    ``records`` keeps what the way back needs of every sample, unless it has no place for one: stage, state after the
+    update, elements of F and H, gain, factor of the innovations' covariance, and rows that were used.
+    """
     stage, updated, entries, gains, factors, used = records
+    recorded = stage.shape[0] > 0
     sizes = x.shape[1], P.shape[1], whites.shape[2], Z.shape[2], parameters.shape[2]
     vectors, square, measured, rows = scratch(*sizes)
     current, present, before, x1, x0, r, dx, grown = vectors
@@ -38,6 +42,7 @@ def loop(  # type: ignore[no-untyped-def]
     H, R, S, HP, K = measured
     starts, F_first, F_column = part(plan, 0), part(plan, 1), part(plan, 2)
     H_first, H_column = part(plan, 3), part(plan, 4)
+    inputs, longest = part(plan, 5), plan[LONGEST] / 1e6
     watched = restart and plan[WATCH] != 0
     for t in range(Z.shape[0]):
         for b in range(Z.shape[1]):
@@ -45,9 +50,10 @@ def loop(  # type: ignore[no-untyped-def]
             z, state, P1, white, pose_now = Z[t, b], x[b], P[b], whites[t, b], poses[t, b]
             if watched and started[b]:
                 call(plan[REJECT], (z, monitor[b], age[b]))
+            outlasted = restart and all_older(age[b], inputs, longest)
             missing = take(z, held[b], age[b], starts, p[plan[DT]], current, present, before)
             lost = watched and monitor[b, plan[WHERE_LOST]] > 0.5
-            if started[b] and not lost:
+            if started[b] and not lost and not (outlasted and all_new(age[b], inputs)):
                 noise = p
                 if missing:
                     call(plan[GROW], (p, age[b], present, grown))
@@ -82,27 +88,3 @@ def loop(  # type: ignore[no-untyped-def]
                 call(plan[WATCH], (monitor[b], present, z, state, pose_now, age[b], p))
             if covariances.shape[0] > 0 or not started[b]:
                 keep(started[b], P1, pose_now, covariances, t, b)
-
-
-@jit
-def run(x, P, held, age, monitor, started, Z, parameters, restart, poses, covariances, whites, nis, plan):  # type: ignore[no-untyped-def]
-    """Forward over a sequence."""
-    counts, cube, more = np.empty((0, 0), np.int64), np.empty((0, 0, 0)), np.empty((0, 0, 0, 0))
-    nothing = counts, cube, cube, more, more, np.empty((0, 0, 0), np.int64)
-    loop(
-        x, P, held, age, monitor, started, Z, parameters, restart, poses, covariances, whites, nis, plan, False, nothing
-    )
-
-
-@jit
-def record(  # type: ignore[no-untyped-def]
-    x, P, held, age, monitor, started, Z, parameters, restart, poses, covariances, whites, nis, plan, records
-):
-    """Forward over a sequence, keeping what the way back needs of every sample.
-
-    ``records``: stage, state after the update, elements of F and H, gain, factor of the innovations' covariance, and
-    rows that were used.
-    """
-    loop(
-        x, P, held, age, monitor, started, Z, parameters, restart, poses, covariances, whites, nis, plan, True, records
-    )

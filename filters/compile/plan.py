@@ -13,19 +13,20 @@ FUNCTIONS = (
     *("reject", "realign", "watch", "store", "fetch", "constants"),
 )
 PRIOR, PREDICT, RESIDUAL, RETRACT, FINISH, POSE, GROW, REJECT, REALIGN, WATCH, STORE, FETCH, CONSTANTS = range(13)
-DT, WHERE_LOST, LISTS = 13, 14, 15
+DT, WHERE_LOST, LONGEST, LISTS = 13, 14, 15, 16
 """Places in a plan: addresses of the functions (0 where a model has none), the place of the sampling interval among the
-parameters, that of the mark of a lost filter in the monitor's memory, and from here where the five lists begin."""
+parameters, that of the mark of a lost filter in the monitor's memory, the longest gap of all inputs in µs, and from
+here where the six lists begin."""
 
 
 def plan_of(printed: Printed, addresses: dict[str, int]) -> np.ndarray:
     """What the loops know of a model, as whole numbers; see :data:`LISTS`."""
-    head = [*(addresses.get(name, 0) for name in FUNCTIONS), printed.dt, LOST]
+    head = [*(addresses.get(name, 0) for name in FUNCTIONS), printed.dt, LOST, round(1e6 * printed.longest)]
     ends = LISTS + len(printed.lists) + 1 + np.cumsum([0, *map(len, printed.lists)])
     return np.concatenate([head, ends, *printed.lists]).astype(np.int64)
 
 
 @jit
 def part(plan, number):  # type: ignore[no-untyped-def]
-    """One of the lists of a plan: 0, starts of the channels; 1 and 2, of F; 3 and 4, of H."""
+    """One of the lists of a plan: 0, starts of the channels; 1 and 2, of F; 3 and 4, of H; 5, held inputs."""
     return plan[plan[LISTS + number] : plan[LISTS + number + 1]]

@@ -8,12 +8,13 @@ Kalman filter whose error state and measurement are empty.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..core.held_inputs import grown_parameters
+from ..core.held_inputs import grown_parameters, longest_gap
 from ..core.model import Equations, Model, Recurrence, parameters_of, with_parameters
 from ..core.monitor import MEMORY, inputs_of, places_of, realigned, starts_of, watch, without_impacts
 from ..core.quantity import ACCELEROMETER, GYROSCOPE
@@ -29,11 +30,14 @@ class Printed(NamedTuple):
     """name → printed function: the equations, what the recursion needs besides, and ``store``, ``fetch``, ``constants``
     of the elements of F and H that vary"""
     lists: tuple[list[int], ...]
-    """first elements of the channels in a sample; of F and of H the lists of elements that can be other than zero"""
+    """first elements of the channels in a sample; of F and of H the lists of elements that can be other than zero; the
+    channels that are held inputs, where the equations start anew after a gap of all of them"""
     dt: int
     """place of the sampling interval among the parameters"""
     entries: int
     """number of elements of F and H that vary"""
+    longest: float
+    """s, of that gap"""
 
 
 def _lists(array: np.ndarray) -> tuple[list[int], list[int]]:
@@ -172,4 +176,7 @@ def print_model(model: Equations) -> Printed:
     if isinstance(traced, Model):
         kept, entries = _print_entries(tape, F, H, shapes)
         functions |= kept
-    return Printed(functions, (begins, *_lists(F), *_lists(H)), names.index("dt"), entries)
+    longest, inputs = longest_gap(model)
+    lasting = places_of(model) is None and math.isfinite(longest)
+    lists = begins, *_lists(F), *_lists(H), inputs if lasting else []
+    return Printed(functions, lists, names.index("dt"), entries, longest if lasting else 0.0)

@@ -19,6 +19,11 @@ from .printer import UntraceableError, print_model
 _COMPILED: dict[tuple[Any, ...], CompiledEquations | None] = {}
 PARALLEL_WORK = 200_000
 """samples × batch above which several threads process a batch"""
+NOTHING = (
+    *(np.empty((0, 0), np.int64), np.empty((0, 0, 0)), np.empty((0, 0, 0))),
+    *(np.empty((0, 0, 0, 0)), np.empty((0, 0, 0, 0)), np.empty((0, 0, 0), np.int64)),
+)
+"""records of a filter that nothing is to smooth"""
 RECORDED = 25_000_000
 """numbers that a smoother keeps in memory at a time (200 MB); the filter runs twice over longer recordings"""
 
@@ -64,7 +69,8 @@ class CompiledEquations:
         width = sum(channel.size for channel in model.channels)
         state = empty_state(model, np.empty((0, width)))
         samples = [np.empty((0, 0, width)), self._parameters(model, None, 0, ()), True]
-        compile_now(loops.run, (*state, *samples, *self._outputs(model, 0, 0, 0), self.plan), "the filters' recursion")
+        arguments = *state, *samples, *self._outputs(model, 0, 0, 0), self.plan, NOTHING
+        compile_now(loops.run, arguments, "the filters' recursion")
 
     def _parameters(self, model: Equations, gains: Gains | None, length: int, batch: tuple[int, ...]) -> np.ndarray:
         """Parameters ``(T or 1, B or 1, count)`` with the gains applied."""
@@ -101,7 +107,7 @@ class CompiledEquations:
         flat = [array.reshape(count, *array.shape[len(batch) :]) for array in after]
         outputs = self._outputs(model, 1, count, 1)
         parameters = self._parameters(model, gains, 1, batch)
-        self.loops.run(*flat, z.reshape(1, count, -1), parameters, restart, *outputs, self.plan)
+        self.loops.run(*flat, z.reshape(1, count, -1), parameters, restart, *outputs, self.plan, NOTHING)
         shaped = [array.reshape((*batch, *array.shape[2:])) for array in outputs]
         return after, self._estimate(model, shaped[0], *shaped[1:])
 
@@ -163,7 +169,8 @@ class CompiledEquations:
             if len(stretches) > 1:
                 own = parameters if len(parameters) == 1 else parameters[stretch]
                 size = stretch.stop - stretch.start
-                self.loops.run(*states, Z[stretch], own, restart, *self._outputs(model, size, count, 0), self.plan)
+                outputs = self._outputs(model, size, count, 0)
+                self.loops.run(*states, Z[stretch], own, restart, *outputs, self.plan, NOTHING)
         later = np.zeros((count, e)), np.zeros((count, e, e))
         label = "the filters' smoother"
         for stretch, start in zip(reversed(stretches), reversed(starts), strict=True):
@@ -172,7 +179,7 @@ class CompiledEquations:
             outputs = poses[stretch], covariance, whites[stretch], nis[stretch]
             kept = (np.empty((size, count, *shape)) for shape in shapes)
             records = np.zeros((size, count), np.int64), *kept, np.empty((size, count, m), np.int64)
-            compile_now(self.loops.record, (*start, Z[stretch], own, restart, *outputs, self.plan, records), label)
+            self.loops.run(*start, Z[stretch], own, restart, *outputs, self.plan, records)
             backward = Z[stretch], own, outputs[2], records, later, covariance, outputs[0], self.plan
             compile_now(self.smoothing.smooth, backward, label)
         shaped = [array.reshape((len(array), *batch, *array.shape[2:])) for array in (poses, covariances, whites, nis)]
@@ -184,7 +191,7 @@ class CompiledEquations:
         """Call the kernel, in threads for large batches; sequences are independent, so the results are the same."""
         threads = min(processors(), Z.shape[1])
         if threads < 2 or Z.shape[0] * Z.shape[1] < PARALLEL_WORK:
-            self.loops.run(*states, Z, parameters, restart, *outs, self.plan)
+            self.loops.run(*states, Z, parameters, restart, *outs, self.plan, NOTHING)
             return
 
         def work(first: int, last: int) -> None:
@@ -193,7 +200,7 @@ class CompiledEquations:
             own = np.ascontiguousarray(parameters[:, part]) if parameters.shape[1] > 1 else parameters
             mine = [np.empty(out[:, part].shape) for out in outs]
             samples = np.ascontiguousarray(Z[:, part])
-            self.loops.run(*(state[part] for state in states), samples, own, restart, *mine, self.plan)
+            self.loops.run(*(state[part] for state in states), samples, own, restart, *mine, self.plan, NOTHING)
             for out, filled in zip(outs, mine, strict=True):
                 out[:, part] = filled
 

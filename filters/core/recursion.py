@@ -8,7 +8,7 @@ Six rules hold for all equations:
 * gains, log factors on named constants, may change at every sample; all zeros is exactly the published tuning;
 * the noise of an input grows with the age of its last sample (:mod:`.held_inputs`);
 * an estimate that contradicts the sensors for too long starts anew, and a force that no motion explains is no sample
-  (:mod:`.monitor`).
+  (:mod:`.monitor`); so does one of a rider that had no input for too long.
 
 NumPy data are processed in the compiled form (:mod:`poise.filters.compile.run`). The array form below defines the
 result, is differentiable, and runs equations that cannot be traced.
@@ -16,6 +16,7 @@ result, is differentiable, and runs equations that cannot be traced.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Self, cast
@@ -25,7 +26,7 @@ import numpy as np
 from ..compile.run import compiled_equations
 from .backend import Array, constant, is_torch, namespace
 from .estimator import check_measurements, stack_estimates
-from .held_inputs import grown_parameters
+from .held_inputs import grown_parameters, longest_gap
 from .model import Gain, Model, Recurrence, with_parameters
 from .monitor import LOST, inputs_of, places_of, realigned, watch, without_impacts
 from .quantity import ACCELEROMETER, GYROSCOPE, Channel, Estimate, Measurement, Quantity
@@ -190,6 +191,10 @@ class Recursion:
         whitened = xp.zeros_like(state.x[..., :1]) + constant([0.0] * model.residual_size, state.x)
         x, P = state.x, state.covariance
         lost = started & (state.monitor[..., LOST] > 0.5) if places is not None else started & ~started
+        longest, inputs = longest_gap(model)
+        if self.restart and places is None and math.isfinite(longest):
+            back = [(state.age[..., index] > longest) & (age[..., index] == 0.0) for index in inputs]
+            lost = lost | (started & xp.all(xp.stack(back, axis=-1), axis=-1))
         going = started & ~lost
         if bool(xp.any(going)):
             now, before = (split(filled(part), self.channels) for part in (current, state.held))

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scipy.linalg import expm
 
 from ..frame.parameters import BicycleParameters
 from ..frame.whipple import WhippleModel
@@ -30,8 +29,25 @@ def lateral_model(model: WhippleModel, bicycle: BicycleParameters, speed: float)
 def sampled(A: np.ndarray, B: np.ndarray, step: float) -> tuple[np.ndarray, np.ndarray]:
     """Exact discretisation of x' = A x + B u with inputs held over a step (s)."""
     size, inputs = B.shape
-    block = expm(step * np.block([[A, B], [np.zeros((inputs, size + inputs))]]))
+    block = exponential(step * np.block([[A, B], [np.zeros((inputs, size + inputs))]]))
     return block[:size, :size], block[:size, size:]
+
+
+def exponential(matrix: np.ndarray) -> np.ndarray:
+    """Matrix exponential ``(n, n)`` by scaling, a Taylor polynomial, and squaring.
+
+    SciPy's changes in its last bits with the number of threads, as its library splits products of this size; a ride
+    must be the same, bit for bit, whether it is simulated alone or by one of several processes.
+    """
+    halvings = max(0, math.ceil(math.log2(max(2.0 * np.abs(matrix).sum(axis=0).max(), 1.0))))
+    scaled, identity = matrix / 2.0**halvings, np.eye(len(matrix))
+    # of norm 0.5 at most: what follows the term of order 14 is below rounding
+    result = identity
+    for order in range(14, 0, -1):
+        result = identity + scaled @ result / order
+    for _ in range(halvings):
+        result = result @ result
+    return result
 
 
 def riccati(A: np.ndarray, B: np.ndarray, cost: np.ndarray, effort: np.ndarray) -> np.ndarray:

@@ -114,7 +114,7 @@ STYLES = {
         ),
         RiderStyle(
             "normal", 0.055, 0.05, 0.055, 0.6, 0.5,
-            pedalling=0.04, posture=0.015, posture_interval=20.0, glance=0.15, glance_interval=25.0, breath=0.006,
+            pedalling=0.036, posture=0.015, posture_interval=20.0, glance=0.15, glance_interval=25.0, breath=0.006,
             gaze=0.3, gaze_interval=3.0,
         ),
         RiderStyle(

@@ -108,7 +108,7 @@ class ForceInertial(ForceInertialParameters, Model):
     error_parts: ClassVar = {"force-inertial/trunk_angles": (0, 3), "bicycle/roll": (3, 4)}
     residual_size: ClassVar[int] = 4
     held_inputs: ClassVar = tuple(
-        ridden(f"{site}/gyr", "gyroscope_noise", power=2) for site in ("trunk_imu", "bicycle_imu")
+        ridden(f"{part}_imu/gyr", "gyroscope_noise", power=2, part=part) for part in ("trunk", "bicycle")
     )
     gains: ClassVar[dict[str, Gain]] = {
         "process": Gain("gyroscope_noise", description="process variance of the angles, from the gyroscopes"),

@@ -199,7 +199,11 @@ class TwoGyro(RiderEquations, Model):
     def held_inputs(self) -> tuple[HeldInput, ...]:  # type: ignore[override]
         """Both gyroscopes, an axis each."""
         pairs = (self.body_gyroscope, "body"), ("bicycle_imu/gyr", "platform")
-        return tuple(ridden(name, f"{part}_gyroscope_noise[{axis}]") for name, part in pairs for axis in range(3))
+        return tuple(
+            ridden(name, f"{of}_gyroscope_noise[{axis}]", part="trunk" if of == "body" else "bicycle")
+            for name, of in pairs
+            for axis in range(3)
+        )
 
     @property
     def outputs(self) -> tuple[Quantity, ...]:  # type: ignore[override]

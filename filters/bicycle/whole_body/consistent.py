@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from ...core.backend import Array, constant, expand, namespace
-from ...core.held_inputs import pedalled
+from ...core.held_inputs import ridden
 from ...core.matrices import block_diagonal, block_matrix, diagonal, diagonal_matrix, zeros
 from ...core.model import Gain, check_positive
 from ...core.quantity import Measurement
@@ -89,7 +89,7 @@ class ConsistentWholeBody(WholeBody):
 
     held_inputs: ClassVar = (
         *WholeBody.held_inputs[:4],
-        *(pedalled(f"thigh_{side}/gyr", "leg_gyroscope_noise") for side in SIDES),
+        *(ridden(f"thigh_{side}/gyr", "leg_gyroscope_noise", part="leg") for side in SIDES),
     )
     gains: ClassVar = {
         **WholeBody.gains,

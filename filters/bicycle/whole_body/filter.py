@@ -34,7 +34,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, Literal
 
 from ...core.backend import Array, constant, expand, namespace
-from ...core.held_inputs import pedalled, ridden
+from ...core.held_inputs import ridden
 from ...core.matrices import diagonal_matrix, identity
 from ...core.model import Gain, Model, check_positive
 from ...core.quantity import STANDARD_GRAVITY, Measurement
@@ -159,9 +159,9 @@ class WholeBody(RiderLinkage, Model):
     error_parts: ClassVar = ERROR_PARTS
     held_inputs: ClassVar = (
         ridden("bicycle_imu/gyr", "bicycle_gyroscope_noise"),
-        ridden("trunk_imu/gyr", "trunk_gyroscope_noise"),
-        *(ridden(f"upper_arm_{side}/gyr", "limb_gyroscope_noise") for side in ("right", "left")),
-        *(pedalled(f"thigh_{side}/gyr", "limb_gyroscope_noise") for side in ("right", "left")),
+        ridden("trunk_imu/gyr", "trunk_gyroscope_noise", part="trunk"),
+        *(ridden(f"upper_arm_{side}/gyr", "limb_gyroscope_noise", part="arm") for side in ("right", "left")),
+        *(ridden(f"thigh_{side}/gyr", "limb_gyroscope_noise", part="leg") for side in ("right", "left")),
     )
     gains: ClassVar = {
         "bicycle": Gain("bicycle_gyroscope_noise", description="process variance of roll"),

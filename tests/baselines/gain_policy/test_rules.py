@@ -76,7 +76,7 @@ def test_on_a_ramp_the_rules_keep_the_roll(ride):
 
 
 def test_shaking_without_a_turn_turns_the_belief_off_and_a_calm_turn_strengthens_it():
-    # straight ahead on cobbles: the pitch rate has no mean but shakes, and (5) drives the roll to 90 degrees
+    # straight ahead on rough ground: the pitch rate has no mean but shakes, and (5) drives the roll to 90 degrees
     time, rng = np.arange(3000) / 100.0, np.random.default_rng(2)
     shaken = np.zeros((3000, 3))
     shaken[:, 1] = np.radians(30.0) * rng.standard_normal(3000)

@@ -31,6 +31,10 @@ def wrapped(values: np.ndarray, limit: float) -> np.ndarray:
     return (values + limit) % (2.0 * limit) - limit
 
 
+def unsigned(values: np.ndarray, limit: float = 35.0) -> np.ndarray:
+    return np.where(values < 0.0, values + 2.0 * limit, values)
+
+
 def recording(**channels: np.ndarray) -> Trajectory:
     return KNOWN.replace(measurements=KNOWN.measurements | {f"imu/{kind}": v for kind, v in channels.items()}, truth={})
 
@@ -44,6 +48,8 @@ def recording(**channels: np.ndarray) -> Trajectory:
         (lambda: recording(gyr=held(GYR), acc=held(ACC)), "imu/gyr", "again and again, for 2.0 s from sample 400"),
         (lambda: recording(gyr=wrapped(GYR, 1.0)), "imu/gyr", "overflow"),
         (lambda: recording(gyr=np.clip(GYR, -1.0, 1.0)), "imu/gyr", "saturation"),
+        (lambda: recording(gyr=unsigned(GYR)), "imu/gyr", "x, y, z lie near 0 and near 70, none between"),
+        (lambda: recording(acc=unsigned(ACC)), "imu/acc", "read as unsigned"),
         (lambda: recording(acc=9.81 * ACC / np.linalg.norm(ACC, axis=1, keepdims=True)), "imu/acc", "length one"),
         (lambda: recording(acc=0.8 * ACC), "imu/acc", "scale error"),
         (lambda: recording(gyr=np.radians(GYR)), "imu/gyr", "once too often"),
@@ -55,6 +61,12 @@ def test_each_kind_is_named(made: Callable[[], Trajectory], channel: str, words:
     assert any(words in text for text in told), told
 
 
+@pytest.mark.parametrize("times", [2, 4])
+def test_a_table_that_is_faster_than_its_sensor_is_told(times: int) -> None:
+    findings = check_recording(recording(gyr=np.repeat(GYR[::times], times, axis=0)[: len(GYR)]))
+    assert any(f"stands {times} times: the sensor runs at {100 / times:g} Hz" in each.what for each in findings)
+
+
 def test_codes_for_no_value_do_not_hide_what_is_right() -> None:
     coded = GYR.copy()
     coded[::40] = -9999.0
@@ -63,6 +75,6 @@ def test_codes_for_no_value_do_not_hide_what_is_right() -> None:
     assert "9999" in findings[0].what
 
 
-@pytest.mark.parametrize("gesture", ["slow", "severe", "carried-walking"])
+@pytest.mark.parametrize("gesture", ["slow", "severe", "carried-walking", "shaking"])
 def test_clean_recordings_are_silent(gesture: str) -> None:
     assert check_recording(simulate_hand(gesture, seed=2, duration=20.0)) == []

@@ -232,6 +232,18 @@ def test_drop_outs_are_survived(ride: Trajectory) -> None:
         assert np.abs(error[1600:]).max() < 1.5, channel
 
 
+@pytest.mark.parametrize("seconds", [2, 6])
+def test_a_gap_of_all_samples_leaves_no_error_that_lasts(seconds: int) -> None:
+    """The course of a bicycle does not tell its attitude, and a prior is nearer than a rate that was held so long."""
+    for seed in range(3):
+        data, turned, _ = ideal_ride(seed, 1800)
+        for samples in data.values():
+            samples[600 : 600 + 100 * seconds] = np.nan
+        roll = run(KalmanFilter(OdometryAided()), data).pose["bicycle/roll"][:, 0]
+        error = np.degrees(np.abs(roll - turned.as_euler("ZYX")[:, 2]))
+        assert error[600 + 100 * seconds + 300 :].max() < 3.0, seed
+
+
 def test_a_ride_that_begins_on_a_bump_begins_upright() -> None:
     """The wheel equation holds for a bicycle on its head too, so that a wrong start would last."""
     data, turned, _ = ideal_ride(0, 1000)
