@@ -111,6 +111,7 @@ class RiderBicycleEnv(PoseEnv):
     | ``truth/head/position`` | 3 | of the neck's joint, world |
     | ``truth/…/angular_rate`` | 3 | rad/s, body axes |
     | ``truth/pelvis/height``, ``angles`` | 1, 2 | m off the saddle; rad of forward tip and of tip to the right |
+    | ``truth/pelvis/shift`` | 2 | m ahead of the saddle and to the left of it; of styles with phases on the pedals |
     | ``truth/seat/force``, ``moment`` | 3 | of the rider on the saddle, bicycle axes, N, N·m |
     | ``truth/handlebar/force_…``, ``pedal/force_…`` | 3 | of hands and feet, bicycle axes, N |
     | ``truth/joints/angles``, ``torques`` | 19 | rad, N·m (torques of a lumped rider: 3) |
@@ -124,8 +125,8 @@ class RiderBicycleEnv(PoseEnv):
         scenario: name, see :func:`.list_scenarios`; ``"slalom+bumps"`` composes; or a
             :class:`poise.envs.bicycle.course.scenarios.Scenario`. ``reset(options={"scenario": …})`` replaces it once.
         subject: 0…4, ``"random"``, or a :class:`poise.envs.bicycle.rider.anthropometry.RiderBody`; also a reset option.
-        style: ``still``, ``mild``, ``normal``, ``aggressive``, ``random`` (another one in each ride), or a style; None
-            for that of the scenario.
+        style: ``still``, ``mild``, ``normal``, ``aggressive``, ``standing`` (out of the saddle for most of the time),
+            ``random`` (another one in each ride, seated), or a style; None for that of the scenario.
         suite: ``two-gyro``, ``force-inertial``, ``whole-body``, ``all``, or a list of channels
             (:mod:`poise.envs.bicycle.sensors.suites` has their sites and errors) and of your own :class:`.Sensor`
             objects on the bodies ``bicycle``, ``trunk``, ``head``, ….

@@ -76,6 +76,7 @@ MIRRORS: dict[str, Mirror] = {
     **dict.fromkeys(("trunk/angles", "hip_left/angles", "hip_right/angles"), ISB),
     **dict.fromkeys(("shoulder_left/angles", "shoulder_right/angles"), shoulder),
     "pelvis/angles": times(1.0, -1.0),
+    "pelvis/shift": times(1.0, -1.0),
     **dict.fromkeys(("flexion", "pelvis/height"), SAME),
     "joints/angles": joints,
     "joints/torques": joints,

@@ -146,7 +146,7 @@ def rider_poses(geometry: RiderGeometry, values: Values) -> Poses:
         geometry: lengths.
         values: ``bicycle/orientation`` ``(n, 4)``, and of what else is known ``<body>/orientation``,
             ``bicycle/position``, ``bicycle/steer``, ``bicycle/crank``, ``wheel/angle``, ``pelvis/height``,
-            ``disk/position``.
+            ``pelvis/shift``, ``disk/position``.
     """
     g, bicycle = geometry, np.asarray(values["bicycle/orientation"], float)
     n = len(bicycle)
@@ -171,6 +171,8 @@ def rider_poses(geometry: RiderGeometry, values: Values) -> Poses:
     hang("front_wheel", "front", ahead, turned("front", (0.0, 1.0, 0.0), wheel))
     hang("crank", "bicycle", np.array(g.crank_axle), turned("bicycle", (0.0, 1.0, 0.0), angle("bicycle/crank")))
     up = angle("pelvis/height") * np.array([0.0, 0.0, 1.0])
+    if "pelvis/shift" in values:
+        up = up + np.asarray(values["pelvis/shift"], float) @ np.eye(3)[:2]
     if "disk/orientation" in values:
         at = values.get("disk/position", position + rotation.rotate(bicycle, np.array(g.trunk_pivot)))
         poses["disk"] = Placed(np.asarray(at, float), np.asarray(values["disk/orientation"], float))
@@ -219,7 +221,15 @@ def estimated_values(estimate: Values, known: Values) -> dict[str, np.ndarray]:
     pitch = estimate["bicycle/pitch"][:, 0] if "bicycle/pitch" in estimate else pitch
     roll = estimate["bicycle/roll"][:, 0] if "bicycle/roll" in estimate else roll
     bicycle = rotation.from_euler_zyx(yaw, pitch, roll)
-    kept = ("bicycle/position", "bicycle/steer", "bicycle/crank", "wheel/angle", "pelvis/height", "disk/position")
+    kept = (
+        "bicycle/position",
+        "bicycle/steer",
+        "bicycle/crank",
+        "wheel/angle",
+        "pelvis/height",
+        "pelvis/shift",
+        "disk/position",
+    )
     found = {name: np.asarray(known[name], float) for name in kept if name in known}
     found["bicycle/orientation"] = bicycle
     carried = "disk" if "disk/orientation" in known else "trunk"

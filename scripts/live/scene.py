@@ -158,7 +158,7 @@ class MotionScene:
         """Begin with the camera so far away that all figures are seen side by side."""
         camera = np.array(self.look.camera)
         width = 2.0 * np.linalg.norm(camera) * np.tan(0.5 * FIELD) * ASPECT
-        away = max(1.0, len(self.labels) * self.look.beside / width)
+        away = max(1.0, (len(self.labels) + 0.5) * self.look.beside / width)
         self.server.initial_camera.position = tuple(float(part) for part in away * camera)
 
     def _add_mesh(self, name: str, mesh: Mesh, label: str, colour: tuple[int, int, int]) -> None:

@@ -15,7 +15,7 @@ from ...rendering import AXIS_COLOURS, TILE_COLOURS, take_picture
 from ...sensors.ideal import BodyState
 from ..frame.bicycle import bicycle_tree
 from ..frame.parameters import BicycleParameters
-from ..rider.links import SEAT_JOINTS, TRUNK_JOINTS, add_full_rider, limb_joints
+from ..rider.links import SEAT_JOINTS, SLIDES, TRUNK_JOINTS, add_full_rider, limb_joints
 from ..rider.posture import LIMBS, Posture
 from .terrain import FlatGround, Ground
 
@@ -101,10 +101,10 @@ class RideScene(BicycleScene):
 
     def __init__(self, posture: Posture, ground: Ground, *, gui: bool = False) -> None:
         tree = bicycle_tree(posture.bicycle)
-        add_full_rider(tree, posture)
+        add_full_rider(tree, posture, slides=True)
         super().__init__(tree, ground, gui=gui)
         links = self._physics.links(self._bicycle)
-        joints = [*SEAT_JOINTS, *TRUNK_JOINTS, *(name for limb in LIMBS for name in limb_joints(limb))]
+        joints = [*SLIDES, *SEAT_JOINTS, *TRUNK_JOINTS, *(name for limb in LIMBS for name in limb_joints(limb))]
         self._joints = [links[name] for name in ("front_assembly", "crank", "rear_wheel", "front_wheel", *joints)]
         self._wheels = posture.bicycle.rear_wheel.radius / posture.bicycle.front_wheel.radius
 
@@ -113,6 +113,7 @@ class RideScene(BicycleScene):
         wheel = float(truth["wheel/angle"][0])
         angles = [float(pose["bicycle/steer"][0]), float(pose["bicycle/crank"][0]), wheel, wheel * self._wheels]
         rider = np.concatenate([truth[name] for name in ("pelvis/angles", "pelvis/height", "joints/angles")])
+        rider = np.concatenate([truth.get("pelvis/shift", np.zeros(len(SLIDES))), rider])
         for link, angle in zip(self._joints, [*angles, *rider.tolist()], strict=True):
             pybullet.resetJointState(self._bicycle, link, angle, 0.0, physicsClientId=self._physics.client)
         super().draw(pose, truth, estimate)

@@ -62,7 +62,9 @@ class BicycleState(NamedTuple):
         return np.array(self[1:])
 
 
-ROLL, SPEED, WHEEL_RATE = (BicycleState._fields.index(name) - 1 for name in ("roll", "speed", "wheel_rate"))
+ROLL, ROLL_RATE, SPEED, WHEEL_RATE = (
+    BicycleState._fields.index(name) - 1 for name in ("roll", "roll_rate", "speed", "wheel_rate")
+)
 """places in :attr:`BicycleState.numbers`"""
 
 

@@ -31,7 +31,8 @@ class RideLog:
     trunk_joints: np.ndarray
     """(n, 3) rad of the trunk's joint about y, x, z"""
     pelvis: np.ndarray
-    """(n, 3) rad of forward tip and of tip to the right, m off the saddle"""
+    """(n, 3) rad of forward tip and of tip to the right, m off the saddle; (n, 5) of a rider who may stand: m ahead and
+    to the left as well"""
     steer: np.ndarray
     """(n,) rad"""
     crank: np.ndarray
@@ -80,6 +81,8 @@ class RideRecorder:
         mounts = [ride.physics.inertial_frame(ride.bicycle.body.body, links[name]) for name in self._names]
         self._mounts = np.stack([centre for centre, _ in mounts]), np.stack([axes for _, axes in mounts])
         self._joints = [links["front_assembly"], links["crank"], links["rear_wheel"], *rider.joints, *rider.seat]
+        self._joints += rider.slides
+        self._pelvis = slice(3 + len(rider.joints), None)
 
     def record(self, samples: int) -> RideLog:
         """Ride on for some samples; stops early after the one in which the rider fell."""
@@ -145,7 +148,7 @@ class RideRecorder:
         frames = self._frames(motion, time)
         angles, rates = joints[..., 0], joints[..., 1]
         steer, crank, trunk = angles[:, 0], angles[:, 1], angles[:, 3:6]
-        limbs, pelvis = {}, angles[:, -3:]
+        limbs, pelvis = {}, angles[:, self._pelvis]
         turn = rotation.conjugate(frames["rear_frame"].orientation)
         trunk_turn = rotation.multiply(turn, frames["trunk"].orientation)
         for index, name in enumerate(LIMBS):
@@ -169,7 +172,7 @@ class RideRecorder:
     def _solve(
         self, name: str, steer: np.ndarray, crank: np.ndarray, trunk: np.ndarray, swivel: np.ndarray, pelvis: np.ndarray
     ) -> LimbPosture:
-        """Posture of a limb by inverse kinematics; ``pelvis``: its displacement ``(n, 3)``."""
+        """Posture of a limb by inverse kinematics; ``pelvis``: its displacement ``(n, …)``."""
         posture, side = self.ride.rider.posture, name[4:]
         if name.startswith("leg"):
             tip = two_turns(pelvis)

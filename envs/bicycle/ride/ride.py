@@ -27,6 +27,8 @@ from .pilot import IDEAL, PilotParameters, pilot_parameters
 
 COASTING = 5.0
 """N of deceleration force left to drag before the brakes are used"""
+SLOWLY = 6.8
+"""rad/s (65 a minute): cadence at most that a rider prefers who stands on the pedals"""
 FALLEN = 1.0
 """rad of roll at which a ride is over"""
 
@@ -92,7 +94,7 @@ class Ride:
             raise ValueError(f"physics_rate must be a multiple of {settings.rate:g} Hz, got {physics_rate:g} Hz")
         load = posture.load()
         self.physics = Physics(time_step=1.0 / physics_rate, gravity=gravity, gui=gui)
-        self.rider = Rider(posture, fidelity)
+        self.rider = Rider(posture, fidelity, motion.stands)
         self.bicycle = Bicycle(self.physics, self.rider.ridden, ground, tyre, load=load, extend=self.rider.extend)
         self.rider.mount(self.bicycle)
         self._loaded, self._settings = posture.bicycle.with_load(load), settings
@@ -123,7 +125,10 @@ class Ride:
         self.pilot = self._pilot(pilot, noise, motion)
         self.path, self.speed, self.events = path, speed, Events() if events is None else events
         if self.bicycle.drivetrain is not None:
-            self.bicycle.drivetrain.prefer(self.events.cadence)
+            cadence = self.events.cadence
+            if motion.stands:
+                cadence = SLOWLY if cadence is None else min(cadence, SLOWLY)
+            self.bicycle.drivetrain.prefer(cadence)
         point, first = path.at(0.0), self.pilot.comfortable_speed(path, speed(0.0))
         self.bicycle.start(first, (point.x, point.y), point.heading, crank=crank)
         self.rider.start(motion, crank, self.bicycle.state().crank_rate)
@@ -179,7 +184,7 @@ class Ride:
         wanted, coasting = self.speed(time), self.events.coasts(time)
         pilot.coast(coasting)
         self.foot.update(seen.item(SPEED), wanted, pilot.period)
-        torque, drive = pilot.update(seen, wanted, self.rider.intended_lean)
+        torque, drive = pilot.update(self.rider.unswung(seen), wanted, self.rider.intended_lean)
         if self.foot.engaged:
             torque = self.foot.steer(torque, self.state)
         if coasting and drive >= -COASTING:

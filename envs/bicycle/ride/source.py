@@ -167,12 +167,12 @@ class RideSource:
         """Draw rider, course and movements, and settle on the saddle."""
         for_body, for_course, for_movement, for_crank, for_pilot = motion.spawn(5)
         body = rider_body(subject, for_body)
-        world = (body, self.physics_rate, self.tyre)
+        style = rider_style(scenario.style if self.style is None else self.style, for_movement.spawn(1)[0])
+        world = (body, self.physics_rate, self.tyre, style.standing > 0.0)
         same = self.ride is not None and world == self._world_key
         posture = self.posture if same else sit(self.bicycle, body)
         length = self.duration + SETTLING + 1.0
         course = scenario.draw(for_course, length, self.surface)
-        style = rider_style(scenario.style if self.style is None else self.style, for_movement.spawn(1)[0])
         movement = RiderMotion(style, for_movement, length)
         crank = float(for_crank.uniform(0.0, 2.0 * math.pi))
         skills = list(PILOTS)

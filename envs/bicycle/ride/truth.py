@@ -177,7 +177,7 @@ def other_truth(log: RideLog, head: BodyState) -> dict[str, np.ndarray]:
         "head/position": head.position,
         "head/angular_rate": rotation.rotate_back(head.orientation, head.angular_velocity),
         "pelvis/angles": log.pelvis[:, :2],
-        "pelvis/height": log.pelvis[:, 2:],
+        "pelvis/height": log.pelvis[:, 2:3],
         "seat/force": rotation.rotate_back(back, contact.seat_force),
         "seat/moment": rotation.rotate_back(back, contact.seat_moment),
         "joints/angles": joint_angles(log),
@@ -187,6 +187,8 @@ def other_truth(log: RideLog, head: BodyState) -> dict[str, np.ndarray]:
         "wheel/rate": log.rates[:, 2:],
         "wheel/angle": log.wheel[:, None],
     }
+    if log.pelvis.shape[1] > 3:
+        truth["pelvis/shift"] = log.pelvis[:, 3:]
     for name, forces in (("handlebar", contact.hands), ("pedal", contact.feet)):
         for index, side in enumerate(SIDES):
             truth[f"{name}/force_{side}"] = rotation.rotate_back(back, forces[:, index])

@@ -17,8 +17,9 @@ from ....filters.compile.cache import jit
 TABLE_RATE = 50.0
 """Hz"""
 CHANNELS = ("flexion", "lean", "twist", "arm_left", "arm_right", "leg_left", "leg_right", "hands")
-"""columns of a table: trunk, swivel of the limbs (rad), torque of unsteady hands (N·m)"""
-TRUNK, SWIVEL, HANDS = slice(0, 3), slice(3, 7), 7
+"""columns of a table: trunk, swivel of the limbs (rad), torque of unsteady hands (N·m); of a rider who stands up
+another one, see :func:`standing_phases`"""
+TRUNK, SWIVEL, HANDS, STANDING = slice(0, 3), slice(3, 7), 7, 8
 CORNERS = (*[0.4] * 3, *[0.15] * 4, 1.0)
 """Hz: corner of each channel's noise. Above it the spectrum of the angle falls with 1/f² and that of its rate is flat,
 as the chest sensor's of a recorded ride between 0.5 and 2 Hz"""
@@ -35,6 +36,8 @@ NODS, LOOKS_AHEAD = 0.4, 0.4
 TURN_TIME, TURN_PACE = 0.3, 0.25
 """s, and s/rad: how long a turn of the head lasts. 38 deg peak at 155 deg/s: free movements of people reach 185 deg/s,
 and voluntary ones far more (Grossman et al., Exp. Brain Res. 70, 1988)"""
+STAND_TIME, RISE_TIME = (15.0, 30.0), 1.0
+"""s: on the pedals at a time, and to get up or sit down"""
 BREATHING_RATE = (0.25, 0.5)
 """Hz: 15 to 30 breaths a minute, from rest to moderate work"""
 
@@ -108,6 +111,26 @@ def gaze_shifts(rng: np.random.Generator, time: np.ndarray, deviation: float, in
         change = following - now
         found += smooth_step(time, begin, TURN_TIME + TURN_PACE * math.hypot(*change))[:, None] * change
         now = following
+    return found
+
+
+def standing_phases(rng: np.random.Generator, time: np.ndarray, share: float) -> np.ndarray:
+    """How far a rider has got up from the saddle ``(n,)``, from 0 to 1 on the pedals; seated at first.
+
+    Args:
+        rng: source of randomness.
+        time: s.
+        share: of the time that the rider stands, above 0.
+    """
+    found, begin = np.zeros(len(time)), RISE_TIME
+    while begin < time[-1]:
+        length = float(rng.uniform(*STAND_TIME))
+        found += smooth_step(time, begin, RISE_TIME)
+        if share < 1.0:
+            found -= smooth_step(time, begin + length, RISE_TIME)
+            begin += length / share
+        else:
+            break
     return found
 
 

@@ -14,6 +14,8 @@ SHIRT, TROUSERS, SKIN, SHOE = (0.15, 0.35, 0.65), (0.18, 0.18, 0.22), (0.85, 0.6
 AXES = {"y": (0.0, 1.0, 0.0), "x": (1.0, 0.0, 0.0), "z": (0.0, 0.0, 1.0)}
 SEAT_JOINTS = ("pelvis_y", "pelvis_x", "pelvis")
 """the pelvis tips forwards and to the right about the saddle point, and rises off it"""
+SLIDES = ("pelvis_along", "pelvis_across")
+"""the pelvis of a rider who stands up also moves along and across the bicycle"""
 TRUNK_JOINTS = ("trunk_y", "trunk_x", "trunk")
 NAMES = {"arm": ("upper_arm", "forearm"), "leg": ("thigh", "shank")}
 LUMPED_MASSES = ("pelvis", "trunk")
@@ -41,9 +43,13 @@ def _three_joints(tree: Tree, parent: str, child: str, origin: np.ndarray, mass:
     tree.joint(parent, child, origin, AXES["z"])
 
 
-def _seat(tree: Tree, posture: Posture, pelvis: Mass) -> None:
+def _seat(tree: Tree, posture: Posture, pelvis: Mass, slides: bool) -> None:
     """Set a pelvis (in the bicycle frame) on the saddle; its link frame begins at the saddle point."""
     parent, origin = "rear_frame", np.array(posture.bicycle.saddle)
+    for name, axis in zip(SLIDES, "xy", strict=True) if slides else ():
+        tree.link(name, PIVOT_MASS, PIVOT_INERTIA, (0.0, 0.0, 0.0))
+        tree.joint(parent, name, origin, AXES[axis], slides=True)
+        parent, origin = name, np.zeros(3)
     for name, axis in zip(SEAT_JOINTS[:2], "yx", strict=True):
         tree.link(name, PIVOT_MASS, PIVOT_INERTIA, (0.0, 0.0, 0.0))
         tree.joint(parent, name, origin, AXES[axis])
@@ -53,10 +59,10 @@ def _seat(tree: Tree, posture: Posture, pelvis: Mass) -> None:
     tree.joint(parent, "pelvis", origin, AXES["z"], slides=True)
 
 
-def add_full_rider(tree: Tree, posture: Posture) -> None:
-    """Pelvis that rests on the saddle, trunk, and four limbs whose ends are still free."""
+def add_full_rider(tree: Tree, posture: Posture, slides: bool) -> None:
+    """Pelvis that rests on the saddle, trunk, and four limbs whose ends are still free; ``slides``: :data:`SLIDES`."""
     segments, saddle = posture.segments(), np.array(posture.bicycle.saddle)
-    _seat(tree, posture, posture.pelvis())
+    _seat(tree, posture, posture.pelvis(), slides)
     _three_joints(tree, "pelvis", "trunk", posture.lumbar - saddle, posture.trunk(), trunk_shapes(posture))
     shapes = limb_shapes(posture)
     for name in LIMBS:
@@ -71,8 +77,8 @@ def add_full_rider(tree: Tree, posture: Posture) -> None:
         tree.joint(f"{upper}_{side}", f"{lower}_{side}", below, AXES["y"])
 
 
-def add_lumped_rider(tree: Tree, posture: Posture) -> None:
-    """Pelvis with the legs at rest, sliding on the saddle, and trunk with the arms at rest."""
+def add_lumped_rider(tree: Tree, posture: Posture, slides: bool) -> None:
+    """Pelvis with the legs at rest, and trunk with the arms at rest; ``slides``: :data:`SLIDES`."""
     limbs = [posture.limbs_at(crank) for crank in (0.0, np.pi)]
 
     def mean(kind: str) -> list[Mass]:
@@ -80,7 +86,7 @@ def add_lumped_rider(tree: Tree, posture: Posture) -> None:
         return [Mass(0.5 * mass.mass, mass.centre, 0.5 * mass.tensor) for mass in found]
 
     pelvis = join([posture.pelvis(), *mean("leg")])
-    _seat(tree, posture, pelvis)
+    _seat(tree, posture, pelvis, slides)
     trunk = join([posture.trunk(), *mean("arm")])
     lumbar = posture.lumbar - posture.bicycle.saddle
     _three_joints(tree, "pelvis", "trunk", lumbar, trunk, trunk_shapes(posture))

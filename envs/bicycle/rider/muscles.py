@@ -4,7 +4,8 @@ Arrays of a rider with n joints (three of the trunk, four of each limb unless lu
 
 * memory ``(MUSCLES + 2 n,)``: what :func:`plan` decided and :func:`act` applied, by the slices below, then n planned
   and n applied torques (N·m);
-* links ``(3 + n,)`` of joints: pitch, roll and rise of the pelvis, then those of trunk and limbs.
+* links ``(3 + n,)`` of joints: pitch, roll and rise of the pelvis, then those of trunk and limbs; ``(5 + n,)`` of a
+  rider who may stand: then those of the pelvis along and across the bicycle.
 """
 
 from __future__ import annotations
@@ -51,8 +52,12 @@ TARGET, SUPPORT, SWIVEL, WANTED = slice(0, 3), slice(3, 6), slice(6, 10), slice(
 HANDS, FEET, PUSHES, WEIGHTS = slice(14, 20), slice(20, 26), slice(26, 32), slice(32, 38)
 HANDS_AND_FEET = slice(14, 26)
 """forces (N, bicycle axes) of left and right hand and foot, of the legs' muscles and of the legs' weight"""
-MUSCLES = 38
+SWUNG = slice(38, 40)
+"""roll of the bicycle by which a standing rider swings it (rad), and its rate (rad/s)"""
+MUSCLES = 40
 """where the planned torques begin"""
+GRIP, HELD, HELD_RATE = 0.6, 3e4, 1.5e3
+"""1, N/m and N·s/m: friction of a saddle that a rider may leave; riders who stay are held without a limit"""
 
 
 class Build(NamedTuple):
@@ -194,19 +199,31 @@ def plan(  # type: ignore[no-untyped-def]
             pull = c * build.pulls[side, 0, axis] + s * build.pulls[side, 1, axis]
             hands[3 * side + axis] = strength * pull + along * build.axis[axis]
         hands[3 * side + 2] += common - build.hand_load
-    left_hand, right_hand = (hands[0], hands[1], hands[2]), (hands[3], hands[4], hands[5])
-    support = memory[SUPPORT]
-    support[0], support[1], support[2] = trunk_support(reach, left_hand, right_hand, target[0], target[1])
     if joints == 3:
         left, right = swung(reach, left, right, lift, tip)
-        for axis in range(3):
-            pushes[axis], pushes[3 + axis] = left[axis], right[axis]
+    for axis in range(3):
+        pushes[axis], pushes[3 + axis] = left[axis], right[axis]
+    tense(numbers, arrays, steer, crank, state, links, memory)
+
+
+@jit
+def tense(numbers, arrays, steer, crank, state, links, memory):  # type: ignore[no-untyped-def]
+    """Torques that make the forces of hands and feet in the memory and support the trunk; arguments of :func:`plan`."""
+    build = build_of(numbers, arrays)
+    first, joints = 13, (memory.shape[0] - MUSCLES) // 2
+    hands, pushes, target, support = memory[HANDS], memory[PUSHES], memory[TARGET], memory[SUPPORT]
+    left_hand, right_hand = (hands[0], hands[1], hands[2]), (hands[3], hands[4], hands[5])
+    supported = trunk_support(build.reach, left_hand, right_hand, target[0], target[1])
+    support[0], support[1], support[2] = supported
+    if joints == 3:
         return
-    abductions(build.table, build.middle, steer, crank, target, intended[3:7], memory[SWIVEL])
+    abductions(build.table, build.middle, steer, crank, target, memory[WANTED], memory[SWIVEL])
+    pitch, roll = state[first + links[0]], state[first + links[1]]
     trunk = (state[first + links[3]], state[first + links[4]], state[first + links[5]])
     up, nothing = into_trunk(trunk, (0.0, 0.0, build.elbow_weight)), (0.0, 0.0, 0.0)
     torques = memory[MUSCLES : MUSCLES + joints]
     torques[:3] = 0.0
+    left, right = (pushes[0], pushes[1], pushes[2]), (pushes[3], pushes[4], pushes[5])
     for limb, force in enumerate((left_hand, right_hand, left, right)):
         force = into_pelvis((pitch, roll), force)
         if limb < 2:
@@ -263,6 +280,9 @@ def act(numbers, tree, state, frames, links, holds, memory, forces):  # type: ig
     forces[6 + links[0]] += forwards
     forces[6 + links[1]] += rightwards
     forces[6 + links[2]] += force
+    for slide in range(3 + joints, links.shape[0]):
+        pull = -HELD * state[first + links[slide]] - HELD_RATE * state[rates + links[slide]]
+        forces[6 + links[slide]] += max(-GRIP * force, min(GRIP * force, pull))
 
 
 @jit

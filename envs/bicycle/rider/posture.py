@@ -40,7 +40,7 @@ AT_REST = np.zeros(3)
 """Displacement of the pelvis: rad of forward tip and of tip to the right, m off the saddle"""
 
 
-def _root(function: Callable[[float], float], low: float, high: float, message: str) -> float:
+def rising_root(function: Callable[[float], float], low: float, high: float, message: str) -> float:
     """Where a rising function passes zero."""
     if not function(low) < 0.0 < function(high):
         raise ValueError(message)
@@ -116,10 +116,14 @@ class Posture:
 
         Args:
             place: ``(3,)`` at rest, m.
-            pelvis: ``(..., 3)`` rad of forward tip and of tip to the right, m off the saddle.
+            pelvis: ``(..., 3)`` rad of forward tip and of tip to the right, m off the saddle; of a rider who stands up
+                ``(..., 5)``: then m ahead of the saddle and to the left of it.
         """
-        saddle, up = np.array(self.bicycle.saddle), pelvis[..., 2:] * (0.0, 0.0, 1.0)
-        return saddle + rotation.rotate(two_turns(pelvis), place - saddle + up)
+        saddle, up = np.array(self.bicycle.saddle), pelvis[..., 2:3] * (0.0, 0.0, 1.0)
+        moved = saddle + rotation.rotate(two_turns(pelvis), place - saddle + up)
+        if pelvis.shape[-1] > len(AT_REST):
+            moved = moved + pelvis[..., 3:] @ np.eye(3)[:2]
+        return moved
 
     def arm_target(
         self, side: str, steer: np.ndarray | float, trunk: np.ndarray, pelvis: np.ndarray = AT_REST
@@ -245,7 +249,9 @@ def sit(bicycle: BicycleParameters, body: RiderBody) -> Posture:
         farthest = math.hypot(math.hypot(across[0], across[2]) + bicycle.drive.crank_length, across[1])  # type: ignore[union-attr]
         return float(farthest / leg.reach - LEG_REACH)
 
-    height = _root(stretch, 0.35, 1.0, f"{body.name} of {body.stature} m cannot reach the pedals of {bicycle.name!r}")
+    height = rising_root(
+        stretch, 0.35, 1.0, f"{body.name} of {body.stature} m cannot reach the pedals of {bicycle.name!r}"
+    )
     saddle = axle + height * tube
     fitted = replace(bicycle, saddle=(float(saddle[0]), 0.0, float(saddle[2])))
     lower = body.segment("lower_trunk").length
@@ -259,7 +265,7 @@ def sit(bicycle: BicycleParameters, body: RiderBody) -> Posture:
         return float(ARM_REACH - np.linalg.norm(posture.arm_target("left", 0.0, trunk)) / arm.reach)
 
     message = f"{body.name} of {body.stature} m cannot reach the handlebar of {bicycle.name!r}"
-    return replace(posture, flexion=_root(bent, math.radians(2.0), math.radians(75.0), message))
+    return replace(posture, flexion=rising_root(bent, math.radians(2.0), math.radians(75.0), message))
 
 
 def loop_closure_error(truth: Mapping[str, np.ndarray], posture: Posture) -> np.ndarray:
@@ -278,7 +284,8 @@ def loop_closure_error(truth: Mapping[str, np.ndarray], posture: Posture) -> np.
     frame, trunk = truth["bicycle/orientation"], truth["trunk/orientation"]
     steer, crank = truth["bicycle/steer"][:, 0], truth["bicycle/crank"][:, 0]
     relative = rotation.multiply(rotation.conjugate(frame), trunk)
-    pelvis = np.concatenate([truth["pelvis/angles"], truth["pelvis/height"]], axis=1)
+    moved = ("pelvis/angles", "pelvis/height", "pelvis/shift")
+    pelvis = np.concatenate([truth[name] for name in moved if name in truth], axis=1)
     errors = []
     for name in LIMBS:
         kind, side = name.split("_")

@@ -14,27 +14,44 @@ from typing import Literal
 import numpy as np
 
 from ....filters.core import rotation
+from ...physics.kinematics import BASE_SIZE
 from ...physics.multibody import connect_points, constraint_forces
 from ...physics.urdf import Tree
 from ...sensors.ideal import STANDARD_GRAVITY
-from ..frame.bicycle import Bicycle
+from ..frame.bicycle import ROLL, ROLL_RATE, Bicycle, BicycleState
 from ..frame.parameters import BicycleParameters
+from .body_motion import STANDING, row_at
 from .effort import reach_of
 from .leg_loads import legs_at_crank
 from .limb_tables import LimbTables, abductions
 from .links import (
     LUMPED_MASSES,
     SEAT_JOINTS,
+    SLIDES,
     TRUNK_JOINTS,
     add_full_rider,
     add_lumped_rider,
     limb_joints,
     segment_links,
 )
-from .muscles import HANDS_AND_FEET, MUSCLES, SWIVEL, TARGET, WANTED, Build, act, act_on_bicycle, plan
+from .muscles import (
+    HANDS_AND_FEET,
+    MUSCLES,
+    RESTING,
+    SWIVEL,
+    SWUNG,
+    TARGET,
+    WANTED,
+    Build,
+    act,
+    act_on_bicycle,
+    plan,
+    tense,
+)
 from .posture import LIMBS, SIDES, SIGNS, Posture
 from .rigid_limbs import holds
 from .saddle import AHEAD, ARMS_ON_HANDS, balanced_hand_load, resting_load, seat_contact
+from .standing import StandingForces, stance
 from .style import RiderMotion
 
 Fidelity = Literal["full", "lumped"]
@@ -54,13 +71,18 @@ class Rider:
     Args:
         posture: the person fitted to the bicycle, see :func:`poise.envs.bicycle.rider.posture.sit`.
         fidelity: ``full`` or ``lumped``.
+        stands: whether the rider may leave the saddle.
+
+    Raises:
+        ValueError: an unknown fidelity, or a bicycle on which this person cannot stand.
     """
 
-    def __init__(self, posture: Posture, fidelity: Fidelity = "full") -> None:
+    def __init__(self, posture: Posture, fidelity: Fidelity = "full", stands: bool = False) -> None:
         if fidelity not in ("full", "lumped"):
             raise ValueError(f"fidelity must be 'full' or 'lumped', got {fidelity!r}")
         self.posture, self.fidelity = posture, fidelity
         self.full = fidelity == "full"
+        self._stance = stance(posture) if stands else None
         axis, origin = posture.bicycle.steer_axis, posture.bicycle.steer_origin
         arm = np.array(posture.bicycle.grip) - origin
         self._grip_arm = float(np.linalg.norm(np.cross(axis, arm)))
@@ -90,7 +112,7 @@ class Rider:
 
     def extend(self, tree: Tree) -> None:
         """Add the rider's links to a bicycle's tree."""
-        (add_full_rider if self.full else add_lumped_rider)(tree, self.posture)
+        (add_full_rider if self.full else add_lumped_rider)(tree, self.posture, self._stance is not None)
 
     def mount(self, bicycle: Bicycle) -> None:
         """Look up the links after the bicycle with this rider has been loaded."""
@@ -99,7 +121,8 @@ class Rider:
         self.limb_links = [body.index(limb_joints(name)) for name in LIMBS] if self.full else []
         self.joints = [*self.trunk_links, *(link for links in self.limb_links for link in links)]
         self.seat = body.index(SEAT_JOINTS)
-        self.driven = [*self.joints, *self.seat]
+        self.slides = body.index(SLIDES) if self._stance is not None else []
+        self.driven = [*self.joints, *self.seat, *self.slides]
         names = segment_links() if self.full else LUMPED_MASSES
         self.mass_links = body.index(names)
         self.masses = np.array([body.masses[name] for name in names])
@@ -109,7 +132,7 @@ class Rider:
         centre, _ = bicycle.physics.inertial_frame(body.body)
         self.saddle_arm = self.holds[2] @ (np.array(self.posture.bicycle.saddle) - centre)
         """(3,) m: saddle point from the base's centre in its principal axes"""
-        self._links = np.array([*self.seat, *self.joints])
+        self._links = np.array([*self.seat, *self.joints, *self.slides])
         self._reach = reach_of(self.posture, bicycle.physics.gravity)
         for links in self.limb_links:
             for link in links:
@@ -122,7 +145,12 @@ class Rider:
             motion: intended motion of the rider.
             crank: rad.
             crank_rate: rad/s.
+
+        Raises:
+            ValueError: a motion with phases out of the saddle, of a rider who may not leave it.
         """
+        if motion.stands and self._stance is None:
+            raise ValueError(f"the style {motion.style.name!r} needs a rider who may stand")
         self.motion, self._began = motion, self.bicycle.physics.time
         body, physics = self.bicycle.body, self.bicycle.physics
         hand_load = self._load_scale * motion.style.hand_load
@@ -139,6 +167,10 @@ class Rider:
         self.constraints = []
         tables = LimbTables(self.posture, target, first_swivel, physics.gravity)
         bike, limbs = self.posture.bicycle, (self.posture.arm, self.posture.leg)
+        self._standing: StandingForces | None = None
+        if self._stance is not None and motion.stands:
+            swing = motion.style.swing
+            self._standing = StandingForces(self.posture, self._stance, swing, physics.gravity, self.full)
         build = Build(
             self._reach,
             self.saddle,
@@ -154,7 +186,13 @@ class Rider:
             tables.legs,
             tables.middle,
         )
-        self._numbers, self._arrays = build.numbers, build.arrays
+        self._numbers, self._arrays, self._legs = build.numbers, build.arrays, tables.legs
+        if self._standing is not None and self._stance is not None:
+            x, y, z = self._reach.grip
+            ahead, above = self._stance.ahead, self._stance.above
+            reach = self._reach._replace(grip=(x - ahead, y, z), lumbar=self._reach.lumbar + above)
+            self._moved = build._replace(reach=reach).numbers - self._numbers
+            """what a standing rider adds to the numbers"""
         self._memory = np.zeros(MUSCLES + 2 * len(self.joints))
         self._memory[TARGET], self._memory[WANTED] = target, first_swivel
         abductions(tables.table, tables.middle, 0.0, crank, self._memory[TARGET], first_swivel, self._memory[SWIVEL])
@@ -179,8 +217,20 @@ class Rider:
 
     @property
     def intended_lean(self) -> float:
-        """Wanted lean of the trunk relative to the bicycle, rad, right positive."""
-        return float(self._memory[1])
+        """Wanted lean of the trunk relative to the bicycle, rad, right positive; without what a swing adds to it."""
+        return float(self._memory[1] + self._memory[SWUNG][0])
+
+    def unswung(self, seen: np.ndarray) -> np.ndarray:
+        """The bicycle as it would be without the rider's own swing, which a pilot does not steer against.
+
+        Args:
+            seen: :attr:`.BicycleState.numbers` of the bicycle now.
+        """
+        if self._standing is None:
+            return seen
+        found = seen.copy()
+        found[[ROLL, ROLL_RATE]] -= self._memory[SWUNG]
+        return found
 
     def plan(self, seen: np.ndarray, curvature: float, steer_torque: float, drive: float) -> None:
         """Compute muscle torques for the next control period.
@@ -197,6 +247,23 @@ class Rider:
             self._numbers, self._arrays, motion.table, motion.habits, since, curvature, seen, steer_torque, drive,
             bicycle.chain, bicycle.body.state, self._links, self._memory,
         )  # fmt: skip
+        if self._standing is not None:
+            self._stand(self._standing, BicycleState(0.0, *seen.tolist()), since, drive)
+
+    def _stand(self, standing: StandingForces, s: BicycleState, since: float, drive: float) -> None:
+        """Go on from :meth:`plan` as a rider who gets up."""
+        self._memory[SWUNG] = 0.0
+        level = standing.level(float(row_at(self.motion.table, since)[STANDING]), s.speed)
+        if level <= 0.0:
+            return
+        state, ratio = self.bicycle.body.state, self.bicycle.ratio
+        places = BASE_SIZE + self._links[[0, 1, 2, -2, -1]]
+        pelvis = np.stack([state[places], state[places + (len(state) - BASE_SIZE) // 2]])
+        torque = max(0.0, drive) * self.posture.bicycle.rear_wheel.radius * ratio
+        ridden = (s.steer, s.crank, s.crank_rate, s.wheel_rate, 0.0 if drive == RESTING else ratio)
+        standing.hold(level, ridden, torque, self._legs, pelvis, self._memory)
+        numbers = self._numbers + level * self._moved
+        tense(numbers, self._arrays, s.steer, s.crank, state, self._links, self._memory)
 
     def act(self) -> None:
         """Add what muscles and saddle do in the next step to the forces on the bodies.

@@ -20,6 +20,7 @@ from .body_motion import (
     glances,
     posture_changes,
     row_at,
+    standing_phases,
 )
 
 START = 2.0
@@ -86,6 +87,11 @@ class RiderStyle:
     """rad: standard deviation of the head's yaw to the trunk where the rider looks around; assumed"""
     gaze_interval: float = math.inf
     """s between turns of the head, on average; assumed"""
+    standing: float = 0.0
+    """1: share of the time that the rider stands on the pedals, in phases of 15 to 30 s, above walking pace"""
+    swing: float = 0.0
+    """rad: amplitude by which a standing rider swings the bicycle from side to side, once a turn of the cranks; riders
+    who sprint swing it by 0.2 and more"""
 
     def __post_init__(self) -> None:
         for name in (*SIZES, "hand_load", "unsteadiness", "gaze"):
@@ -94,6 +100,8 @@ class RiderStyle:
         for name in ("posture_interval", "glance_interval", "gaze_interval"):
             if not getattr(self, name) >= 1.0:
                 raise ValueError(f"{name} must be at least 1 s, got {getattr(self, name)}")
+        if not 0.0 <= self.standing <= 1.0:
+            raise ValueError(f"standing must lie in [0, 1], got {self.standing}")
         largest = max(SIZES, key=lambda name: getattr(self, name))
         if getattr(self, largest) > 0.2:
             raise ValueError(
@@ -101,7 +109,7 @@ class RiderStyle:
             )
 
 
-SIZES = ("lean", "flexion", "twist", "swivel", "pedalling", "posture", "glance", "breath")
+SIZES = ("lean", "flexion", "twist", "swivel", "pedalling", "posture", "glance", "breath", "swing")
 """fields that are angles of movements"""
 STYLES = {
     style.name: style
@@ -122,18 +130,22 @@ STYLES = {
             pedalling=0.06, posture=0.015, posture_interval=15.0, glance=0.2, glance_interval=15.0, breath=0.01,
             gaze=0.5, gaze_interval=1.5,
         ),
+        RiderStyle(
+            "standing", 0.04, 0.038, 0.05, 0.25, 0.3,
+            posture=0.01, posture_interval=30.0, breath=0.01, gaze=0.2, gaze_interval=5.0, standing=0.85, swing=0.06,
+        ),
     )
 }  # fmt: skip
 """The styles by name."""
 
 
 def random_style(rng: np.random.Generator) -> RiderStyle:
-    """A style between mild and aggressive, each parameter by itself, uniform on a logarithmic scale."""
+    """A style between mild and aggressive, each parameter by itself, uniform on a logarithmic scale; always seated."""
     low, high = STYLES["mild"], STYLES["aggressive"]
     drawn = {}
     for field in fields(RiderStyle)[1:]:
         a, b = getattr(low, field.name), getattr(high, field.name)
-        drawn[field.name] = float(a * (b / a) ** rng.random())
+        drawn[field.name] = float(a * (b / a) ** rng.random()) if a > 0.0 else a
     return RiderStyle("random", **drawn)
 
 
@@ -197,7 +209,7 @@ class RiderMotion:
 
     def __init__(self, style: RiderStyle, rng: np.random.Generator, duration: float = 120.0) -> None:
         self.style, self.duration = style, duration
-        for_noise, for_posture, for_glances, for_breath, for_rest, for_gaze = rng.spawn(6)
+        for_noise, for_posture, for_glances, for_breath, for_rest, for_gaze, for_standing = rng.spawn(7)
         # one row before time 0 and two after the end, for the interpolation
         rows = math.ceil(duration * TABLE_RATE) + 4
         time = (np.arange(rows) - 1.0) / TABLE_RATE
@@ -208,12 +220,20 @@ class RiderMotion:
         self.table[:, CHANNELS.index("twist")] += looks
         self.table[:, CHANNELS.index("flexion")] += breathing(for_breath, time, style.breath)
         self.table[:, SWIVEL] += style.swivel * for_rest.standard_normal(4)
+        if self.stands:
+            phases = standing_phases(for_standing, time, style.standing)
+            self.table = np.column_stack([self.table, phases])
         phases = for_rest.uniform(0.0, 2.0 * math.pi, 3)
         self.gaze = gaze_shifts(for_gaze, time, style.gaze, style.gaze_interval)
         """yaw and pitch of the head to the trunk, a table of :mod:`.body_motion`, rad"""
         self.gaze[:, 0] += LOOK * looks
         self.gaze = MOST_TURNED * np.tanh(self.gaze / MOST_TURNED)
         self.habits = np.array([style.turn_lean, style.levelling, style.pedalling, *phases])
+
+    @property
+    def stands(self) -> bool:
+        """Whether the rider gets out of the saddle."""
+        return self.style.standing > 0.0
 
     def at(
         self, time: float, curvature: float, roll: float, crank: float = 0.0, speed: float = AT_EASE
