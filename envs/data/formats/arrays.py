@@ -112,7 +112,7 @@ def load_npy(path: Path) -> np.ndarray:
 
 
 def load_npz(path: Path) -> dict[str, np.ndarray]:
-    """The arrays of an archive; what declares more than its file can hold is refused before it is unpacked."""
+    """The arrays of an archive, dates in whole ns; what declares more than its file can hold is not unpacked."""
     try:
         with zipfile.ZipFile(path) as archive:
             total = sum(entry.file_size for entry in archive.infolist())
@@ -126,7 +126,10 @@ def load_npz(path: Path) -> dict[str, np.ndarray]:
                 with archive.open(entry) as file:
                     check_declared(file, entry)
         with np.load(path, allow_pickle=False) as archive:
-            return {name: archive[name] for name in archive.files if archive[name].dtype.kind in "fiubU"}
+            arrays = {name: archive[name] for name in archive.files}
+        dates = {name: array for name, array in arrays.items() if array.dtype.kind in "Mm"}
+        whole = {name: array.astype(f"{array.dtype.kind}8[ns]").astype(np.int64) for name, array in dates.items()}
+        return {name: array for name, array in (arrays | whole).items() if array.dtype.kind in "fiubUc"}
     except (zipfile.BadZipFile, EOFError, OSError, KeyError) as reason:
         raise ValueError(f"it is not a readable NumPy archive; it may be truncated: {reason}") from None
 

@@ -18,6 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from ....filters.core import rotation
+from ....filters.core.estimator import real_numbers
 from .. import reference_clock
 from ..trajectory import Trajectory
 from .arrays import ZIP, load_mat, load_npz, read_table, time_first
@@ -173,11 +174,15 @@ def is_archive(head: Head) -> bool:
 def load_archive(path: Path) -> list[Trajectory]:
     """Read an archive: ``t`` s, ``gyr`` rad/s, ``acc`` m/s², ``mag``; truth ``quat`` w, x, y, z; ``mask``."""
     arrays = load_npz(path)
-    time = np.asarray(arrays["t"], dtype=float).ravel()
+    for name in arrays.keys() & {"t", "gyr", "acc", "mag", "quat", "pos"}:
+        real_numbers(arrays[name], f"array {name!r}")
+    time = np.ravel(arrays["t"])
+    if time.dtype.kind == "i" and len(time):
+        time = as_seconds(time, "", "t").elapsed
     measurements = {f"imu/{kind}": time_first(arrays[kind]) for kind in ("gyr", "acc", "mag") if kind in arrays}
     truth = {"orientation": time_first(arrays["quat"])} if "quat" in arrays else {}
     truth |= {"position": time_first(arrays["pos"])} if "pos" in arrays else {}
     mask = np.asarray(arrays["mask"], dtype=bool).ravel() if "mask" in arrays else np.ones(len(time), bool)
     details = {"name": path.stem, "format": "NumPy archive", "group": path.parent.name}
-    recorded = Trajectory(time, measurements, truth, mask, details)
+    recorded = Trajectory(np.asarray(time, dtype=float), measurements, truth, mask, details)
     return [reference_clock.measured(recorded)]

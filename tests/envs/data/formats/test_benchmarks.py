@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 import pytest
 import scipy.io
@@ -134,3 +136,18 @@ def test_the_benchmarks_fit_their_gyroscopes(recordings_folder, name):
         assert trial.uniform
         assert trial.mask.mean() > 0.8
         assert not trial.mask[~np.isfinite(trial.truth["orientation"]).all(axis=1)].any()
+
+
+def test_archives_of_dates_and_of_what_is_no_reading(tmp_path):
+    time, values = np.arange(300) / 100, np.random.default_rng(0).standard_normal((300, 3))
+    dates = np.datetime64("2026-03-01T10:00") + np.timedelta64(10_000_000, "ns") * np.arange(300)
+    for number, stamps in enumerate((dates, dates - dates[0], dates.astype("datetime64[us]"))):
+        np.savez(tmp_path / f"{number}.npz", t=stamps, gyr=values, acc=values)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            np.testing.assert_allclose(poise.load_recording(tmp_path / f"{number}.npz").time, time, atol=1e-9)
+    for name in ("gyr", "t"):
+        arrays = {"t": time, "gyr": values, "acc": values}
+        np.savez(tmp_path / "no.npz", **{**arrays, name: arrays[name].astype(complex)})
+        with pytest.raises(ValueError, match=f"array '{name}' must hold real numbers, got dtype complex128"):
+            poise.load_recording(tmp_path / "no.npz")
