@@ -169,8 +169,8 @@ class CompiledEquations:
             if len(stretches) > 1:
                 own = parameters if len(parameters) == 1 else parameters[stretch]
                 size = stretch.stop - stretch.start
-                outputs = self._outputs(model, size, count, 0)
-                self.loops.run(*states, Z[stretch], own, restart, *outputs, self.plan, NOTHING)
+                unused = self._outputs(model, size, count, 0)
+                self.loops.run(*states, Z[stretch], own, restart, *unused, self.plan, NOTHING)
         later = np.zeros((count, e)), np.zeros((count, e, e))
         label = "the filters' smoother"
         for stretch, start in zip(reversed(stretches), reversed(starts), strict=True):
