@@ -40,6 +40,12 @@ TRUNK_STIFFNESS, TRUNK_DAMPING = 900.0, 90.0
 """N·m/rad and N·m·s/rad of the lumbar joint's muscles"""
 SWIVEL_STIFFNESS, SWIVEL_DAMPING = 60.0, 2.0
 """N·m/rad, N·m·s/rad: hold elbows and knees in their plane"""
+ABDUCTION, ROTATION = 0.6, 0.9
+"""rad: beyond these the ligaments of a hip resist, so that a knee never passes behind it"""
+LIGAMENT, LIGAMENT_DAMPING = 300.0, 8.0
+"""N·m/rad, N·m·s/rad: by which they do"""
+ARMS = 2
+"""limbs before the legs"""
 HEAVIEST = 3.0
 """1: weight of a lumped rider's legs on the pedals over a bump at most, in parts of that at rest"""
 RESTING = -1e-6
@@ -237,6 +243,16 @@ def tense(numbers, arrays, steer, crank, state, links, memory):  # type: ignore[
 
 
 @jit
+def ligament(angle, rate, limit):  # type: ignore[no-untyped-def]
+    """Torque of a joint's ligaments, N·m: zero within ± the limit (rad), never one that pulls outwards."""
+    beyond = angle - max(-limit, min(limit, angle))
+    if beyond == 0.0:
+        return 0.0
+    torque = -LIGAMENT * beyond - LIGAMENT_DAMPING * rate
+    return min(0.0, torque) if beyond > 0.0 else max(0.0, torque)
+
+
+@jit
 def act(numbers, tree, state, frames, links, holds, memory, forces):  # type: ignore[no-untyped-def]
     """Add what rider and saddle do in the next physics step to the generalised forces.
 
@@ -268,6 +284,10 @@ def act(numbers, tree, state, frames, links, holds, memory, forces):  # type: ig
         joint = 4 + 4 * limb
         angle, rate = state[first + links[3 + joint]], state[rates + links[3 + joint]]
         applied[joint] += SWIVEL_STIFFNESS * (memory[SWIVEL][limb] - angle) - SWIVEL_DAMPING * rate
+        if limb >= ARMS:
+            turned, turning = state[first + links[4 + joint]], state[rates + links[4 + joint]]
+            applied[joint] += ligament(angle, rate, ABDUCTION)
+            applied[joint + 1] += ligament(turned, turning, ROTATION)
     forwards, rightwards, force = press(seat, pitch, pitching, roll, rolling, rise, rising)
     if joints == 3:
         # saddle and pedals share the weight of rigid legs, also over a bump

@@ -67,7 +67,7 @@ class ConsistentWholeBody(WholeBody):
     swivel_time: float = 3.0
     """s: correlation time of the offsets of C3 and C7; others are constant"""
     bicycle_gyroscope_noise: float = 0.06
-    """rad/s/√Hz; it stands for its biases across the bicycle too, which are no states"""
+    """rad/s/√Hz; it stands for its biases across the bicycle too, which are not states"""
     trunk_gyroscope_noise: float = 0.05
     """rad/s/√Hz"""
     limb_gyroscope_noise: float = 0.02

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from poise.baselines.learned.head import AngleHead
 from poise.baselines.learned.inputs.filter_features import FilterFeatures
-from poise.baselines.learned.rides import ride_data
+from poise.baselines.learned.presets import RIDES, seeds_of
+from poise.baselines.learned.rides import UNSEEN, ride_data
 from poise.envs import episodes
 from poise.envs.recipes.rides import RideSource, drawn, held_out, ride
 from poise.filters.registry import make
@@ -64,3 +66,13 @@ def test_what_cannot_be_is_refused() -> None:
         RideSource(0)
     with pytest.raises(ValueError, match="draws must be at least 1"):
         RideSource(3, 0)
+
+
+def test_no_knee_turns_behind_its_hip() -> None:
+    """An unsteady rider of a heavy bicycle, whose legs would turn around between hip and pedal without ligaments."""
+    source = replace(RIDES, rides=3, draws=1)
+    ride = drawn(held_out(source, **UNSEEN["aggressive riders"]), seeds_of(0)[3] + 2, 2)[0]
+    for side in ("left", "right"):
+        abducted, rotated = np.degrees(ride.truth[f"hip_{side}/angles"][:, 1:]).T
+        assert np.abs(abducted).max() < 50.0
+        assert np.abs(rotated).max() < 70.0

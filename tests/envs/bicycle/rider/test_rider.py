@@ -14,6 +14,7 @@ from poise.envs.bicycle.ride.contact_forces import Contact, LoadCells, contact, 
 from poise.envs.bicycle.ride.ride import Ride
 from poise.envs.bicycle.rider.anthropometry import MEN, SUBJECTS, WOMEN, RiderBody, random_body, rider_body
 from poise.envs.bicycle.rider.limbs import Limb, forward, reach_to, three_angles, three_turns, tip_torques
+from poise.envs.bicycle.rider.muscles import LIGAMENT, ligament
 from poise.envs.bicycle.rider.posture import ARM_REACH, LEG_REACH, sit
 from poise.envs.bicycle.rider.style import STYLES, RiderMotion, RiderStyle, rider_style
 from poise.filters.core import rotation
@@ -267,3 +268,11 @@ def test_two_minutes_with_every_subject(subject, fidelity):
 def test_impossible_riders_are_refused(make, message):
     with pytest.raises(ValueError, match=message):
         make()
+
+
+def test_ligaments_resist_beyond_their_range_and_never_pull_outwards():
+    assert ligament(0.5, 3.0, 0.6) == ligament(-0.6, -3.0, 0.6) == 0.0
+    assert ligament(0.7, 0.0, 0.6) == pytest.approx(-0.1 * LIGAMENT)
+    assert ligament(-0.7, 0.0, 0.6) == pytest.approx(0.1 * LIGAMENT)
+    assert ligament(0.7, -100.0, 0.6) == 0.0
+    assert ligament(0.7, 1.0, 0.6) < ligament(0.7, 0.0, 0.6)
