@@ -57,8 +57,7 @@ class RestingBoundedMotion(BoundedMotion):
     rest_deviation: float = math.radians(0.05)
     """σ_D, rad/s: between the bias at rest and that in motion"""
     bias_prior: float = math.radians(1.5)
-    """rad/s; wider priors find large biases sooner and cost accuracy where the bias is small: simulated gestures, with
-    0.2 °/s, have 0.98 to 1.01 of the error that bounded-motion's prior gives, episodes of hand recipes 0.97"""
+    """rad/s; a wider prior finds a large bias sooner and costs accuracy where the bias is small"""
 
     state_size: ClassVar[int] = 22
     residual_size: ClassVar[int] = 6
