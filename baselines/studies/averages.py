@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
+
+from ...filters.support.rows import cell
 
 
 def windowed(
@@ -59,3 +61,19 @@ def rounded(row: Mapping[str, float], digits: int = 2) -> dict[str, float]:
 def mean_rms(results: Iterable[Mapping[str, Any]], method: str, window: str = "settled") -> dict[str, float]:
     """Angle → mean over rides of a method's RMS error, deg."""
     return mean_of(each["rms"][method][window] for each in results)
+
+
+def leading(printed: str) -> float:
+    """Mean of a printed ``mean ± deviation``."""
+    return float(printed.replace("±", " ").split()[0])
+
+
+def interval_of_mean(values: Sequence[float]) -> str:
+    """Mean and its 95 % interval by Student's t, as text; a single value has no interval."""
+    from scipy.stats import t
+
+    found = np.asarray([value for value in values if np.isfinite(value)])
+    if len(found) < 2:
+        return cell(float(found.mean()), 2) if len(found) else "–"
+    mean, half = float(found.mean()), float(t.ppf(0.975, len(found) - 1) * found.std(ddof=1) / np.sqrt(len(found)))
+    return f"{cell(mean, 2)} ({cell(max(0.0, mean - half), 2)} … {cell(mean + half, 2)})"

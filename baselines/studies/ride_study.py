@@ -16,9 +16,8 @@ from ...filters.core.consistency import nees
 from ...filters.core.kalman import KalmanFilter
 from ...filters.core.observer import Observer
 from ...filters.core.quantity import Estimate
-from ...filters.support.rows import cell
 from ..evaluation import COLUMNS
-from .averages import circular_mean, largest, mean_of, mean_rms, rounded, windowed
+from .averages import circular_mean, interval_of_mean, largest, leading, mean_of, mean_rms, rounded, windowed
 from .claims import Claim
 from .kit import RideJob, Study, load_ride
 from .report import STD, Report
@@ -383,22 +382,6 @@ SKILL = (
     "*Posterior bound*: {bound}. *NEES*: of the angle alone, 1 if the covariance is right; mean over rides, with the "
     "95 % interval of that mean by the spread between rides, since errors within a ride are correlated."
 )
-
-
-def leading(printed: str) -> float:
-    """Mean of a printed ``mean ± deviation``."""
-    return float(printed.replace("±", " ").split()[0])
-
-
-def interval_of_mean(values: Sequence[float]) -> str:
-    """Mean and its 95 % interval by Student's t, as text; a single value has no interval."""
-    from scipy.stats import t
-
-    found = np.asarray([value for value in values if np.isfinite(value)])
-    if len(found) < 2:
-        return cell(float(found.mean()), 2) if len(found) else "–"
-    mean, half = float(found.mean()), float(t.ppf(0.975, len(found) - 1) * found.std(ddof=1) / np.sqrt(len(found)))
-    return f"{cell(mean, 2)} ({cell(max(0.0, mean - half), 2)} … {cell(mean + half, 2)})"
 
 
 def _settled(ride: Trajectory) -> np.ndarray:

@@ -23,11 +23,11 @@ from ....filters.core.consistency import nees
 from ....filters.core.estimator import run
 from ....filters.core.kalman import KalmanFilter
 from ...plots import TRUTH_COLOR, legend_above, new_figure
+from ..averages import interval_of_mean
 from ..claims import Claim
 from ..kit import Study
 from ..report import OVER_MOTIONS, Report
 from ..ride_figures import DRAWN
-from ..ride_study import interval_of_mean
 from .rate_table import TABLE_4_2
 from .spatial import (
     DURATION,

@@ -16,9 +16,10 @@ from ....filters.core.metrics import DEGREES, direction_error
 from ....filters.core.rotation import normalize
 from ....filters.imu.external_acceleration import ExternalAcceleration
 from ...registry import make_estimator
+from ..averages import interval_of_mean
 from ..claims import Claim
 from ..report import Report
-from ..ride_study import MEAN, STRAPDOWN, ZERO, interval_of_mean
+from ..ride_study import MEAN, STRAPDOWN, ZERO
 from .simulation import MODES, RATE, SENSORS, TESTS, Trial, estimate, simulate
 
 BOUND = "posterior bound"

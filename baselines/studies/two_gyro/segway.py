@@ -17,12 +17,12 @@ from ....filters.core.consistency import nees
 from ....filters.core.kalman import KalmanFilter
 from ....filters.core.rotation import wrap
 from ...plots import TRUTH_COLOR, legend_above, new_figure
-from ..averages import mean_of, rms, rounded
+from ..averages import interval_of_mean, mean_of, rms, rounded
 from ..claims import Claim
 from ..kit import Study
 from ..report import Report
 from ..ride_figures import DRAWN, with_band
-from ..ride_study import MEAN, ZERO, interval_of_mean
+from ..ride_study import MEAN, ZERO
 from ..signals import DEG, Waves
 from .motion import MOTIONS, NOTHING, Errors, Motion, filter_of, simulate
 

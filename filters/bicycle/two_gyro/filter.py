@@ -15,8 +15,7 @@ A sample is the mean rate of the interval that it ends, so the sample of k propa
 
 Errata and differences: the paper uses the sample of k−1; (26) has Â₃₃ and D̂₄₃ instead of D̂₃₂ and D̂₄₂; the second
 variance of the platform's biases in (25) is that of z; Q is T² C, and (27) lacks the power of T. Σ2 is exact only
-without pitch, not "without any approximation". The paper gives neither noises nor T nor a prior. The pseudo-measurement
-of :mod:`.platform_gyro` needs only the platform's gyroscope.
+without pitch, not "without any approximation". The paper gives neither noises nor T nor a prior.
 """
 
 from __future__ import annotations

@@ -132,7 +132,7 @@ class ConsistentWholeBody(WholeBody):
         lasting = x[..., PUBLISHED:]
         now = self._unbiased(lasting, z)
         after, F, Q = super().predict(x, now, self._unbiased(lasting, previous))
-        fade = xp.exp(-dt / expand(self.swivel_time, 1)) + zero
+        fade = xp.exp(zero - dt / expand(self.swivel_time, 1))
         keep = xp.concat([*[1.0 + zero] * CONSTRAINED.start, *[1.0 + zero, 1.0 + zero, fade] * 4], axis=-1)
         arm, leg = (
             [zero, zero, expand(each[2] ** 2, 1) * (1.0 - fade * fade)] for each in (self.arm_offsets, self.leg_offsets)

@@ -17,14 +17,12 @@ with f the specific force that the bicycle's accelerometer gives at the trunk's 
 Differences from the paper: (3) has the wrong sign of gravity and lacks the centripetal acceleration v ϑ̇, without which
 the estimate of φ tends to zero in a turn; (9) holds in a balanced steady turn only. Residuals of C2, C3, C6 and C7 are
 divided by lengths. C7 is about the forward axis (``knee_axis="y"`` is as published). k_T is the trunk's first moment of
-mass about its pivot, and k_S that of the masses fixed between saddle and pivot (:func:`.seat_moments`). Since hands may
-support the trunk's lean, ``seat_share`` is the share that the seat carries. Legs and pedal forces are covered by the
-noise. Q is that of the gyroscopes' noise, which correlates trunk and arms. The correlation of φ, trunk and legs through
-the bicycle's gyroscope is neglected, so that the filter has four decoupled subsystems: {φ, ϑ̈}, {Θ, a_ts, Φ_r, Φ_l},
-{Ψ_r}, {Ψ_l}. A shock (|f| far from g) increases the variances of a_bz, a_t and τ for a while (``shock_guard``).
-
-Yaw and the biases of gyroscopes and accelerometers are not estimated. The model assumes flat ground, no pitch, no side
-slip, a pelvis fixed to the frame, and fixed ankles.
+mass about its pivot, and k_S that of what is fixed between saddle and pivot. ``seat_share`` is the part of the trunk's
+lean that the seat carries, not the hands. Legs and pedal forces are covered by the noise. Q is that of the gyroscopes'
+noise, which correlates trunk and arms. The correlation of φ, trunk and legs through the bicycle's gyroscope is
+neglected, so that four subsystems are decoupled: {φ, ϑ̈}, {Θ, a_ts, Φ_r, Φ_l}, {Ψ_r}, {Ψ_l}. A shock (|f| far from g)
+increases the variances of a_bz, a_t and τ for a while (``shock_guard``). Biases and yaw are not estimated. The model
+assumes flat ground, no pitch, no side slip, a fixed pelvis and fixed ankles.
 """
 
 from __future__ import annotations

@@ -244,7 +244,7 @@ def test_the_command_leaves_weights_that_load(tmp_path: Path, capsys: pytest.Cap
         assert (folder / name).is_file(), name
     arrays, card = load_weights(tmp_path / "mine")
     assert card["command"].startswith("poise train bounded-motion+network --quick --seed 0 --replicate 0 --episodes 4")
-    assert card["test"]["hand-held-prompt"]["bounded-motion+network"]["mean_deg"] > 0.0
+    assert card["test"]["hand-held-varying"]["bounded-motion+network"]["mean_deg"] > 0.0
     assert LearnedEstimator.load(tmp_path / "mine").network.memory_size == 8
     assert main([*words, "--resume", str(folder)]) == 0
     again, _ = load_weights(folder / "bounded-motion_network.safetensors")

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from poise.baselines.studies.averages import mean_of, mean_rms, windowed
+from poise.baselines.studies.averages import interval_of_mean, mean_of, mean_rms, windowed
 from poise.baselines.studies.report import Report
-from poise.baselines.studies.ride_study import MEAN, ZERO, interval_of_mean
+from poise.baselines.studies.ride_study import MEAN, ZERO
 from poise.baselines.studies.two_gyro.motion import MOTIONS, Errors, simulate
 from poise.baselines.studies.two_gyro.rides import RIDES, claims
 from poise.filters.bicycle.two_gyro.truth import true_angles
