@@ -117,30 +117,6 @@ def update_back(H, first, column, K, S, rows, white, vector, information, V, B, 
 
 
 @jit
-def multiply_transposed(A, B, C):  # type: ignore[no-untyped-def]
-    """C ← Aᵀ B of square matrices, four columns at a time."""
-    n = A.shape[0]
-    for i in range(n):
-        j = 0
-        while j + 4 <= n:
-            s0 = s1 = s2 = s3 = 0.0
-            for k in range(n):
-                f = A[k, i]
-                s0 += f * B[k, j]
-                s1 += f * B[k, j + 1]
-                s2 += f * B[k, j + 2]
-                s3 += f * B[k, j + 3]
-            C[i, j], C[i, j + 1], C[i, j + 2], C[i, j + 3] = s0, s1, s2, s3
-            j += 4
-        while j < n:
-            s0 = 0.0
-            for k in range(n):
-                s0 += A[k, i] * B[k, j]
-            C[i, j] = s0
-            j += 1
-
-
-@jit
 def reduce(A, B, row):  # type: ignore[no-untyped-def]
     """A ← A − A B of square matrices, four columns at a time. Scratch: row ``(n,)``."""
     n = A.shape[0]
@@ -189,7 +165,7 @@ def predict_back(F, vector, information, moved, work):  # type: ignore[no-untype
             moved[c] += F[k, c] * vector[k]
     copy(moved, vector)
     multiply(information, e, F, work)
-    multiply_transposed(F, work, information)
+    multiply(F.T, e, work, information)
     symmetric(information)
 
 

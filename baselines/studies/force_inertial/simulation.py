@@ -11,7 +11,7 @@ from ....filters.bicycle.force_inertial.filter import ForceInertial
 from ....filters.core import rotation
 from ....filters.core.kalman import KalmanFilter
 from ....filters.core.metrics import rms
-from ..averages import rounded
+from ..averages import leading, rounded
 from ..claims import Claim
 from ..kit import Study
 from ..report import Report
@@ -210,13 +210,13 @@ def claims(means: dict[tuple[str, str], dict[str, float]], slowest: dict[str, fl
         ),
         Claim.every(
             "indoor: corrected (7), (8) from accelerometers keep every angle within table II",
-            {angle: accelerometers[angle] / float(INDOOR[angle].split()[0]) for angle in ANGLES},
+            {angle: accelerometers[angle] / leading(INDOOR[angle]) for angle in ANGLES},
             1.0,
             "of the published error",
         ),
         Claim.every(
             "indoor: the apparent vertical in (13) keeps every angle within table II",
-            {angle: ours[angle] / float(INDOOR[angle].split()[0]) for angle in ANGLES},
+            {angle: ours[angle] / leading(INDOOR[angle]) for angle in ANGLES},
             1.0,
             "of the published error",
         ),

@@ -12,7 +12,7 @@ from ....filters.bicycle.platform_gyro import PlatformGyro, TwoGyroIntegration
 from ....filters.bicycle.two_gyro.filter import TwoGyro
 from ....filters.bicycle.two_gyro.truth import true_angles
 from ....filters.core.quantity import Estimate
-from ..averages import mean_of, mean_rms
+from ..averages import leading, mean_of, mean_rms
 from ..claims import Claim
 from ..kit import Study
 from ..report import Report
@@ -170,7 +170,7 @@ def claims(results: list[dict[str, Any]]) -> list[Claim]:
     settled = mean_rms(results, "Σ2")["φ"] if long else float("nan")
     late, peak = mean_rms(results, "Σ2", "last 20 s")["φ"], mean_of(each["peak"]["Σ2"] for each in results)["φ"]
     ours, white = (mean_rms(results, name) for name in ("Σ2", WHITE_CAMERA))
-    published = {angle: float(text.split()[0]) for angle, text in TABLE_I.items()}
+    published = {angle: leading(text) for angle, text in TABLE_I.items()}
     own_ratio = max(published[angle] / value for angle, value in EARLIER.items())
 
     def shares(errors: dict[str, float], of: dict[str, float]) -> dict[str, float]:

@@ -18,7 +18,7 @@ from ....filters.bicycle.whole_body.integration import WholeBodyIntegration
 from ....filters.bicycle.whole_body.linkage import SHOULDER, SIDES, TRUNK, true_angles
 from ....filters.core import rotation
 from ....filters.core.quantity import Estimate
-from ..averages import largest, mean_of, mean_rms, windowed
+from ..averages import largest, leading, mean_of, mean_rms, windowed
 from ..claims import Claim
 from ..kit import Study
 from ..report import Report
@@ -259,7 +259,7 @@ def beats_the_constant(every: list[dict[str, Any]], method: str, statement: str)
 
 def published_error(course: str, angle: str) -> float:
     """Mean RMS error of table III, deg."""
-    return float(TABLE_III[course][angle].split("±")[0])
+    return leading(TABLE_III[course][angle])
 
 
 def bump_errors(path: Path) -> dict[str, dict[str, float]]:

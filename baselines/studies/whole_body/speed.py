@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ....envs.data.trajectory import Trajectory
+from ..averages import leading
 from ..claims import Claim
 from ..ride_study import SETTLED
 from .angles import STATES, TABLE_III
@@ -55,7 +56,7 @@ def speed_claims(rows: Mapping[str, Mapping[str, float]]) -> list[Claim]:
     }
     spans = {
         angle: (max(row[angle] for row in rows.values()) - min(row[angle] for row in rows.values()))
-        / float(TABLE_III["outdoor"][angle].split("±")[0])
+        / leading(TABLE_III["outdoor"][angle])
         for angle in STATES
     }
     whole = {name: float(np.sqrt(np.mean([row[angle] ** 2 for angle in STATES]))) for name, row in rows.items()}
