@@ -196,7 +196,7 @@ def test_trajectories(preset: Preset, seed: int, episodes: int) -> list[Trajecto
             trajectories.append(each.replace(metadata={**each.metadata, "name": f"{name}:{index}"}))
     for index, gesture in enumerate(GESTURES):
         hand = HandTrajectories((gesture,), rates=(60.0, 100.0, 200.0), sensors=("paper-hand",), duration=60.0)
-        for number, trajectory in enumerate(hand.draw_many(root + 1 + index, max(1, episodes // 6))):
+        for number, trajectory in enumerate(hand.draw_many(root + 1 + index, max(1, episodes // 4))):
             metadata = {**trajectory.metadata, "name": f"{gesture}:{number}"}
             trajectories.append(trajectory.replace(metadata=metadata))
     return trajectories

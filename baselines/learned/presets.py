@@ -145,16 +145,16 @@ BICYCLE_SITES = {
     "whole-body": ("bicycle_imu", "wheel", "steer", "crank"),
 }
 """Paper → sites of its sensors of which none is worn or held by the rider"""
-HANDS = {"hand-held-prompt": 200, "carried-prompt": 40}
+HANDS = {"hand-held-prompt": 300, "carried-prompt": 80, "gestures-varying": 40}
 PRESETS: dict[str, Preset] = {
-    "gru": Preset("inclination from six axes by a recurrent network alone", HANDS, fit=FitConfig(epochs=6)),
+    "gru": Preset("inclination from six axes by a recurrent network alone", HANDS, fit=FitConfig(epochs=7)),
     "tcn": Preset(
         "inclination from six axes by a causal convolution network alone", HANDS, network="tcn", units=32,
         fit=FitConfig(epochs=6),
     ),
     "bounded-motion+network": Preset(
         "bounded-motion-rest in ten tunings, weighed by a recurrent network",
-        {"hand-held-varying": 200, "carried-varying": 70},
+        {"hand-held-varying": 200, "carried-varying": 70, "gestures-varying": 40},
         filter="bounded-motion-rest",
         bank=True,
         units=48,

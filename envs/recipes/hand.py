@@ -17,6 +17,7 @@ from ...filters.support.ranges import Range, log_uniform
 from ...filters.support.seeds import named_generator
 from ..data.trajectory import Trajectory
 from ..hand.carried import Carried
+from ..hand.gestures import GESTURES, GestureConfig, gesture_config
 from ..hand.hand_held import HandHeld
 from ..sensors.ideal import Mounting, mounted
 from ..sensors.magnetics import MAGNETICS
@@ -50,6 +51,9 @@ class HandRecipe(Recipe):
     carried: Carried = field(default_factory=lambda: Carried(first_rest=(0.3, 20.0), running_share=0.15))
     carried_share: float = 0.25
     """of the episodes in which the device is carried, not moved by the hand alone"""
+    gestures: tuple[str, ...] = ()
+    """names of gestures (:data:`poise.envs.hand.gestures.GESTURES`), of which the hand makes one an episode instead of
+    what ``held`` draws"""
     magnetics: tuple[str, ...] = ()
     """names of magnetic surroundings (:data:`poise.envs.sensors.magnetics.MAGNETICS`), of which an episode has one;
     without any, devices have no magnetometer"""
@@ -57,8 +61,9 @@ class HandRecipe(Recipe):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.magnetics:
-            check_some("magnetics", self.magnetics, tuple(MAGNETICS))
+        for name, known in (("magnetics", tuple(MAGNETICS)), ("gestures", tuple(GESTURES))):
+            if getattr(self, name):
+                check_some(name, getattr(self, name), known)
         if not self.duration * self.rates[0] >= 2.0:
             raise ValueError(f"duration must be two samples at least, got {self.duration} s")
 
@@ -83,7 +88,10 @@ class HandRecipe(Recipe):
         )
         suite.reset(noise)
         carried = setting.random() < self.carried_share
-        gesture = (self.carried if carried else self.held).draw(motion, self.duration)
+        moves: GestureConfig = self.carried if carried else self.held
+        if self.gestures and not carried:
+            moves = gesture_config(chosen(named_generator(setting, "gesture"), self.gestures))
+        gesture = moves.draw(motion, self.duration)
         times = np.arange(1, math.floor(self.duration * rate) + 1) / rate
         states = gesture.sample(times)
         before = gesture.sample(times - 1.0 / rate)

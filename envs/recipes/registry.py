@@ -76,6 +76,11 @@ RECIPES: dict[str, ShippedRecipe] = {
         "carried, by the same sensors",
         {"carried_share": 1.0, "carried": {"first_rest": (0.3, 20.0), "running_share": 0.0}, "sensors": VARYING},
     ),
+    "gestures-varying": ShippedRecipe(
+        "hand",
+        "gestures of poise/HandMotion-v0, slow to severe, by the same sensors",
+        {"carried_share": 0.0, "gestures": ["slow", "fast", "severe", "mixed"], "sensors": VARYING},
+    ),
     "rider": ShippedRecipe("rider", "rides of anybody anywhere with sensors of several grades", {}),
 }
 """Name → recipe."""

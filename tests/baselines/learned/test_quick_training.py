@@ -19,5 +19,5 @@ def test_the_quick_network_of_hands_learns_within_minutes(tmp_path: Path) -> Non
     assert time.process_time() - start < 180.0
     _, card = load_weights(tmp_path / "quick")
     assert card["best_epoch"] >= 1
-    carried = card["test"]["carried-prompt"]
+    carried = card["test"]["carried-varying"]
     assert carried["bounded-motion+network"]["mean_deg"] < 0.95 * carried["bounded-motion"]["mean_deg"]

@@ -60,6 +60,16 @@ def test_drawing_twice_from_one_seed_sequence_gives_the_same() -> None:
     assert_same(SHORT.draw(sequence), SHORT.draw(5))
 
 
+def test_the_hand_makes_gestures_of_the_environment_by_name() -> None:
+    def strength(*gestures: str) -> float:
+        episode = replace(SHORT, duration=30.0, gestures=gestures).episode(3, 0)
+        return float(np.nanstd(np.linalg.norm(episode.measurements["imu/acc"], axis=1)))
+
+    assert strength("severe") > 3.0 * strength("slow")
+    with pytest.raises(ValueError, match=r"gestures must be among .*got 'dance'"):
+        replace(SHORT, gestures=("dance",))
+
+
 def test_a_recipe_is_read_from_its_file(tmp_path: Path) -> None:
     path = save_recipe(SHORT, tmp_path / "mine.json")
     assert recipe(path) == SHORT
