@@ -31,6 +31,13 @@ RULED = {
 """Filter → rules that set one of its gains."""
 POLICIES = ("external-acceleration", "two-gyro-level")
 """Filters with a shipped policy."""
+WEIGHTS = ".safetensors"
+"""End of a name that is a file of weights."""
+NETWORKS = {
+    "LearnedEstimator": "..baselines.learned.estimator:shipped",
+    "GainFilter": "..baselines.learned.gains.gain_filter:shipped",
+}
+"""Class on the card of a network → what makes it of its weights."""
 LOSING = frozenset({"mekf+innovation", "mekf+acceleration", "external-acceleration+noise", "two-gyro-level+policy"})
 """Rules and networks that lose to the plain filter on most sets of recordings, and a policy that loses to a rule."""
 TRAINED: dict[str, Entry] = {
@@ -60,14 +67,14 @@ TRAINED: dict[str, Entry] = {
         for rule in rules
     },
     "gru": Entry(
-        "..baselines.learned.estimator:shipped",
+        NETWORKS["LearnedEstimator"],
         "recurrent network, trained on simulated hand motion",
         HERE,
         "learned",
         {"weights": "gru"},
     ),
     "bounded-motion+network": Entry(
-        "..baselines.learned.estimator:shipped",
+        NETWORKS["LearnedEstimator"],
         "bounded-motion-rest in ten tunings, weighed by a recurrent network trained on simulated motion",
         HERE,
         "learned",
@@ -75,7 +82,7 @@ TRAINED: dict[str, Entry] = {
     ),
     **{
         f"{name}+network": Entry(
-            "..baselines.learned.estimator:shipped",
+            NETWORKS["LearnedEstimator"],
             f"{name}, its angles corrected by a recurrent network trained on simulated rides",
             HERE,
             "learned",
@@ -85,7 +92,7 @@ TRAINED: dict[str, Entry] = {
     },
     **{
         f"gru-{name}": Entry(
-            "..baselines.learned.estimator:shipped",
+            NETWORKS["LearnedEstimator"],
             f"angles of {name} from its sensors by a recurrent network alone, trained on simulated rides",
             HERE,
             "learned",
@@ -95,7 +102,7 @@ TRAINED: dict[str, Entry] = {
     },
     **{
         f"gru-{name}-bicycle": Entry(
-            "..baselines.learned.estimator:shipped",
+            NETWORKS["LearnedEstimator"],
             f"the same from sensors of the bicycle alone: what a rider's habits tell, to compare with gru-{name}",
             HERE,
             "learned",
@@ -106,7 +113,7 @@ TRAINED: dict[str, Entry] = {
     },
     **{
         f"{name}+noise": Entry(
-            "..baselines.learned.gains.gain_filter:shipped",
+            NETWORKS["GainFilter"],
             f"{name}, its noises set by a recurrent network that was trained through the filter",
             HERE,
             "learned",
@@ -172,7 +179,8 @@ def make_estimator(name: str, *, metadata: Mapping[str, Any] | None = None, **pa
     """Make an estimator.
 
     Args:
-        name: see :func:`list_estimators`; the suffix `` (offline)`` selects the estimator's smoother.
+        name: see :func:`list_estimators`, or a file of weights that ``poise train`` wrote (``….safetensors``); the
+            suffix `` (offline)`` selects the estimator's smoother.
         metadata: of the recording (``trajectory.metadata``): filters are configured with the rider's anthropometry, the
             bicycle's geometry or the device's array described there.
         parameters: ``dt``, the sampling interval in s (0.01 by default), and constants of the method, by the names of
@@ -186,8 +194,24 @@ def make_estimator(name: str, *, metadata: Mapping[str, Any] | None = None, **pa
         ValueError: an unknown name or parameter (the message lists the valid ones), or a value out of its range.
         ImportError: the package that an external estimator wraps is not installed.
     """
-    known = {**FILTERS, **TRAINED}
     if isinstance(name, str) and name.endswith(SUFFIX):
-        name = name.removesuffix(SUFFIX)
-        return Offline(look_up("estimator", name, known).make(name, parameters, metadata))
-    return look_up("estimator", name, known).make(name, parameters, metadata)
+        return Offline(make_estimator(name.removesuffix(SUFFIX), metadata=metadata, **parameters))
+    if isinstance(name, str) and name.endswith(WEIGHTS):
+        return of_weights(name).make(name, parameters, metadata)
+    return look_up("estimator", name, {**FILTERS, **TRAINED}).make(name, parameters, metadata)
+
+
+def of_weights(path: str) -> Entry:
+    """The estimator that the card of a file of weights describes.
+
+    Raises:
+        FileNotFoundError: there is no such file.
+        ValueError: it is damaged, or holds weights of something else than a network of ``poise train``.
+    """
+    from .weights_io import load_weights
+
+    card = load_weights(path)[1]
+    kind = str(card.get("estimator", "")).rpartition(".")[2]
+    if kind not in NETWORKS:
+        raise ValueError(f"{path}: its card describes no estimator of `poise train`, but {card.get('kind', kind)!r}")
+    return Entry(NETWORKS[kind], str(card.get("description", "")), HERE, "learned", {"weights": path})

@@ -40,7 +40,7 @@ class Args:
     recordings: tuple[Path, ...] = ()
     """recordings, or folders of them, to compare on as well"""
     estimators: tuple[str, ...] = ()
-    """names of estimators (default: all that are installed, except some slow loops)"""
+    """names of estimators, or files of trained weights (default: all that are installed, except some slow loops)"""
     reference: str = "auto"
     """replacement of a missing truth (agreement, not error), see `poise evaluate --help`"""
     offline: bool = False

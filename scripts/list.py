@@ -12,22 +12,29 @@ import textwrap
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import tyro
 
-from ..filters.core.offline import SUFFIX
 from ..filters.support.optional import MissingExtraError
 from ..filters.support.rows import markdown_table
 from .main import run_command
 from .output import PIPE_WIDTH, Output
+from .pages.measured import (
+    Rows,
+    benchmark,
+    benchmark_best,
+    benchmark_heading,
+    benchmark_limits,
+    learned,
+    riders,
+    riders_best,
+    riders_bound,
+    riders_consistency,
+)
 
-Rows = list[dict[str, Any]]
 BEGIN, END = "<!-- list: {} -->", "<!-- end of list -->"
 PLACED = re.compile(r"<!-- list: ([a-z-]+) -->\n.*?<!-- end of list -->", re.DOTALL)
 """A list in a page, with its name."""
-BEST = 12
-"""Rows of the short table of errors."""
 TITLE_WIDTH = 14
 """Characters of the column of titles in the overview."""
 
@@ -42,80 +49,13 @@ class Args:
     """print the tables in Markdown, as the documentation has them; all if none is named"""
     update: tuple[Path, ...] = ()
     """pages whose lists are updated, for instance `poise list --update docs/*.md`"""
+    weights: tuple[Path, ...] = ()
+    """files of trained weights, or folders that are searched for them, for the list `learned` instead of the shipped
+    ones; several trainings of one preset stand in one row"""
     environments: Path | None = None
     """folder in which the page of every environment is written anew, for instance docs/environments"""
     json: bool = False
     """print one JSON document instead of tables; of all lists if none is named"""
-
-
-def benchmark(metric: str = "inclination") -> Rows:
-    """Every estimator's mean error on every data set of the shipped benchmark, deg."""
-    from ..baselines.comparison.recommendation import dataset_errors, load_results
-
-    recordings = load_results()["recordings"]
-    names = list(dict.fromkeys(one["dataset"] for one in recordings))
-    means = dataset_errors(recordings, metric)
-    shown = [name for name in names if any(name in errors for errors in means.values())]
-    return [{"name": name, **{each: errors.get(each) for each in shown}} for name, errors in means.items()]
-
-
-def benchmark_best() -> Rows:
-    """The first rows of :func:`benchmark` that have an error on every data set."""
-    return [row for row in benchmark() if None not in row.values()][:BEST]
-
-
-def benchmark_heading() -> Rows:
-    """The same for the heading, on data sets whose reference knows north."""
-    return benchmark("heading")
-
-
-def benchmark_limits() -> Rows:
-    """Where every estimator that runs online is nearest to the best of these, and where it falls behind most."""
-    rows = [row for row in benchmark() if not row["name"].endswith(SUFFIX)]
-    sets = [name for name in rows[0] if name != "name"]
-    best = {each: min(row[each] for row in rows if row.get(each) is not None) for each in sets}
-    found = []
-    for row in rows:
-        ratios = {each: row[each] / best[each] for each in sets if row.get(each) is not None}
-        holds, fails = min(ratios, key=lambda each: ratios[each]), max(ratios, key=lambda each: ratios[each])
-        found.append(
-            {
-                "name": row["name"],
-                "holds best on": f"{holds} ({row[holds]:.2f}°, {ratios[holds]:.1f} × the best)",
-                "falls behind most on": f"{fails} ({row[fails]:.2f}°, {ratios[fails]:.1f} × the best)",
-            }
-        )
-    return found
-
-
-def riders(table: str = "error") -> Rows:
-    """Errors of the shipped benchmark's riders, deg: mean over the paper's angles [95 % interval over riders]."""
-    from ..baselines.comparison.recommendation import load_results
-    from ..baselines.comparison.rider_tables import by_group
-
-    numbers = load_results().get("riders", [])
-    papers = dict.fromkeys(each["paper"] for each in numbers)
-    return [
-        {"name": cells.pop("method"), "sensors of": paper, **cells}
-        for paper in papers
-        for cells in by_group(numbers, paper, table)
-    ]
-
-
-def riders_best() -> Rows:
-    """The mean errors of what is told apart most easily: the mean, the filter of each paper, and its networks."""
-    kept = ("always the mean", "{}", "{}-consistent", "{}+network", "gru-{}")
-    return [row for row in riders("mean") if row["name"] in [name.format(row["sensors of"]) for name in kept]]
-
-
-def riders_consistency() -> Rows:
-    """Mean NEES of an angle, and share of the errors inside the stated 90 %, of the same."""
-    return riders("consistency")
-
-
-def riders_bound() -> Rows:
-    """The same errors in multiples of the posterior bound of the published filter's model."""
-    return riders("bound")
 
 
 def run(args: Args) -> int:
@@ -139,7 +79,7 @@ def run(args: Args) -> int:
             if args.markdown and not args.json:
                 out.say(f"{placed(name)}\n")
             else:
-                found = rows()
+                found = learned(args.weights) if name == "learned" else rows()
                 shown = [key for row in found[:1] for key in row if key not in ("channels", "outputs", "source")]
                 out.rows(found, name)
                 out.show(found, name, shown)
@@ -329,21 +269,6 @@ def presets() -> Rows:
     from ..baselines.learned.gains.presets import all_presets
 
     return [{"name": name, "description": each.summary} for name, each in all_presets().items()]
-
-
-def learned() -> Rows:
-    """Every shipped network of a preset: its error on simulated episodes that it never saw, deg, from its card."""
-    from ..baselines.weights_io import list_weights, load_weights
-
-    rows: Rows = []
-    for weights in list_weights():
-        card = load_weights(weights)[1]
-        for group, errors in card.get("test", {}).items():
-            others = {name: each for name, each in errors.items() if name != card["name"]}
-            best = min(others, key=lambda name: float(others[name]["mean_deg"]))
-            row = {"name": card["name"], "episodes": group, "error": f"{errors[card['name']]['mean_deg']:.2f}"}
-            rows.append({**row, "best other": f"{best} {others[best]['mean_deg']:.2f}"})
-    return rows
 
 
 def formats() -> Rows:

@@ -20,7 +20,8 @@ class Args:
     recordings: tyro.conf.Positional[tuple[Path, ...]]
     """files, or folders that are searched for recordings"""
     estimators: tuple[str, ...] = ("bounded-motion", "external-acceleration", "mekf", "mahony", "gru")
-    """names of estimators; `poise evaluate --estimators all .` takes every one that is installed"""
+    """names of estimators, or files of weights of `poise train`; `poise evaluate --estimators all .` takes all that
+    are installed"""
     reference: str = "auto"
     """replacement of a missing truth (agreement, not error): an estimator, `onboard` for the
     orientation that the device computed, or `auto`: mekf-9, or bounded-motion where there is no magnetometer"""

@@ -7,6 +7,7 @@ import pytest
 
 import poise
 from poise.baselines.registry import KINDS
+from poise.baselines.weights_io import WEIGHTS
 from poise.filters.core.estimator import Estimator
 
 
@@ -64,3 +65,16 @@ def test_the_public_face_is_light_to_import():
 def test_every_public_name_can_be_had():
     for name in poise.__all__:
         assert getattr(poise, name) is not None
+
+
+def test_a_file_of_weights_is_an_estimator_by_its_path():
+    for weights, name in (("gru", "gru"), ("mekf_noise", "mekf+noise")):
+        made = poise.make_estimator(str(WEIGHTS / f"{weights}.safetensors"), dt=0.02)
+        named = poise.make_estimator(name, dt=0.02)
+        assert type(made) is type(named)
+        assert made.outputs == named.outputs
+        assert made.dt == 0.02
+    with pytest.raises(FileNotFoundError, match=r"no weights 'nothing\.safetensors'"):
+        poise.make_estimator("nothing.safetensors")
+    with pytest.raises(ValueError, match="describes no estimator of `poise train`, but 'gain policy'"):
+        poise.make_estimator(str(WEIGHTS / "external_acceleration_policy.safetensors"))

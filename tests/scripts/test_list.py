@@ -2,9 +2,11 @@
 
 import json
 
+import numpy as np
 import pytest
 
 import poise
+from poise.baselines.weights_io import save_weights
 from poise.scripts.list import LISTS, first_sentence, short, updated
 from poise.scripts.main import main
 
@@ -48,6 +50,21 @@ def test_a_page_is_written_anew(tmp_path, capsys):
     assert updated(text) == text
     assert main(["list", "scenarios", "--markdown"]) == 0
     assert capsys.readouterr().out.strip() in text
+
+
+def test_trainings_of_one_preset_stand_in_one_row(tmp_path, capsys):
+    for replicate, error in ((1, 1.25), (0, 1.5)):
+        means = {"mine": {"mean_deg": error}, "mekf": {"mean_deg": 2.0}}
+        card = {"name": "mine", "command": f"poise train mine --replicate {replicate}", "test": {"slow": means}}
+        save_weights(tmp_path / f"run-{replicate}" / "mine", {"bias": np.zeros(1)}, card)
+    assert main(["list", "learned", "--weights", str(tmp_path), "--json"]) == 0
+    (row,) = json.loads(capsys.readouterr().out)["rows"]
+    assert (row["name"], row["episodes"], row["error"], row["best other"]) == (
+        "mine",
+        "slow",
+        "1.50, 1.25",
+        "mekf 2.00",
+    )
 
 
 def test_unknown_lists_are_refused(capsys):
