@@ -93,5 +93,9 @@ def rider_sweeps(settings: RiderSuite, args: Any, folder: Run, out: Output) -> d
             title = f"{paper}: {sweep.label}; mean over angles and riders, RMS in deg"
             out.table(table, title)
             sections[title] = markdown_table(table)
+        title = f"{paper}: each angle where geometry is told exactly; mean over riders, RMS in deg"
+        table = sweeps.angle_rows(points, paper, "geometry", 0.0)
+        out.table(table, title)
+        sections[title] = markdown_table(table)
     out.say(f"figure: {sweeps.draw_sweeps(points, folder.figures / 'sweeps.png')}")
     return sections

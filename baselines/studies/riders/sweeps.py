@@ -19,7 +19,7 @@ from ...learned.presets import seeds_of
 from ...plots import new_figure, save
 from ...registry import make_estimator
 from .errors import errors_of, score
-from .suite import RiderSuite, estimators_of, scored_samples, training_rides
+from .suite import RiderSuite, estimators_of, names_of, scored_samples, training_rides
 
 BURST = 0.2
 """s: mean length of a gap"""
@@ -118,15 +118,20 @@ SWEEPS: Mapping[str, Sweep] = {
 
 @dataclass(frozen=True)
 class Point:
-    """Mean error of an estimator under one condition on one ride."""
+    """Errors of an estimator under one condition on one ride."""
 
     sweep: str
     value: float
     paper: str
     estimator: str
     ride: int
-    error: float
-    """deg, mean over the angles; NaN where the estimator refuses the data"""
+    angles: tuple[float, ...]
+    """deg, root mean square error of each"""
+
+    @property
+    def error(self) -> float:
+        """Mean over the angles, deg."""
+        return float(np.mean(self.angles))
 
 
 def ride_points(settings: RiderSuite, index: int) -> list[Point]:
@@ -143,15 +148,15 @@ def ride_points(settings: RiderSuite, index: int) -> list[Point]:
             drawn = drawn.replace(mask=drawn.time > SETTLED)
             for paper in settings.papers:
                 for label in estimators_of(paper):
-                    error = mean_error(label, drawn)
-                    points.append(Point(name, value, paper, label, index, error))
+                    points.append(Point(name, value, paper, label, index, angle_errors(label, drawn)))
     return points
 
 
-def mean_error(name: str, drawn: Trajectory) -> float:
-    """Mean over a paper's angles of the root mean square error, deg."""
+def angle_errors(name: str, drawn: Trajectory) -> tuple[float, ...]:
+    """Root mean square error of each of a paper's angles, deg."""
     made: Any = make_estimator(name, dt=drawn.dt, metadata=drawn.metadata)
-    return score(errors_of(made, drawn, made.run(drawn.measurements), scored_samples(drawn))).mean
+    found = score(errors_of(made, drawn, made.run(drawn.measurements), scored_samples(drawn)))
+    return tuple(float(angle) for angle in found.angles)
 
 
 def sweep_points(settings: RiderSuite, *, processes: int = 1, progress: bool = False) -> Iterator[list[Point]]:
@@ -203,3 +208,16 @@ def sweep_table(points: list[Point], paper: str, sweep: str) -> list[dict[str, A
             cells[f"{value:g}"] = round(float(np.mean(found)), 2)
         rows.append(cells)
     return rows
+
+
+def angle_rows(points: list[Point], paper: str, sweep: str, value: float) -> list[dict[str, Any]]:
+    """Angle × estimator under one condition: mean over rides, deg."""
+    here = [p for p in points if (p.paper, p.sweep, p.value) == (paper, sweep, value)]
+    means = {
+        label: np.mean([p.angles for p in here if p.estimator == label], axis=0)
+        for label in dict.fromkeys(p.estimator for p in here)
+    }
+    return [
+        {"angle": name, **{label: round(float(mean[index]), 2) for label, mean in means.items()}}
+        for index, name in enumerate(names_of(paper))
+    ]

@@ -164,3 +164,15 @@ def test_the_comparison_of_one_paper(monkeypatch: pytest.MonkeyPatch, tmp_path: 
     quick = suite.compare(replace(settings, training=0), tmp_path)
     assert {row.method for row in quick} < {row.method for row in rows}
     assert suite.MEAN not in {row.method for row in quick}
+
+
+def test_each_angle_has_a_row_under_one_condition() -> None:
+    points = [
+        sweeps.Point("geometry", value, "two-gyro", "two-gyro", ride, (1.0 + ride, 2.0, 3.0, 4.0))
+        for value in sweeps.SWEEPS["geometry"].values
+        for ride in (0, 1)
+    ]
+    rows = sweeps.angle_rows(points, "two-gyro", "geometry", 0.0)
+    assert [row["two-gyro"] for row in rows] == [1.5, 2.0, 3.0, 4.0]
+    assert [row["angle"] for row in rows] == suite.names_of("two-gyro")
+    assert sweeps.sweep_table(points, "two-gyro", "geometry")[0]["1"] == 2.62
