@@ -8,7 +8,6 @@ from typing import Annotated
 
 import tyro
 
-from .main import run_command
 from .output import Output
 
 
@@ -52,7 +51,3 @@ def run(args: Args) -> int:
         if array.redundancy == 0:
             out.say("No redundancy: the fault of an accelerometer looks like motion.")
     return 0
-
-
-if __name__ == "__main__":
-    run_command("array")

@@ -7,7 +7,6 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from .main import run_command
 from .output import Output
 from .targets import check_file
 
@@ -315,7 +314,3 @@ def write_page(suites: dict[str, Results], tables: dict[str, list[dict[str, Any]
         out.say(f"no page for a browser: {reason}")
         return
     out.say(f"page for a browser: {write_text(folder.folder / 'report.html', page)}")
-
-
-if __name__ == "__main__":
-    run_command("benchmark")

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import tyro
 
-from .main import run_command
 from .output import Output
 from .targets import check_file
 
@@ -34,7 +33,3 @@ def run(args: Args) -> int:
         out.say(f"{path}: {path.stat().st_size / 1000.0:.0f} kB")
         out.add(file=str(path))
     return 0
-
-
-if __name__ == "__main__":
-    run_command("export")

@@ -17,7 +17,6 @@ import tyro
 
 from ..filters.support.optional import MissingExtraError
 from ..filters.support.rows import markdown_table
-from .main import run_command
 from .output import PIPE_WIDTH, Output
 from .pages.measured import (
     Rows,
@@ -316,7 +315,3 @@ def short(names: Iterable[str]) -> str:
     """Names on one line; ``imu/`` is understood, and both sides of a body are one name."""
     seen = [re.sub(r"_(left|right)(?=/)", "_{left,right}", name.removeprefix("imu/")) for name in names]
     return ", ".join(dict.fromkeys(seen))
-
-
-if __name__ == "__main__":
-    run_command("list")

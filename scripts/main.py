@@ -16,7 +16,7 @@ import os
 import re
 import sys
 from collections.abc import Sequence
-from typing import NamedTuple, NoReturn
+from typing import NamedTuple
 
 from gymnasium.error import UnregisteredEnv
 
@@ -181,11 +181,6 @@ def unboxed(complaint: str) -> str:
     return re.sub(
         r"\.? For full helptext, (?:run|see):?", "; see", " ".join(content[1:] if len(content) > 1 else content)
     )
-
-
-def run_command(name: str) -> NoReturn:
-    """Leave the process through the subcommand ``name``; serves ``python -m poise.scripts.<name>``."""
-    sys.exit(main([name, *sys.argv[1:]]))
 
 
 def usage() -> str:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from .main import run_command
 from .reproduce import studying
 
 
@@ -47,7 +46,3 @@ def run(args: Args) -> int:
     with studying("realism", args, settings, "poise realism", 200) as (study, _, report):
         work.realism(study, report, amounts, groups, args.parts)
     return 0
-
-
-if __name__ == "__main__":
-    run_command("realism")

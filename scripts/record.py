@@ -14,7 +14,6 @@ import tyro
 
 from ..filters.support.names import look_up
 from ..filters.support.parallel import progress_bar
-from .main import run_command
 from .output import Output
 from .targets import check_folder
 
@@ -154,7 +153,3 @@ def recorder(args: Args) -> tuple[Callable[..., list[Path]], str]:
     # once, here, where a wrong option is explained in one line
     make_environment(env_id, **options).close()
     return partial(record_episodes, env_id, options=options), env_id
-
-
-if __name__ == "__main__":
-    run_command("record")

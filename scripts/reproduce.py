@@ -21,7 +21,6 @@ from typing import TYPE_CHECKING, Any
 import tyro
 
 from .experiment import Run, command_line, open_run, write_json
-from .main import run_command
 from .output import Output
 from .targets import check_file
 
@@ -314,7 +313,3 @@ def write(title: str, folder: Run, report: Report) -> Path:
             parts.append(entry.text)
     parts.append(f"## Provenance\n\n{provenance(folder)}")
     return write_text(folder.folder / "report.md", "\n\n".join(parts) + "\n")
-
-
-if __name__ == "__main__":
-    run_command("reproduce")

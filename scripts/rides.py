@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from .main import run_command
 from .reproduce import studying
 
 
@@ -56,7 +55,3 @@ def run(args: Args) -> int:
         upright = sum(each["upright"] for each in found)
         out.say(f"{upright} of {len(found)} rides upright")
     return 0 if upright == len(found) else 1
-
-
-if __name__ == "__main__":
-    run_command("rides")

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 from typing import Literal
 
-from .main import run_command
 from .output import Output
 
 
@@ -48,7 +47,3 @@ def run(args: Args) -> int:
                 out.rows(table)
                 out.show(table, group, columns=("what", "rate", "unit", "ratio"))
     return 0
-
-
-if __name__ == "__main__":
-    run_command("speed")

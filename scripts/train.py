@@ -13,7 +13,6 @@ import tyro
 
 from ..filters.support.rows import jsonable
 from .experiment import command_line, known_recordings, open_run, versions
-from .main import run_command
 from .output import Output
 from .targets import check_file
 
@@ -250,7 +249,3 @@ def card_of(args: Args, preset: Preset, result: FitResult, table: pandas.DataFra
         "date": date.today().isoformat(),
         "licence": "MIT",
     }
-
-
-if __name__ == "__main__":
-    run_command("train")

@@ -20,7 +20,6 @@ from ..filters.support.parallel import progress_bar
 from ..filters.support.rows import markdown_table
 from ..filters.support.seeds import child_seed
 from .experiment import Run, command_line, known_recordings, open_run, start_run, versions
-from .main import run_command
 from .output import Output
 from .targets import check_file
 
@@ -368,7 +367,3 @@ def card_of(
         "date": date.today().isoformat(),
         "licence": "MIT",
     }
-
-
-if __name__ == "__main__":
-    run_command("tune")

@@ -27,7 +27,7 @@ EXAMPLES = [
     pytest.param(path, code, id=f"{path.name}-{number}")
     for path in DOCUMENTS
     for number, code in enumerate(re.findall(r"```python\n(.*?)```", path.read_text(encoding="utf-8"), re.DOTALL))
-    if "import " in code and "run_command" not in code
+    if "import " in code
 ]
 
 

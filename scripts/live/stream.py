@@ -19,7 +19,6 @@ from typing import TYPE_CHECKING, Any
 
 import tyro
 
-from ..main import run_command
 from ..targets import check_file
 from .lines import LineFormat
 from .sources import lines_of
@@ -331,7 +330,3 @@ def summary(estimator: str, clock: StreamClock, counts: Counts, latency: Mapping
         f"{name.removesuffix(' (µs)')} {value:.0f} µs" for name, value in latency.items() if name != "samples"
     )
     return f"poise: {'; '.join(parts)}\npoise: time per estimate of {estimator}: {times}"
-
-
-if __name__ == "__main__":
-    run_command("stream")

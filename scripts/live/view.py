@@ -20,7 +20,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import tyro
 
 from ...filters.support.optional import extra
-from ..main import run_command
 from ..output import Output
 from ..targets import check_file
 from .curves import TRUTH
@@ -375,7 +374,3 @@ def fed(blocks: Blocks, args: Args) -> Iterator[tuple[Subject, Motion, Callable[
     finally:
         stop.set()
         thread.join(timeout=2.0)
-
-
-if __name__ == "__main__":
-    run_command("view")

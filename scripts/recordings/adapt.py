@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 import tyro
 
 from ...filters.support.seeds import child_seed
-from ..main import run_command
 from ..output import Output
 from ..tune import TEST_SEED
 
@@ -146,7 +145,3 @@ def smaller_errors(changes: Mapping[str, Any], factor: float) -> dict[str, Any]:
     sensors = dict(changes["sensors"])
     sensors["noise_scale"] = [factor * value for value in sensors["noise_scale"]]
     return {**changes, "placement_errors": factor, "sensors": sensors}
-
-
-if __name__ == "__main__":
-    run_command("adapt")

@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
-from ..main import run_command
 from ..output import Output
 from ..targets import FIGURES, check_file
 
@@ -149,7 +148,3 @@ def save_curves(path: Path, curves: dict[str, tuple[float, float, Any]], label: 
     ax.set(xlabel="time, s", ylabel=label)
     legend_above(ax)
     out.say(f"figure: {save(figure, path)}")
-
-
-if __name__ == "__main__":
-    run_command("align")

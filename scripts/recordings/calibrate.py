@@ -18,7 +18,6 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 import tyro
 
-from ..main import run_command
 from ..output import Output
 from ..targets import check_file, check_folder
 
@@ -175,7 +174,3 @@ def frame(args: Args) -> CalibrationRecord:
         "singular_values": fit.singular_values.tolist(),
     }
     return CalibrationRecord({}, {"frame": details})
-
-
-if __name__ == "__main__":
-    run_command("calibrate")

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 import tyro
 
-from ..main import run_command
 from ..output import Output
 from ..targets import FIGURES, check_file
 
@@ -90,7 +89,3 @@ def summary_row(name: str, estimate: Estimate) -> dict[str, Any]:
         if f"std_{angle}" in frame:
             row[f"± {angle}"] = float(frame[f"std_{angle}"].iloc[-1])
     return row
-
-
-if __name__ == "__main__":
-    run_command("estimate")

@@ -8,7 +8,6 @@ from typing import Annotated, Literal
 
 import tyro
 
-from ..main import run_command
 from ..output import Output
 from ..targets import check_folder
 
@@ -74,7 +73,3 @@ def run(args: Args) -> int:
         sections["Provenance"] = provenance(folder)
         out.report(folder.write_report("poise evaluate", sections))
     return 0
-
-
-if __name__ == "__main__":
-    run_command("evaluate")

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import tyro
 
-from ..main import run_command
 from ..output import Output
 from ..targets import FIGURES, check_file
 
@@ -70,7 +69,3 @@ def run(args: Args) -> int:
 
             out.say(f"figure: {save(signals(loaded[0], inspect_recording(loaded[0]).rest), args.plot)}")
     return 0
-
-
-if __name__ == "__main__":
-    run_command("inspect")

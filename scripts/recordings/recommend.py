@@ -8,7 +8,6 @@ from typing import Literal
 
 import tyro
 
-from ..main import run_command
 from ..output import Output
 
 
@@ -48,7 +47,3 @@ def run(args: Args) -> int:
             for note in found.notes:
                 out.say(f"note: {note}")
     return 0
-
-
-if __name__ == "__main__":
-    run_command("recommend")
