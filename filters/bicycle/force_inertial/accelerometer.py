@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from ...analysis.forward_mode import Scalar, cos, sin
 from .kinematics import Accelerations, Angles, Rates, Travel, Triple, point_acceleration
+from .parameters import ForceInertialParameters
 
 
 def yaw_acceleration(
@@ -25,8 +26,7 @@ def yaw_acceleration(
     rate: Rates,
     roll_acceleration: Scalar,
     travel: Travel,
-    place: tuple[Scalar, Scalar],
-    gravity: Scalar,
+    rider: ForceInertialParameters,
     published: bool = False,
 ) -> Scalar:
     """Equation (7), rad/s².
@@ -37,11 +37,10 @@ def yaw_acceleration(
         rate: of the angles.
         roll_acceleration: φ̈_b; zero in the published form.
         travel: of the rear contact.
-        place: p_x, p_z of the IMU: ahead of the rear contact, above ground, m.
-        gravity: m/s².
+        rider: p_x, p_z of the IMU.
         published: with the published signs and omissions.
     """
-    p_x, p_z = place
+    p_x, p_z, gravity = rider.imu_forward, rider.imu_height, rider.gravity
     s_b, c_b = sin(phi_b), cos(phi_b)
     squared = rate.psi * rate.psi
     if published:
@@ -60,8 +59,7 @@ def accelerometer_accelerations(
     roll_acceleration: Scalar,
     axial: Scalar,
     travel: Travel,
-    places: tuple[Scalar, Scalar, Scalar, Scalar, Scalar],
-    gravity: Scalar,
+    rider: ForceInertialParameters,
     published: bool = False,
 ) -> Accelerations:
     """Equations (7) and (8).
@@ -74,18 +72,17 @@ def accelerometer_accelerations(
         roll_acceleration: φ̈_b, rad/s²; unused in the published form.
         axial: derivative of the trunk's rate about its axis, passed through.
         travel: of the rear contact.
-        places: p_x, p_z of the bicycle's IMU, l_s, h_s of the trunk's pivot, and h from there up to the trunk's IMU, m.
-        gravity: m/s².
+        rider: positions of the IMUs and of the trunk's pivot.
         published: with the published signs and omissions.
     """
-    p_x, p_z, l_s, h_s, h = places
+    l_s, h_s, h = rider.pivot_forward, rider.pivot_height, rider.trunk_imu_height
     s_h, c_h = sin(angles.phi_h), cos(angles.phi_h)
     s_t, c_t = sin(angles.theta), cos(angles.theta)
     s_p, c_p = sin(angles.phi), cos(angles.phi)
     # specific force of the pivot (5), (6); that of the trunk's accelerometer adds the motion of the trunk
     if published:
         roll_acceleration = 0.0 * roll_acceleration
-    yaw = yaw_acceleration(a_by, angles.phi_b, rate, roll_acceleration, travel, (p_x, p_z), gravity, published)
+    yaw = yaw_acceleration(a_by, angles.phi_b, rate, roll_acceleration, travel, rider, published)
     acceleration = Accelerations(0.0, 0.0, axial, roll_acceleration, yaw)
     seat_x, seat_y, seat_z = point_acceleration(l_s, h_s, angles.phi_b, rate, acceleration, travel)
     squared, cotangent = rate.psi * rate.psi, c_t / s_t
@@ -94,14 +91,14 @@ def accelerometer_accelerations(
         # (5) as published: no v_b ψ̇, + g, and ω̇ without its y component ψ̇ φ̇_b, which changes x and z of the seat
         turned = rate.phi_b * rate.psi
         seat_x, seat_y = seat_x + h_s * cos(angles.phi_b) * turned, seat_y - travel.speed * rate.psi
-        seat_z = seat_z + gravity + l_s * turned
+        seat_z = seat_z + rider.gravity + l_s * turned
         lean = c_h * rate.psi * rate.theta - s_h * cotangent * rate.phi_h * rate.psi
         lean = lean - cotangent * rate.phi_h * rate.theta
         pitch = (2.0 * c_t * c_t - 1.0) * c_h * rate.phi_h * rate.psi
     else:
         # the sample in axes before the spin φ
         a_y, a_z = c_p * a_h[1] - s_p * a_h[2], s_p * a_h[1] + c_p * a_h[2]
-        seat_z = seat_z - gravity
+        seat_z = seat_z - rider.gravity
         lean = 2.0 * c_h * rate.psi * rate.theta - 2.0 * cotangent * rate.phi_h * rate.theta
         pitch = -2.0 * c_h * s_t * s_t * rate.phi_h * rate.psi
     # (8): acceleration of the sensor relative to the pivot over h, then Coriolis, centripetal and yaw terms

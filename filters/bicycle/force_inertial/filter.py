@@ -201,7 +201,7 @@ class ForceInertial(ForceInertialParameters, Model):
         N_x, N_y, N_z = read.moment
         load = in_bicycle(needed.force, angles.phi_b if whole else value(angles.phi_b))
         down = -1.0 * (read.whole[2] + load[2])
-        N_y = N_y + self.pedal_share * pedal_moment(down if whole else value(down), self.pedals())
+        N_y = N_y + self.pedal_share * pedal_moment(down if whole else value(down), self)
         tau_theta = cos(delta) * N_y - sin(delta) * N_z if self.torque_reading == "exact" else N_y / cos(delta)
         # (13): direction of the seat force, and φ_c, the apparent vertical
         if self.roll_model == "apparent-vertical":
@@ -295,8 +295,7 @@ class ForceInertial(ForceInertialParameters, Model):
                 found.phi_b,
                 found.axial,
                 self._travel(x),
-                (self.imu_forward, self.imu_height, self.pivot_forward, self.pivot_height, self.trunk_imu_height),
-                self.gravity,
+                self,
                 published=self.form == "published",
             )
         return rate, found, omega_h[0]
@@ -305,21 +304,11 @@ class ForceInertial(ForceInertialParameters, Model):
         return Travel(x[..., 13], x[..., 20])
 
     def _needed(self, x: Array, angles: Angles, rate: Rates, acceleration: Accelerations, axial: Any) -> Needed:
-        pivot, masses = (self.pivot_forward, self.pivot_height), self.masses()
-        moving = needed_load(angles, rate, acceleration, axial, self._travel(x), pivot, masses, self.gravity)
+        moving = needed_load(angles, rate, acceleration, axial, self._travel(x), self)
         if self.torque_model == "dynamic":
             return moving
         zero = 0.0 * x[..., 0]
-        still = needed_load(
-            angles,
-            Rates(*[zero] * 5),
-            Accelerations(*[zero] * 5),
-            zero,
-            Travel(zero, zero),
-            pivot,
-            masses,
-            self.gravity,
-        )
+        still = needed_load(angles, Rates(*[zero] * 5), Accelerations(*[zero] * 5), zero, Travel(zero, zero), self)
         return still._replace(force=moving.force)
 
     def _with_published_h14(self, H: Array, x: Array, rate: Rates) -> Array:

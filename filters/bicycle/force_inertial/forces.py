@@ -27,24 +27,7 @@ from typing import NamedTuple
 
 from ...analysis.forward_mode import Scalar, atan2, cos, sin
 from .kinematics import Accelerations, Angles, Rates, Travel, Triple, axis_motion, point_acceleration, trunk_axis
-
-
-class Masses(NamedTuple):
-    """Masses on the seat; kg, kg·m², m."""
-
-    trunk: Scalar
-    """m_h"""
-    height: Scalar
-    """h_h, from the pivot up the trunk"""
-    across: Scalar
-    """I_t, about the centre of mass"""
-    along: Scalar
-    """I_a"""
-    carried: Scalar
-    """m_c"""
-    carried_forward: Scalar
-    """of its centre from the pivot"""
-    carried_up: Scalar
+from .parameters import ForceInertialParameters
 
 
 class Needed(NamedTuple):
@@ -70,42 +53,38 @@ def needed_load(
     acceleration: Accelerations,
     axial_rate: Scalar,
     travel: Travel,
-    pivot: tuple[Scalar, Scalar],
-    masses: Masses,
-    gravity: Scalar,
+    rider: ForceInertialParameters,
 ) -> Needed:
     """Moments about the trunk's pivot, and the force, that a motion requires.
 
     Args:
         angles: of trunk and bicycle.
-        rate: theirs.
+        rate: theirs; with zero rates and accelerations this is the static model.
         acceleration: theirs.
         axial_rate: of the trunk about its own axis, rad/s.
         travel: of the rear contact.
-        pivot: l_s ahead of the rear contact and h_s high, m.
-        masses: on the seat.
-        gravity: m/s²; with zero rates and accelerations this is the static model.
+        rider: masses and the place of the pivot.
     """
     # the trunk's centre of mass, h_h up the trunk from the pivot: its specific force, times m_h
-    l_s, h_s = pivot
+    l_s, h_s, gravity = rider.pivot_forward, rider.pivot_height, rider.gravity
     s_h, c_h = sin(angles.phi_h), cos(angles.phi_h)
     u = trunk_axis(angles)
     first, second = axis_motion(angles, rate, acceleration)
     base = point_acceleration(l_s, h_s, angles.phi_b, rate, acceleration, travel)
-    a_x, a_y, a_z = (a + masses.height * b for a, b in zip(base, second, strict=True))
-    force = (masses.trunk * a_x, masses.trunk * a_y, masses.trunk * (a_z - gravity))
+    a_x, a_y, a_z = (a + rider.trunk_height * b for a, b in zip(base, second, strict=True))
+    force = (rider.trunk_mass * a_x, rider.trunk_mass * a_y, rider.trunk_mass * (a_z - gravity))
     # (9): h_h u × force; I_t u × ü has the same arm u
-    along_u = tuple(masses.height * f + masses.across * b for f, b in zip(force, second, strict=True))
+    along_u = tuple(rider.trunk_height * f + rider.trunk_across * b for f, b in zip(force, second, strict=True))
     tau_x, tau_y = _turned(u, (along_u[0], along_u[1], along_u[2]), s_h, c_h)
     # the spin's angular momentum I_a ω_a u: its derivative is I_a (ω_a u̇ + ω̇_a u)
-    tau_x = tau_x + masses.along * (axial_rate * first[0] + acceleration.axial * u[0])
+    tau_x = tau_x + rider.trunk_along * (axial_rate * first[0] + acceleration.axial * u[0])
     # u itself is perpendicular to y'
-    tau_y = tau_y + masses.along * axial_rate * (c_h * first[1] + s_h * first[2])
+    tau_y = tau_y + rider.trunk_along * axial_rate * (c_h * first[1] + s_h * first[2])
     s_b, c_b = sin(angles.phi_b), cos(angles.phi_b)
     # the carried mass rotates with the bicycle: the moment of its specific force about the pivot
-    forward, up = masses.carried_forward, masses.carried_up
+    forward, up = rider.carried_forward, rider.carried_up
     c_x, c_y, c_z = point_acceleration(l_s + forward, h_s + up, angles.phi_b, rate, acceleration, travel)
-    load = (masses.carried * c_x, masses.carried * c_y, masses.carried * (c_z - gravity))
+    load = (rider.carried_mass * c_x, rider.carried_mass * c_y, rider.carried_mass * (c_z - gravity))
     more_x, more_y = _turned((forward, up * s_b, -up * c_b), load, s_h, c_h)
     return Needed(tau_x + more_x, tau_y + more_y, (force[0] + load[0], force[1] + load[1], force[2] + load[2]))
 
@@ -122,59 +101,25 @@ def in_bicycle(force: Triple, phi_b: Scalar) -> Triple:
     return force[0], c_b * force[1] + s_b * force[2], c_b * force[2] - s_b * force[1]
 
 
-class Pedals(NamedTuple):
-    """Forces of the feet on the pedals and their points of action; m, N."""
-
-    axle_forward: Scalar
-    """of the crank's axle from the pivot"""
-    axle_up: Scalar
-    """negative"""
-    down: Scalar
-    """force of both legs at rest, mean over a revolution"""
-    back: Scalar
-    """likewise, backwards"""
-    drive_forward: Scalar
-    """of the point of action of the driving force, from the pivot"""
-
-
-def pedal_moment(force: Scalar, pedals: Pedals) -> Scalar:
+def pedal_moment(force: Scalar, rider: ForceInertialParameters) -> Scalar:
     """Moment about the bicycle's y of the pedals on the rider, about the pivot, N·m.
 
     Args:
         force: of the rider down on the pedals, bicycle axes, N.
-        pedals: points of action.
+        rider: points of action.
     """
-    resting = pedals.axle_forward * pedals.down - pedals.axle_up * pedals.back
-    return resting + pedals.drive_forward * (force - pedals.down)
-
-
-class SeatSensors(NamedTuple):
-    """Positions of the seat's sensors; m, rad."""
-
-    post_length: Scalar
-    """L_1"""
-    post_tilt: Scalar
-    """γ"""
-    cells_long: Scalar
-    """L_x"""
-    cells_wide: Scalar
-    """L_y"""
-    cells_behind: Scalar
-    """L_m"""
-    forward: Scalar
-    """of the saddle point from the pivot"""
-    below: Scalar
-    """of the saddle point from the pivot"""
+    resting = rider.axle_forward * rider.pedal_down - rider.axle_up * rider.pedal_back
+    return resting + rider.drive_forward * (force - rider.pedal_down)
 
 
 def seat_load(
-    wrench: tuple[Triple, Triple], sensors: SeatSensors, centre: tuple[Scalar, Scalar]
+    wrench: tuple[Triple, Triple], rider: ForceInertialParameters, centre: tuple[Scalar, Scalar]
 ) -> tuple[Triple, Triple]:
     """Equation (10): the load on the seat about a point of its plane, axes of the bicycle.
 
     Args:
         wrench: force (N) and moment (N·m) of the rider on the six-axis sensor, its axes (z down).
-        sensors: their positions.
+        rider: positions of the seat's rider.
         centre: of pressure x_C, y_C from the saddle point, m; zeros for the saddle point itself.
 
     Returns:
@@ -182,26 +127,26 @@ def seat_load(
     """
     force, moment = wrench
     # R_y(γ) turns the sensor's axes into the bicycle's; then the moment is shifted from the sensor to the point
-    s_g, c_g = sin(sensors.post_tilt), cos(sensors.post_tilt)
+    s_g, c_g = sin(rider.post_tilt), cos(rider.post_tilt)
     R = (c_g * force[0] + s_g * force[2], force[1], c_g * force[2] - s_g * force[0])
     T = (c_g * moment[0] + s_g * moment[2], moment[1], c_g * moment[2] - s_g * moment[0])
-    x = sensors.post_length * s_g - centre[0]
+    x = rider.post_length * s_g - centre[0]
     y = -1.0 * centre[1]
-    z = sensors.post_length * c_g
+    z = rider.post_length * c_g
     return R, (T[0] + y * R[2] - z * R[1], T[1] + z * R[0] - x * R[2], T[2] + x * R[1] - y * R[0])
 
 
-def centre_of_pressure(cells: Triple, sensors: SeatSensors) -> tuple[Scalar, Scalar]:
+def centre_of_pressure(cells: Triple, rider: ForceInertialParameters) -> tuple[Scalar, Scalar]:
     """x_C ahead and y_C to the right of the saddle point, m, from the cells front, rear **right**, rear left (N)."""
     total = cells[0] + cells[1] + cells[2]
     return (
-        cells[0] / total * sensors.cells_long - sensors.cells_behind,
-        0.5 * (cells[1] - cells[2]) / total * sensors.cells_wide,
+        cells[0] / total * rider.cells_long - rider.cells_behind,
+        0.5 * (cells[1] - cells[2]) / total * rider.cells_wide,
     )
 
 
 def trunk_moment(
-    R: Triple, M: Triple, centre: tuple[Scalar, Scalar], sensors: SeatSensors, published: bool = False
+    R: Triple, M: Triple, centre: tuple[Scalar, Scalar], rider: ForceInertialParameters, published: bool = False
 ) -> Triple:
     """Equations (11), (12) in the bicycle's axes: moment of the seat on the rider about the pivot, N·m.
 
@@ -211,10 +156,10 @@ def trunk_moment(
         R: load on the seat, bicycle axes, N.
         M: its moment about the centre of pressure.
         centre: of pressure from the saddle point, m.
-        sensors: where they are.
+        rider: positions of the seat's rider.
         published: −R_z(x_C − x_V) in N_y as published; the cross product gives plus.
     """
-    x, y, z = centre[0] + sensors.forward, centre[1], sensors.below
+    x, y, z = centre[0] + rider.seat_forward, centre[1], rider.seat_below
     sign = -1.0 if published else 1.0
     return (
         -1.0 * M[0] - (y * R[2] - z * R[1]),

@@ -17,7 +17,6 @@ import numpy as np
 from ...core.model import check_positive
 from ...core.quantity import GRAVITY, Channel
 from ..geometry import ARM_MASS, RiderEquations, RiderGeometry
-from .forces import Masses, Pedals, SeatSensors
 from .kinematics import true_angles
 
 DEG = math.pi / 180.0
@@ -161,34 +160,6 @@ class ForceInertialParameters(RiderEquations):
     def truth(self, truth: Mapping[str, Any]) -> dict[str, Any]:
         """The trunk's angles in the paper's frame, from the orientations of bicycle and trunk."""
         return true_angles(truth) if {"bicycle/orientation", "trunk/orientation"} <= set(truth) else {}
-
-    def masses(self) -> Masses:
-        """Masses on the seat."""
-        return Masses(
-            self.trunk_mass,
-            self.trunk_height,
-            self.trunk_across,
-            self.trunk_along,
-            self.carried_mass,
-            self.carried_forward,
-            self.carried_up,
-        )
-
-    def pedals(self) -> Pedals:
-        """Forces of the feet."""
-        return Pedals(self.axle_forward, self.axle_up, self.pedal_down, self.pedal_back, self.drive_forward)
-
-    def seat_sensors(self) -> SeatSensors:
-        """Positions of the seat's sensors."""
-        return SeatSensors(
-            self.post_length,
-            self.post_tilt,
-            self.cells_long,
-            self.cells_wide,
-            self.cells_behind,
-            self.seat_forward,
-            self.seat_below,
-        )
 
 
 def rider_parameters(geometry: RiderGeometry) -> dict[str, float]:

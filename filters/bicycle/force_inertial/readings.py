@@ -36,16 +36,15 @@ def readings(
         hands: ``each`` hand at its grip, ``sum`` for the two terms of (12), or ``none``.
         published: the published sign in (12).
     """
-    sensors = parameters.seat_sensors()
     wrench, cells = z["seat/wrench"], z["seat/load_cells"]
     xp = namespace(wrench)
     known = xp.all(xp.isfinite(cells), axis=-1)
     filled = [xp.where(known, cells[..., k], 1.0 + 0.0 * parameters.cells_long) for k in range(3)]
     # the channel holds front, rear left, rear right
-    x_C, y_C = centre_of_pressure((filled[0], filled[2], filled[1]), sensors)
+    x_C, y_C = centre_of_pressure((filled[0], filled[2], filled[1]), parameters)
     centre = (xp.where(known, x_C, 0.0 * x_C), xp.where(known, y_C, 0.0 * y_C))
-    R, M = seat_load((down(wrench[..., :3]), down(wrench[..., 3:])), sensors, centre)
-    N = trunk_moment(R, M, centre, sensors, published)
+    R, M = seat_load((down(wrench[..., :3]), down(wrench[..., 3:])), parameters, centre)
+    N = trunk_moment(R, M, centre, parameters, published)
     left, right = down(z["handlebar/force"][..., :3]), down(z["handlebar/force"][..., 3:])
     both = (left[0] + right[0], left[1] + right[1], left[2] + right[2])
     forward, up, half = parameters.grip_forward, parameters.grip_up, parameters.grip_half_width
@@ -99,7 +98,7 @@ def static_angles(
     f_y, f_z = c_b * lateral - s_b * gravity, -s_b * lateral - c_b * gravity
     carried, forward, up = parameters.carried_mass, parameters.carried_forward, parameters.carried_up
     down = -1.0 * (read.whole[2] + mass * f_z)
-    pedals = parameters.pedal_share * pedal_moment(down, parameters.pedals())
+    pedals = parameters.pedal_share * pedal_moment(down, parameters)
     N_x = read.moment[0] - carried * up * f_y
     N_y = read.moment[1] + pedals + carried * forward * f_z
     N_z = read.moment[2] - carried * forward * f_y

@@ -21,9 +21,6 @@ from poise.envs.bicycle.ride.contact_forces import LoadCells
 from poise.filters.bicycle.force_inertial.accelerometer import accelerometer_accelerations
 from poise.filters.bicycle.force_inertial.filter import ForceInertial
 from poise.filters.bicycle.force_inertial.forces import (
-    Masses,
-    Pedals,
-    SeatSensors,
     apparent_vertical,
     centre_of_pressure,
     in_bicycle,
@@ -45,9 +42,8 @@ from poise.filters.bicycle.geometry import RiderGeometry
 from poise.filters.core import rotation
 
 G, L_S, H_S, M_H, H_H = 9.8, 0.26, 0.38, 45.0, 0.33
-POINT = Masses(M_H, H_H, 0.0, 0.0, 0.0, 0.0, 0.0)
+POINT = ForceInertial.published()
 STILL = (Rates(*[0.0] * 5), Accelerations(*[0.0] * 5), 0.0, Travel(0.0, 0.0))
-SEAT = SeatSensors(0.13, 20.0 * DEG, 0.20, 0.12, 0.043, 0.0, 0.0)
 
 
 def published(angles, rate, acceleration, travel):
@@ -78,7 +74,7 @@ def test_a_point_mass_is_the_published_model():
         angles = Angles(rng.uniform(-0.5, 0.5), rng.uniform(0.5, 2.0), 0.3, rng.uniform(-0.4, 0.4))
         rate, acceleration = Rates(*rng.normal(size=5)), Accelerations(*rng.normal(size=5))
         travel = Travel(rng.uniform(0.0, 6.0), rng.normal())
-        found = needed_load(angles, rate, acceleration, 0.4, travel, (L_S, H_S), POINT, G)
+        found = needed_load(angles, rate, acceleration, 0.4, travel, POINT)
         np.testing.assert_allclose(found[:2], published(angles, rate, acceleration, travel), rtol=1e-11)
 
 
@@ -88,6 +84,8 @@ def test_needed_moments_are_those_of_newton_and_euler(course):
     motion = draw_motion(np.random.default_rng(3), course, NO_ERRORS)
     across, along, carried, forward, up = 1.1, 0.4, 20.0, 0.15, -0.25
     rider = ForceInertial.published(pivot_height=1.0)
+    masses = {"trunk_across": across, "trunk_along": along, "carried_mass": carried}
+    loaded = replace(rider, **masses, carried_forward=forward, carried_up=up)
     t = np.linspace(1.0, 9.0, 9)
     exact = exact_readings(motion, t, rider, (along, across, across))
     turned = [
@@ -113,8 +111,7 @@ def test_needed_moments_are_those_of_newton_and_euler(course):
     rate = rates(angles, omega_h, omega_b, rider.imu_tilt)
     found = gyroscope_accelerations(angles, rate, omega_h, tuple(turned[0].T), tuple(turned[1].T), rider.imu_tilt)
     travel = Travel(motion.speed(t), derivative(motion.speed, t))
-    masses = Masses(M_H, H_H, across, along, carried, forward, up)
-    needed = needed_load(angles, rate, found, omega_h[0], travel, (L_S, 1.0), masses, G)
+    needed = needed_load(angles, rate, found, omega_h[0], travel, loaded)
     np.testing.assert_allclose(needed.tau_phi_h, moment[:, 0], atol=2e-4)
     wanted = np.cos(angles.phi_h) * moment[:, 1] + np.sin(angles.phi_h) * moment[:, 2]
     np.testing.assert_allclose(needed.tau_theta, wanted, atol=2e-4)
@@ -130,7 +127,7 @@ def test_needed_moments_are_those_of_newton_and_euler(course):
 
 def test_at_rest_the_torque_is_gravity_s():
     for angles in (Angles(0.2, 1.0, 0.1, -0.1), Angles(-0.5, 1.8, 0.0, 0.3)):
-        needed = needed_load(angles, *STILL, (L_S, H_S), POINT, G)
+        needed = needed_load(angles, *STILL, POINT)
         lean = -M_H * G * H_H * math.sin(angles.phi_h) * math.sin(angles.theta)
         pitch = M_H * G * H_H * math.cos(angles.phi_h) * math.cos(angles.theta)
         np.testing.assert_allclose(needed[:2], (lean, pitch), rtol=1e-13)
@@ -154,7 +151,7 @@ def test_what_the_seat_s_force_tells_of_the_roll(turning, lean, roll, reads):
     """v = 2 m/s, r = 2.5 m, θ = 60°: R_y / R_z as an independent simulation found it."""
     angles = Angles(lean * DEG, 60.0 * DEG, 0.0, roll * DEG)
     rate = Rates(0.0, 0.0, 0.0, 0.0, 0.8 if turning else 0.0)
-    load = needed_load(angles, rate, STILL[1], 0.0, Travel(2.0, 0.0), (L_S, H_S), POINT, G)
+    load = needed_load(angles, rate, STILL[1], 0.0, Travel(2.0, 0.0), POINT)
     R = [-part for part in in_bicycle(load.force, angles.phi_b)]
     assert math.atan2(R[1], R[2]) / DEG == pytest.approx(reads, abs=0.01)
 
@@ -172,9 +169,9 @@ def test_gravity_cancels_with_accelerometers(height, sensitivity):
     def torque(phi_h):
         angles, rate, acceleration, axial, travel = true._replace(phi_h=phi_h), *STILL
         if height is not None:
-            places = (0.37, 0.71, L_S, H_S, height)
-            acceleration = accelerometer_accelerations(angles, rate, a_h, 0.0, 0.0, 0.0, travel, places, G)
-        return needed_load(angles, rate, acceleration, axial, travel, (L_S, H_S), POINT, G).tau_phi_h
+            rider = replace(POINT, trunk_imu_height=height)
+            acceleration = accelerometer_accelerations(angles, rate, a_h, 0.0, 0.0, 0.0, travel, rider)
+        return needed_load(angles, rate, acceleration, axial, travel, POINT).tau_phi_h
 
     slope = (torque(true.phi_h + 1e-6) - torque(true.phi_h - 1e-6)) / 2e-6
     assert slope == pytest.approx(sensitivity, abs=0.06)
@@ -185,16 +182,16 @@ def test_centre_of_pressure_is_that_of_the_environment_s_cells():
     force, at = 400.0, (0.03, 0.012)
     # ours: y to the left; an upward force there has moments y F and −x F
     share = cells.share(np.array([0.0, 0.0, force]), np.array([at[1] * force, -at[0] * force, 0.0]))
-    x_C, y_C = centre_of_pressure((share[0], share[2], share[1]), SEAT)
+    x_C, y_C = centre_of_pressure((share[0], share[2], share[1]), POINT)
     assert (x_C, y_C) == pytest.approx((at[0], -at[1]), abs=1e-12)
 
 
 def test_the_seat_s_load_is_moved_by_cross_products():
     rng = np.random.default_rng(5)
-    sensors = SEAT._replace(forward=0.02, below=0.15)
+    sensors = replace(POINT, seat_forward=0.02, seat_below=0.15)
     F, T = rng.normal(0.0, 200.0, 3), rng.normal(0.0, 20.0, 3)
     turn = Rotation.from_euler("Y", sensors.post_tilt)
-    sensor = np.array([sensors.forward, 0.0, sensors.below]) + turn.apply([0.0, 0.0, sensors.post_length])
+    sensor = np.array([sensors.seat_forward, 0.0, sensors.seat_below]) + turn.apply([0.0, 0.0, sensors.post_length])
     wanted = -(turn.apply(T) + np.cross(sensor, turn.apply(F)))
     found = []
     for centre in ((0.0, 0.0), (0.04, -0.03)):
@@ -206,11 +203,12 @@ def test_the_seat_s_load_is_moved_by_cross_products():
     R, M = seat_load((tuple(F), tuple(T)), sensors, (0.04, 0.0))
     published = trunk_moment(R, M, (0.04, 0.0), sensors, published=True)
     # with the published sign it counts twice
-    assert published[1] - wanted[1] == pytest.approx(-2.0 * R[2] * (0.04 + sensors.forward), abs=1e-9)
+    assert published[1] - wanted[1] == pytest.approx(-2.0 * R[2] * (0.04 + sensors.seat_forward), abs=1e-9)
 
 
 def test_pedals_push_where_they_are():
-    pedals = Pedals(0.17, -0.76, 150.0, 25.0, 0.38)
+    axle, legs = {"axle_forward": 0.17, "axle_up": -0.76}, {"pedal_down": 150.0, "pedal_back": 25.0}
+    pedals = replace(POINT, **axle, **legs, drive_forward=0.38)
     # (x, z) of the axle from the pivot, z down; force of the feet on the pedals (−25, 150)
     wanted = -np.cross([0.17, 0.0, 0.76], [-25.0, 0.0, 150.0])[1]
     assert pedal_moment(150.0, pedals) == pytest.approx(wanted)

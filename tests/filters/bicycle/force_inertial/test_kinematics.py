@@ -8,6 +8,7 @@ import sympy
 from sympy.physics.mechanics import Point, ReferenceFrame, dynamicsymbols
 
 from poise.filters.bicycle.force_inertial.accelerometer import accelerometer_accelerations, yaw_acceleration
+from poise.filters.bicycle.force_inertial.filter import ForceInertial
 from poise.filters.bicycle.force_inertial.kinematics import (
     Angles,
     Rates,
@@ -21,7 +22,8 @@ from poise.filters.bicycle.force_inertial.kinematics import (
 )
 
 ALPHA, P_X, P_Z, L_S, H_S, H, G = 0.17, 0.37, 0.71, 0.26, 0.9, 0.42, 9.8
-LENGTHS = (P_X, P_Z, L_S, H_S, H)
+RIDER = ForceInertial.published(pivot_height=H_S, trunk_imu_height=H)
+"""With the lengths above."""
 
 
 @pytest.fixture(scope="module")
@@ -100,9 +102,9 @@ def test_everything_is_that_of_the_frames(oracle):
         np.testing.assert_allclose(second, true["ddu"], atol=1e-11)
         seat = point_acceleration(L_S, H_S, angles.phi_b, rate, found, travel)
         np.testing.assert_allclose(seat, true["seat"], atol=1e-11)
-        yaw = yaw_acceleration(true["a_b"][1], angles.phi_b, rate, found.phi_b, travel, (P_X, P_Z), G)
+        yaw = yaw_acceleration(true["a_b"][1], angles.phi_b, rate, found.phi_b, travel, RIDER)
         assert yaw == pytest.approx(ddq[4], abs=1e-10)
-        rest = (true["a_h"], true["a_b"][1], found.phi_b, found.axial, travel, LENGTHS, G)
+        rest = (true["a_h"], true["a_b"][1], found.phi_b, found.axial, travel, RIDER)
         np.testing.assert_allclose(accelerometer_accelerations(angles, rate, *rest), wanted, atol=1e-10)
 
 
@@ -111,9 +113,9 @@ def test_printed_accelerations_are_wrong_where_the_errata_say(oracle):
     q = np.array([-0.35, 1.05, 0.5, -0.09, 0.0])
     numbers = np.concatenate([q, [0.0, 0.0, 0.0, 0.0, -0.8], np.zeros(5), [2.0, 0.0]])
     true, rate, travel = oracle(numbers), Rates(0.0, 0.0, 0.0, 0.0, -0.8), Travel(2.0, 0.0)
-    a_by, place = true["a_b"][1], (P_X, P_Z)
-    assert yaw_acceleration(a_by, q[3], rate, 0.0, travel, place, G) == pytest.approx(0.0, abs=1e-12)
-    published = yaw_acceleration(a_by, q[3], rate, 0.0, travel, place, G, published=True)
+    a_by = true["a_b"][1]
+    assert yaw_acceleration(a_by, q[3], rate, 0.0, travel, RIDER) == pytest.approx(0.0, abs=1e-12)
+    published = yaw_acceleration(a_by, q[3], rate, 0.0, travel, RIDER, published=True)
     s, c = np.sin(q[3]), np.cos(q[3])
     # what (7) leaves out or turns round, divided by p_x c
     lacking = c * 2.0 * -0.8 - 2.0 * s * G - 2.0 * P_Z * s * c * 0.64
@@ -126,7 +128,7 @@ def test_rest_gives_no_acceleration_from_accelerometers(oracle):
     for _ in range(10):
         q = draw(rng)[0]
         true = oracle(np.concatenate([q, np.zeros(12)]))
-        rest = (true["a_h"], true["a_b"][1], 0.0, 0.0, Travel(0.0, 0.0), LENGTHS, G)
+        rest = (true["a_h"], true["a_b"][1], 0.0, 0.0, Travel(0.0, 0.0), RIDER)
         found = accelerometer_accelerations(Angles(*q[:4]), Rates(*np.zeros(5)), *rest)
         np.testing.assert_allclose(found, 0.0, atol=1e-12)
         published = accelerometer_accelerations(Angles(*q[:4]), Rates(*np.zeros(5)), *rest, published=True)

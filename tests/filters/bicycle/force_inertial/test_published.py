@@ -5,9 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from poise.filters.bicycle.force_inertial.accelerometer import accelerometer_accelerations, yaw_acceleration
+from poise.filters.bicycle.force_inertial.filter import ForceInertial
 from poise.filters.bicycle.force_inertial.kinematics import Angles, Rates, Travel
 
+RIDER = ForceInertial.published()
 PX, PZ, LS, HS, H, G = 0.37, 0.71, 0.26, 0.38, 0.42, 9.8
+"""Of table I, as the rider has them."""
 
 
 def published_seat(phi_b, rate, yaw, speed_change):
@@ -50,7 +53,7 @@ def test_the_published_form_is_the_printed_one():
         angles = Angles(*rng.uniform((-0.6, 0.6, -0.6, -0.4), (0.6, 1.5, 0.6, 0.4)))
         rate = Rates(*rng.normal(0.0, 0.8, len(Rates._fields)))
         travel, a_h, a_by = Travel(rng.uniform(1.0, 5.0), rng.normal()), rng.normal(0.0, 3.0, 3), rng.normal()
-        yaw = yaw_acceleration(a_by, angles.phi_b, rate, 0.0, travel, (PX, PZ), G, published=True)
+        yaw = yaw_acceleration(a_by, angles.phi_b, rate, 0.0, travel, RIDER, published=True)
         tangent = np.tan(angles.phi_b)
         printed = (
             a_by / (PX * np.cos(angles.phi_b))
@@ -60,7 +63,7 @@ def test_the_published_form_is_the_printed_one():
         )
         np.testing.assert_allclose(yaw, printed, rtol=1e-12)
         found = accelerometer_accelerations(
-            angles, rate, tuple(a_h), a_by, rng.normal(), 0.0, travel, (PX, PZ, LS, HS, H), G, published=True
+            angles, rate, tuple(a_h), a_by, rng.normal(), 0.0, travel, RIDER, published=True
         )
         seat = published_seat(angles.phi_b, rate, yaw, travel.acceleration)
         np.testing.assert_allclose(found[:2], published_accelerations(angles, rate, a_h, yaw, seat), rtol=1e-10)
