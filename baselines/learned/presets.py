@@ -128,8 +128,8 @@ class Preset:
 
 TRAINED = {"scenarios": ["indoor_circle", "outdoor", "straight", "slalom"], "styles": ["mild", "normal"]}
 """Rides that networks train on; other scenarios and aggressive riders are kept aside."""
-RIDES = RideSource(rides=80, draws=4, duration=40.0, changes=TRAINED)
-KEPT = 0.5
+RIDES = RideSource(rides=160, draws=4, duration=40.0, changes=TRAINED)
+KEPT = 0.4
 """Rides for the best epoch and the covariance, as a share of those of the training; riders differ: 24 are too few."""
 RIDDEN = FitConfig(epochs=14, window=125, learning_rate=3e-3)
 CORRECTED = {
