@@ -8,10 +8,11 @@ learned estimators, and policies that adapt filter gains, compared on the same s
 >>> estimate = poise.run("bounded-motion", trajectory)
 >>> table = poise.evaluate(["bounded-motion", "tilt"], [trajectory])
 
-Four layers that import downwards only: :mod:`poise.filters` (rotations, the Kalman core, published filters, metrics),
+Five layers that import downwards only: :mod:`poise.filters` (rotations, the Kalman core, published filters, metrics),
 :mod:`poise.envs` (physics, sensors, environments, recordings), :mod:`poise.baselines` (learned estimators, gain
-policies, the registry of all estimators, evaluation), :mod:`poise.scripts` (the command ``poise``). Importing poise
-registers its environments with Gymnasium and loads neither PyBullet nor torch.
+policies, the registry of all estimators, evaluation), :mod:`poise.baselines.studies` (the five published works) and
+:mod:`poise.scripts` (the command ``poise``). Importing poise registers its environments with Gymnasium and loads
+neither PyBullet nor torch.
 """
 
 from __future__ import annotations

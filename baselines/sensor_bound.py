@@ -1,6 +1,6 @@
 """What the errors of an IMU alone leave of the inclination: a bound for every estimator of a simulated trajectory.
 
-The posterior Cramér–Rao bound of an estimator that is told the external acceleration, at the true attitude R (sensor
+The posterior Cramér–Rao bound of an estimator that knows the external acceleration, at the true attitude R (sensor
 to world). With the rotation vector δ of the attitude error in world axes, the biases b_g and b_a, the white noises w_g
 and w_a of the simulated sensors, and gravity g e₃,
 

@@ -213,8 +213,8 @@ FILTERS: dict[str, Entry] = {
     ),
     "whole-body-consistent": Entry(
         f"{BICYCLE}.whole_body.consistent:ConsistentWholeBody",
-        "whole-body with biases and errors of the told geometry as states, from the usual posture: its covariance is "
-        "that of its errors",
+        "whole-body with biases and errors of the rider's geometry as states, from the usual posture: its covariance "
+        "is that of its errors",
         HERE,
     ),
     "odometry-aided": Entry(

@@ -62,7 +62,7 @@ def check_recording(trajectory: Trajectory) -> list[Finding]:
         Findings, warnings first; empty for a plausible recording.
 
     Raises:
-        ValueError: ``trajectory`` is no trajectory.
+        ValueError: ``trajectory`` is not a :class:`.Trajectory`.
     """
     if not isinstance(trajectory, Trajectory):
         raise ValueError(f"trajectory must be a Trajectory, such as poise.load_recording gives, got {trajectory!r}")

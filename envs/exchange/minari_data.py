@@ -58,7 +58,7 @@ def to_minari(
 
     Raises:
         ValueError: ``episodes`` is not positive, the data set exists, or the environment cannot be rebuilt from its
-            specification because an argument is no plain value (give paths instead of trajectories).
+            specification because an argument is not a plain value (give paths instead of trajectories).
         MissingExtraError: Minari is not installed.
     """
     with extra("exchange"):

@@ -1,8 +1,8 @@
 """The whole-body filter with what is wrong for a whole ride as states, and noises that hold on rides.
 
-The published form estimates neither biases of gyroscopes nor errors of the geometry that it is told. A rotation of the
-elbow about the line from shoulder to hand is observed within about forty seconds only, so a bias of 1 °/s turns the arm
-by tens of degrees, and the trunk with it.
+The published form estimates neither biases of gyroscopes nor errors of the rider's geometry. A rotation of the elbow
+about the line from shoulder to hand is observed within about forty seconds only, so a bias of 1 °/s turns the arm by
+tens of degrees, and the trunk with it.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The whole-body filter with biases and errors of the told geometry as states."""
+"""The whole-body filter with biases and errors of the geometry as states."""
 
 from __future__ import annotations
 
