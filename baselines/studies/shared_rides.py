@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
+from .force_inertial.rides import RIDES as FORCE_INERTIAL
 from .kit import Study
+from .two_gyro.rides import RIDES as TWO_GYRO
+from .whole_body.rides import RIDES as WHOLE_BODY
 
 
 def record_rides(study: Study, papers: Collection[str]) -> None:
@@ -14,9 +17,5 @@ def record_rides(study: Study, papers: Collection[str]) -> None:
         study: of all works.
         papers: names; those that ride nothing may be among them.
     """
-    from .force_inertial.rides import RIDES as FORCE_INERTIAL
-    from .two_gyro.rides import RIDES as TWO_GYRO
-    from .whole_body.rides import RIDES as WHOLE_BODY
-
     works = (TWO_GYRO, FORCE_INERTIAL, WHOLE_BODY)
     study.record_together(job for work in works if work.name in papers for job in work.jobs(study))

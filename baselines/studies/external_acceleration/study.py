@@ -12,13 +12,17 @@ from typing import Any
 
 import numpy as np
 
+from ....envs.data.formats.load import load_recording, recording_files
 from ....filters.core.estimator import run
 from ....filters.core.metrics import DEGREES, direction_error, rms
 from ....filters.imu.external_acceleration import ExternalAcceleration
+from ...registry import make_estimator
+from ...scoring import has_truth
 from ..claims import Claim
 from ..coverage import cover
 from ..kit import Study
 from ..report import Report
+from .figures import FIGURES
 from .items import ITEMS
 from .published import LEVELS, TABLE_I, TABLE_II, TABLE_III
 from .simulation import MODES, RATE, TESTS, Trial, errors, reference, simulate
@@ -45,8 +49,6 @@ BROAD_MODELS: dict[str, dict[str, Any]] = {
 
 def reproduce(study: Study, report: Report) -> None:
     """Do the study."""
-    from .figures import FIGURES
-
     seeds = tuple(
         study.seed_of("external-acceleration", subject, index)
         for subject in study.subjects
@@ -327,8 +329,6 @@ def claims(tests: dict[str, Any], still: dict[str, Any]) -> list[Claim]:
 
 def recordings(study: Study, report: Report) -> None:
     """Inclination errors on recordings with a reference, where there are any."""
-    from ....envs.data.formats.load import recording_files
-
     title = "Recordings"
     if not study.recordings:
         report.text("None given (`--recordings`, or the folder in `POISE_DATA`).", title)
@@ -350,10 +350,6 @@ def recordings(study: Study, report: Report) -> None:
 
 def recorded_errors(path: Path) -> dict[str, Any]:
     """Errors of the modes on one recording; empty if it knows no orientation."""
-    from ....envs.data.formats.load import load_recording
-    from ...registry import make_estimator
-    from ...scoring import has_truth
-
     trial = load_recording(path)
     if not has_truth(trial) or not {"imu/gyr", "imu/acc"} <= set(trial.measurements):
         return {}  # what has no reference, or is not a single IMU
