@@ -1,15 +1,14 @@
 """Distributions of motions of a hand-held controller: those of a thesis, and of a rate table for calibration.
 
 P. He, "Estimating the orientation of a game controller from inertial and magnetic measurements", thesis, Université
-Laval: random walk and ∞ (chapter 3), rate table (chapter 4), pointing at targets (chapter 5). Where the thesis gives
-no value, the default is marked as a choice of this project.
+Laval: random walk (chapter 3, whose ∞ is in :mod:`.planar_motion`), rate table (chapter 4), pointing at targets
+(chapter 5). Where the thesis gives no value, the default is marked as a choice of this project.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import ClassVar
 
 import numpy as np
 
@@ -17,17 +16,11 @@ from ...filters.core import rotation
 from ...filters.core.model import checked_quaternion
 from .controller_motion import Knots, PointingGesture, RateTableGesture, ShakingGesture, WalkGesture
 from .motion import euler_motion
-from .planar_motion import InfinityGesture
+from .planar_motion import check_positive
 from .smooth import Series
 
 SHAKING_DRAWS = 20
 """Number of motions from which the one with the peak nearest to the requested one is chosen."""
-
-
-def _check_positive(config: object, *names: str) -> None:
-    for name in names:
-        if not 0.0 < getattr(config, name) < math.inf:
-            raise ValueError(f"{name} must be positive and finite, got {getattr(config, name)}")
 
 
 @dataclass(frozen=True)
@@ -88,38 +81,6 @@ class Walk:
 
 
 @dataclass(frozen=True)
-class Infinity:
-    """The ∞ of section 3.2: x = a sin(ct), y = b sin(2ct), c = 2π/τ; the body's x axis follows the path.
-
-    The unwrapped φ swings between 45° and −225°. Nothing is random.
-
-    Attributes:
-        duration: length, s.
-        width: a, m.
-        height: b, m.
-        period: τ, s.
-        rest: time at rest before, s.
-        ramp: duration of the start, s; 0 for the abrupt start of the thesis.
-    """
-
-    duration: float = 100.0
-    width: float = 0.5
-    height: float = 0.25
-    period: float = 2.0
-    rest: float = 1.0
-    ramp: float = 1.0
-    planar: ClassVar[bool] = True
-
-    def __post_init__(self) -> None:
-        _check_positive(self, "width", "height", "period")
-
-    def draw(self, generator: np.random.Generator, duration: float | None = None) -> InfinityGesture:
-        """The figure; nothing is drawn."""
-        duration = self.duration if duration is None else duration
-        return InfinityGesture(duration, self.width, self.height, self.period, self.rest, self.ramp)
-
-
-@dataclass(frozen=True)
 class Pointing:
     """Pointing with the body's y axis at targets around north that come one after the other.
 
@@ -144,7 +105,7 @@ class Pointing:
     rest: float = 1.0
 
     def __post_init__(self) -> None:
-        _check_positive(self, "spread", "turn")
+        check_positive(self, "spread", "turn")
 
     def draw(self, generator: np.random.Generator, duration: float | None = None) -> PointingGesture:
         """Draw targets and motion."""
@@ -208,7 +169,7 @@ class Shaking:
     rest: float = 1.0
 
     def __post_init__(self) -> None:
-        _check_positive(self, "rate", "peak", "cycle")
+        check_positive(self, "rate", "peak", "cycle")
 
     def draw(self, generator: np.random.Generator, duration: float | None = None) -> ShakingGesture:
         """Draw some motions of the requested rate and keep the one with the peak nearest to the requested one."""
@@ -269,7 +230,7 @@ class RateTable:
     rest: float = 1.0
 
     def __post_init__(self) -> None:
-        _check_positive(self, "hold", "ramp")
+        check_positive(self, "hold", "ramp")
         checked_quaternion("attitude", self.attitude)
 
     @property

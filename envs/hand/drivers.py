@@ -49,10 +49,6 @@ class MotionDriver(Protocol):
         """Continue from saved memory, bitwise."""
         ...
 
-    def close(self) -> None:
-        """Free what is not memory."""
-        ...
-
 
 class KinematicDriver:
     """The device follows the gesture exactly; no physics engine is involved.
@@ -86,9 +82,6 @@ class KinematicDriver:
     def restore(self, saved: tuple[Gesture | None, int]) -> None:
         """Continue from saved memory, bitwise."""
         self._gesture, self._step = saved
-
-    def close(self) -> None:
-        """Nothing to free."""
 
 
 @dataclass(frozen=True)

@@ -241,6 +241,4 @@ class HandMotionEnv(PoseEnv):
     def close(self) -> None:
         """Close the window; may be called twice."""
         super().close()
-        driver, self._driver, self._block = self._driver, None, None
-        if driver is not None:
-            driver.close()
+        self._driver = self._block = None

@@ -20,9 +20,10 @@ import numpy as np
 
 from ...filters.core import rotation
 from ...filters.support.names import look_up
-from .controller_gestures import Infinity, Pointing, RateTable, Shaking, Walk
+from .controller_gestures import Pointing, RateTable, Shaking, Walk
 from .everyday import EVERYDAY
 from .motion import Gesture, Segment, SegmentedGesture, TurnGesture, match_levels
+from .planar_motion import Infinity
 
 MOST_DRAWS = 200
 """Attempts to draw a trial with a small enough ratio of peak to mean; one in five succeeds for ``fast``."""

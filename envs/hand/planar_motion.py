@@ -7,7 +7,8 @@ from east to up. World: x east, y north, z up; quaternions w, x, y, z, body to w
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 
@@ -54,25 +55,42 @@ def planar_angle(orientation: np.ndarray) -> np.ndarray:
     return np.arctan2(along[..., 2], along[..., 0])
 
 
+def check_positive(config: object, *names: str) -> None:
+    """Refuse numbers that a motion divides by and that are not positive and finite."""
+    for name in names:
+        if not 0.0 < getattr(config, name) < math.inf:
+            raise ValueError(f"{name} must be positive and finite, got {getattr(config, name)}")
+
+
 @dataclass(frozen=True)
-class InfinityGesture:
-    """The figure ∞ in the vertical plane, the body's x axis along the path.
+class Infinity:
+    """The ∞ of section 3.2: x = a sin(ct), y = b sin(2ct), c = 2π/τ; the body's x axis follows the path.
+
+    The unwrapped φ swings between 45° and −225°. Nothing is random, so the configuration is the motion.
 
     Attributes:
         duration: length, s.
-        width: half of the figure's width a, m.
-        height: half of its height b, m.
-        period: of one figure τ, s.
-        rest: time at rest, s.
-        ramp: time of getting under way, s.
+        width: a, m.
+        height: b, m.
+        period: τ, s.
+        rest: time at rest before, s.
+        ramp: duration of the start, s; 0 for the abrupt start of the thesis.
     """
 
-    duration: float
-    width: float
-    height: float
-    period: float
-    rest: float
-    ramp: float
+    duration: float = 100.0
+    width: float = 0.5
+    height: float = 0.25
+    period: float = 2.0
+    rest: float = 1.0
+    ramp: float = 1.0
+    planar: ClassVar[bool] = True
+
+    def __post_init__(self) -> None:
+        check_positive(self, "width", "height", "period")
+
+    def draw(self, generator: np.random.Generator, duration: float | None = None) -> Infinity:
+        """The figure; nothing is drawn."""
+        return self if duration is None else replace(self, duration=duration)
 
     def sample(self, times: np.ndarray) -> BodyState:
         """The motion at ``times`` ``(T,)``, s."""

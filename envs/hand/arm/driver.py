@@ -138,6 +138,3 @@ class ArmDriver:
     def restore(self, saved: tuple[Any, ...]) -> None:
         """Continue from saved memory, bitwise."""
         self._gesture, self._noise, self._mass_factor, self._step, self._table, self._state, self._late = saved
-
-    def close(self) -> None:
-        """Nothing to free."""

@@ -11,7 +11,6 @@ from poise.envs.hand.controller_gestures import (
     BOTH_WAYS,
     DOWNWARDS,
     UPWARDS,
-    Infinity,
     Pointing,
     RateTable,
     Shaking,
@@ -20,7 +19,7 @@ from poise.envs.hand.controller_gestures import (
     pointing_direction,
 )
 from poise.envs.hand.gestures import make_gesture
-from poise.envs.hand.planar_motion import planar_angle
+from poise.envs.hand.planar_motion import Infinity, planar_angle
 
 
 def draw(config, seed=0, duration=None):

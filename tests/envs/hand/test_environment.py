@@ -98,7 +98,6 @@ def test_drives_give_the_same_in_blocks_of_their_own_and_after_restoring(kind):
     second = drive.advance(50)
     np.testing.assert_array_equal(np.asarray(first.now.position), np.asarray(second.now.position))
     np.testing.assert_array_equal(np.asarray(first.now.orientation), np.asarray(second.now.orientation))
-    drive.close()
 
 
 def strapdown(trajectory, dt):
@@ -297,7 +296,6 @@ def test_states_of_the_first_tick_reach_back_into_the_rest():
     drive = ArmDriver(100.0)
     drive.start(make_gesture("slow", np.random.default_rng(0)))
     states = drive.advance(3)
-    drive.close()
     assert isinstance(states.now, BodyState)
     np.testing.assert_allclose(states.now.time, [0.0, 0.01, 0.02])
     np.testing.assert_allclose(states.earlier.time, [-0.0005, 0.0095, 0.0195])
