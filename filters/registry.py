@@ -217,6 +217,11 @@ FILTERS: dict[str, Entry] = {
         "is that of its errors",
         HERE,
     ),
+    "balanced-gyro": Entry(
+        f"{BICYCLE}.balanced_gyro:BalancedGyro",
+        "roll and pitch of a bicycle from its gyroscope alone: level on the mean, balanced in turns of unknown speed",
+        HERE,
+    ),
     "odometry-aided": Entry(
         f"{BICYCLE}.odometry_aided:OdometryAided",
         "roll and pitch of a bicycle from its IMU and the wheel's speed: the wheel rolls and does not slide",
