@@ -8,7 +8,8 @@ with the unlikeness u of the network's inputs (:mod:`.networks.unlikeness`). For
 its maximum at s = mean(e² / (1 − ρ + ρ u)). Most of an error is constant in a ride, so rides, not samples, are what is
 independent: all rides weigh the same, and ρ is the one with the highest likelihood of each ride under the s of the
 others. κ widens the interval of 90 % of a normal distribution to that of Student's with as many degrees of freedom as
-there are rides: a variance of few rides is known badly.
+there are rides, since a variance of few rides is known badly, and further until 90 % of the errors of other rides lie
+inside with a confidence of 95 %: each ride under the covariance of the others, less 1.64 standard errors of their mean.
 """
 
 from __future__ import annotations
@@ -22,7 +23,9 @@ from scipy.stats import norm, t
 SHARES = np.linspace(0.0, 0.9, 19)
 """ρ that are tried"""
 INSIDE = 0.95
-"""quantile at the upper end of an interval of 90 %"""
+"""quantile at the upper end of an interval of 90 %, and confidence that other rides lie inside"""
+WIDER = np.geomspace(1.0, 9.0, 45)
+"""factors on the variances that are tried; the last one, if none is wide enough"""
 
 
 class Calibration(NamedTuple):
@@ -68,7 +71,6 @@ def calibrate(errors: np.ndarray, unlikeness: np.ndarray, mask: np.ndarray, name
         """Of each ride."""
         return np.bincount(of_sample, values, minlength=count) / number
 
-    widened = (t.ppf(INSIDE, count) / norm.ppf(INSIDE)) ** 2
     deviations, growth, normalised = [], [], np.empty_like(squares)
     for k in range(squares.shape[1]):
         best, share = np.inf, 0.0
@@ -81,14 +83,27 @@ def calibrate(errors: np.ndarray, unlikeness: np.ndarray, mask: np.ndarray, name
                 best, share = cost, float(rho)
         profile = 1.0 - share + share * u
         each = np.maximum(means(squares[:, k] / profile), np.finfo(float).tiny)
-        deviations.append(float(np.sqrt(widened * each.mean() * (1.0 - share))))
+        deviations.append(float(np.sqrt(each.mean() * (1.0 - share))))
         growth.append(share / (1.0 - share))
-        normalised[:, k] = squares[:, k] / (widened * left_out(each)[of_sample] * profile)
-    inside = normalised < norm.ppf(INSIDE) ** 2
-    nees, coverage = (float(np.mean([means(column).mean() for column in part.T])) for part in (normalised, inside))
-    nothing = float("nan")
-    both = (nees, coverage) if count > 1 else (nothing, nothing)
-    return Calibration(tuple(deviations), tuple(growth), count, *both)
+        normalised[:, k] = squares[:, k] / (left_out(each)[of_sample] * profile)
+
+    def covered(widened: float) -> np.ndarray:
+        """Share of the errors of each ride that lie inside."""
+        inside = normalised < widened * norm.ppf(INSIDE) ** 2
+        return np.asarray(np.mean([means(column) for column in inside.T], axis=0))
+
+    widened = (t.ppf(INSIDE, count) / norm.ppf(INSIDE)) ** 2
+    nees = coverage = float("nan")
+    if count > 1:
+        doubt = norm.ppf(INSIDE) / np.sqrt(count - 1)
+        shares = [covered(widened * wider) for wider in WIDER]
+        enough = [share.mean() - doubt * share.std() >= 2.0 * INSIDE - 1.0 for share in shares]
+        chosen = enough.index(True) if any(enough) else len(WIDER) - 1
+        widened, coverage = widened * WIDER[chosen], float(shares[chosen].mean())
+        nees = float(np.mean([means(column).mean() for column in normalised.T])) / widened
+    return Calibration(
+        tuple(float(np.sqrt(widened)) * each for each in deviations), tuple(growth), count, nees, coverage
+    )
 
 
 def left_out(values: np.ndarray) -> np.ndarray:
