@@ -10,7 +10,7 @@ from typing import Any, Literal, get_args
 from ...envs.hand.gestures import Mixed
 from ...envs.hand.trajectories import HandTrajectories
 from ...envs.sensors.presets import sensor_preset
-from .motions import DEG, FLOWN_MOTIONS, GradedMotions, MixedMotions, Motions, RiddenMotions
+from .motions import DEG, FLOWN_MOTIONS, GradedMotions, MixedMotions, Motions, RiddenMotions, uneven_rides
 
 SUSTAINED = Mixed(lengths=(15.0, 40.0), rest_share=0.1, spread=0.5, single_share=0.25)
 """Sustained motion of one kind, in addition to the quick changes of ``mixed``."""
@@ -174,6 +174,17 @@ class TrainingConfig:
         return json.loads(json.dumps(values))
 
 
+RIDERS: dict[str, tuple[tuple[str, ...], str | None]] = {
+    "two-gyro-level": (("constraint",), None),
+    "platform-gyro": (("measurement",), None),
+    "balanced-gyro": (("level", "balance"), None),
+    "whole-body": (("trunk", "limb", "acceleration", "lateral"), None),
+    "force-inertial": (("torque", "roll"), "seat offset"),
+    "odometry-aided": (("process", "bias"), "bias step"),
+}
+"""Filter of rides → gains that are acted on, and the fault of the sensors in all rides, if there is one."""
+
+
 def shipped_config(filter: str) -> TrainingConfig:
     """The configuration of a filter with ``--preset shipped``; cards say how and at which commit weights were trained.
 
@@ -181,12 +192,13 @@ def shipped_config(filter: str) -> TrainingConfig:
     simulation and loses on recordings. With an oracle over the whole box of actions the filter diverges in single
     motions.
     """
-    if filter in ("two-gyro-level", "platform-gyro"):
-        gain = "constraint" if filter == "two-gyro-level" else "measurement"
+    if filter in RIDERS:
+        gains, fault = RIDERS[filter]
+        source = uneven_rides()
         return TrainingConfig(
             filter=filter,
-            gains=(gain,),
-            motions=RiddenMotions(),
+            gains=gains,
+            motions=RiddenMotions(replace(source, fault=fault)),
             trajectories=48,
             total_timesteps=260_000,
             n_envs=48,

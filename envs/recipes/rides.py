@@ -12,8 +12,10 @@ from typing import Any
 
 import numpy as np
 
+from ...filters.support.names import look_up
 from ..data.trajectory import Trajectory
 from ..episodes import EpisodeStore
+from .faults import FAULTS
 from .recipe import Recipe
 from .registry import described_recipe, recipe
 from .slopes import sloped
@@ -29,7 +31,7 @@ class RideSource:
     """Rides of the ``rider`` recipe.
 
     Raises:
-        ValueError: no rides or no draws.
+        ValueError: no rides or no draws, or an unknown fault.
     """
 
     rides: int = 80
@@ -42,6 +44,8 @@ class RideSource:
     """fields of the recipe that differ"""
     sloped_share: float = 0.0
     """of draws whose ground rises and falls, see :func:`.slopes.sloped`: those have no other channels"""
+    fault: str | None = None
+    """one of :data:`.faults.FAULTS` in every draw, at the same time in all of a ride"""
 
     def __post_init__(self) -> None:
         for name in ("rides", "draws"):
@@ -49,6 +53,8 @@ class RideSource:
                 raise ValueError(f"{name} must be at least 1, got {getattr(self, name)}")
         if not 0.0 <= self.sloped_share <= 1.0:
             raise ValueError(f"sloped_share must lie in [0, 1], got {self.sloped_share}")
+        if self.fault is not None:
+            look_up("fault", self.fault, FAULTS)
 
     def recipe(self) -> Recipe:
         """The distribution of the rides."""
@@ -76,6 +82,9 @@ def drawn(source: RideSource, seed: int, index: int) -> list[Trajectory]:
     ridden = ride(source, seed, index)
     children = np.random.SeedSequence(seed, spawn_key=(index, 1)).spawn(source.draws)
     draws = [made.sensed(ridden, child).replace(mask=ridden.time > SETTLED) for child in children]
+    if source.fault is not None:
+        sequence = np.random.SeedSequence(seed, spawn_key=(index, 3))
+        draws = [FAULTS[source.fault].applied(each, np.random.default_rng(sequence)) for each in draws]
     ground = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(index, 2)))
     return [sloped(each, ground) if ground.random() < source.sloped_share else each for each in draws]
 

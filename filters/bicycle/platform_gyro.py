@@ -65,6 +65,7 @@ class PlatformGyro(RiderEquations, Model):
     state_size: ClassVar[int] = 4
     error_size: ClassVar[int] = 4
     residual_size: ClassVar[int] = 1
+    error_parts: ClassVar[Mapping[str, tuple[int, int]]] = {ROLL.name: (0, 1)}
     held_inputs: ClassVar = (ridden("bicycle_imu/gyr", "gyroscope_noise"),)
     gains: ClassVar[dict[str, Gain]] = {
         "process": Gain("process_scale", description="process variance"),

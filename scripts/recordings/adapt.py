@@ -23,7 +23,10 @@ class Args:
     """Arguments of ``poise adapt``."""
 
     filter: tyro.conf.Positional[str] = "external-acceleration"
-    """name of a Kalman filter; of rides: two-gyro-level or platform-gyro"""
+    """name of a Kalman filter; of rides: two-gyro-level, platform-gyro, balanced-gyro, whole-body, or force-inertial or
+    odometry-aided, whose sensors then have a lasting fault"""
+    quantities: tuple[str, ...] = ()
+    """outputs of the filter that are scored together (default: up, or the first)"""
     recordings: tuple[Path, ...] = ()
     """files or folders of recordings with known truth, each folder a table (default: simulated trajectories that no
     policy was trained on)"""
@@ -38,6 +41,8 @@ class Args:
     """simulated trajectories on which the best constants are searched"""
     points: int = 32
     """constant gains that the bounds choose from"""
+    search: int = 32
+    """constant gains that the search for the best ones begins with; 24 more follow"""
     ablation: bool = False
     """also what each policy loses without a group of its observations, and with a gain that it leaves alone"""
     seed: int = 0
@@ -59,7 +64,7 @@ def run(args: Args) -> int:
     from ...baselines.gain_policy.policy import GainPolicy
     from ...baselines.plots import save
     from ...baselines.weights_io import list_weights
-    from ...envs.gain_reward import scored_quantity
+    from ...envs.gain_reward import scored_quantities
     from ...filters.adaptation.gains import tunable_filter
     from ...filters.adaptation.tuned import TunedFilter
     from ..experiment import known_recordings, start_run
@@ -77,7 +82,8 @@ def run(args: Args) -> int:
         if math.isfinite(policy.bias_limit)
     }
     tuned = TunedFilter.of(tunable_filter(args.filter), config.gains)
-    quantity = scored_quantity(tuned.kalman, None)
+    scored = scored_quantities(tuned.kalman, args.quantities or None)
+    quantity = replace(scored[0], name=", ".join(each.name for each in scored))
     sets: dict[str, list[Trajectory]] = {
         path.name: [trajectory.on_grid() for trajectory in known_recordings((path,))] for path in args.recordings
     }
@@ -86,24 +92,33 @@ def run(args: Args) -> int:
         motions = config.motions.draw_many(config.seed, args.training)
         out.say(f"searching constant gains of {args.filter} on {len(motions)} trajectories")
         guesses = () if config.warm_start_centre is None else (config.warm_start_centre,)
-        constant = best_constant_gains(tuned, motions, guesses=guesses, samples=32, refinements=24, seed=args.seed)
+        constant = best_constant_gains(
+            tuned,
+            motions,
+            quantity=args.quantities or None,
+            guesses=guesses,
+            samples=args.search,
+            refinements=24,
+            seed=args.seed,
+        )
         twins: list[Trajectory] = []
         if not sets:
             sets, twins = simulated(args, config.motions)
         errors = {}
         for group, trajectories in sets.items():
-            errors[group] = contenders(
+            errors[group], nees = contenders(
                 tuned,
                 trajectories,
                 constant.action,
                 policies=policies | unlimited,
                 twins=twins,
+                quantity=args.quantities or None,
                 leave_out=bool(args.recordings),
                 points=args.points,
                 seed=args.seed,
             )
             title = f"Error of {args.filter} ({quantity.name}) on {len(trajectories)} {group} trajectories, deg"
-            out.table(rows_of(errors[group]), title)
+            out.table(rows_of(errors[group], nees), title)
             for name, policy in policies.items():
                 explained = gains_by_motion(tuned.kalman, policy, trajectories)
                 out.table(explained, f"Factors on the variances by {name}, geometric means of {group} seconds")

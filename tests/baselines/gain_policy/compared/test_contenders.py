@@ -24,7 +24,7 @@ def motions():
 def found(motions):
     policies = {"policy": GainPolicy.neutral(TUNED)}
     constant = np.array([0.3, 0.4])
-    return contenders(TUNED, motions, constant, policies=policies, twins=motions, leave_out=True, points=2)
+    return contenders(TUNED, motions, constant, policies=policies, twins=motions, leave_out=True, points=2).errors
 
 
 def test_contenders_are_measured_alike(found, motions):
