@@ -33,8 +33,8 @@ MEAN, BIAS, RIDGE, TUNED, ORACLE = (
     "each ride's mean error removed",
 )
 """What is no estimator: references of the table."""
-ROLL_ONLY = "odometry-aided"
-"""Filter of the roll, the first angle of every paper, from the bicycle's sensors."""
+ROLL_ONLY = ("odometry-aided", "balanced-gyro", "platform-gyro+turning", "two-gyro-level+turning")
+"""Estimators of the roll, the first angle of every paper."""
 
 
 @dataclass(frozen=True)
@@ -94,14 +94,24 @@ def estimators_of(paper: str) -> list[str]:
     return [name for name in own if name in FILTERS] + [name for name in networks if name in TRAINED]
 
 
-def all_errors(paper: str, learnt: Learnt | None, ride: Trajectory, scored: np.ndarray) -> dict[str, Errors]:
-    """Label → errors of every method on a drawn ride at the samples that count ``(T,)``."""
+def roll_errors(ride: Trajectory, scored: np.ndarray) -> dict[str, np.ndarray]:
+    """Estimator of the roll alone → its error ``(n, 1)`` on a drawn ride at the samples that count."""
+    found = {}
+    for name in ROLL_ONLY:
+        made: Any = make_estimator(name, dt=ride.dt, metadata=ride.metadata)
+        found[name] = (made.run(ride.measurements).pose["bicycle/roll"] - ride.truth["bicycle/roll"])[scored]
+    return found
+
+
+def all_errors(
+    paper: str, learnt: Learnt | None, ride: Trajectory, scored: np.ndarray, rolls: Mapping[str, np.ndarray]
+) -> dict[str, Errors]:
+    """Label → errors of every method on a drawn ride at the samples that count; ``rolls`` as :func:`roll_errors`."""
     published = estimated(paper, ride, scored)
-    odometry: Any = make(ROLL_ONLY, dt=ride.dt, metadata=ride.metadata)
-    roll = np.full(published.values.shape, np.nan)
-    roll[:, :1] = (odometry.run(ride.measurements).pose["bicycle/roll"] - ride.truth["bicycle/roll"])[scored]
     found = {paper: published} if learnt is None else references(paper, learnt, ride, scored, published)
-    found[ROLL_ONLY] = Errors(wrapped(roll))
+    for name, errors in rolls.items():
+        others = np.full((len(errors), published.values.shape[1] - 1), np.nan)
+        found[name] = Errors(wrapped(np.concatenate([errors, others], axis=1)))
     found |= {name: estimated(name, ride, scored) for name in estimators_of(paper) if name != paper}
     return found | {f"{paper}, {ORACLE}": Errors(published.values - published.values.mean(axis=0))}
 
@@ -151,10 +161,11 @@ def ride_rows(settings: RiderSuite, learnt: Mapping[str, Learnt], group: str, in
     bounds: dict[str, np.ndarray] = {}
     for _, draw, ride in unseen_rides(source, seeds_of(settings.seed)[3], group, index):
         ride, scored = ride.on_grid(), scored_samples(ride)
+        rolls = roll_errors(ride, scored)
         for paper in settings.papers:
             if paper not in bounds:  # the same, nearly, for all draws of one ride
                 bounds[paper] = angle_bounds(paper, ride, scored)
-            for label, errors in all_errors(paper, learnt.get(paper), ride, scored).items():
+            for label, errors in all_errors(paper, learnt.get(paper), ride, scored, rolls).items():
                 found = score(errors)
                 angles = tuple(float(angle) for angle in found.angles)
                 ratio = float(np.nanmean(found.angles / bounds[paper]))

@@ -47,7 +47,7 @@ def ride_means(rows: Iterable[Row], paper: str) -> list[tuple[str, str, str, str
     """Means over the draws of each ride, as rows of :func:`poise.evaluate`, of what estimates all angles of a paper."""
     found = []
     for method, groups in by_method(rows, paper).items():
-        for group, own in groups.items() if method != ROLL_ONLY else ():
+        for group, own in groups.items() if method not in ROLL_ONLY else ():
             for ride in sorted({row.ride for row in own}):
                 draws = [measures(row) for row in own if row.ride == ride]
                 for metric, _, unit in draws[0]:
@@ -64,7 +64,7 @@ def riders(rows: Sequence[Row]) -> np.ndarray:
 
 def told(method: str) -> str:
     """Name of a method in tables of means."""
-    return f"{method} (roll alone)" if method == ROLL_ONLY else method
+    return f"{method} (roll alone)" if method in ROLL_ONLY else method
 
 
 def summary(rows: Sequence[Row]) -> list[dict[str, Any]]:

@@ -139,7 +139,7 @@ def test_the_comparison_of_one_paper(monkeypatch: pytest.MonkeyPatch, tmp_path: 
     monkeypatch.setitem(PRESETS, "two-gyro+network", replace(PRESETS["two-gyro+network"], rides=source))
     monkeypatch.setattr("poise.baselines.learned.rides.UNSEEN", {group: {} for group in UNSEEN})
     settings = suite.RiderSuite(("two-gyro",), rides=2, draws=1, training=2)
-    monkeypatch.setattr(suite, "ROLL_ONLY", "two-gyro-integration")
+    monkeypatch.setattr(suite, "ROLL_ONLY", ("two-gyro-integration", "platform-gyro+turning"))
     rows = suite.compare(settings, tmp_path)
     files = sorted(tmp_path.iterdir())
     assert len(files) == 2 * len(UNSEEN)
