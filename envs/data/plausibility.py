@@ -12,7 +12,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ...filters.core import rotation
-from .rate_consistency import RateConsistency, rate_consistency
+from .rate_consistency import FASTEST_TURN, RateConsistency, rate_consistency
 from .readings import Finding, check_alive, plausible_samples
 from .trajectory import Trajectory
 
@@ -37,8 +37,8 @@ FIELD = (22.0, 68.0)
 """µT: the earth's field anywhere."""
 PLAUSIBLE_RATES = (5.0, 10_000.0)
 """Hz."""
-FASTEST_TURN = 70.0
-"""rad/s (4,000 °/s): the largest range of the gyroscopes in use."""
+UNUSUAL_RATE = 2000.0
+"""Hz, faster than what nearly all recorders write."""
 LARGEST_BIAS = 0.12
 """rad/s (7 °/s): beyond what uncalibrated consumer gyroscopes show at rest."""
 NORMALISED = 1e-4
@@ -127,6 +127,11 @@ def check_clock(trajectory: Trajectory) -> Iterator[Finding]:
         what = f"{rate:.3g} Hz"
         yield Finding("warning", "time", what, "time in minutes, days or another unit", "Give time in seconds.")
     else:
+        if rate > UNUSUAL_RATE:
+            cause = f"time in minutes (in seconds that would be {rate / 60.0:.4g} Hz)"
+            yield Finding(
+                "note", "time", f"{rate:.4g} Hz", cause, "Give time in seconds, unless the sensor is so fast."
+            )
         long = step[step > 1.0]
         if len(long):
             what = f"{len(long)} gaps of more than 1 s, the longest {long.max():.1f} s"
@@ -145,24 +150,42 @@ def check_site(trajectory: Trajectory, site: str, wrong_clock: bool) -> list[Fin
     for kind, values in recorded.items():
         if values is not None:
             findings += check_alive(f"{site}/{kind}", values, trajectory.dt if not wrong_clock else None)
-    gyr, acc, mag = (seen(trajectory, f"{site}/{kind}") for kind in recorded)
     dead = {finding.channel for finding in findings if finding.severity == "warning"}
-    if acc is not None and f"{site}/acc" not in dead:
-        findings += check_force(f"{site}/acc", acc)
-    if gyr is not None and f"{site}/gyr" not in dead:
+    gyr, acc, mag = (
+        None if f"{site}/{kind}" in dead else seen(trajectory, f"{site}/{kind}") for kind in ("gyr", "acc", "mag")
+    )
+    turning = {} if gyr is None or wrong_clock else compared(trajectory, site, gyr, acc, mag)
+    if acc is not None:
+        findings += check_force(f"{site}/acc", acc, turning.get("accelerometer"))
+    if gyr is not None:
         if not wrong_clock:
-            findings += check_rates(trajectory, site, gyr, acc, mag if f"{site}/mag" not in dead else None)
-        findings += check_rest(f"{site}/gyr", gyr, any(f.channel == f"{site}/gyr" for f in findings))
-    if mag is not None and f"{site}/mag" not in dead:
+            findings += check_rates(trajectory, site, gyr, turning)
+        known = any(finding.channel == f"{site}/gyr" for finding in findings)
+        findings += check_rest(f"{site}/gyr", gyr, known or any(one.explains for one in turning.values()))
+    if mag is not None:
         findings += check_field(f"{site}/mag", mag)
     removed = any(f.channel == f"{site}/acc" and f.severity == "warning" for f in findings)
     if acc is not None and not removed:
-        findings += check_sign(trajectory, f"{site}/acc", acc, mag if f"{site}/mag" not in dead else None)
+        findings += check_sign(trajectory, f"{site}/acc", acc, mag)
     return findings
 
 
-def check_force(channel: str, acc: np.ndarray) -> Iterator[Finding]:
-    """Unit of the accelerometer, and whether gravity is in it."""
+def compared(
+    trajectory: Trajectory, site: str, gyr: np.ndarray, acc: np.ndarray | None, mag: np.ndarray | None
+) -> dict[str, RateConsistency]:
+    """The rates beside the motion of gravity, of the field and of the truth, by name, where these can be compared."""
+    against = {"accelerometer": acc, "magnetometer": mag}
+    if site == "imu" and "orientation" in trajectory.truth:
+        against["reference"] = rotation.rotate_back(trajectory.truth["orientation"], np.array([0.6, 0.0, 0.8]))
+    found = {
+        name: None if vector is None else rate_consistency(trajectory.time, gyr, vector, name != "accelerometer")
+        for name, vector in against.items()
+    }
+    return {name: one for name, one in found.items() if one is not None}
+
+
+def check_force(channel: str, acc: np.ndarray, turning: RateConsistency | None = None) -> Iterator[Finding]:
+    """Unit of the accelerometer, and whether gravity is in it: by the median, and by means that the gyroscope turns."""
     samples = acc[np.isfinite(acc).all(axis=1) & acc.any(axis=1)]
     length = np.linalg.norm(samples, axis=1)
     usual = float(np.median(length))
@@ -170,20 +193,25 @@ def check_force(channel: str, acc: np.ndarray) -> Iterator[Finding]:
         what, remedy = f"every sample is {usual:.4g} long", "Export the specific force itself."
         yield Finding("warning", channel, what, "directions of length one instead of measurements", remedy)
     rest = quietest(samples)
-    if PLAUSIBLE_FORCE[0] <= usual <= PLAUSIBLE_FORCE[1]:
+    mean = usual if turning is None else turning.longest
+    scattered = turning is not None and not turning.steady and mean < 0.5 * usual
+    lively = turning is not None and turning.steady and PLAUSIBLE_FORCE[0] <= turning.length <= PLAUSIBLE_FORCE[1]
+    if (PLAUSIBLE_FORCE[0] <= usual <= PLAUSIBLE_FORCE[1] and not scattered) or lively:
         yield from check_scale(channel, rest)
         return
     what = f"median length {usual:.4g} m/s²"
     # Where the sensor is quiet it reads gravity, in whatever unit; without gravity it reads next to nothing.
     quiet = usual if rest is None else float(np.linalg.norm(rest.mean(axis=0)))
-    unit = min(FORCE_UNITS, key=lambda name: abs(np.log(usual / FORCE_UNITS[name])))
-    apart = max(abs(np.log(value / FORCE_UNITS[unit])) if value > 0.0 else np.inf for value in (usual, quiet))
+    unit = min(FORCE_UNITS, key=lambda name: abs(np.log(mean / FORCE_UNITS[name])))
+    apart = max(abs(np.log(value / FORCE_UNITS[unit])) if value > 0.0 else np.inf for value in (mean, quiet))
     if apart < 0.25:
         factor = GRAVITY / FORCE_UNITS[unit]
         yield Finding("warning", channel, what, f"readings in {unit}", f"Multiply by {factor:.6g}.")
-    elif usual < PLAUSIBLE_FORCE[0]:
+    elif usual < PLAUSIBLE_FORCE[0] or scattered:
         remedy = "Export the raw acceleration (specific force), which is 9.81 m/s² at rest."
-        yield Finding("warning", channel, what, "gravity was removed (linear acceleration)", remedy)
+        cause = "gravity was removed (linear acceleration)"
+        cause += ", or the rates are not those of this sensor" if scattered and usual > PLAUSIBLE_FORCE[0] else ""
+        yield Finding("warning", channel, what, cause, remedy)
     else:
         remedy = "Calibrate the sensor, or convert to m/s²."
         yield Finding("warning", channel, what, "a scale error, or a unit other than m/s²", remedy)
@@ -210,19 +238,11 @@ def check_field(channel: str, mag: np.ndarray) -> Iterator[Finding]:
 
 
 def check_rates(
-    trajectory: Trajectory, site: str, gyr: np.ndarray, acc: np.ndarray | None, mag: np.ndarray | None
+    trajectory: Trajectory, site: str, gyr: np.ndarray, turning: dict[str, RateConsistency]
 ) -> Iterator[Finding]:
     """Unit, signs and axes of the gyroscope, against the motion of gravity, of the field and of the truth."""
-    channel = f"{site}/gyr"
+    channel, found = f"{site}/gyr", dict(turning)
     fastest = float(np.nanquantile(np.linalg.norm(gyr, axis=1), 0.99))
-    against = {"accelerometer": acc, "magnetometer": mag}
-    if site == "imu" and "orientation" in trajectory.truth:
-        against["reference"] = rotation.rotate_back(trajectory.truth["orientation"], np.array([0.6, 0.0, 0.8]))
-    found: dict[str, RateConsistency] = {}
-    for name, vector in against.items():
-        one = None if vector is None else rate_consistency(trajectory.time, gyr, vector)
-        if one is not None:
-            found[name] = one
     yield from check_conjugate(trajectory, gyr, found)
     turned = 0.0 if "accelerometer" not in found else found["accelerometer"].at_rest
     if turned > LEANING and 3.0 * fastest < STILL * turned:
@@ -250,7 +270,7 @@ def check_conjugate(trajectory: Trajectory, gyr: np.ndarray, found: dict[str, Ra
     if given is None or given.as_given < 0.3 * given.at_rest or given.at_rest < 0.05:
         return
     other = rotation.rotate(trajectory.truth["orientation"], np.array([0.6, 0.0, 0.8]))
-    conjugate = rate_consistency(trajectory.time, gyr, other)
+    conjugate = rate_consistency(trajectory.time, gyr, other, constant=True)
     if conjugate is not None and conjugate.as_given < 0.3 * min(given.as_given, given.axes_residual):
         what = "gyroscope and reference turn together only if it is read the other way round"
         cause = "conjugate quaternions, which turn the world into the sensor"
@@ -308,7 +328,7 @@ def check_rest(channel: str, gyr: np.ndarray, known: bool) -> Iterator[Finding]:
     bias, spread = float(np.linalg.norm(rest.mean(axis=0))), float(rest.std(axis=0).max())
     if bias > LARGEST_BIAS and spread < 0.05 * bias:
         what = f"{bias:.3g} rad/s ({np.degrees(bias):.1f} °/s) where it is steady"
-        cause = "rates in deg/s, or a gyroscope without calibration"
+        cause = "rates in deg/s, a gyroscope without calibration, or a steady turn about the vertical"
         yield Finding("warning", channel, what, cause, "Convert to rad/s, or subtract the rates at rest.")
 
 

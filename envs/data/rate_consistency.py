@@ -2,7 +2,8 @@
 
 Rotated by the integrated gyroscope, gravity (or the magnetic field) is constant. Short windows are rotated under each
 hypothesis about the gyroscope's unit and axes, and the one with the most constant direction is compared with "as
-given". Accelerations average out over the segments of a window, because velocity stays bounded.
+given". Accelerations average out over the segments of a window, because velocity stays bounded: the mean of a specific
+force over a window is gravity, however strong the motion is.
 """
 
 from __future__ import annotations
@@ -16,22 +17,35 @@ from ...filters.core import rotation
 
 SEGMENT = 1.0
 """s over which acceleration averages out; three of them are one window."""
-SEGMENTS = 3
+SEGMENTS, FEWEST_SEGMENTS = 3, 6
+"""Of a window, and of a recording: those of a short recording are shorter."""
 FEWEST_STEPS, MOST_STEPS = 10, 25
 """Integration steps a segment: samples are averaged down to at most so many."""
-WINDOWS = 24
-"""Windows that are looked at: those with the largest rotation."""
+MOST_WINDOWS = 24
+"""Windows that are looked at: those in which the direction and the rates move most."""
+LIVELY = 0.1
+"""Share of the motion of the liveliest window, below which a window tells nothing: most of a recording may be rest."""
 LONGEST_STEP = 3.0
 """A window with an interval longer than so many median ones spans a gap, and is left out."""
 CLEARLY = 0.6
 """A hypothesis is preferred to the data as given if it leaves less than this share."""
+STEADY = 0.6
+"""Residual as given, below which vectors have a direction in common; of vectors without one it is 0.8."""
+NEARLY = 0.25
+"""What a unit that differs by a factor of two only may leave of the motion: a disturbed field may look like it."""
+SPUN = 0.01
+"""Variance within a segment, relative to the squared length, that tells nothing."""
+RIGHT = 0.2
+"""Share of the motion that data which are right may leave: noise decides between hypotheses below it."""
+FASTEST_TURN = 70.0
+"""rad/s (4,000 °/s): the largest range of the gyroscopes in use."""
 
 SCALES: dict[str, float] = {
     "rad/s that were converted from deg/s once too often": 180.0 / np.pi,
     "rev/s": 2.0 * np.pi,
-    "half rad/s (another full scale than assumed)": 2.0,
+    "half rad/s (another full scale than assumed, or a clock of twice the rate)": 2.0,
     "rad/s": 1.0,
-    "twice rad/s (another full scale than assumed)": 0.5,
+    "twice rad/s (another full scale than assumed, or a clock of half the rate)": 0.5,
     "rpm": 2.0 * np.pi / 60.0,
     "deg/s": np.pi / 180.0,
     "mrad/s": 1e-3,
@@ -64,6 +78,8 @@ class RateConsistency:
         unit_residual: residual with this unit.
         axes: ``(3, 3)`` signed permutation of the reported axes that leaves least, at that unit.
         axes_residual: residual with these axes.
+        length: of the mean vector of a window, turned back as given, in the unit of the vector.
+        longest: the same under the hypothesis where it is longest.
     """
 
     as_given: float
@@ -72,6 +88,13 @@ class RateConsistency:
     unit_residual: float
     axes: np.ndarray
     axes_residual: float
+    length: float
+    longest: float
+
+    @property
+    def steady(self) -> bool:
+        """Whether the mean of a window is one: otherwise the vector points anywhere."""
+        return self.as_given < STEADY
 
     @property
     def explains(self) -> bool:
@@ -83,22 +106,28 @@ class RateConsistency:
         """A unit that fits clearly better than rad/s, or None."""
         too_much = self.as_given > 0.3 and self.as_given > 3.0 * self.at_rest
         better = self.unit_residual < CLEARLY * self.as_given and (self.explains or too_much)
+        if 0.25 < SCALES[self.unit] < 4.0:
+            better = better and self.unit_residual < NEARLY * self.at_rest
         return self.unit if self.unit != "rad/s" and better else None
 
     @property
     def other_axes(self) -> np.ndarray | None:
         """An arrangement of the axes that fits clearly better than the one given, or None."""
         better = self.axes_residual < CLEARLY * self.unit_residual and self.explains
+        better = better and self.unit_residual > RIGHT * self.at_rest
         return self.axes if better and not np.array_equal(self.axes, np.eye(3)) else None
 
 
-def rate_consistency(time: np.ndarray, rate: np.ndarray, vector: np.ndarray) -> RateConsistency | None:
+def rate_consistency(
+    time: np.ndarray, rate: np.ndarray, vector: np.ndarray, constant: bool = False
+) -> RateConsistency | None:
     """Compare reported rates with the motion of a measured direction.
 
     Args:
         time: ``(T,)`` s, increasing.
         rate: ``(T, 3)`` as the gyroscope reports it, NaN where missing.
         vector: ``(T, 3)`` of an accelerometer or magnetometer, any unit, NaN where missing.
+        constant: the direction is constant in the world at every instant, as that of a field, not only in the mean.
 
     Returns:
         The comparison; None if the recording has no complete window.
@@ -106,24 +135,31 @@ def rate_consistency(time: np.ndarray, rate: np.ndarray, vector: np.ndarray) -> 
     windows = cut(time, rate, vector)
     if windows is None:
         return None
-    turns, vectors = windows
+    turns, vectors, size = windows
     axes = signed_permutations()
+    fastest = float(np.nanquantile(np.linalg.norm(rate, axis=1), 0.99))
     small = float(np.nanmax(np.abs(rate))) < SMALL_UNITS_FROM
-    units = {unit: scale for unit, scale in SCALES.items() if not (small and unit.startswith("m"))}
+    units = {
+        unit: scale
+        for unit, scale in SCALES.items()
+        if unit == "rad/s" or (scale * fastest < FASTEST_TURN and not (small and unit.startswith("m")))
+    }
     scales = np.array([0.0, *units.values()])[:, None, None, None]
-    at_rest, *rest = residuals(np.concatenate([scales * turns, rearranged(axes, turns)]), vectors).tolist()
+    left, lengths = residuals(np.concatenate([scales * turns, rearranged(axes, turns)]), vectors, constant)
+    at_rest, *rest = left.tolist()
     by_unit, by_axes = dict(zip(units, rest, strict=False)), rest[len(units) :]
-    given = by_unit["rad/s"]
+    given, length = by_unit["rad/s"], size * float(lengths[len(units) + 1])
+    longest = size * float(lengths.max())
     # Too small a unit is as good as none: the largest that fits is meant.
     unit = next(name for name in units if by_unit[name] <= 1.15 * min(by_unit.values()))
     if by_unit[unit] > CLEARLY * given or by_unit[unit] > min(by_axes):
         unit = "rad/s"
     elif by_unit[unit] > 0.5 * at_rest:
-        by_axes = residuals(rearranged(axes, SCALES[unit] * turns), vectors).tolist()
+        by_axes = residuals(rearranged(axes, SCALES[unit] * turns), vectors, constant)[0].tolist()
     else:
-        return RateConsistency(given, at_rest, unit, by_unit[unit], axes[0], by_unit[unit])
+        return RateConsistency(given, at_rest, unit, by_unit[unit], axes[0], by_unit[unit], length, longest)
     best = int(np.argmin(by_axes))
-    return RateConsistency(given, at_rest, unit, by_unit[unit], axes[best], by_axes[best])
+    return RateConsistency(given, at_rest, unit, by_unit[unit], axes[best], by_axes[best], length, longest)
 
 
 def rearranged(axes: list[np.ndarray], turns: np.ndarray) -> np.ndarray:
@@ -131,11 +167,11 @@ def rearranged(axes: list[np.ndarray], turns: np.ndarray) -> np.ndarray:
     return np.einsum("hij,wtj->hwti", np.stack(axes), turns)
 
 
-def cut(time: np.ndarray, rate: np.ndarray, vector: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+def cut(time: np.ndarray, rate: np.ndarray, vector: np.ndarray) -> tuple[np.ndarray, np.ndarray, float] | None:
     """Windows of a recording: rotation vectors as reported, and measured vectors of length about 1.
 
     Returns:
-        Two arrays ``(windows, steps, 3)``; None without a complete window.
+        Two arrays ``(windows, steps, 3)``, and the usual length of the vectors; None without a complete window.
     """
     present = np.isfinite(rate).all(axis=1) & np.isfinite(vector).all(axis=1) & (vector != 0.0).any(axis=1)
     time, rate, vector = time[present], rate[present], vector[present]
@@ -144,34 +180,41 @@ def cut(time: np.ndarray, rate: np.ndarray, vector: np.ndarray) -> tuple[np.ndar
     step = float(np.median(np.diff(time)))
     # A clock in another unit than seconds still gets windows of a sensible number of samples.
     samples = int(np.clip(round(SEGMENT / step), FEWEST_STEPS, 2000))
+    samples = max(FEWEST_STEPS, min(samples, (len(time) - 1) // FEWEST_SEGMENTS))
     together = -(-samples // MOST_STEPS)
-    length = samples // together * together * SEGMENTS
+    length = samples // together * together
     count = (len(time) - 1) // length
-    if count == 0:
+    if count < SEGMENTS:
         return None
-    size = np.median(np.linalg.norm(vector, axis=1))
-    intervals = np.diff(time)[: count * length].reshape(count, length)
+    size = float(np.median(np.linalg.norm(vector, axis=1)))
+    intervals = np.diff(time)[: count * length]
     # A sample describes the interval that it ends.
-    turns = (rate[1 : count * length + 1] * np.diff(time)[: count * length, None]).reshape(count, -1, together, 3)
-    vectors = (vector[1 : count * length + 1] / size).reshape(count, -1, together, 3)
-    turns, vectors = turns.sum(axis=2), vectors.mean(axis=2)
-    whole = intervals.max(axis=1) < LONGEST_STEP * step
-    if not whole.any():
+    turns = (rate[1 : count * length + 1] * intervals[:, None]).reshape(count, -1, together, 3).sum(axis=2)
+    vectors = (vector[1 : count * length + 1] / size).reshape(count, -1, together, 3).mean(axis=2)
+    whole = intervals.reshape(count, length).max(axis=1) < LONGEST_STEP * step
+    window = np.arange(count - SEGMENTS + 1)[:, None] + np.arange(SEGMENTS)
+    window = window[whole[window].all(axis=1)]
+    if not len(window):
         return None
-    amount = np.where(whole, np.linalg.norm(turns, axis=2).sum(axis=1), -1.0)
-    chosen = np.argsort(-amount, kind="stable")[: min(WINDOWS, int(whole.sum()))]
-    return turns[chosen], vectors[chosen]
+    amount = np.linalg.norm(turns, axis=2).sum(axis=1)[window].sum(axis=1)
+    moves = np.sqrt(np.var(vectors.mean(axis=1)[window], axis=1).sum(axis=1))
+    lively = (amount / max(amount.max(), 1e-12) + 1e-6) * (moves / max(moves.max(), 1e-12) + 1e-6)
+    order = np.argsort(-lively, kind="stable")[:MOST_WINDOWS]
+    chosen = window[order[lively[order] >= LIVELY * lively.max()]]
+    return turns[chosen].reshape(len(chosen), -1, 3), vectors[chosen].reshape(len(chosen), -1, 3), size
 
 
-def residuals(turns: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+def residuals(turns: np.ndarray, vectors: np.ndarray, constant: bool) -> tuple[np.ndarray, np.ndarray]:
     """Motion of the mean vectors of the segments, turned back to the start of their window, as a share of their mean.
 
     Args:
         turns: ``(hypotheses, windows, steps, 3)`` rotation vectors.
         vectors: ``(windows, steps, 3)``.
+        constant: count the motion within a segment, too.
 
     Returns:
-        ``(hypotheses,)`` root of the median over windows of the relative variance of the means.
+        ``(hypotheses,)`` root of the median over windows of the relative variance of the means; and ``(hypotheses,)``
+        median length of the mean over a window.
     """
     q = np.zeros((*turns.shape[:2], 4))
     q[..., 0] = 1.0
@@ -182,7 +225,11 @@ def residuals(turns: np.ndarray, vectors: np.ndarray) -> np.ndarray:
         q = rotation.multiply(q, half)
         turned[:, :, t] = rotation.rotate(q, vectors[:, t])
         q = rotation.multiply(q, half)
-    means = turned.reshape(*turns.shape[:2], SEGMENTS, -1, 3).mean(axis=3)
-    variance = np.var(means, axis=2).sum(axis=-1)
-    # Relative, since vectors that are spun around vanish in the mean.
-    return np.sqrt(np.median(variance / (np.square(means.mean(axis=2)).sum(axis=-1) + variance), axis=1))
+    segments = turned.reshape(*turns.shape[:2], SEGMENTS, -1, 3)
+    means = segments.mean(axis=3)
+    variance, square = np.var(means, axis=2).sum(axis=-1), np.square(means.mean(axis=2)).sum(axis=-1)
+    if constant:
+        # A vector that is spun around keeps its part along the axis.
+        within = np.var(segments, axis=3).sum(axis=-1).mean(axis=-1)
+        variance += np.maximum(within - 2.0 * within.min(axis=0) - SPUN, 0.0)
+    return np.sqrt(np.median(variance / (square + variance), axis=1)), np.sqrt(np.median(square, axis=1))

@@ -128,6 +128,51 @@ def test_dead_channels_are_named(motions, channel, kind):
     assert any(text.startswith(f"imu/{channel}: ") and "Leave" in text for text in found)
 
 
+def test_most_of_a_recording_may_be_rest(motions):
+    motion = motions["mixed"]
+    order = np.r_[np.zeros(4000, int), 0 : len(motion)]
+    noise = np.random.default_rng(0).standard_normal((2, len(order), 3)) * [[[0.002]], [[0.02]]]
+    rest = {"imu/gyr": 0.0, "imu/acc": motion.measurements["imu/acc"][0]}
+    measurements = {
+        name: np.where(order[:, None] > 0, motion.measurements[name][order], rest[name]) + noise[k]
+        for k, name in enumerate(rest)
+    }
+    long = Trajectory(np.arange(len(order)) * motion.dt, measurements)
+    assert warnings_of(long) == []
+    for change, words in (
+        (lambda values: np.radians(values), "converted from deg/s once too often"),
+        (lambda values: values * [1.0, -1.0, 1.0], "sign of y"),
+    ):
+        (found,) = warnings_of(changed(long, gyr=change))
+        assert words in found
+
+
+@pytest.mark.parametrize("site", ["imu/acc", "imu/mag"])
+def test_strong_accelerations_are_no_unit(site):
+    motion = simulate_hand("walk", seed=5, duration=20.0)
+    assert np.median(np.linalg.norm(motion.measurements["imu/acc"], axis=1)) > 20.0
+    kept = {name: motion.measurements[name] for name in ("imu/gyr", "imu/acc", site)}
+    strong = motion.replace(measurements=kept, truth={})
+    assert warnings_of(strong) == []
+    (found,) = warnings_of(changed(strong, acc=lambda values: values / 9.80665))
+    assert "readings in g" in found
+    (found,) = warnings_of(changed(strong, acc=lambda values: values - 9.81 * motion.truth_of("up")))
+    assert "gravity was removed" in found
+
+
+@pytest.mark.parametrize(("factor", "words"), [(1.0, None), (180.0 / np.pi, "rates in deg/s"), (30.0 / np.pi, "rpm")])
+def test_a_steady_turn_is_no_bias(factor, words):
+    turn = simulate_hand("turn", seed=5, duration=8.0)
+    found = warnings_of(changed(turn, gyr=lambda values: factor * values))
+    assert [words in text for text in found] == ([] if words is None else [True])
+
+
+def test_minutes_are_noted(motions):
+    motion = motions["slow"]
+    found = [str(finding) for finding in check_recording(motion.replace(time=motion.time / 60.0, truth={}))]
+    assert any("time in minutes (in seconds that would be 100 Hz)" in text for text in found)
+
+
 @pytest.mark.parametrize("gesture", GESTURES)
 @pytest.mark.parametrize("factor", [0.5, 2.0])
 def test_another_full_scale_of_the_gyroscope_is_named(motions, gesture, factor):
