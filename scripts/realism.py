@@ -5,7 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from .reproduce import studying
+from .reproduce import made_with, studying
+
+MADE = ("parts", "episodes", "rides", "seed")
+"""arguments that a page names"""
 
 
 @dataclass
@@ -15,11 +18,14 @@ class Args:
     recordings: tuple[str, ...] = ()
     """recorded data as role=path, where path is a file or folder and role one of hand, carried, chest, head"""
     parts: tuple[str, ...] = ()
-    """parts of the report: gestures, rides, steering, roads, sensors; with recordings motion, ranks (default: all)"""
+    """parts of the report: points (a table of them all), gestures, rides, steering, roads, sensors; with recordings
+    motion, ranks (default: all)"""
     episodes: int = 60
     """simulated episodes of each recipe of hands"""
     rides: int = 20
     """simulated rides of each recipe of riders"""
+    pages: tuple[Path, ...] = ()
+    """pages whose blocks of realism are replaced by tables of this run"""
     processes: int = 2
     """number of parallel processes"""
     seed: int = 0
@@ -37,6 +43,7 @@ def run(args: Args) -> int:
     from ..baselines.studies.realism import study as work
     from ..baselines.studies.realism.roles import recorded
     from ..filters.support.names import look_up
+    from .pages.studies import update
 
     for name in args.parts:
         look_up("part", name, work.PARTS)
@@ -45,4 +52,5 @@ def run(args: Args) -> int:
     settings = {"seed": args.seed, "subjects": (0,), "processes": args.processes}
     with studying("realism", args, settings, "poise realism", 200) as (study, _, report):
         work.realism(study, report, amounts, groups, args.parts)
+    update(args.pages, {"realism": study.folder}, made_with(args, study.folder, "realism", MADE))
     return 0

@@ -178,10 +178,14 @@ def is_done(paper: str, run: Run) -> bool:
     return is_kept(run.folder / paper / DONE, {"paper": paper})
 
 
-def made_with(args: Args, folder: Path) -> str:
-    """Lines of a page that is kept: command, version, commit and packages of a run, and no machine."""
-    command = command_line("reproduce", args, ("quick", "seed", "subjects", "seeds", "duration"))
-    state = Run(folder, "reproduce", args.seed).versions
+SHOWN = ("quick", "seed", "subjects", "seeds", "duration")
+"""arguments that a page names"""
+
+
+def made_with(args: Any, folder: Path, command: str = "reproduce", shown: Sequence[str] = SHOWN) -> str:
+    """Lines of a page that is kept: command with some arguments, version, commit and packages of a run, no machine."""
+    state = Run(folder, command, args.seed).versions
+    command = command_line(command, args, shown)
     commit = f", commit {state['poise']['commit'][:12]}" if "commit" in state["poise"] else ""
     changed = " with changes" if state["poise"].get("changed") else ""
     packages = ", ".join(f"{name} {version}" for name, version in state["packages"].items() if version)

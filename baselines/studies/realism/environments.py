@@ -89,6 +89,7 @@ def control_statistics(ride: Trajectory) -> dict[str, float]:
     forward = np.degrees(truth["bicycle/angular_rate"][:, 0])
     return {
         "speed": float(truth["bicycle/speed"].mean()),
+        "slowest": float(truth["bicycle/speed"].min()),
         "steer_rate": float(np.degrees(truth["steer/rate"]).std()),
         "roll_rate": float(forward.std()),
         "roll": float(np.degrees(truth["bicycle/roll"]).std()),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,7 +13,7 @@ from ..rides.vibration import BANDWIDTH, MEASURED
 
 @dataclass(frozen=True)
 class Believable:
-    """The range of a number."""
+    """The range in which numbers lie."""
 
     low: float
     high: float
@@ -24,6 +24,10 @@ class Believable:
         """Whether a value is inside."""
         return self.low <= value <= self.high
 
+    def met(self, values: Iterable[float]) -> bool:
+        """Whether all values are inside."""
+        return all(self.holds(each) for each in values)
+
     @property
     def text(self) -> str:
         """``3 … 10 Hz``, ``≥ -5 N``."""
@@ -31,7 +35,24 @@ class Believable:
             return f"≥ {self.low:g} {self.unit}".strip()
         if math.isinf(self.low):
             return f"≤ {self.high:g} {self.unit}".strip()
+        if self.low == self.high:
+            return f"{self.low:g} {self.unit}".strip()
         return f"{self.low:g} … {self.high:g} {self.unit}".strip()
+
+
+@dataclass(frozen=True)
+class Covered(Believable):
+    """Numbers that people or devices have: simulated ones must reach from the lowest to the highest."""
+
+    def met(self, values: Iterable[float]) -> bool:
+        """Whether some value is at the lower end or below, and some at the upper end or above."""
+        found = list(values)
+        return any(each <= self.low for each in found) and any(each >= self.high for each in found)
+
+    @property
+    def text(self) -> str:
+        """``9 … 30 Hz among them``."""
+        return f"{super().text} among them"
 
 
 CHEST = "chest sensor of a recorded ride of 307 s (imt, head_chest_bike), with a margin for other riders and roads"
@@ -53,7 +74,7 @@ TORQUE = "bound of this project for ordinary riding; no published table was foun
 BELIEVABLE = {
     "trunk gyroscope rms": Believable(20.0, 45.0, "deg/s", CHEST),
     "trunk gyroscope 95 % frequency": Believable(3.0, 10.0, "Hz", CHEST),
-    "share of samples in which a load cell pulls": Believable(-math.inf, 1.0, "%", SADDLE),
+    "share of samples in which a load cell pulls": Believable(0.0, 0.0, "%", SADDLE),
     "least force of a load cell": Believable(-PULL, math.inf, "N", SADDLE),
     "centre of pressure across": Believable(-ACROSS, ACROSS, "mm", SADDLE),
     "centre of pressure along": Believable(-ALONG, ALONG, "mm", SADDLE),

@@ -8,7 +8,7 @@ from ....envs.bicycle.course.scenarios import list_scenarios
 from ....envs.sensors.allan import FLOOR_TIME, allan_floors
 from ..kit import Study
 from ..report import Report
-from ..rides.saddle import saddle_rows, worst_of
+from ..rides.saddle import SITTING, saddle_rows, worst_of
 from ..rides.steering import by_speed
 from ..rides.vibration import MEASURED, levels, vibration_checks
 from .environments import BANDWIDTH, GESTURE_RATE, GESTURE_TIME, PLACES, SHOWN, SHOWN_OF_HANDS, gestures, medians, rides
@@ -128,12 +128,16 @@ def saddle(report: Report, found: Mapping[str, Sequence[Mapping[str, float]]]) -
     report.table(
         "Saddle by scenario",
         list(saddle_rows(found)),
-        "Largest share, least force and widest 5 to 95 % of the centre of pressure over the rides of a scenario.",
+        "Largest shares, least force and widest 5 to 95 % of the centre of pressure over the rides of a scenario. "
+        f"Off the saddle: less than {SITTING:g} N on it; all else is of the other samples.",
     )
     firm = {name: rides for name, rides in found.items() if name not in BUMPY}
     rows = [
-        judged("share of samples in which a load cell pulls", {n: worst_of(each, "pulls") for n, each in firm.items()}),
-        judged("least force of a load cell", {name: worst_of(each, "least") for name, each in firm.items()}),
+        judged(quantity, {name: worst_of(each, statistic) for name, each in firm.items()})
+        for quantity, statistic in (
+            ("share of samples in which a load cell pulls", "seated_pulls"),
+            ("least force of a load cell", "seated_least"),
+        )
     ]
     for axis in ("across", "along"):
         ends = {f"{name}, {end} %": worst_of(firm[name], f"{axis}_{end}") for name in firm for end in (5, 95)}
@@ -172,9 +176,14 @@ def steering(study: Study, report: Report, count: int) -> None:
     )
 
 
-def roads(report: Report) -> None:
+def vibrations(study: Study) -> dict[str, tuple[float, float]]:
+    """:func:`.levels` of every surface, computed once a run folder."""
+    return {name: (rms, edge) for name, (rms, edge) in study.cached("vibration", levels).items()}
+
+
+def roads(study: Study, report: Report) -> None:
     """Vertical acceleration of the bicycle on every surface."""
-    found = levels()
+    found = vibrations(study)
     report.table("Vibration by road surface", [each._asdict() for each in vibration_checks(found)])
     rows = [judged(f"vertical acceleration on {name}", {name: found[name][0]}) for name in MEASURED]
     rows.append(judged("bandwidth of vertical acceleration", {name: found[name][1] for name in MEASURED}))

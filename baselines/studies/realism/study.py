@@ -16,6 +16,7 @@ from ..report import Report
 from .containment import HIGH, LOW, Summary, containment_rows, simulated_summaries, summary, totals
 from .figures import spectra
 from .motion import SHARE_OF_RATE, UNITS
+from .points import points
 from .ranks import agreement, inclination_errors, installed, matrix, simulated_errors
 from .roles import ROLES, Recorded, by_recipe
 from .simulators import hand_motion, ride_motion, roads, sensors, steering
@@ -125,10 +126,11 @@ def ranks(study: Study, report: Report, settings: Settings, groups: Sequence[Rec
 
 Part = Callable[[Study, Report, Settings, Sequence[Recorded]], None]
 PARTS: Mapping[str, Part] = {
+    "points": lambda study, report, settings, groups: points(study, report, settings.episodes, settings.rides),
     "gestures": lambda study, report, settings, groups: hand_motion(study, report, settings.episodes, groups),
     "rides": lambda study, report, settings, groups: ride_motion(study, report, settings.rides, groups),
     "steering": lambda study, report, settings, groups: steering(study, report, max(2, settings.rides // 4)),
-    "roads": lambda study, report, settings, groups: roads(report),
+    "roads": lambda study, report, settings, groups: roads(study, report),
     "sensors": lambda study, report, settings, groups: sensors(report),
     "motion": containment,
     "ranks": ranks,

@@ -26,17 +26,21 @@ def saddle_statistics(cells: np.ndarray) -> dict[str, float]:
         cells: ``(T, 3)`` compression front, rear left, rear right, N.
 
     Returns:
-        ``pulls``: % of the samples in which a cell is below −5 N; ``least``: N; of the centre of pressure ahead and to
-        the left of the post, in mm and while the saddle carries more than 50 N, the 5th and 95th percentiles
-        ``along_5``, ``along_95``, ``across_5``, ``across_95``, and ``along_mean``, ``along_sd``, ``across_mean``,
-        ``across_sd``.
+        ``pulls``: % of the samples in which a cell is below −5 N; ``least``: N. The rider has left the saddle where it
+        carries less than 50 N: ``lifted``, % of the samples. In all others, ``seated_pulls``: % of all samples in which
+        a cell is below −5 N, ``seated_least``: N, and, of the centre of pressure ahead and to the left of the post in
+        mm, the 5th and 95th percentiles ``along_5``, ``along_95``, ``across_5``, ``across_95``, and ``along_mean``,
+        ``along_sd``, ``across_mean``, ``across_sd``; NaN for a rider who is never seated.
     """
     geometry = LoadCells()
     cells = cells[np.isfinite(cells).all(axis=1)]
     total = cells.sum(axis=1)
     loaded = total > SITTING
     place = 1e3 * cells[loaded] @ np.array([geometry.x, geometry.y]).T / total[loaded, None]
-    found = {"pulls": 100.0 * float((cells < -PULL).any(axis=1).mean()), "least": float(cells.min())}
+    pulled = (cells < -PULL).any(axis=1)
+    found = {"pulls": 100.0 * float(pulled.mean()), "least": float(cells.min())}
+    found |= {"lifted": 100.0 * float((~loaded).mean()), "seated_pulls": 100.0 * float((pulled & loaded).mean())}
+    found["seated_least"] = float(cells[loaded].min()) if loaded.any() else float("nan")
     for index, axis in enumerate(("along", "across")):
         values = place[:, index] if loaded.any() else np.array([np.nan])
         low, high = np.percentile(values, [5.0, 95.0])
@@ -47,7 +51,7 @@ def saddle_statistics(cells: np.ndarray) -> dict[str, float]:
 
 def worst_of(rides: Sequence[Mapping[str, float]], statistic: str) -> float:
     """Worst of several rides: the least force and the outermost centre of pressure, and the largest of the rest."""
-    pick = min if statistic == "least" or statistic.endswith("_5") else max
+    pick = min if statistic.endswith(("least", "_5")) else max
     return float(pick(each[statistic] for each in rides))
 
 
@@ -55,12 +59,14 @@ def saddle_rows(found: Mapping[str, Sequence[Mapping[str, float]]]) -> Iterator[
     """Rows of a table, worst of the rides of each scenario; ``found``: scenario → :func:`saddle_statistics`."""
     for name, rides in found.items():
         worst = {
-            key: worst_of(rides, key) for key in ("pulls", "least", "along_5", "along_95", "across_5", "across_95")
+            key: worst_of(rides, key)
+            for key in ("lifted", "seated_pulls", "seated_least", "along_5", "along_95", "across_5", "across_95")
         }
         yield {
             "scenario": name,
-            "a cell below -5 N, %": worst["pulls"],
-            "least N": worst["least"],
+            "off the saddle, %": worst["lifted"],
+            "seated, a cell below -5 N, %": worst["seated_pulls"],
+            "least N": worst["seated_least"],
             "CoP along mm": f"{worst['along_5']:.0f} … {worst['along_95']:.0f}",
             "CoP across mm": f"{worst['across_5']:.0f} … {worst['across_95']:.0f}",
             "mean along mm": f"{float(np.mean([each['along_mean'] for each in rides])):.0f}",

@@ -16,7 +16,7 @@ from .checks import all_checks
 from .inclinations import inclination_rows
 from .plots import example_ride, ride_signals
 from .reports import comparison
-from .saddle import ACROSS, ALONG, PULL, saddle_rows
+from .saddle import ACROSS, ALONG, PULL, SITTING, saddle_rows
 from .statistics import KINDS, UNITS, ride
 from .steering import SETTLED, long_rides, steering_rows
 from .vibration import levels, vibration_checks
@@ -62,7 +62,10 @@ def rides(study: Study, report: Report, scenarios: Sequence[str], fidelity: str)
         [{title: each[field] for field, title in shown.items()} for each in found],
     )
     saddles = {name: [each["saddle"] for each in found if each["scenario"] == name] for name in scenarios}
-    accepted = f"Accepted: no cell below -{PULL:g} N but in flight; ±{ALONG:g} mm along and ±{ACROSS:g} mm across."
+    accepted = (
+        f"Off the saddle: less than {SITTING:g} N on it. Accepted: no cell below -{PULL:g} N while it carries more; "
+        f"±{ALONG:g} mm along and ±{ACROSS:g} mm across."
+    )
     report.table(f"Saddle by scenario, worst of the riders, {fidelity} rider", list(saddle_rows(saddles)), accepted)
     if claims := comparison(found):
         report.claims("Beside the papers, range over riders", claims)

@@ -26,6 +26,11 @@ def test_saddle_statistics_of_a_known_load() -> None:
     lifted = saddle_statistics(np.array([[100.0, 100.0, 100.0], [100.0, -20.0, 100.0], [np.nan] * 3]))
     assert lifted["pulls"] == 50.0
     assert lifted["least"] == -20.0
+    assert lifted["seated_pulls"] == 50.0
+    assert lifted["lifted"] == 0.0
+    thrown = saddle_statistics(np.array([[100.0, 100.0, 100.0], [10.0, -20.0, 15.0]]))
+    assert (thrown["pulls"], thrown["seated_pulls"], thrown["lifted"]) == (50.0, 0.0, 50.0)
+    assert (thrown["least"], thrown["seated_least"]) == (-20.0, 100.0)
     assert math.isnan(saddle_statistics(np.zeros((5, 3)))["along_5"])
 
 
@@ -33,8 +38,9 @@ def test_rows_are_the_worst_of_all_riders() -> None:
     one = saddle_statistics(np.array([[100.0, 100.0, 100.0]] * 2))
     other = saddle_statistics(np.array([[100.0, -20.0, 300.0]] * 2))
     slow, bumps = saddle_rows({"slow": [one, other], "bumps": [one]})
-    assert (slow["a cell below -5 N, %"], slow["least N"]) == (100.0, -20.0)
-    assert (bumps["a cell below -5 N, %"], bumps["least N"]) == (0.0, 100.0)
+    assert (slow["seated, a cell below -5 N, %"], slow["least N"]) == (100.0, -20.0)
+    assert (bumps["seated, a cell below -5 N, %"], bumps["least N"]) == (0.0, 100.0)
+    assert slow["off the saddle, %"] == 0.0
     assert slow["CoP across mm"] == "-51 … 0"
 
 
