@@ -30,6 +30,10 @@ WELL_LOCKED = 0.15
 LARGEST_SHIFT = 3.0
 """Intervals by which samples are typically moved at most, so that they fit a nominal rate."""
 MILLISECOND = 1e-3
+RESOLUTIONS = (1.0, 0.1, 0.01, MILLISECOND)
+"""s to which loggers round their stamps."""
+SHARED = 0.03
+"""Least share of samples with the stamp of the one before: fewer are rows that were written twice."""
 LONGEST_GAP = 600.0
 """s; an interruption beyond it separates two recordings."""
 USUAL_RATES: tuple[float, ...] = (25, 30, 50, 52, 60, 62.5, 64, 75, 80, 100, 104, 119, 120, 125, 128, 143, 150, 200)
@@ -82,7 +86,7 @@ def fit_clock(time: np.ndarray, nominal_rate: float | None = None) -> Clock:
             f"a gap of {steps[gap]:.0f} s before sample {gap + 1} separates two recordings; cut them apart, "
             f"[:{gap + 1}] and [{gap + 1}:]"
         )
-    regular = exact_clock(time, steps, nominal_rate)
+    regular = exact_clock(time, steps, nominal_rate) or coarse_clock(time, steps, nominal_rate)
     if regular is not None:
         return regular
     stamps, counts = packets(time, steps)
@@ -151,6 +155,48 @@ def exact_clock(time: np.ndarray, steps: np.ndarray, nominal_rate: float | None)
         return None
     jitter = max(float(np.sqrt(np.mean(residual**2))), np.finfo(float).tiny)
     return Clock(interval, start, index, jitter, 0)
+
+
+def coarse_clock(time: np.ndarray, steps: np.ndarray, nominal_rate: float | None) -> Clock | None:
+    """The clock of stamps that are rounded to more than an interval, so that several samples share one; else None.
+
+    Between gaps such stamps lie within half their resolution from a line.
+    """
+    tolerance = 4.0 * np.spacing(np.abs(time[[0, -1]]).max())
+    whole = (r for r in RESOLUTIONS if np.abs(time - r * np.rint(time / r)).max() <= 1e-6 * r + tolerance)
+    resolution = next(whole, None)
+    if resolution is None or np.mean(steps < 0.5 * resolution) < SHARED:
+        return None
+    gaps = np.flatnonzero(steps > 1.5 * resolution)
+    parts = np.split(np.arange(len(time)), gaps + 1)
+    last = np.append(steps > 0.0, False)
+    weight, slope = 0.0, 0.0
+    for part in parts:
+        # The last samples of stamps; that of the last stamp may be missing.
+        ends = part[:-1][last[part[:-1]]]
+        if len(ends) > 1:
+            k = ends - ends.mean()
+            weight, slope = weight + float(k @ k), slope + float(k @ time[ends])
+    interval = slope / weight if weight > 0.0 else 0.0
+    if not 0.0 < interval < resolution or (
+        nominal_rate is not None and abs(interval * nominal_rate - 1.0) > RATE_RANGE
+    ):
+        return None
+    index, residuals = np.arange(len(time)), []
+    for before, part in zip([None, *parts[:-1]], parts, strict=True):
+        begin = float((time[part] - interval * (part - part[0])).mean())
+        residuals.append(time[part] - interval * (part - part[0]) - begin)
+        if before is None:
+            start = begin
+        else:
+            index[part] = part - part[0] + max(index[before[-1]] + 1, round((begin - start) / interval))
+    residual = np.concatenate(residuals)
+    # The line of few steps leans by a part of one.
+    ticks = max(1.0, (time[-1] - time[0]) / resolution)
+    if np.abs(residual).max() > (0.5 + 2.0 / ticks) * resolution + 0.1 * interval + tolerance:
+        return None
+    shared = int((np.unique(time, return_counts=True)[1] > 1).sum())
+    return Clock(interval, start, index, float(np.sqrt(np.mean(residual**2))), shared)
 
 
 def packets(time: np.ndarray, steps: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -37,8 +37,8 @@ FIELD = (22.0, 68.0)
 """µT: the earth's field anywhere."""
 PLAUSIBLE_RATES = (5.0, 10_000.0)
 """Hz."""
-UNUSUAL_RATE = 2000.0
-"""Hz, faster than what nearly all recorders write."""
+SLOW_RATE, UNUSUAL_RATE = 20.0, 2000.0
+"""Hz, slower than what motion needs and faster than what nearly all recorders write."""
 LARGEST_BIAS = 0.12
 """rad/s (7 °/s): beyond what uncalibrated consumer gyroscopes show at rest."""
 NORMALISED = 1e-4
@@ -127,6 +127,9 @@ def check_clock(trajectory: Trajectory) -> Iterator[Finding]:
         what = f"{rate:.3g} Hz"
         yield Finding("warning", "time", what, "time in minutes, days or another unit", "Give time in seconds.")
     else:
+        if rate < SLOW_RATE:
+            cause = "a recording that was thinned out, or a sensor's slow mode"
+            yield Finding("note", "time", f"{rate:.3g} Hz", cause, "Motion needs 20 Hz or more; 50 Hz if it is fast.")
         if rate > UNUSUAL_RATE:
             cause = f"time in minutes (in seconds that would be {rate / 60.0:.4g} Hz)"
             yield Finding(

@@ -196,3 +196,16 @@ def test_a_nominal_rate_that_the_stamps_contradict_is_named(nominal):
     with pytest.warns(UserWarning, match=f"a nominal rate of {nominal:g} Hz is named, but the stamps are 100 Hz"):
         assert named.on_grid().dt == pytest.approx(0.01)
     assert any("is named, but" in str(finding) for finding in poise.check_recording(named))
+
+
+@pytest.mark.parametrize("rate", [104.0, 120.0, 128.0, 286.0])
+@pytest.mark.parametrize("resolution", [0.01, 0.1, 1.0])
+@pytest.mark.parametrize("rounded", [np.round, np.floor])
+def test_stamps_coarser_than_the_interval_keep_rate_and_gaps(rate, resolution, rounded):
+    index = np.delete(np.arange(int(40 * rate)), np.arange(int(20 * rate), int(25 * rate)))
+    stamps = rounded(index / rate / resolution + 1e-9) * resolution
+    clock = fit_clock(1000.0 + stamps)
+    # Where a gap begins within a stamp, its length is known to a stamp.
+    assert clock.interval == pytest.approx(1.0 / rate, rel=5e-3 if resolution == 1.0 else 5e-4)
+    assert np.abs(clock.index - index).max() <= 1.5 * resolution * rate + 1
+    assert clock.packets > 0
