@@ -9,7 +9,7 @@ computes what NumPy computes, to rounding.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -41,6 +41,49 @@ class Tape:
         return array
 
 
+def _operator(rule: Callable[[Expression, Expression], Expression]) -> tuple[Any, Any]:
+    """An operator and its reflection; both leave what is not a number to the other operand."""
+
+    def forward(self: Expression, other: Any) -> Any:
+        right = self._other(other)
+        return NotImplemented if right is None else rule(self, right)
+
+    def reflected(self: Expression, other: Any) -> Any:
+        left = self._other(other)
+        return NotImplemented if left is None else rule(left, self)
+
+    return forward, reflected
+
+
+def _sum(a: Expression, b: Expression) -> Expression:
+    if b.value == 0.0:
+        return a
+    return b if a.value == 0.0 else a._record("+", lambda a, b: a + b, a, b)
+
+
+def _difference(a: Expression, b: Expression) -> Expression:
+    if b.value == 0.0:
+        return a
+    return -b if a.value == 0.0 else a._record("-", lambda a, b: a - b, a, b)
+
+
+def _product(a: Expression, b: Expression) -> Expression:
+    for one, two in ((a, b), (b, a)):
+        if one.value == 0.0:
+            return a.tape.constant(0.0)
+        if one.value == 1.0:
+            return two
+        if one.value == -1.0:
+            return -two
+    return a._record("*", lambda a, b: a * b, a, b)
+
+
+def _quotient(a: Expression, b: Expression) -> Expression:
+    if a.value == 0.0 or b.value == 1.0:
+        return a
+    return a._record("/", lambda a, b: a / b, a, b)
+
+
 class Expression:
     """One recorded scalar; behaves like an array without axes in model code."""
 
@@ -70,19 +113,10 @@ class Expression:
             return self.tape.constant(function(*values))
         return self.tape.node(operation, *operands)
 
-    def __add__(self, other: Any) -> Any:
-        right = self._other(other)
-        if right is None:
-            return NotImplemented
-        if right.value == 0.0:
-            return self
-        if self.value == 0.0:
-            return right
-        return self._record("+", lambda a, b: a + b, self, right)
-
-    def __radd__(self, other: Any) -> Any:
-        left = self._other(other)
-        return NotImplemented if left is None else left + self
+    __add__, __radd__ = _operator(_sum)
+    __sub__, __rsub__ = _operator(_difference)
+    __mul__, __rmul__ = _operator(_product)
+    __truediv__, __rtruediv__ = _operator(_quotient)
 
     def __neg__(self) -> Expression:
         if self.operation == "neg":
@@ -91,51 +125,6 @@ class Expression:
 
     def __pos__(self) -> Expression:
         return self
-
-    def __sub__(self, other: Any) -> Any:
-        right = self._other(other)
-        if right is None:
-            return NotImplemented
-        if right.value == 0.0:
-            return self
-        if self.value == 0.0:
-            return -right
-        return self._record("-", lambda a, b: a - b, self, right)
-
-    def __rsub__(self, other: Any) -> Any:
-        left = self._other(other)
-        return NotImplemented if left is None else left - self
-
-    def __mul__(self, other: Any) -> Any:
-        right = self._other(other)
-        if right is None:
-            return NotImplemented
-        for one, two in ((self, right), (right, self)):
-            if one.value == 0.0:
-                return self.tape.constant(0.0)
-            if one.value == 1.0:
-                return two
-            if one.value == -1.0:
-                return -two
-        return self._record("*", lambda a, b: a * b, self, right)
-
-    def __rmul__(self, other: Any) -> Any:
-        left = self._other(other)
-        return NotImplemented if left is None else left * self
-
-    def __truediv__(self, other: Any) -> Any:
-        right = self._other(other)
-        if right is None:
-            return NotImplemented
-        if self.value == 0.0:
-            return self
-        if right.value == 1.0:
-            return self
-        return self._record("/", lambda a, b: a / b, self, right)
-
-    def __rtruediv__(self, other: Any) -> Any:
-        left = self._other(other)
-        return NotImplemented if left is None else left / self
 
     def __pow__(self, exponent: Any) -> Any:
         if isinstance(exponent, int) and exponent == 1:
@@ -202,6 +191,16 @@ def _objects(array: Any) -> np.ndarray:
     return np.asarray(array, dtype=object)
 
 
+def _on_first(function: Callable[..., Any]) -> Callable[..., Any]:
+    """A function of NumPy whose first argument may be a single expression."""
+    return lambda array, *arguments, **named: function(_objects(array), *arguments, **named)
+
+
+def _on_each(function: Callable[..., Any]) -> Callable[..., Any]:
+    """A function of NumPy that joins arrays, of which some may be single expressions."""
+    return lambda arrays, axis=0: function([_objects(array) for array in arrays], axis=axis)
+
+
 def _choose(condition: Any, first: Any, second: Any) -> Any:
     if not isinstance(condition, Expression):
         return first if condition else second
@@ -256,20 +255,13 @@ class TracedNamespace:
         """The larger one, elementwise."""
         return TracedNamespace.where(TracedNamespace.greater(b, a), b, a)
 
-    @staticmethod
-    def stack(arrays: Iterable[Any], axis: int = 0) -> np.ndarray:
-        """Join along a new axis."""
-        return np.stack([_objects(array) for array in arrays], axis=axis)
-
-    @staticmethod
-    def concat(arrays: Iterable[Any], axis: int = 0) -> np.ndarray:
-        """Join along an axis that is there."""
-        return np.concatenate([_objects(array) for array in arrays], axis=axis)
-
-    @staticmethod
-    def sum(array: Any, axis: int | None = None, keepdims: bool = False) -> Any:
-        """Sum of elements."""
-        return np.sum(_objects(array), axis=axis, keepdims=keepdims)
+    stack = staticmethod(_on_each(np.stack))
+    concat = staticmethod(_on_each(np.concatenate))
+    sum = staticmethod(_on_first(np.sum))
+    reshape = staticmethod(_on_first(np.reshape))
+    broadcast_to = staticmethod(_on_first(np.broadcast_to))
+    zeros_like = staticmethod(_on_first(lambda array: 0.0 * array))
+    ones_like = staticmethod(_on_first(lambda array: 0.0 * array + 1.0))
 
     @staticmethod
     def all(array: Any, axis: int = -1) -> Any:
@@ -293,26 +285,6 @@ class TracedNamespace:
     def matmul(a: Any, b: Any) -> np.ndarray:
         """Matrix product."""
         return _objects(a) @ _objects(b)
-
-    @staticmethod
-    def broadcast_to(array: Any, shape: tuple[int, ...]) -> np.ndarray:
-        """Repeat along leading axes."""
-        return np.broadcast_to(_objects(array), shape)
-
-    @staticmethod
-    def zeros_like(array: Any) -> np.ndarray:
-        """Zeros of the same shape."""
-        return 0.0 * _objects(array)
-
-    @staticmethod
-    def reshape(array: Any, shape: tuple[int, ...]) -> np.ndarray:
-        """The same elements in another shape."""
-        return np.reshape(_objects(array), shape)
-
-    @staticmethod
-    def ones_like(array: Any) -> np.ndarray:
-        """Ones of the same shape."""
-        return 0.0 * _objects(array) + 1.0
 
     @staticmethod
     def eye(size: int) -> np.ndarray:
