@@ -23,7 +23,7 @@ from ..claims import Claim
 from ..kit import Study
 from ..report import OVER_MOTIONS, Report
 from ..ride_study import MEAN, ZERO
-from .tables import Row, grouped, mean_of, values_of
+from .tables import Row, grouped, mean_of, results_of, values_of
 
 RATE = 100.0
 """Hz"""
@@ -259,6 +259,7 @@ def planar(study: Study, report: Report) -> None:
     roots = [study.seed_of("planar", index) for index in range(seeds)]
     jobs = [(seed, motion, duration) for motion in MOTIONS for seed in roots]
     rows = [row for found in study.map("planar", planar_errors, jobs) for row in found]
+    report.numbers(results_of(rows, "rms", "{motion} {seed}", PLANAR_ANGLE.name, "angle", "deg"))
     report.compare(
         "Figures 3.5 to 3.12: errors of the angle in the plane",
         [

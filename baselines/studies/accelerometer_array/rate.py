@@ -23,7 +23,7 @@ from ..claims import Claim
 from ..kit import Study
 from ..report import OVER_MOTIONS, Report
 from ..ride_study import ZERO
-from .tables import Row, grouped, mean_of, values_of
+from .tables import Row, grouped, mean_of, results_of, values_of
 
 RATE = 100.0
 """Hz"""
@@ -228,6 +228,7 @@ def angular_rates(study: Study, report: Report) -> None:
     kinds = [DATA_SHEET, CALIBRATED] if study.quick else list(ERRORS)
     jobs = [(study.seed_of("shaking", index), kind, duration) for kind in kinds for index in range(seeds)]
     rows = [row for found in study.map("angular rate", rate_errors, jobs) for row in found]
+    report.numbers(results_of(rows, "rms", "shaking {seed}, {errors}", ANGULAR_RATE.name, "rms", "rad/s"))
     report.compare(
         "Table 2.1: angular rate of a shaken OCTA",
         [

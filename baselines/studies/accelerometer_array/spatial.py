@@ -33,7 +33,7 @@ from ..kit import Study
 from ..report import OVER_MOTIONS, Report
 from ..ride_study import ZERO
 from .figures import move_figure, pointing_figures, readings_figure
-from .tables import Row, grouped, mean_of, values_of
+from .tables import Row, grouped, mean_of, results_of, values_of
 
 RATE = 100.0
 """Hz"""
@@ -332,6 +332,7 @@ def spatial(study: Study, report: Report) -> list[Row]:
     jobs: list[tuple[Any, ...]] = [("controller", seed, duration, 0.0, ()) for seed in roots]
     jobs += [("octa", seed, duration, 0.0, QUICK_OCTA if study.quick else ()) for seed in roots]
     rows = [row for found in study.map("pointing", attitude_errors, jobs) for row in found]
+    report.numbers(results_of(rows, "total", "{device} pointing {seed}", "orientation", "total", "deg"))
     report.compare(
         "Figures 5.6 to 5.10 and Table 5.1, simulation: the proposed method",
         [

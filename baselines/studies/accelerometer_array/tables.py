@@ -33,6 +33,15 @@ def grouped(
     return table
 
 
+def results_of(rows: Iterable[Row], key: str, trajectory: str, quantity: str, metric: str, unit: str) -> list[Row]:
+    """Rows of ``results.csv``: ``row[key]`` of each method; ``trajectory`` is a format of the row's entries."""
+    return [
+        {"estimator": row["method"], "trajectory": trajectory.format(**row), "quantity": quantity}
+        | {"metric": metric, "value": row[key], "unit": unit}
+        for row in rows
+    ]
+
+
 def values_of(rows: Iterable[Row], key: str, **chosen: Any) -> list[Any]:
     """``row[key]`` of the rows that have all the ``chosen`` entries."""
     return [row[key] for row in rows if all(row[name] == value for name, value in chosen.items())]

@@ -110,6 +110,7 @@ def test_the_section_has_its_tables_and_figures(study, monkeypatch, tmp_path):
     compared = report.entries[0].rows
     assert len(compared) == 12
     assert {row["device"] for row in compared} == {"controller", "octa"}
+    assert {row["trajectory"].split()[0] for row in report.results} == {"controller", "octa"}
     assert all(entry.figure is None or entry.figure.exists() for entry in report.entries)
 
 
