@@ -21,6 +21,7 @@ PLAUSIBLE_FORCE = (7.0, 13.0)
 """m/s²: median length of the specific force of anything that people or vehicles carry."""
 FORCE_UNITS = {
     "g": 1.0,
+    "m/s² that were multiplied by 9.81 once too often": GRAVITY**2,
     "mg": 1e3,
     "cm/s²": 100.0 * GRAVITY,
     "ft/s²": GRAVITY / 0.3048,

@@ -113,6 +113,13 @@ def cells(line: str, delimiter: str) -> int:
     return sum(field != "" and is_value(field) for field in fields_of(line, delimiter))
 
 
+def belongs(line: str, later: str, delimiter: str) -> bool:
+    """Whether a line is a row like a later one: as full, or as long with nothing else than numbers."""
+    fields, others = fields_of(line, delimiter), fields_of(later, delimiter)
+    as_long = len(fields) == len(others) and all(is_value(field) for field in fields if field)
+    return as_long or cells(line, delimiter) > 0.3 * cells(later, delimiter)
+
+
 def guess_delimiter(lines: list[str]) -> str | None:
     """The delimiter that makes most numbers of most lines; None if there are no numbers."""
     step = max(1, len(lines) // SAMPLE)
@@ -150,7 +157,7 @@ def table_of(text: str, name: str) -> Table:
             if numbers(line, delimiter)
             and not line.lstrip().startswith(COMMENT)
             and all(numbers(after, delimiter) or not after.strip() for after in lines[number + 1 : number + 3])
-            and cells(line, delimiter) > 0.3 * cells(lines[min(number + 5, len(lines) - 1)], delimiter)
+            and belongs(line, lines[min(number + 5, len(lines) - 1)], delimiter)
         ),
         None,
     )
@@ -331,6 +338,11 @@ def numeric(column: pandas.Series) -> tuple[np.ndarray | None, tuple[int, str] |
 def spelled_out(texts: pandas.Series, filled: pandas.Series) -> pandas.Series:
     """Numbers as Python writes them, of those with a Fortran exponent or with digits in groups of thousands."""
     texts = texts.str.replace(r"(?<=\d)[dD](?=[-+]?\d)", "e", regex=True)
+    for mark in (".", ","):
+        # A mark that occurs twice in a number is no decimal mark.
+        whole = texts[filled].str.fullmatch(rf"[-+]?\d{{1,3}}(\{mark}\d{{3}})*").all()
+        if whole and (texts[filled].str.count(rf"\{mark}") > 1).any():
+            return texts.str.replace(mark, "", regex=False)
     if not texts[filled].str.fullmatch(GROUPED).all():
         return texts
     for group, decimal in ((",", "."), (".", ",")):

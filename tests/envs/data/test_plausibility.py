@@ -54,7 +54,14 @@ def test_units_of_the_gyroscope_are_named(motions, gesture, truth, unit, factor)
 
 @pytest.mark.parametrize("gesture", GESTURES)
 @pytest.mark.parametrize(
-    ("unit", "at_rest"), [("g", 1.0), ("mg", 1e3), ("cm/s²", 980.665), ("counts of ±8 g in 16 bits", 4096.0)]
+    ("unit", "at_rest"),
+    [
+        ("g", 1.0),
+        ("mg", 1e3),
+        ("cm/s²", 980.665),
+        ("counts of ±8 g in 16 bits", 4096.0),
+        ("m/s² that were", 9.80665**2),
+    ],
 )
 def test_units_of_the_accelerometer_are_named(motions, gesture, unit, at_rest):
     (found,) = warnings_of(changed(motions[gesture], acc=lambda values: values / 9.80665 * at_rest))

@@ -224,3 +224,21 @@ def test_a_parquet_table_with_units_needs_no_mapping(tmp_path):
     frame.to_parquet(tmp_path / "a.parquet")
     recording = load_recording(tmp_path / "a.parquet")
     np.testing.assert_allclose(recording.measurements["imu/acc"][0], [0.0, 0.0, 9.80665])
+
+
+def test_a_first_row_with_little_in_it_does_not_lose_the_header(tmp_path):
+    content = text().replace(",".join(f"{value:.4f}" for value in VALUES[0]), f"{VALUES[0, 0]:.4f},,,")
+    table = table_of(tmp_path / "a.csv", content)
+    assert list(table.arrays) == NAMES
+    assert np.isnan(table.matrix(NAMES[1:])[0]).all()
+    np.testing.assert_allclose(table.matrix(NAMES)[1:], VALUES[1:])
+
+
+@pytest.mark.parametrize(("mark", "delimiter"), [(".", ";"), (",", ";"), (",", "\t")])
+def test_whole_numbers_in_groups_are_read(tmp_path, mark, delimiter):
+    stamps = 999_950 + np.arange(100)
+    number = "1,5" if mark == "." else "1.5"
+    rows = [delimiter.join([f"{stamp:,d}".replace(",", mark), number, number]) for stamp in stamps]
+    table = table_of(tmp_path / "a.csv", "\n".join([delimiter.join(["time_ms", "x", "y"]), *rows, ""]))
+    np.testing.assert_array_equal(table.arrays["time_ms"], stamps)
+    np.testing.assert_array_equal(table.arrays["x"], 1.5)
