@@ -29,7 +29,7 @@ RULED = {
     "mekf": ("innovation", "acceleration"),
 }
 """Filter → rules that set one of its gains."""
-POLICIES = ("external-acceleration", "two-gyro-level")
+POLICIES = ("external-acceleration",)
 """Filters with a shipped policy."""
 WEIGHTS = ".safetensors"
 """End of a name that is a file of weights."""
@@ -38,8 +38,8 @@ NETWORKS = {
     "GainFilter": "..baselines.learned.gains.gain_filter:shipped",
 }
 """Class on the card of a network → what makes it of its weights."""
-LOSING = frozenset({"mekf+innovation", "mekf+acceleration", "external-acceleration+noise", "two-gyro-level+policy"})
-"""Rules and networks that lose to the plain filter on most sets of recordings, and a policy that loses to a rule."""
+LOSING = frozenset({"mekf+innovation", "mekf+acceleration", "external-acceleration+noise"})
+"""Rules and networks that lose to the plain filter on most sets of recordings."""
 TRAINED: dict[str, Entry] = {
     **{
         f"{name}+policy": Entry(
