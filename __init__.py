@@ -21,7 +21,6 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 from .envs import register_environments
-from .filters.support import moved
 from .filters.support.version import poise_version
 
 if TYPE_CHECKING:
@@ -92,7 +91,6 @@ _HOMES = {
 __version__ = poise_version()
 
 register_environments()
-moved.install()
 
 
 def __getattr__(name: str) -> Any:

@@ -7,14 +7,12 @@ objects, and :class:`PoseEnv` returns them one by one.
 from __future__ import annotations
 
 import copy
-import functools
 import itertools
 import math
 import operator
-import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple, TypeVar, cast
+from typing import Any, NamedTuple
 
 import numpy as np
 from gymnasium import spaces
@@ -25,7 +23,6 @@ from .drawn import DrawnEnv, Shown
 from .sensors.observation import Sensing
 
 Observation = dict[str, np.ndarray]
-Function = TypeVar("Function", bound=Callable[..., Any])
 UNIT_ENTRY = {"rotation": 0, "direction": -1}
 """Kind of quantity → entry that is 1 where there is no rotation, or up is straight up."""
 
@@ -372,20 +369,3 @@ def choose_quantity(score: str, choices: Sequence[Quantity]) -> Quantity:
         if quantity.name == score:
             return quantity
     raise ValueError(f"score must be one of {[quantity.name for quantity in choices]}, got {score!r}")
-
-
-def renamed(**names: str) -> Callable[[Function], Function]:
-    """Let a function understand former names of its keyword arguments (old → new), with a DeprecationWarning."""
-
-    def decorate(function: Function) -> Function:
-        @functools.wraps(function)
-        def call(*args: Any, **kwargs: Any) -> Any:
-            for old in names.keys() & kwargs.keys():
-                warnings.warn(f"argument {old} is now called {names[old]}", DeprecationWarning, stacklevel=2)
-                kwargs.setdefault(names[old], kwargs.pop(old))
-            return function(*args, **kwargs)
-
-        call.former_names = names  # type: ignore[attr-defined]
-        return cast(Function, call)
-
-    return decorate

@@ -12,7 +12,6 @@ import numpy as np
 
 from ..filters.core.kalman import KalmanFilter
 from ..filters.support.seeds import child_seeds, root_seed
-from .base import renamed
 from .data.formats.load import load_recording
 from .data.trajectory import Trajectory
 from .gain_env import Drawn, GainTuningEnv
@@ -99,7 +98,6 @@ class HandMotionGainEnv(GainTuningEnv):
     than the published gains.
     """
 
-    @renamed(grade="noise_scale")
     def __init__(
         self,
         filter: str | KalmanFilter = "external-acceleration",

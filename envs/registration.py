@@ -47,7 +47,7 @@ def make_environment(identity: str, **options: Any) -> gymnasium.Env[Any, Any]:
     try:
         known = accepted_arguments(identity)
         for name in options:
-            look_up("option", name, dict.fromkeys([*known, *former_arguments(identity)]))
+            look_up("option", name, dict.fromkeys(known))
         return gymnasium.make(identity, **options)
     except gymnasium.error.Error as reason:
         raise ValueError(str(reason)) from reason
@@ -60,11 +60,6 @@ def environment_class(identity: str) -> Any:
     """The class (or function) that makes the environments of a registered id."""
     entry_point = gymnasium.spec(identity).entry_point
     return gymnasium.envs.registration.load_env_creator(entry_point) if isinstance(entry_point, str) else entry_point
-
-
-def former_arguments(identity: str) -> list[str]:
-    """Former names of arguments that are understood with a warning."""
-    return list(getattr(environment_class(identity).__init__, "former_names", ()))
 
 
 def accepted_arguments(identity: str) -> list[str]:

@@ -10,7 +10,6 @@ import numpy as np
 
 from ..filters.core.kalman import KalmanFilter
 from ..filters.support.seeds import child_seeds, root_seed
-from .base import renamed
 from .bicycle.course.scenarios import Scenario
 from .bicycle.environment import RiderBicycleEnv
 from .bicycle.rider.anthropometry import RiderBody
@@ -116,7 +115,6 @@ class RiderBicycleGainEnv(GainTuningEnv):
 
     _episode_fields = (*GainTuningEnv._episode_fields, "_ridden", "_present")
 
-    @renamed(grade="noise_scale", place="site")
     def __init__(
         self,
         filter: str | KalmanFilter = "external-acceleration",

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...filters.bicycle.geometry import RiderGeometry
 from ...filters.core.quantity import Quantity
-from ..base import Block, PoseEnv, renamed
+from ..base import Block, PoseEnv
 from ..drawn import Scene
 from ..sensors.ideal import Sampling
 from ..sensors.magnetics import Magnetics
@@ -169,7 +169,6 @@ class RiderBicycleEnv(PoseEnv):
 
     reset_options: ClassVar[tuple[str, ...]] = ("scenario", "subject")
 
-    @renamed(grade="noise_scale")
     def __init__(
         self,
         scenario: str | Scenario = "indoor_circle",

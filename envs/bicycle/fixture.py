@@ -16,7 +16,7 @@ import numpy as np
 from ...filters.bicycle.geometry import RiderGeometry
 from ...filters.core import rotation
 from ...filters.core.quantity import Quantity
-from ..base import Block, PoseEnv, choose_quantity, renamed
+from ..base import Block, PoseEnv, choose_quantity
 from ..drawn import Scene
 from ..sensors.ideal import BodyState
 from .frame.parameters import MOUNTAIN_BIKE
@@ -171,7 +171,6 @@ class BicycleFixtureEnv(PoseEnv):
     * v0: first release.
     """
 
-    @renamed(grade="noise_scale")
     def __init__(
         self,
         suite: str | Sequence[str] = "two-gyro-fixture",

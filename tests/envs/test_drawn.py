@@ -154,10 +154,8 @@ def test_wrong_arguments_are_a_value_error_that_names_the_right_ones(options, me
         make_environment("poise/Replay-v0", **options)
 
 
-def test_arguments_of_the_base_and_former_names_are_known():
+def test_arguments_of_the_base_are_known():
     with pytest.raises(ValueError, match=r"unknown option 'foo' \(options: .*gesture.*consistency"):
         make_environment("poise/HandMotionGain-v0", foo=1)
     with pytest.raises(ValueError, match="Environment `Nothing` doesn't exist"):
         make_environment("poise/Nothing-v0")
-    with pytest.warns(DeprecationWarning, match="argument grade is now called noise_scale"):
-        make_environment("poise/BicycleFixture-v0", grade=0.5).close()
