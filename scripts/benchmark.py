@@ -7,7 +7,12 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
+from ..filters.support.files import write_json, write_text
+from ..filters.support.optional import MissingExtraError
+from ..filters.support.rows import markdown_table
+from .experiment import COLUMNS, open_run
 from .output import Output
+from .report import draw_example, kinds_of, print_comparison, provenance
 from .targets import check_file
 
 if TYPE_CHECKING:
@@ -71,9 +76,7 @@ def run(args: Args) -> int:
     from ..baselines.comparison.recommendation import load_results
     from ..baselines.comparison.tasks import run_tasks
     from .comparison.riders import rider_settings, rider_sweeps, rider_tables
-    from .experiment import open_run
     from .recordings.load import load_all, passed_over_text, plain_warnings
-    from .report import provenance
 
     riders = None if args.suite == "hand" else rider_settings(args.estimators, args.seed, quick=args.quick)
     if args.suite == "rider" and (riders is None or args.recordings):
@@ -168,8 +171,6 @@ def show_suite(suite: str, results: Results, tasks: list[Task], args: Args, fold
     """Tables of a suite, its intervals and an example over time; heading → Markdown."""
     from ..baselines.comparison.data_sets import contenders
     from ..baselines.comparison.intervals import errors_of, intervals, is_measure
-    from ..filters.support.rows import markdown_table
-    from .report import draw_example, print_comparison
 
     table = results.table[~is_measure(results.table)]
     table.attrs |= results.table.attrs
@@ -189,7 +190,6 @@ def show_suite(suite: str, results: Results, tasks: list[Task], args: Args, fold
 def show_data_sets(suites: dict[str, Results], args: Args, folder: Run, out: Output) -> dict[str, str]:
     """Mean errors of all data sets side by side; heading → Markdown."""
     from ..baselines.comparison.recommendation import ERRORS, dataset_errors
-    from ..filters.support.rows import markdown_table
 
     results = [one for each in suites.values() for one in each.recordings]
     sections = {}
@@ -209,7 +209,6 @@ def keep(args: Args, folder: Run, kept: dict[str, Any], parts: dict[str, list[di
     A run of all estimators replaces all errors of recordings, one of named estimators theirs alone.
     """
     from ..baselines.comparison.recommendation import merged
-    from ..filters.support.files import write_json
 
     assert args.save is not None
     new = {part: rows for part, rows in parts.items() if rows}
@@ -225,7 +224,6 @@ def keep(args: Args, folder: Run, kept: dict[str, Any], parts: dict[str, list[di
 def show_paper(trials: int, out: Output) -> dict[str, str]:
     """The tests of the external-acceleration paper; heading → Markdown."""
     from ..baselines.studies.external_acceleration.simulation import compare_modes
-    from ..filters.support.rows import markdown_table
 
     out.say(f"the three tests of the external-acceleration paper, {trials} trials each")
     modes = compare_modes(range(trials))
@@ -243,8 +241,6 @@ def load_baseline(path: Path) -> pandas.DataFrame:
     """
     import pandas
 
-    from .experiment import COLUMNS
-
     try:
         table = pandas.read_csv(path)
     except ValueError as reason:
@@ -260,7 +256,6 @@ def show_regressions(
 ) -> list[dict[str, Any]]:
     """What grew against the baseline."""
     from ..baselines.comparison.intervals import regressions
-    from ..filters.support.rows import markdown_table
 
     grown = regressions(table, before)
     sections[REGRESSIONS] = markdown_table(grown) if grown else "None."
@@ -277,8 +272,6 @@ def show_costs(args: Args, channels: list[str], sections: dict[str, str], out: O
     from ..baselines.run import fitted
     from ..baselines.speed.measure import measure
     from ..filters.core.estimator import run, run_by_steps
-    from ..filters.support.rows import markdown_table
-    from .report import kinds_of
 
     (trajectory,) = hand_episode("mixed", 1, args.seed, sensors=args.sensors, duration=5.0)
     rows = []
@@ -300,9 +293,6 @@ def show_costs(args: Args, channels: list[str], sections: dict[str, str], out: O
 def write_page(suites: dict[str, Results], tables: dict[str, list[dict[str, Any]]], folder: Run, out: Output) -> None:
     """The report for a browser, if Plotly is there."""
     from ..baselines.comparison.html_report import html_report
-    from ..filters.support.files import write_text
-    from ..filters.support.optional import MissingExtraError
-    from .report import kinds_of
 
     state = folder.versions
     about = {"command": f"poise {folder.command}", "seed": folder.seed, "poise": state["poise"]["version"]}

@@ -15,6 +15,7 @@ from pathlib import Path
 
 import tyro
 
+from ..filters.support.names import look_up
 from ..filters.support.optional import MissingExtraError
 from ..filters.support.rows import markdown_table
 from .output import PIPE_WIDTH, Output
@@ -59,8 +60,6 @@ class Args:
 
 def run(args: Args) -> int:
     """Print the lists, or write them into pages."""
-    from ..filters.support.names import look_up
-
     chosen = {name: look_up("list", name, LISTS) for name in args.lists or LISTS}
     for page in args.update:
         page.write_text(updated(page.read_text(encoding="utf-8")), encoding="utf-8")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from ..filters.support.names import look_up
 from .reproduce import made_with, studying
 
 MADE = ("parts", "episodes", "rides", "seed")
@@ -42,7 +43,6 @@ def run(args: Args) -> int:
     """Simulate, compare, and leave a run folder."""
     from ..baselines.studies.realism import study as work
     from ..baselines.studies.realism.roles import recorded
-    from ..filters.support.names import look_up
     from .pages.studies import update
 
     for name in args.parts:

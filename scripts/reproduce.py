@@ -20,8 +20,13 @@ from typing import TYPE_CHECKING, Any
 
 import tyro
 
+from ..filters.support.files import write_text
+from ..filters.support.parallel import in_parallel
+from ..filters.support.resume import is_kept, keep
+from ..filters.support.rows import markdown_table
 from .experiment import Run, command_line, open_run, write_json
 from .output import Output
+from .report import provenance
 from .targets import check_file
 
 if TYPE_CHECKING:
@@ -104,7 +109,6 @@ def run_every(args: Args, settings: dict[str, Any]) -> int:
     from ..baselines.studies import PAPERS, coverage
     from ..baselines.studies.kit import Study
     from ..baselines.studies.shared_rides import record_rides
-    from ..filters.support.files import write_text
     from .pages.studies import update
 
     check(settings)
@@ -138,8 +142,6 @@ def run_every(args: Args, settings: dict[str, Any]) -> int:
 
 def attempts(papers: Sequence[str], settings: dict[str, Any], run: Run) -> Iterator[tuple[str, str | None]]:
     """Do the studies of papers, one in each process; paper and error (None: it is done), as soon as each ends."""
-    from ..filters.support.parallel import in_parallel
-
     jobs = [(paper, {**settings, "processes": 1, "progress": False}, run) for paper in papers]
     waiting = dict.fromkeys(papers)
     try:
@@ -154,8 +156,6 @@ def attempts(papers: Sequence[str], settings: dict[str, Any], run: Run) -> Itera
 
 def attempt(paper: str, settings: dict[str, Any], run: Run) -> tuple[str, str | None]:
     """:func:`one_study`, with its error in one line; all of it goes to ``error.txt`` in the folder of the work."""
-    from ..filters.support.files import write_text
-
     report = run.folder / paper / "error.txt"
     try:
         one_study(paper, settings, run)
@@ -173,8 +173,6 @@ def in_a_line(error: BaseException) -> str:
 
 def is_done(paper: str, run: Run) -> bool:
     """Whether the study of a paper was finished in this run, with this version of the code."""
-    from ..filters.support.resume import is_kept
-
     return is_kept(run.folder / paper / DONE, {"paper": paper})
 
 
@@ -198,7 +196,6 @@ def one_study(paper: str, settings: dict[str, Any], run: Run) -> None:
     from ..baselines.studies import find_paper
     from ..baselines.studies.kit import Study
     from ..baselines.studies.report import Report
-    from ..filters.support.resume import keep
 
     folder = dataclasses.replace(run, folder=run.folder / paper)
     folder.figures.mkdir(parents=True, exist_ok=True)
@@ -301,10 +298,6 @@ def console(width: int | None) -> Any:
 
 def write(title: str, folder: Run, report: Report) -> Path:
     """Write ``report.md`` with all entries so far."""
-    from ..filters.support.files import write_text
-    from ..filters.support.rows import markdown_table
-    from .report import provenance
-
     parts = [f"# {title}"]
     for entry in report.entries:
         if entry.title:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import tyro
 
+from ..filters.support.names import look_up
 from ..filters.support.rows import jsonable
 from .experiment import command_line, known_recordings, open_run, versions
 from .output import Output
@@ -131,7 +132,6 @@ def chosen(args: Args) -> Preset:
         ValueError: an unknown name, or a number out of its range.
     """
     from ..baselines.learned.gains.presets import all_presets
-    from ..filters.support.names import look_up
 
     preset: Preset = look_up("preset", args.preset, all_presets())
     preset = preset.quick() if args.quick else preset

@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from ...filters.support.rows import markdown_table
 from ..output import Output
+from ..report import MOST_COLUMNS
 
 if TYPE_CHECKING:
     from ...baselines.comparison.tasks import Results
@@ -49,8 +51,6 @@ def rider_tables(settings: RiderSuite, args: Any, folder: Run, out: Output) -> R
     from ...baselines.error_table import ErrorTable
     from ...baselines.scoring import COLUMNS
     from ...baselines.studies.riders import suite, tables
-    from ...filters.support.rows import markdown_table
-    from ..report import MOST_COLUMNS
 
     learning = f"; references learn from {settings.training} others" if settings.training else ""
     out.say(f"riders: {settings.rides} rides of each group{learning}; rides are simulated once and kept")
@@ -81,7 +81,6 @@ def rider_tables(settings: RiderSuite, args: Any, folder: Run, out: Output) -> R
 def rider_sweeps(settings: RiderSuite, args: Any, folder: Run, out: Output) -> dict[str, str]:
     """Errors while one condition is varied, and a figure."""
     from ...baselines.studies.riders import sweeps
-    from ...filters.support.rows import markdown_table
 
     found = sweeps.sweep_points(settings, processes=args.processes, progress=True)
     points = sorted((point for one in found for point in one), key=lambda point: point.ride)

@@ -17,6 +17,7 @@ from ...filters.adaptation.gains import filter_name, gain_sizes
 from ...filters.bicycle.geometry import RiderGeometry
 from ...filters.core.estimator import Estimator
 from ...filters.core.model import equations_of
+from ...filters.support.optional import MissingExtraError
 from .curves import Curves
 from .motion import Block, Device, Motion, Rider, Subject, joined
 from .online import OnlineEstimator, Timed
@@ -35,8 +36,6 @@ USUAL |= {"array/acc": ("array-orientation", "planar-orientation")}
 
 def usual_estimators(channels: Sequence[str]) -> tuple[str, ...]:
     """Names of the estimators that are shown of a recording with these channels."""
-    from ...filters.support.optional import MissingExtraError
-
     known, found = list_estimators(), []
     for channel, names in USUAL.items():
         for name in names if channel in channels else ():

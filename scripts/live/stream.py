@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 
 import tyro
 
+from ...filters.support.names import unknown
 from ..targets import check_file
 from .lines import LineFormat
 from .sources import lines_of
@@ -151,8 +152,6 @@ def ranges_of(texts: Sequence[str], layout: Layout) -> dict[str, float]:
     Raises:
         ValueError: an unknown kind, or no positive number.
     """
-    from ...filters.support.names import unknown
-
     ranges: dict[str, float] = {}
     kinds = sorted({name.rpartition("/")[2] for name in layout.channels})
     for text in texts:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import tyro
 
 from ...filters.support.seeds import child_seed
+from ..experiment import known_recordings, start_run
 from ..output import Output
 from ..tune import TEST_SEED
 
@@ -67,7 +68,6 @@ def run(args: Args) -> int:
     from ...envs.gain_reward import scored_quantities
     from ...filters.adaptation.gains import tunable_filter
     from ...filters.adaptation.tuned import TunedFilter
-    from ..experiment import known_recordings, start_run
     from ..tune import results
 
     config = shipped_config(args.filter)

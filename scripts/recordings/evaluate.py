@@ -8,7 +8,9 @@ from typing import Annotated, Literal
 
 import tyro
 
+from ..experiment import start_run
 from ..output import Output
+from ..report import draw_example, print_comparison, provenance
 from ..targets import check_folder
 
 
@@ -45,8 +47,6 @@ def run(args: Args) -> int:
     from ...baselines.comparison.data_sets import groups_of
     from ...baselines.evaluation import evaluate
     from ...baselines.registry import list_estimators
-    from ..experiment import start_run
-    from ..report import draw_example, print_comparison, provenance
     from .load import load_all, passed_over_text, plain_warnings
 
     check_folder("runs", args.runs)

@@ -168,7 +168,7 @@ def test_works_of_a_process_that_was_killed_are_named(tmp_path, monkeypatch):
         yield "one", None
         raise BrokenExecutor("the process was killed")
 
-    monkeypatch.setattr("poise.filters.support.parallel.in_parallel", killed)
+    monkeypatch.setattr("poise.scripts.reproduce.in_parallel", killed)
     run = Run(tmp_path, "reproduce", 0)
     found = list(attempts(["one", "two"], {"processes": 2}, run))
     assert found == [("one", None), ("two", "BrokenExecutor: the process was killed")]
