@@ -168,10 +168,11 @@ def command_line(command: str, args: Any, options: Sequence[str]) -> str:
 
     Args:
         command: its name.
-        args: its arguments, a dataclass instance whose first field is the positional one.
+        args: its arguments, a dataclass instance; a first field that is a text is the positional one.
         options: fields that the result depends on; those that are None or empty are left out.
     """
-    words = ["poise", command, getattr(args, dataclasses.fields(args)[0].name)]
+    first = getattr(args, dataclasses.fields(args)[0].name)
+    words = ["poise", command, *([first] if isinstance(first, str) else [])]
     for name in options:
         value = getattr(args, name)
         if value is True:

@@ -180,3 +180,13 @@ def test_printed_table_holds_every_row_and_no_markup() -> None:
     assert "[red]vqf" in text
     assert "slow" in text
     assert text.count("–") == 2
+
+
+def test_the_command_that_repeats_a_run_has_a_positional_argument_only_where_there_is_one():
+    from poise.scripts.realism import Args as Realism
+    from poise.scripts.reproduce import Args as Reproduce
+
+    words = experiment.command_line("realism", Realism(recordings=("hand=a",), parts=("points",)), ("parts", "rides"))
+    assert words == "poise realism --parts points --rides 20"
+    words = experiment.command_line("reproduce", Reproduce("two-gyro", quick=True), ("quick",))
+    assert words == "poise reproduce two-gyro --quick"
