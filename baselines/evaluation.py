@@ -10,6 +10,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
+import numpy as np
+
 from ..envs.data.formats.load import load_recordings
 from ..envs.data.plausibility import check_recording, sites
 from ..envs.data.reference_clock import measured
@@ -167,8 +169,10 @@ class Evaluation:
             self.skipped = dict.fromkeys(contenders, str(reason))
         if not self.skipped and not trajectory.mask.any():
             self.skipped = dict.fromkeys(contenders, "no sample is scored: its mask is true nowhere")
-        self.trajectory = trajectory
-        self.blind = without_truth(trajectory)
+        self.trajectory = known_truth(trajectory)
+        self.blind = without_truth(self.trajectory)
+        if self.blind and not without_truth(trajectory) and not self.skipped:
+            warnings.warn(f"{trajectory.name}: its truth is known at no sample that is scored", stacklevel=4)
         if self.blind and reference is not None and not self.skipped:
             chosen = automatic_reference(trajectory) if reference == AUTO else reference
             if chosen is not None:
@@ -250,6 +254,14 @@ class Evaluation:
                 "heading and total errors are this offset",
                 stacklevel=4,
             )
+
+
+def known_truth(trajectory: Trajectory) -> Trajectory:
+    """The trajectory without truth that is known at no sample that is scored."""
+    scored = {name: np.isfinite(values[trajectory.mask]).all(axis=1).any() for name, values in trajectory.truth.items()}
+    if all(scored.values()):
+        return trajectory
+    return trajectory.replace(truth={name: values for name, values in trajectory.truth.items() if scored[name]})
 
 
 def report_findings(trajectory: Trajectory) -> None:

@@ -342,8 +342,11 @@ def check_sign(trajectory: Trajectory, channel: str, acc: np.ndarray, mag: np.nd
     remedy = "Change the sign of all three axes."
     length = np.linalg.norm(acc, axis=1)
     direction = acc / np.where(length > 0.0, length, np.nan)[:, None]
+    cosines = np.array([])
     if "up" in trajectory.quantities and channel == "imu/acc":
-        cosine = float(np.nanmedian((direction * trajectory.truth_of("up")).sum(axis=1)))
+        cosines = (direction * trajectory.truth_of("up")).sum(axis=1)
+    if np.isfinite(cosines).any():
+        cosine = float(np.nanmedian(cosines))
         if cosine < -0.5:
             what = f"it points down by the reference (cosine {cosine:.2f})"
             yield Finding("warning", channel, what, f"{apple}, or the z axis of the reference points down", remedy)

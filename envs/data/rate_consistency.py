@@ -19,6 +19,8 @@ SEGMENT = 1.0
 """s over which acceleration averages out; three of them are one window."""
 SEGMENTS, FEWEST_SEGMENTS = 3, 6
 """Of a window, and of a recording: those of a short recording are shorter."""
+SHORTEST = 0.67
+"""Share of a whole segment that they have at least."""
 FEWEST_STEPS, MOST_STEPS = 10, 25
 """Integration steps a segment: samples are averaged down to at most so many."""
 MOST_WINDOWS = 24
@@ -31,8 +33,9 @@ CLEARLY = 0.6
 """A hypothesis is preferred to the data as given if it leaves less than this share."""
 STEADY = 0.6
 """Residual as given, below which vectors have a direction in common; of vectors without one it is 0.8."""
-NEARLY = 0.25
-"""What a unit that differs by a factor of two only may leave of the motion: a disturbed field may look like it."""
+NEARLY, FEW_WINDOWS = 0.25, 4
+"""What a unit that differs by a factor of two only may leave of the motion: a disturbed field may look like it. So much
+for axes, too, in fewer windows: of 48 arrangements one fits by chance."""
 SPUN = 0.01
 """Variance within a segment, relative to the squared length, that tells nothing."""
 RIGHT = 0.2
@@ -80,6 +83,7 @@ class RateConsistency:
         axes_residual: residual with these axes.
         length: of the mean vector of a window, turned back as given, in the unit of the vector.
         longest: the same under the hypothesis where it is longest.
+        windows: how many were compared.
     """
 
     as_given: float
@@ -90,6 +94,7 @@ class RateConsistency:
     axes_residual: float
     length: float
     longest: float
+    windows: int
 
     @property
     def steady(self) -> bool:
@@ -115,6 +120,8 @@ class RateConsistency:
         """An arrangement of the axes that fits clearly better than the one given, or None."""
         better = self.axes_residual < CLEARLY * self.unit_residual and self.explains
         better = better and self.unit_residual > RIGHT * self.at_rest
+        if self.windows < FEW_WINDOWS:
+            better = better and self.axes_residual < NEARLY * self.at_rest
         return self.axes if better and not np.array_equal(self.axes, np.eye(3)) else None
 
 
@@ -157,9 +164,9 @@ def rate_consistency(
     elif by_unit[unit] > 0.5 * at_rest:
         by_axes = residuals(rearranged(axes, SCALES[unit] * turns), vectors, constant)[0].tolist()
     else:
-        return RateConsistency(given, at_rest, unit, by_unit[unit], axes[0], by_unit[unit], length, longest)
+        return RateConsistency(given, at_rest, unit, by_unit[unit], axes[0], by_unit[unit], length, longest, len(turns))
     best = int(np.argmin(by_axes))
-    return RateConsistency(given, at_rest, unit, by_unit[unit], axes[best], by_axes[best], length, longest)
+    return RateConsistency(given, at_rest, unit, by_unit[unit], axes[best], by_axes[best], length, longest, len(turns))
 
 
 def rearranged(axes: list[np.ndarray], turns: np.ndarray) -> np.ndarray:
@@ -180,7 +187,7 @@ def cut(time: np.ndarray, rate: np.ndarray, vector: np.ndarray) -> tuple[np.ndar
     step = float(np.median(np.diff(time)))
     # A clock in another unit than seconds still gets windows of a sensible number of samples.
     samples = int(np.clip(round(SEGMENT / step), FEWEST_STEPS, 2000))
-    samples = max(FEWEST_STEPS, min(samples, (len(time) - 1) // FEWEST_SEGMENTS))
+    samples = max(FEWEST_STEPS, round(SHORTEST * samples), min(samples, (len(time) - 1) // FEWEST_SEGMENTS))
     together = -(-samples // MOST_STEPS)
     length = samples // together * together
     count = (len(time) - 1) // length

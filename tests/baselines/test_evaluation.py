@@ -323,3 +323,14 @@ def test_a_recording_without_a_scored_sample_is_a_reason_and_reasons_stand_once(
         pytest.raises(ValueError, match="nothing could be run: mekf, tilt: no sample is scored"),
     ):
         evaluate(["mekf", "tilt"], blank, check=False)
+
+
+@pytest.mark.parametrize("scored", [True, False])
+def test_a_truth_without_a_known_sample_counts_as_none(trajectory, scored):
+    late = np.arange(len(trajectory)) < 100
+    unknown = {name: np.where(scored | late[:, None], np.nan, values) for name, values in trajectory.truth.items()}
+    mask = late if not scored else np.ones(len(late), bool)
+    with pytest.warns(UserWarning, match="truth is known at no sample that is scored"):
+        table = evaluate(["mekf", "tilt"], trajectory.replace(truth=unknown, mask=mask))
+    assert value(table, "mekf", "inclination to tilt") > 0.0
+    assert np.isfinite(table["value"]).all()
