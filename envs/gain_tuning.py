@@ -33,11 +33,11 @@ class HandMotionGainEnv(GainTuningEnv):
     ## Action space
 
     ``Box(-1, 1, (k,), float32)``, one number for each gain; 0 is the published tuning exactly, and between 0 and ±1
-    the logarithm of the constant is changed linearly, variances by a factor of 10^1.5 at most.
+    the logarithm of the constant is changed linearly, variances by a factor of 10^1.5 at most unless a range is given.
 
     | filter | gains (constant that is scaled) |
     |---|---|
-    | ``external-acceleration`` | ``measurement`` (σ_A); where named, ``process`` (σ_G), ``c_a`` (10⁻³ to 0.5) |
+    | ``external-acceleration`` | ``measurement`` (σ_A ≤ 0.3 m/s²); where named, ``process`` (σ_G), ``c_a`` (≤ 0.5) |
     | ``bounded-motion`` | ``process`` (σ_g), ``bias`` (σ_b), ``velocity`` (σ_V) |
 
     c_a is never so large that a gyroscope error of 1 °/s could lock the filter out

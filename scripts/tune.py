@@ -249,15 +249,15 @@ def loaded(name: str, tuned: TunedFilter) -> GainPolicy:
     """A policy of a filter, by file or shipped name.
 
     Raises:
-        ValueError: it is a policy of another filter, or sets other gains.
+        ValueError: it is a policy of another filter, or sets other gains; their ranges are its own.
     """
     from ..baselines.gain_policy.policy import GainPolicy
 
     policy = GainPolicy.load(name)
-    if policy.filter != tuned.name or policy.ranges != tuned.ranges:
+    wanted, sets = ([part.gain for part in ranges] for ranges in (tuned.ranges, policy.ranges))
+    if policy.filter != tuned.name or sets != wanted:
         raise ValueError(
-            f"policy must set the gains {[part.gain for part in tuned.ranges]} of {tuned.name}, got {name!r}, which "
-            f"sets {[part.gain for part in policy.ranges]} of {policy.filter}"
+            f"policy must set the gains {wanted} of {tuned.name}, got {name!r}, which sets {sets} of {policy.filter}"
         )
     return policy
 

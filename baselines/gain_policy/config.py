@@ -206,7 +206,7 @@ def shipped_config(filter: str) -> TrainingConfig:
             warm_start=48,
         )
     # The valley in which the measurement variance does the work, and c_a, which trusts the filter's own error, little.
-    centre = (-0.7, 0.7, -0.7) if filter == "external-acceleration" else None
+    centre = (-0.7, 0.36, -0.7) if filter == "external-acceleration" else None
     return TrainingConfig(
         filter=filter,
         # With motions of uncalibrated devices a filter without a bias gains in simulation and loses on recordings.

@@ -1,10 +1,11 @@
 """PPO of stable-baselines3 on the default gain environment, against its filter and the best constant gains.
 
-python plain_ppo.py --seeds 0 1 2 3 4 --steps 50000
-python plain_ppo.py --seeds 0 1 2 3 4 --steps 100000 --settings shipped
+python plain_ppo.py --seeds 0 1 2 3 4 --steps 25000 --results runs/ppo
+python plain_ppo.py --seeds 0 1 2 3 4 --settings shipped --results runs/ppo --figure curves.png
 
-With its default hyper-parameters, or with those of ``rl_zoo3_ppo.yml`` beside this file: a learning rate that falls to
-zero, and less exploration. Results go to ``--results`` as they are found; seeds that it holds are not trained again.
+With its default hyper-parameters, or with those of ``rl_zoo3_ppo.yml`` beside this file. The best constant is chosen on
+the test motions themselves. Printed are the mean errors of every training and statistics over seeds and motions. Each
+training leaves a file in ``--results``: it is not repeated, and the table and the figure are of all that are there.
 
 The native vector environment replaces one environment: 8 episodes of 256 decisions make the 2048 of a default rollout.
 """
@@ -12,62 +13,117 @@ The native vector environment replaces one environment: 8 episodes of 256 decisi
 from __future__ import annotations
 
 import argparse
-import csv
+import json
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from stable_baselines3 import PPO
+from stable_baselines3.common.callbacks import BaseCallback
+from stable_baselines3.common.vec_env import VecNormalize
 
 from poise.baselines.gain_policy.actor_critic import actor_layers
+from poise.baselines.gain_policy.compared.runs import CONSTANT, POLICY, PUBLISHED, TuneRun, comparison, curves_figure
 from poise.baselines.gain_policy.constant_gains import constant_errors, policy_errors
 from poise.baselines.gain_policy.policy import GainPolicy
 from poise.baselines.gain_policy.vec_env import SB3VecEnv
+from poise.baselines.plots import save
 from poise.envs.hand.trajectories import HandTrajectories
+from poise.filters.support.rows import markdown_table
 
 IDENTITY = "poise/HandMotionGain-v0"
-EPISODES = 16
+EPISODES = 32
 """of a minute, that no training sees"""
 SETTINGS: dict[str, dict[str, Any]] = {
-    "default": {},
-    "shipped": {"learning_rate": lambda left: 3e-4 * left, "policy_kwargs": {"log_std_init": -1.0}},
+    "default": {"envs": 8, "n_steps": 256},
+    "shipped": {"envs": 64, "n_steps": 64, "batch_size": 1024, "learning_rate": lambda left: 1e-3 * left},
 }
-"""Arguments of PPO besides the rollouts."""
+"""Episodes at a time, and arguments of PPO; of ``shipped`` also the rewards are normalised."""
 
 
-def main(words: list[str] | None = None) -> list[tuple[float, float, float]]:
-    """Train once a seed, and return for each: mean RMS error of the published gains, the best constant, PPO (deg)."""
+class Curve(BaseCallback):
+    """Notes the mean reward of a decision over the last episodes, before every update."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.rows: list[dict[str, float]] = []
+
+    def _on_step(self) -> bool:
+        return True
+
+    def _on_rollout_end(self) -> None:
+        over = list(self.model.ep_info_buffer or ())
+        if over:
+            gain = float(np.mean([one["r"] / one["l"] for one in over]))
+            self.rows.append({"steps": float(self.num_timesteps), "gain": gain})
+
+
+def main(words: list[str] | None = None) -> list[TuneRun]:
+    """Train once a seed."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seeds", type=int, nargs="+", default=[0])
-    parser.add_argument("--steps", type=int, default=50_000)
+    parser.add_argument("--steps", type=int, default=100_000)
     parser.add_argument("--settings", choices=list(SETTINGS), default="default")
-    parser.add_argument("--results", type=Path, help="CSV file to continue")
+    parser.add_argument("--episodes", type=int, default=EPISODES, help="test motions")
+    parser.add_argument("--results", type=Path, help="folder of finished trainings")
+    parser.add_argument("--figure", type=Path, help="picture of the learning curves")
     args = parser.parse_args(words)
-    known = {}
-    if args.results is not None and args.results.is_file():
-        with args.results.open(newline="") as file:
-            for settings, steps, seed, *rest in csv.reader(file):
-                if (settings, int(steps)) == (args.settings, args.steps):
-                    known[int(seed)] = tuple(map(float, rest))
-    test = HandTrajectories(("hand-held",)).draw_many(777, EPISODES)
-    found = []
+    test = HandTrajectories(("hand-held",)).draw_many(777, args.episodes)
+    constants: dict[str, np.ndarray] = {}
+    found, known = {}, [] if args.results is None else sorted(args.results.glob("*.json"))
+    for file in known:
+        found[file.stem] = run_of(file.stem, json.loads(file.read_text()), test)
     for seed in args.seeds:
-        if seed in known:
-            found.append(known[seed])
+        name = f"{args.settings}-{args.steps}-{seed}"
+        if name in found:
             continue
-        env = SB3VecEnv.make(IDENTITY, 8, infos=False)
-        (tuned, *_) = env.get_attr("tuned")
-        model = PPO("MlpPolicy", env, n_steps=256, seed=seed, device="cpu", **SETTINGS[args.settings]).learn(args.steps)
-        size = tuned.observation_size
-        policy = GainPolicy.of_network(tuned, actor_layers(model), np.zeros(size), np.ones(size))
-        grid = [constant_errors(tuned, test, np.array([action])).mean() for action in np.linspace(-1.0, 1.0, 9)]
-        errors = (grid[4], min(grid), policy_errors(tuned.kalman, policy, test).mean())
-        found.append(tuple(float(np.degrees(each)) for each in errors))
+        content = trained(args.settings, seed, args.steps, test, constants)
+        found[name] = run_of(name, content, test)
         if args.results is not None:
-            with args.results.open("a", newline="") as file:
-                csv.writer(file).writerow([args.settings, args.steps, seed, *found[-1]])
-        print("seed {}: published {:.3f}, best constant {:.3f}, PPO {:.3f}".format(seed, *found[-1]), flush=True)
-    return found
+            args.results.mkdir(parents=True, exist_ok=True)
+            (args.results / f"{name}.json").write_text(json.dumps(content))
+    runs = list(found.values())
+    rows = [
+        {"PPO": run.agent, "seed": run.seed}
+        | {gains: float(np.mean(list(errors.values()))) for gains, errors in run.errors.items()}
+        for run in runs
+    ]
+    print(markdown_table(rows))
+    print(markdown_table(comparison(runs)))
+    if args.figure is not None and (figure := curves_figure(runs)) is not None:
+        save(figure, args.figure)
+    return runs
+
+
+def run_of(name: str, content: dict[str, Any], test: list[Any]) -> TuneRun:
+    """A training by its name, such as ``shipped-100000-0``."""
+    settings, steps, seed = name.split("-")
+    sets = {"unseen motions": [each.name for each in test]}
+    return TuneRun(Path(name), "external-acceleration", f"{settings}, {int(steps):,} steps", int(seed), sets, **content)
+
+
+def trained(settings: str, seed: int, steps: int, test: list[Any], constants: dict[str, np.ndarray]) -> dict[str, Any]:
+    """Errors on the test motions, deg, of the published gains, the best constant and PPO; and its learning curve.
+
+    ``constants`` holds the errors of the former two from one training to the next.
+    """
+    arguments = dict(SETTINGS[settings])
+    rows = SB3VecEnv.make(IDENTITY, arguments.pop("envs"), infos=False)
+    (tuned, *_) = rows.get_attr("tuned")
+    env = rows if settings == "default" else VecNormalize(rows, norm_obs=False)
+    curve = Curve()
+    model = PPO("MlpPolicy", env, seed=seed, device="cpu", **arguments).learn(steps, curve)
+    size = tuned.observation_size
+    policy = GainPolicy.of_network(tuned, actor_layers(model), np.zeros(size), np.ones(size))
+    if not constants:
+        grid = [constant_errors(tuned, test, np.array([action])) for action in np.linspace(-1.0, 1.0, 17)]
+        constants |= {PUBLISHED: grid[8], CONSTANT: min(grid, key=np.mean)}
+    errors = {**constants, POLICY: policy_errors(tuned.kalman, policy, test)}
+    named = {
+        gains: {one.name: float(np.degrees(value)) for one, value in zip(test, values, strict=True)}
+        for gains, values in errors.items()
+    }
+    return {"errors": named, "curve": curve.rows}
 
 
 if __name__ == "__main__":

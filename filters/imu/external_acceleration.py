@@ -22,7 +22,7 @@ be that of ε, which falls as c_a grows.
 
 Differences from the paper: the first-order rotation (12) loses 1.9 °/s at 10 rad/s and 100 Hz; ``exact_rotation``
 replaces it by the exponential. The paper gives no initial state. Here the sensor starts at rest, with Z₀ = y_A/‖y_A‖
-and P₀ = 10⁻² I.
+and P₀ = 10⁻² I. Samples of a saturated gyroscope count as uncertain; the paper's experiments have none.
 
 A gain policy must not choose c_a freely. A steady tilt error e appears as an acceleration g e. It reduces the
 innovation to (1 − c_a) g e and increases the variance M to at least c_a² g² e² / 3. With the steady-state covariance
@@ -50,11 +50,14 @@ from ..core.held_inputs import HeldInput
 from ..core.model import Gain, Model
 from ..core.quantity import ACCELEROMETER, EXTERNAL_ACCELERATION, GYROSCOPE, UP, Measurement
 from ..core.rotation import exp_matrix, norm, normalize, skew
+from .strapdown import clipped_inflation
 
 LARGEST_C_A = 0.5
 """Largest c_a that a gain policy can choose; from 0.7 any gyroscope bias can make the error grow without bound."""
 SMALLEST_C_A = 1e-3
 """Smallest c_a that a gain policy can choose; practically zero."""
+SMALLEST_NOISE, LARGEST_NOISE = 1e-3, 0.3
+"""m/s²: least and largest σ_A that a gain policy can choose. Of hand-held devices the best constant is about 0.1."""
 FOLLOWED_DRIFT = math.radians(1.0)
 """rad/s: gyroscope error that the filter must be able to follow whatever a gain policy chooses."""
 
@@ -89,6 +92,10 @@ class ExternalAcceleration(Model):
     """n Δt of mode 3, s: the paper's n = 4 at 100 Hz; kept in seconds at any rate"""
     gravity: float = 9.8
     """g, m/s² (the paper's experiments; its introduction has 9.81)"""
+    gyroscope_range: float = 34.8
+    """rad/s (1994 °/s): beyond the range the sensor turned, but nobody measured how far"""
+    clipped_inflation: float = 1000.0
+    """factor on σ_G for saturated samples: they are wrong by some 10 rad/s"""
 
     channels: ClassVar = (GYROSCOPE, ACCELEROMETER)
     outputs: ClassVar = (UP, EXTERNAL_ACCELERATION)
@@ -98,7 +105,9 @@ class ExternalAcceleration(Model):
     residual_size: ClassVar = 3
     gains: ClassVar = {
         "process": Gain("gyroscope_noise", description="process variance σ_G²", acted=False),
-        "measurement": Gain("accelerometer_noise", description="measurement variance σ_A²"),
+        "measurement": Gain(
+            "accelerometer_noise", description="measurement variance σ_A²", bounds=(SMALLEST_NOISE, LARGEST_NOISE)
+        ),
         "c_a": Gain("c_a", 1.0, 1.0, "constant of the acceleration model", (SMALLEST_C_A, LARGEST_C_A), acted=False),
     }
 
@@ -123,11 +132,12 @@ class ExternalAcceleration(Model):
         xp = namespace(x)
         rate = (z if self.gyroscope_sample == "current" else previous)["imu/gyr"]
         turn = expand(self.dt, 1) * rate
+        clipped = clipped_inflation(rate, self.gyroscope_range, self.clipped_inflation)[..., None]
         identity = constant([[1, 0, 0], [0, 1, 0], [0, 0, 1]], x)
         phi = exp_matrix(-turn) if self.exact_rotation else identity - skew(turn)
         up = x[..., :3]
         squared = xp.sum(up * up, axis=-1)[..., None, None]
-        variance = expand(self.dt**2 * self.gyroscope_noise**2, 2)
+        variance = expand(self.dt**2 * self.gyroscope_noise**2, 2) * clipped
         Q = variance * (squared * identity - up[..., :, None] * up[..., None, :])
         return xp.concat([(phi @ up[..., None])[..., 0], x[..., 3:]], axis=-1), phi, Q
 

@@ -133,8 +133,11 @@ def test_a_single_file_that_knows_only_the_id(words, tmp_path):
 
 @pytest.mark.slow
 def test_plain_ppo_beats_the_published_gains():
-    ((published, constant, ppo),) = example("plain_ppo").main(["--steps", "25000"])
-    assert ppo < 0.95 * published
+    (run,) = example("plain_ppo").main(["--steps", "25000", "--episodes", "16"])
+    published, constant, ppo = (
+        np.mean(list(run.errors[gains].values())) for gains in ("published", "constant", "policy")
+    )
+    assert ppo < 0.9 * published
     assert constant < published
 
 

@@ -13,6 +13,7 @@ from poise.envs.sensors.ideal import interval_readings
 from poise.filters.core import metrics, rotation
 from poise.filters.core.kalman import KalmanFilter
 from poise.filters.imu.bounded_motion import BoundedMotion, BoundedMotion9
+from poise.filters.imu.external_acceleration import ExternalAcceleration
 
 GRAVITY = np.array([0.0, 0.0, 9.81])
 BIAS = np.deg2rad([0.3, -0.2, 0.4])
@@ -78,7 +79,8 @@ def test_clipped_samples_count_less() -> None:
     assert errors[0] < 0.2 * errors[1]
 
 
-def test_clipped_rotation_is_made_up_for() -> None:
+@pytest.mark.parametrize("kind", [BoundedMotion, ExternalAcceleration])
+def test_clipped_rotation_is_made_up_for(kind: type[BoundedMotion] | type[ExternalAcceleration]) -> None:
     """Where the gyroscope was saturated the tilt is soon found again: the filter knows that it was turned further."""
     data = {"imu/gyr": np.zeros((600, 3)), "imu/acc": np.tile(GRAVITY, (600, 1))}
     data["imu/gyr"][150:160, 0] = 34.9
@@ -86,7 +88,7 @@ def test_clipped_rotation_is_made_up_for() -> None:
     data["imu/acc"][160:] = 9.81 * np.array([0.0, np.sin(turned), np.cos(turned)])
     errors = []
     for limit in (34.8, 1e3):
-        up = KalmanFilter(BoundedMotion(gyroscope_range=limit)).run(data).pose["up"]
+        up = KalmanFilter(kind(gyroscope_range=limit)).run(data).pose["up"]
         errors.append(float(metrics.direction_error(up, data["imu/acc"])[180:].mean()))
     assert errors[0] < 0.4 * errors[1]
 
