@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import tyro
 
 from ...filters.support.seeds import child_seed
@@ -16,7 +17,9 @@ from ..output import Output
 from ..tune import TEST_SEED
 
 if TYPE_CHECKING:
+    from ...baselines.gain_policy.constant_gains import ConstantGains
     from ...envs.data.trajectory import Trajectory
+    from ...filters.adaptation.tuned import TunedFilter
 
 
 @dataclass
@@ -44,6 +47,8 @@ class Args:
     """constant gains that the bounds choose from"""
     search: int = 32
     """constant gains that the search for the best ones begins with; 24 more follow"""
+    folds: int = 0
+    """of recordings: also policies trained on the recordings of all other folds, by the exact gradient; 0: none"""
     ablation: bool = False
     """also what each policy loses without a group of its observations, and with a gain that it leaves alone"""
     seed: int = 0
@@ -57,7 +62,7 @@ class Args:
 def run(args: Args) -> int:
     """Print one table a set of trajectories, and leave the errors of all in a run folder."""
     from ...baselines.gain_policy.compared.ablation import ablation
-    from ...baselines.gain_policy.compared.contenders import contenders, rows_of
+    from ...baselines.gain_policy.compared.contenders import contenders, rows_of, side_by_side
     from ...baselines.gain_policy.compared.explained import gains_by_motion, gains_figure
     from ...baselines.gain_policy.config import shipped_config
     from ...baselines.gain_policy.constant_gains import best_constant_gains
@@ -71,6 +76,8 @@ def run(args: Args) -> int:
     from ..tune import results
 
     config = shipped_config(args.filter)
+    if args.folds and not args.recordings:
+        raise ValueError("folds can only be given with recordings, which policies are trained on in turn")
     if args.errors != 1.0 and (args.recordings or not isinstance(config.motions, RiddenMotions)):
         raise ValueError("errors can only be given for simulated rides: recordings and hand motions keep theirs")
     shipped = f"{args.filter.replace('-', '_')}_policy"
@@ -117,6 +124,8 @@ def run(args: Args) -> int:
                 points=args.points,
                 seed=args.seed,
             )
+            if args.folds:
+                errors[group] |= left_out(args, tuned, trajectories, constant)
             title = f"Error of {args.filter} ({quantity.name}) on {len(trajectories)} {group} trajectories, deg"
             out.table(rows_of(errors[group], nees), title)
             for name, policy in policies.items():
@@ -125,6 +134,8 @@ def run(args: Args) -> int:
                 if args.ablation:
                     rows = ablation(tuned.kalman, policy, trajectories, constant.action)
                     out.table(rows, f"Error of {name} without parts of it on {group} trajectories, deg")
+        if len(errors) > 1:
+            out.table(side_by_side(errors), f"Mean errors of {args.filter} ({quantity.name}), deg, and what is saved")
         for name, policy in policies.items():
             file = folder.figures / f"{name.replace(' ', '-')}.png"
             save(gains_figure(tuned.kalman, policy, sets), file)
@@ -132,6 +143,18 @@ def run(args: Args) -> int:
         folder.write_results(results(errors, sets, quantity))
         out.say(f"errors of every trajectory: {folder.folder / 'results.csv'}")
     return 0
+
+
+def left_out(
+    args: Args, tuned: TunedFilter, trajectories: list[Trajectory], constant: ConstantGains
+) -> dict[str, np.ndarray]:
+    """Contender → errors, rad, of policies that were trained on the other recordings."""
+    from ...baselines.gain_policy.compared.left_out import left_out_policy_errors
+
+    # The best of a search in simulation and the first that it tried, which lie evenly in the box.
+    actions = np.concatenate([constant.action[None], constant.tried[: args.points]])
+    errors = left_out_policy_errors(tuned, trajectories, actions, args.folds, seed=args.seed)
+    return {"policy of the other trajectories": errors}
 
 
 def simulated(args: Args, motions: object) -> tuple[dict[str, list[Trajectory]], list[Trajectory]]:

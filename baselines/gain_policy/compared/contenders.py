@@ -200,6 +200,24 @@ def rows_of(found: Mapping[str, np.ndarray], nees: Mapping[str, np.ndarray] | No
     return rows
 
 
+def side_by_side(sets: Mapping[str, Mapping[str, np.ndarray]]) -> list[dict[str, Any]]:
+    """Several sets of trajectories beside each other: mean errors, deg, and what is saved of the reference's.
+
+    What is saved is that of the best constants of the other trajectories, where they are among the contenders.
+
+    Args:
+        sets: name → contender → errors ``(n,)``, rad.
+    """
+    rows: dict[str, dict[str, Any]] = {}
+    for group, found in sets.items():
+        reference = found[OTHERS if OTHERS in found else REFERENCE]
+        for name, errors in found.items():
+            row = rows.setdefault(name, {"gains by": name})
+            row[f"{group} ({len(errors)})"] = float(np.degrees(errors).mean())
+            row[f"saved, {group}"] = percent(improvement(errors, reference))
+    return list(rows.values())
+
+
 def percent(interval: Interval) -> str:
     """``25 % (4 to 37)``."""
     value, low, high = (round(100 * number) for number in interval)

@@ -84,8 +84,8 @@ def test_clipped_rotation_is_made_up_for(kind: type[BoundedMotion] | type[Extern
     """Where the gyroscope was saturated the tilt is soon found again: the filter knows that it was turned further."""
     data = {"imu/gyr": np.zeros((600, 3)), "imu/acc": np.tile(GRAVITY, (600, 1))}
     data["imu/gyr"][150:160, 0] = 34.9
-    turned = 10 * 0.01 * 38.0
-    data["imu/acc"][160:] = 9.81 * np.array([0.0, np.sin(turned), np.cos(turned)])
+    turned = 0.01 * 38.0 * np.clip(np.arange(600) - 149, 0, 10)
+    data["imu/acc"] = 9.81 * np.stack([0.0 * turned, np.sin(turned), np.cos(turned)], axis=-1)
     errors = []
     for limit in (34.8, 1e3):
         up = KalmanFilter(kind(gyroscope_range=limit)).run(data).pose["up"]

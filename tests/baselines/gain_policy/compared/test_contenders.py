@@ -3,7 +3,14 @@
 import numpy as np
 import pytest
 
-from poise.baselines.gain_policy.compared.contenders import OTHERS, REFERENCE, contenders, improvement, rows_of
+from poise.baselines.gain_policy.compared.contenders import (
+    OTHERS,
+    REFERENCE,
+    contenders,
+    improvement,
+    rows_of,
+    side_by_side,
+)
 from poise.baselines.gain_policy.compared.explained import gains_by_motion, gains_figure
 from poise.baselines.gain_policy.compared.oracles import schedule_error, windowed_oracle
 from poise.baselines.gain_policy.constant_gains import constant_errors
@@ -84,3 +91,13 @@ def test_the_figure_shows_every_gain_over_every_number(motions):
     line = figure.axes[2].lines[0]
     np.testing.assert_allclose(line.get_ydata(), np.exp(TUNED.ranges[1].upper))
     assert len(figure.axes[0].lines) == 2
+
+
+def test_sets_stand_side_by_side():
+    one = {REFERENCE: np.radians([1.0, 3.0]), "policy": np.radians([1.0, 1.0])}
+    two = {REFERENCE: np.radians([4.0]), OTHERS: np.radians([2.0]), "policy": np.radians([1.0])}
+    rows = {row["gains by"]: row for row in side_by_side({"a": one, "b": two})}
+    assert rows["policy"]["a (2)"] == pytest.approx(1.0)
+    assert rows["policy"]["saved, a"].startswith("50 %")
+    assert rows["policy"]["saved, b"].startswith("50 %")
+    assert "a (2)" not in rows[OTHERS]
