@@ -73,6 +73,9 @@ def main(words: list[str] | None = None) -> list[TuneRun]:
     found, known = {}, [] if args.results is None else sorted(args.results.glob("*.json"))
     for file in known:
         found[file.stem] = run_of(file.stem, json.loads(file.read_text()), test)
+    if found:
+        same = next(iter(found.values())).errors
+        constants = {gains: np.radians(list(same[gains].values())) for gains in (PUBLISHED, CONSTANT)}
     for seed in args.seeds:
         name = f"{args.settings}-{args.steps}-{seed}"
         if name in found:
