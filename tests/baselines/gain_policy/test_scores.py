@@ -36,11 +36,8 @@ def test_recordings_are_scored_by_the_constants_of_all_others():
     assert scores.oracle <= min(scores.neutral, scores.constant)
     for data, known in RECORDED.items():
         assert poise.normalized_score(REPLAY, known.neutral, data) == 0.0
-        assert (
-            0.0
-            < poise.normalized_score(REPLAY, known.constant, data)
-            <= poise.normalized_score(REPLAY, known.oracle, data)
-        )
+        # The best constants of a few other recordings may be worse than the published gains.
+        assert poise.normalized_score(REPLAY, known.constant, data) < poise.normalized_score(REPLAY, known.oracle, data)
     with pytest.raises(ValueError, match="unknown data set 'broaad', did you mean 'broad'"):
         poise.normalized_score(REPLAY, 1.0, "broaad")
     with pytest.raises(ValueError, match="unknown data set ''"):
