@@ -110,7 +110,7 @@ def comparison(runs: Sequence[TuneRun], seed: int = 0, draws: int = DRAWS) -> li
 
     Intervals of ``saved`` are those of other seeds of training. ``better than constant`` is the probability that the
     agent saves more than the best constant gains of its training data do on a trajectory, and its interval is that of
-    other seeds and trajectories.
+    other seeds and trajectories. What it saves more than those has both kinds of interval.
 
     Args:
         runs: finished runs.
@@ -126,7 +126,10 @@ def comparison(runs: Sequence[TuneRun], seed: int = 0, draws: int = DRAWS) -> li
                 each: np.mean([run.errors[each][name] for run in some for name in names]) for each in some[0].errors
             }
             saved = bootstrap_interval(interquartile_mean, scores, seed=seed, draws=draws)
-            more = bootstrap_interval(mean_score, scores - constant, seed=seed, draws=draws, tasks_too=True)
+            seeds, more = (
+                bootstrap_interval(mean_score, scores - constant, seed=seed, draws=draws, tasks_too=tasks)
+                for tasks in (False, True)
+            )
             better = bootstrap_interval(improvement, scores, constant, seed=seed, draws=draws, tasks_too=True)
             rows.append(
                 {
@@ -140,6 +143,7 @@ def comparison(runs: Sequence[TuneRun], seed: int = 0, draws: int = DRAWS) -> li
                     "agent (deg)": round(float(mean[gains]), 3),
                     "saved, IQM": shown(saved),
                     "saved more than constant": shown(more),
+                    "the same, other seeds alone": shown(seeds),
                     "better than constant": shown(better),
                 }
             )
