@@ -42,20 +42,22 @@ SETTINGS: dict[str, dict[str, Any]] = {
 
 
 class Curve(BaseCallback):
-    """Notes the mean reward of a decision over the last episodes, before every update."""
+    """Notes the mean reward of a decision, as the environment gives it, over every rollout."""
 
     def __init__(self) -> None:
         super().__init__()
         self.rows: list[dict[str, float]] = []
+        self.rewards: list[float] = []
 
     def _on_step(self) -> bool:
+        env = self.training_env
+        given = env.get_original_reward() if isinstance(env, VecNormalize) else self.locals["rewards"]
+        self.rewards.append(float(np.mean(given)))
         return True
 
     def _on_rollout_end(self) -> None:
-        over = list(self.model.ep_info_buffer or ())
-        if over:
-            gain = float(np.mean([one["r"] / one["l"] for one in over]))
-            self.rows.append({"steps": float(self.num_timesteps), "gain": gain})
+        self.rows.append({"steps": float(self.num_timesteps), "gain": float(np.mean(self.rewards))})
+        self.rewards.clear()
 
 
 def main(words: list[str] | None = None) -> list[TuneRun]:

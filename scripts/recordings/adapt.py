@@ -78,6 +78,8 @@ def run(args: Args) -> int:
     config = shipped_config(args.filter)
     if args.folds and not args.recordings:
         raise ValueError("folds can only be given with recordings, which policies are trained on in turn")
+    if args.folds and len(args.quantities) > 1:
+        raise ValueError(f"folds train on one quantity, got {list(args.quantities)}")
     if args.errors != 1.0 and (args.recordings or not isinstance(config.motions, RiddenMotions)):
         raise ValueError("errors can only be given for simulated rides: recordings and hand motions keep theirs")
     shipped = f"{args.filter.replace('-', '_')}_policy"
@@ -153,7 +155,8 @@ def left_out(
 
     # The best of a search in simulation and the first that it tried, which lie evenly in the box.
     actions = np.concatenate([constant.action[None], constant.tried[: args.points]])
-    errors = left_out_policy_errors(tuned, trajectories, actions, args.folds, seed=args.seed)
+    quantity = args.quantities[0] if args.quantities else None
+    errors = left_out_policy_errors(tuned, trajectories, actions, args.folds, quantity=quantity, seed=args.seed)
     return {"policy of the other trajectories": errors}
 
 
