@@ -72,7 +72,7 @@ class ReplayEnv(PoseEnv):
     |---|---|---|---|
     | ``imu/gyr`` | (3,) float32 | rad/s | of the trajectory |
     | ``imu/acc`` | (3,) float32 | m/s² | of the trajectory |
-    | ``fresh`` | (channels,) int8 | 1 for a new sample, 0 where the last value is repeated | of the trajectory |
+    | ``new_sample`` | (channels,) int8 | 1 for a new sample, 0 where the last value is repeated | of the trajectory |
 
     Bounds are the largest recorded magnitudes.
 

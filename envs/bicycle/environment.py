@@ -77,7 +77,7 @@ class RiderBicycleEnv(PoseEnv):
     | ``relative/distances`` | (3,) | m, of three markers on the trunk from the camera, 16 Hz | all |
     | ``head_imu/gyr``, ``head_imu/acc`` | (3,) | rad/s; m/s² at the crown, head axes | only in a list of channels |
     | ``bicycle_imu/mag``, ``trunk_imu/mag`` | (3,) | µT | only in a list of channels |
-    | ``fresh`` | (channels,) int8 | 1 for a new sample, 0 where the last value is repeated | all |
+    | ``new_sample`` | (channels,) int8 | 1 for a new sample, 0 where the last value is repeated | all |
 
     The bicycle's IMU sits 0.37 m ahead of the rear contact and 0.71 m high, nose 10° up; the trunk's at T6.
 

@@ -132,7 +132,7 @@ class BicycleFixtureEnv(PoseEnv):
     ## Observation Space
 
     ``Dict``: ``bicycle_imu/gyr`` and ``disk/gyr`` (3,) rad/s, ``relative/distances`` (3,) m of three markers on the
-    disk from a camera on the bicycle (or the channels in ``suite``), and ``fresh``.
+    disk from a camera on the bicycle (or the channels in ``suite``), and ``new_sample``.
 
     ## Rewards
 

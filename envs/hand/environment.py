@@ -57,7 +57,7 @@ class HandMotionEnv(PoseEnv):
     | ``imu/gyr`` | (3,) float32 | rad/s, angular rate, sensor axes | ``rate`` |
     | ``imu/acc`` | (3,) float32 | m/s², specific force (+g on an axis that points up at rest) | ``rate`` |
     | ``imu/mag`` | (3,) float32 | µT, magnetic field; only with ``magnetometer`` | ``rate`` |
-    | ``fresh`` | (channels,) int8 | 1 for a new sample, 0 where the last value is repeated | ``rate`` |
+    | ``new_sample`` | (channels,) int8 | 1 for a new sample, 0 where the last value is repeated | ``rate`` |
 
     A device with an array of m uniaxial accelerometers has ``array/acc`` (m,), m/s² along each axis, in place of
     ``imu/acc``, and ``imu/gyr`` and ``imu/mag`` if it has these sensors; a planar one ``planar/gyr`` (1,), rad/s, about

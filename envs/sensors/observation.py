@@ -1,6 +1,6 @@
 """Channels of an environment, whose measurements become observations.
 
-A channel without a new sample keeps its last valid one (zero-order hold); its flag in ``fresh`` is then 0.
+A channel without a new sample keeps its last valid one (zero-order hold); its flag in ``new_sample`` is then 0.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from gymnasium import spaces
 from ...filters.core.quantity import Channel
 from ...filters.core.sampling import latest
 
-FRESH = "fresh"
+NEW_SAMPLE = "new_sample"
 """Key of the flags in an observation."""
 
 
@@ -29,13 +29,14 @@ class Sensing:
             clipped.
 
     Raises:
-        ValueError: two channels share a name, one is called ``fresh``, or a limit is missing, not positive or infinite.
+        ValueError: two channels share a name, one is called ``new_sample``, or a limit is missing, not positive or
+            infinite.
     """
 
     def __init__(self, channels: Sequence[Channel], limits: Mapping[str, float | np.ndarray]) -> None:
         names = [channel.name for channel in channels]
-        if len(set(names)) < len(names) or FRESH in names or not names:
-            raise ValueError(f"channels must have names of their own, none of them {FRESH!r}, got {names}")
+        if len(set(names)) < len(names) or NEW_SAMPLE in names or not names:
+            raise ValueError(f"channels must have names of their own, none of them {NEW_SAMPLE!r}, got {names}")
         boxes: dict[str, spaces.Space] = {}
         for channel in channels:
             limit = limits.get(channel.name, math.nan)
@@ -46,7 +47,7 @@ class Sensing:
                 )
             bound = np.full(channel.size, limit, np.float32)
             boxes[channel.name] = spaces.Box(-bound, bound, dtype=np.float32)
-        boxes[FRESH] = spaces.MultiBinary(len(names))
+        boxes[NEW_SAMPLE] = spaces.MultiBinary(len(names))
         self.channels = tuple(channels)
         self.observation_space = spaces.Dict(boxes)
         self._limits = {name: np.asarray(limits[name], np.float32).astype(float) for name in names}
@@ -81,20 +82,20 @@ class Sensing:
             count: number of rows.
 
         Returns:
-            Channel name → float32 ``(count, size)`` within the bounds, and ``fresh``: int8 ``(count, channels)``.
+            Channel name → float32 ``(count, size)`` within the bounds, and ``new_sample``: int8 ``(count, channels)``.
         """
-        fresh, seen = np.zeros((count, len(self.channels)), np.int8), {}
+        new_sample, seen = np.zeros((count, len(self.channels)), np.int8), {}
         for index, channel in enumerate(self.channels):
             values, held = measurements.get(channel.name), self.held[channel.name]
             rows = np.tile(held, (count, 1))
             if values is not None:
                 limit, known = self._limits[channel.name], ~np.isnan(values).any(axis=1)
-                fresh[:, index] = known
+                new_sample[:, index] = known
                 clipped = np.minimum(np.maximum(values, -limit), limit).astype(np.float32)
                 last = latest(known)
                 rows = np.where(last[:, None] >= 0, clipped[last], rows)
             seen[channel.name], self.held[channel.name] = rows, rows[-1].copy()
-        return {**seen, FRESH: fresh}
+        return {**seen, NEW_SAMPLE: new_sample}
 
     def to_observation(self, measurement: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Turn one measurement, channel name → ``(size,)``, into an observation, as :meth:`observations` several."""
@@ -105,23 +106,25 @@ class Sensing:
         """Undo :meth:`to_observation`, over any leading (batch, time) dimensions.
 
         Args:
-            observation: channel name → ``(..., size)``, and ``fresh`` ``(..., channels)``.
+            observation: channel name → ``(..., size)``, and ``new_sample`` ``(..., channels)``.
 
         Returns:
-            Channel name → float64 ``(..., size)``; NaN where not fresh.
+            Channel name → float64 ``(..., size)``; NaN where no sample is new.
 
         Raises:
-            ValueError: a key is missing, or ``fresh`` has not one flag a channel.
+            ValueError: a key is missing, or ``new_sample`` has not one flag a channel.
         """
-        missing = [name for name in (*self._limits, FRESH) if name not in observation]
+        missing = [name for name in (*self._limits, NEW_SAMPLE) if name not in observation]
         if missing:
             raise ValueError(f"observation lacks {missing}; it holds {sorted(observation)}")
-        fresh = np.asarray(observation[FRESH])
-        if fresh.shape[-1:] != (len(self.channels),):
-            raise ValueError(f"observation['fresh'] must have shape (..., {len(self.channels)}), got {fresh.shape}")
+        new_sample = np.asarray(observation[NEW_SAMPLE])
+        if new_sample.shape[-1:] != (len(self.channels),):
+            raise ValueError(
+                f"observation['new_sample'] must have shape (..., {len(self.channels)}), got {new_sample.shape}"
+            )
         return {
             channel.name: np.where(
-                fresh[..., index, None] > 0, np.asarray(observation[channel.name], dtype=float), np.nan
+                new_sample[..., index, None] > 0, np.asarray(observation[channel.name], dtype=float), np.nan
             )
             for index, channel in enumerate(self.channels)
         }

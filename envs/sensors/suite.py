@@ -63,7 +63,7 @@ class SensorSuite(Sensing):
     with ``sampling="interval"`` start at their second sample, unless :meth:`simulate` is given the states ``before``.
 
     Args:
-        sensors: in the order of ``fresh``.
+        sensors: in the order of ``new_sample``.
         rate: time steps per second, Hz.
         gravity: m/s².
         field: magnetic field in the world (east, north, up), ``(3,)``, µT; None for that of :func:`.magnetic_field`.

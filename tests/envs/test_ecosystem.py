@@ -69,7 +69,7 @@ def test_checkers_and_pickles(identity, options):
 def test_stable_baselines_trains_saves_and_loads(identity, options, tmp_path):
     envs = make_vec_env(identity, 2, seed=0, env_kwargs=options)
     boxes = isinstance(envs.observation_space, gymnasium.spaces.Box)
-    keys = None if boxes else [name for name in envs.observation_space.spaces if name != "fresh"]
+    keys = None if boxes else [name for name in envs.observation_space.spaces if name != "new_sample"]
     normalised = VecNormalize(envs, norm_obs_keys=keys)
     model = PPO("MlpPolicy" if boxes else "MultiInputPolicy", normalised, n_steps=8, batch_size=8, n_epochs=1, seed=0)
     model.learn(16)

@@ -45,7 +45,7 @@ def test_time_is_kept_over_gaps_and_jitter(trajectory, jitter):
     for step in range(1, 951):
         observation, reward, _, truncated, info = env.step(env.neutral_action)
         assert info["time"] - start == pytest.approx(step / 100.0, abs=2e-3)
-        lost += not observation["fresh"][0]
+        lost += not observation["new_sample"][0]
         if not info["scored"]:
             unscored += 1
             assert np.isnan(info["truth"]["position"]).all()
@@ -171,4 +171,4 @@ def test_channels_without_any_sample_have_a_space():
     env = ReplayEnv(trajectory)
     observation, _ = env.reset(seed=0)
     assert env.observation_space.contains(observation)
-    assert observation["fresh"].tolist() == [0, 1]
+    assert observation["new_sample"].tolist() == [0, 1]

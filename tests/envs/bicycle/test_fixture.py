@@ -39,7 +39,7 @@ def test_environment():
     check_env(env, skip_render_check=True)
     env = BicycleFixtureEnv(sensors="ideal", duration=2.0)
     observation, info = env.reset(seed=0)
-    assert set(observation) == {"bicycle_imu/gyr", "disk/gyr", "relative/distances", "fresh"}
+    assert set(observation) == {"bicycle_imu/gyr", "disk/gyr", "relative/distances", "new_sample"}
     assert env.step(info["pose"]["bicycle/roll"])[1] == pytest.approx(0.0, abs=1e-7)
     snapshot = env.snapshot()
     first = [env.step(env.neutral_action)[1] for _ in range(150)]

@@ -270,17 +270,17 @@ class Options:
 
 class Suite:
     def to_measurement(self, observation: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-        return {"imu/gyr": np.where(observation["fresh"][0], observation["imu/gyr"], np.nan)}
+        return {"imu/gyr": np.where(observation["new_sample"][0], observation["imu/gyr"], np.nan)}
 
     def describe(self) -> dict[str, Any]:
         return {"imu": {"rate": np.float64(25.0)}}
 
 
 class Spinner(gymnasium.Env):
-    """Turns about z by what the action says; every second sample is fresh; ends after ten steps."""
+    """Turns about z by what the action says; every second sample is new; ends after ten steps."""
 
     observation_space = gymnasium.spaces.Dict(
-        {"imu/gyr": gymnasium.spaces.Box(-9, 9, (3,)), "fresh": gymnasium.spaces.MultiBinary(1)}
+        {"imu/gyr": gymnasium.spaces.Box(-9, 9, (3,)), "new_sample": gymnasium.spaces.MultiBinary(1)}
     )
     action_space = gymnasium.spaces.Box(-1, 1, (1,))
 
@@ -296,7 +296,7 @@ class Spinner(gymnasium.Env):
         noise = 0.01 * self.np_random.standard_normal(3)
         gyr = (np.array([0, 0, rate[0]]) + noise).astype(np.float32)
         orientation = rotation.exp(np.array([0.0, 0.0, self.angle]))
-        observation = {"imu/gyr": gyr, "fresh": np.array([self.tick % 2 == 0], dtype=np.int8)}
+        observation = {"imu/gyr": gyr, "new_sample": np.array([self.tick % 2 == 0], dtype=np.int8)}
         pose = {"orientation": orientation}
         return observation, {
             "time": self.tick / 50,

@@ -238,10 +238,10 @@ def test_gesture_of_one_episode_by_reset_option():
 def test_slow_magnetometer_is_marked_as_not_fresh():
     with HandMotionEnv("slow", "kinematic", magnetometer=20.0) as env:
         observation, _ = env.reset(seed=0)
-        flags = [observation["fresh"][2]]
-        flags += [env.step(env.neutral_action)[0]["fresh"][2] for _ in range(100)]
+        flags = [observation["new_sample"][2]]
+        flags += [env.step(env.neutral_action)[0]["new_sample"][2] for _ in range(100)]
         assert sum(flags) == 21
-    assert HandMotionEnv("slow", "kinematic", magnetometer=False).observation_space["fresh"].n == 2
+    assert HandMotionEnv("slow", "kinematic", magnetometer=False).observation_space["new_sample"].n == 2
 
 
 def test_a_whole_suite_may_be_given():

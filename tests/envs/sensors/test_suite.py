@@ -146,7 +146,7 @@ def test_observations_lie_in_their_space_and_hold_the_last_value():
         measurement = {name: values[index] for name, values in measured.items()}
         observation = suite.to_observation(measurement)
         assert suite.observation_space.contains(observation)
-        np.testing.assert_array_equal(observation["fresh"], [index > 0 and index % 4 == 0] * 2)
+        np.testing.assert_array_equal(observation["new_sample"], [index > 0 and index % 4 == 0] * 2)
         if index < 4:
             assert not observation["imu/acc"].any()
         elif index % 4:
@@ -167,7 +167,7 @@ def test_values_beyond_the_bounds_are_clipped():
     wild = {"imu/gyr": np.full(3, 1e6), "imu/acc": np.array([1.0, np.nan, 1.0])}
     observation = suite.to_observation(wild)
     assert suite.observation_space.contains(observation)
-    np.testing.assert_array_equal(observation["fresh"], [1, 0])
+    np.testing.assert_array_equal(observation["new_sample"], [1, 0])
     assert np.isfinite(suite.observation_space["imu/gyr"].high).all()
 
 

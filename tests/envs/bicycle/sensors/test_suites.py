@@ -133,7 +133,7 @@ def test_observations_flag_what_is_fresh():
     for step in range(10):
         observation = suite.to_observation({name: values[step] for name, values in measured.items()})
         assert suite.observation_space.contains(observation)
-        flags.append(observation["fresh"].tolist())
+        flags.append(observation["new_sample"].tolist())
     assert flags[:3] == [[0, 0, 1], [1, 1, 0], [1, 1, 0]]
     assert flags[7] == [1, 1, 1]
 
