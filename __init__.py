@@ -26,6 +26,7 @@ from .filters.support.version import poise_version
 if TYPE_CHECKING:
     from .baselines.evaluation import evaluate
     from .baselines.gain_policy.scores import normalized_score
+    from .baselines.online import OnlineEstimator
     from .baselines.registry import EstimatorInfo, list_estimators, make_estimator
     from .baselines.run import run, smooth
     from .envs.data.calibration.records import apply_calibration, load_calibration
@@ -44,6 +45,7 @@ __all__ = [
     "Estimator",
     "EstimatorInfo",
     "Finding",
+    "OnlineEstimator",
     "SensorKind",
     "Trajectory",
     "__version__",
@@ -69,6 +71,7 @@ _HOMES = {
     "Estimator": ".filters.core.estimator",
     "EstimatorInfo": ".baselines.registry",
     "Finding": ".envs.data.readings",
+    "OnlineEstimator": ".baselines.online",
     "SensorKind": ".envs.sensors.kinds",
     "Trajectory": ".envs.data.trajectory",
     "apply_calibration": ".envs.data.calibration.records",

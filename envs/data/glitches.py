@@ -157,9 +157,11 @@ class SamplesSoFar:
             kind = name.rpartition("/")[2]
             if kind not in LEAST or len(values) != 3:
                 continue
-            step = float(np.abs(values - last[name]).max())
             # The distance of a glitch is at most its larger step; one coordinate has at least 1/√3 of it.
-            if step > 0.5 * LEAST[kind] or not values.any() or (name in self.ranges and self._full(name, values)):
+            least, now, before = 0.5 * LEAST[kind], values.tolist(), last[name].tolist()
+            if any(abs(one - other) > least for one, other in zip(now, before, strict=True)) or not any(now):
+                return True
+            if name in self.ranges and self._full(name, values):
                 return True
         return False
 

@@ -1,22 +1,16 @@
-"""An estimator fed with samples as they arrive: gaps become predictions, and the time of every step is measured."""
+"""The clock of samples as they arrive: gaps become missing samples."""
 
 from __future__ import annotations
 
 import math
-import time
-from array import array
-from collections import deque
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple, Self
+from typing import NamedTuple
 
 import numpy as np
 
 from ...envs.data.clock import check_interval, fit_clock
-from ...envs.data.glitches import FEWEST, SamplesSoFar, alike
-from ...filters.core.estimator import Estimator, check_measurements
-from ...filters.core.offline import Offline
-from ...filters.core.quantity import Estimate
+from ...envs.data.glitches import alike
 from .lines import BadLineError, Sample
 
 LONGEST_GAP = 5.0
@@ -199,75 +193,3 @@ class StreamClock:
         late = sample.time - self._now
         self._now += (FORWARD if late > 0.0 else BACK) * late
         yield Timed(self._now, sample.measurement, False, False)
-
-
-@dataclass
-class OnlineEstimator:
-    """An estimator with its state, and how long its steps took.
-
-    Attributes:
-        estimator: at the sampling interval of the stream.
-        ranges: channel → range of the sensor in its unit; what reaches it is not a sample.
-        seconds: of every step.
-
-    Glitches count as missing, as in :func:`poise.run`: what looks like one does at once, and where later samples show
-    that it is one or is none, the estimate begins again from there.
-
-    Raises:
-        ValueError: the estimator needs the whole recording.
-    """
-
-    estimator: Estimator[Any]
-    ranges: Mapping[str, float] = field(default_factory=dict)
-    seconds: array[float] = field(default_factory=lambda: array("d"))
-    _state: Any = field(default=None, init=False)
-    _before: deque[Any] = field(default_factory=lambda: deque(maxlen=FEWEST), init=False)
-    _samples: SamplesSoFar = field(init=False)
-
-    def __post_init__(self) -> None:
-        if isinstance(self.estimator, Offline):
-            raise ValueError(
-                "a smoother needs the whole recording: name an estimator with steps, or use `poise estimate`"
-            )
-        self._samples = SamplesSoFar(self.ranges)
-
-    def warm_up(self) -> Self:
-        """Compute an estimate of a resting sensor, so that compiled code is loaded before the first sample comes."""
-        rest = {each.name: np.full(each.size, 1.0) for each in self.estimator.channels}
-        state = self.estimator.init(rest)
-        self.estimator.step(state, rest)
-        return self
-
-    def step(self, sample: Timed) -> Estimate:
-        """The estimate after a sample.
-
-        Raises:
-            ValueError: the sample lacks a channel of the estimator.
-        """
-        start = time.perf_counter()
-        if self._state is None or sample.restart:
-            measurement = check_measurements(self.estimator.channels, sample.measurement, time_axis=False)
-            self._state = self.estimator.init(measurement)
-            self._samples = SamplesSoFar(self.ranges)
-            self._before.clear()
-        changed = self._samples.add(sample.measurement)
-        for _ in changed[1:]:
-            self._state = self._before.pop()
-        for each in changed:
-            self._before.append(self._state)
-            self._state, estimate = self.estimator.step(self._state, each)
-        self.seconds.append(time.perf_counter() - start)
-        return estimate
-
-    def latency(self) -> dict[str, float]:
-        """Median, 95 % and largest time of a step, µs."""
-        taken = 1e6 * np.array(self.seconds)
-        if not len(taken):
-            return {"samples": 0}
-        median, high = np.quantile(taken, [0.5, 0.95])
-        return {
-            "samples": len(self.seconds),
-            "median (µs)": float(median),
-            "95 % (µs)": float(high),
-            "largest (µs)": float(taken.max()),
-        }

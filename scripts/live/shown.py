@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...baselines.gain_policy.adaptive import AdaptiveEstimator
+from ...baselines.online import OnlineEstimator
 from ...baselines.registry import list_estimators, make_estimator
 from ...baselines.run import fitted, run_on
 from ...envs.data.trajectory import Trajectory
@@ -20,7 +21,7 @@ from ...filters.core.model import equations_of
 from ...filters.support.optional import MissingExtraError
 from .curves import Curves
 from .motion import Block, Device, Motion, Rider, Subject, joined
-from .online import OnlineEstimator, Timed
+from .online import Timed
 
 if TYPE_CHECKING:
     from ...envs.base import PoseEnv
@@ -168,7 +169,10 @@ class LiveMotion:
         """
         if not samples:
             return
-        steps = {label: [online.step(sample).pose for sample in samples] for label, online in self.online.items()}
+        steps = {
+            label: [online.step(sample.measurement, sample.restart).pose for sample in samples]
+            for label, online in self.online.items()
+        }
         poses = {
             label: {name: np.array([pose[name] for pose in rows]) for name in rows[0]} for label, rows in steps.items()
         }

@@ -279,8 +279,8 @@ def as_line(row: Mapping[str, float], as_json: bool) -> str:
 
 def run(args: Args) -> int:
     """Estimate until the lines end or the command is interrupted."""
+    from ...baselines.online import OnlineEstimator
     from ...baselines.registry import make_estimator
-    from .online import OnlineEstimator
 
     check_file("output", args.output, () if args.source == "-" else (Path(args.source),))
     made = make_estimator(args.estimator)
@@ -300,7 +300,7 @@ def run(args: Args) -> int:
                     online = OnlineEstimator(made.with_dt(clock.dt), ranges_of(args.full_scale, reader.layout))
                     first = FirstSamples(clock.dt)
                 first.add(sample)
-                row = estimate_row(sample, online.step(sample), kinds)
+                row = estimate_row(sample, online.step(sample.measurement, sample.restart), kinds)
                 if len(online.seconds) == 1 and reader.kind == "csv":
                     write(",".join(row))
                 write(as_line(row, reader.kind == "json"))

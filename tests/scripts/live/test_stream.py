@@ -14,7 +14,7 @@ import pytest
 import poise
 from poise.envs.data.trajectory import Trajectory
 from poise.scripts.live.lines import BadLineError, LineReader
-from poise.scripts.live.online import OnlineEstimator, StreamClock, Timed
+from poise.scripts.live.online import StreamClock, Timed
 from poise.scripts.live.sources import datagrams, file_lines
 from poise.scripts.main import main
 
@@ -240,20 +240,6 @@ def test_ranges_of_sensors_are_no_samples(motion, tmp_path):
     largest = str(np.abs(motion.measurements["imu/gyr"]).max())
     assert main(["stream", str(path), "--output", str(ranged), "--full-scale", f"gyr={largest}"]) == 0
     assert plain.read_text() != ranged.read_text()
-
-
-def test_stepping_equals_running(motion):
-    online = OnlineEstimator(poise.make_estimator("bounded-motion", dt=motion.dt)).warm_up()
-    found = [
-        online.step(Timed(t, {name: values[i] for name, values in motion.measurements.items()}, False, False)).pose[
-            "up"
-        ]
-        for i, t in enumerate(motion.time)
-    ]
-    np.testing.assert_allclose(np.array(found), poise.run("bounded-motion", motion).pose["up"], atol=1e-9)
-    latency = online.latency()
-    assert latency["samples"] == len(motion)
-    assert 0.0 < latency["median (µs)"] <= latency["95 % (µs)"] <= latency["largest (µs)"]
 
 
 def test_estimates_of_a_file_equal_those_of_the_recording(motion, tmp_path, capsys):

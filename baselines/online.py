@@ -1,0 +1,94 @@
+"""An estimator for a loop of one's own: glitches count as missing, and the time of every step is measured."""
+
+from __future__ import annotations
+
+import time
+from array import array
+from collections import deque
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Self
+
+import numpy as np
+
+from ..envs.data.glitches import FEWEST, SamplesSoFar
+from ..filters.core.estimator import Estimator, check_measurements
+from ..filters.core.offline import Offline
+from ..filters.core.quantity import Estimate
+
+
+@dataclass
+class OnlineEstimator:
+    """An estimator with its state, fed with samples as they arrive, and how long its steps took.
+
+    Attributes:
+        estimator: at the sampling interval of the stream.
+        ranges: channel → range of the sensor in its unit; what reaches it is not a sample.
+        seconds: of every step.
+
+    Glitches count as missing, as in :func:`poise.run`: what looks like one does at once, and where later samples show
+    that it is one or is none, the estimate begins again from there.
+
+    Raises:
+        ValueError: the estimator needs the whole recording.
+    """
+
+    estimator: Estimator[Any]
+    ranges: Mapping[str, float] = field(default_factory=dict)
+    seconds: array[float] = field(default_factory=lambda: array("d"))
+    _state: Any = field(default=None, init=False)
+    _before: deque[Any] = field(default_factory=lambda: deque(maxlen=FEWEST), init=False)
+    _samples: SamplesSoFar = field(init=False)
+
+    def __post_init__(self) -> None:
+        if isinstance(self.estimator, Offline):
+            raise ValueError(
+                "a smoother needs the whole recording: name an estimator with steps, or use `poise estimate`"
+            )
+        self._samples = SamplesSoFar(self.ranges)
+
+    def warm_up(self) -> Self:
+        """Compute an estimate of a resting sensor, so that compiled code is loaded before the first sample comes."""
+        rest = {each.name: np.full(each.size, 1.0) for each in self.estimator.channels}
+        state = self.estimator.init(rest)
+        self.estimator.step(state, rest)
+        return self
+
+    def step(self, measurement: Mapping[str, Any], restart: bool = False) -> Estimate:
+        """The estimate after a sample.
+
+        Args:
+            measurement: channel → ``(size,)``, one sampling interval after the last; NaN where there is none.
+            restart: begin anew with this sample, as after a long gap.
+
+        Raises:
+            ValueError: the sample lacks a channel of the estimator, or has another shape.
+        """
+        start = time.perf_counter()
+        sample = check_measurements(self.estimator.channels, measurement, time_axis=False)
+        if self._state is None or restart:
+            self._state = self.estimator.init(sample)
+            self._samples = SamplesSoFar(self.ranges)
+            self._before.clear()
+        others = {name: np.asarray(values, float) for name, values in measurement.items() if name not in sample}
+        changed = self._samples.add({**others, **sample})
+        for _ in changed[1:]:
+            self._state = self._before.pop()
+        for each in changed:
+            self._before.append(self._state)
+            self._state, estimate = self.estimator.step(self._state, each)
+        self.seconds.append(time.perf_counter() - start)
+        return estimate
+
+    def latency(self) -> dict[str, float]:
+        """Median, 95 % and largest time of a step, µs."""
+        taken = 1e6 * np.array(self.seconds)
+        if not len(taken):
+            return {"samples": 0}
+        median, high = np.quantile(taken, [0.5, 0.95])
+        return {
+            "samples": len(self.seconds),
+            "median (µs)": float(median),
+            "95 % (µs)": float(high),
+            "largest (µs)": float(taken.max()),
+        }
