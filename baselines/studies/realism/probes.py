@@ -63,7 +63,7 @@ def arm_apart() -> float:
     """RMS distance (mm) of a device that an arm shakes from where the gesture has it."""
     paths = []
     for drive in ("kinematic", "dynamic"):
-        env = HandMotionEnv("severe", drive, "ideal", duration=10.0)  # type: ignore[arg-type]
+        env = HandMotionEnv("severe", drive, "ideal", duration=10.0)
         paths.append(record_once(env, SEED).truth["position"])
     return 1e3 * float(np.sqrt(np.mean(np.sum((paths[0] - paths[1]) ** 2, axis=1))))
 
