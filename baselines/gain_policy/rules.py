@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from ...filters.adaptation.gains import filter_name, gain_ranges
+from ...filters.adaptation.gains import DECADES, filter_name, gain_ranges
 from ...filters.adaptation.rules import AccelerationRule, InnovationRule, PitchRateRule, Rule, TurningRule
 from ...filters.core.kalman import KalmanFilter
 from ...filters.registry import make
@@ -49,12 +50,16 @@ def ruled(filter: KalmanFilter, gain: str, rule: Rule) -> AdaptiveEstimator:
     Args:
         filter: in its published tuning.
         gain: name of the gain.
-        rule: what sets it; actions 1 and −1 are the ends of the gain's range.
+        rule: what sets it; actions 1 and −1 are the ends of the gain's range, of a single IMU the common one at most.
 
     Raises:
         ValueError: the filter has no such gain.
     """
     (part,) = gain_ranges(filter, (gain,))
+    if all(channel.name.startswith("imu/") for channel in filter.channels):
+        # Beyond the common range the rules lose to the published gains on recordings of RepoIMU and phones.
+        reach = DECADES * math.log(10.0)
+        part = replace(part, lower=max(part.lower, -reach), upper=min(part.upper, reach))
     features = replace(rule, largest=part.upper, reach=max(-part.lower, 1e-9))
     # Nothing lowers the variance of what is only believed but a rule that sees when it holds.
     if isinstance(features, InnovationRule | AccelerationRule) and gain == "measurement":

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 import poise
-from poise.baselines.gain_policy.rules import ruled
+from poise.baselines.gain_policy.rules import RULES, ruled
 from poise.envs.bicycle.environment import RiderBicycleEnv
 from poise.envs.gain_episode import filter_for
 from poise.envs.gain_reward import true_values
-from poise.filters.adaptation.gains import tunable_filter
+from poise.filters.adaptation.gains import DECADES, tunable_filter
 from poise.filters.adaptation.rules import InnovationRule, PitchRateRule, TurningRule
 from poise.filters.bicycle.two_gyro.filter import TwoGyro
 from poise.filters.core.estimator import run_by_steps
@@ -98,3 +98,11 @@ def test_shaking_without_a_turn_turns_the_belief_off_and_a_calm_turn_strengthens
 def test_filters_without_the_gain_are_refused():
     with pytest.raises(ValueError, match="gains must be distinct names"):
         ruled(PLATFORM, "constraint", PitchRateRule())
+
+
+def test_rules_of_a_single_imu_keep_the_common_range():
+    """An agent may raise σ_A of this filter further than the rules, whose constants were chosen within it."""
+    kalman = tunable_filter("external-acceleration")
+    for name in ("innovation", "acceleration"):
+        (part,) = ruled(kalman, "measurement", RULES[name]).policy.ranges
+        assert (part.lower, part.upper) == pytest.approx((-DECADES * np.log(10.0), DECADES * np.log(10.0)))
