@@ -244,12 +244,12 @@ class Evaluation:
 
     def check_north(self) -> None:
         """Warn if the headings of all estimators differ from that of the truth by the same angle."""
-        told = [label for label, (_, one) in self.estimates.items() if ORIENTATION.name in one.pose]
-        offsets = [heading_offset(self.estimates[label][1], self.trajectory) for label in told]
+        oriented = [label for label, (_, one) in self.estimates.items() if ORIENTATION.name in one.pose]
+        offsets = [heading_offset(self.estimates[label][1], self.trajectory) for label in oriented]
         known = [offset for offset in offsets if offset is not None]
         if known and len(known) == len(offsets) and max(known) - min(known) < LARGEST_NORTH:
             warnings.warn(
-                f"{self.trajectory.name}: the heading of the truth differs from that of {', '.join(told)} by a "
+                f"{self.trajectory.name}: the heading of the truth differs from that of {', '.join(oriented)} by a "
                 f"constant {known[0]:.0f}°; likely cause: the x axis of the reference does not point east. Their "
                 "heading and total errors are this offset",
                 stacklevel=4,

@@ -96,8 +96,8 @@ def agreement_tables(table: pandas.DataFrame) -> dict[str, list[dict[str, Any]]]
             related = any(family(str(name)) == family(one) and name != one for one in references)
             label = f"{name} (family of the reference)" if related else str(name)
             rows.append({"estimator": label, **{f"to {other}": value for other, value in row.items()}})
-        told = f"; reference {', '.join(sorted(references))}" if references else ""
-        tables[f"Agreement, {metric}, RMS, deg (no truth: neither error nor ranking{told})"] = rows
+        listed = f"; reference {', '.join(sorted(references))}" if references else ""
+        tables[f"Agreement, {metric}, RMS, deg (no truth: neither error nor ranking{listed})"] = rows
     if tables:
         nis = table[table["metric"] == "nis"].groupby("estimator", sort=False)["value"].mean()
         rows = [{"estimator": name, "NIS": value} for name, value in nis.items()]

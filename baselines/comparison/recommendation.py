@@ -105,8 +105,8 @@ def results_of(trajectories: Sequence[Trajectory], table: pandas.DataFrame, suff
         errors: dict[str, dict[str, float]] = {}
         for row in part.itertuples():
             # An arbitrary heading of the truth cannot be compared with that of an estimate.
-            told = row.metric == "inclination" or dataset_of(trajectory) in NORTH
-            if row.quantity in ("up", "orientation") and np.isfinite(row.value) and told:
+            comparable = row.metric == "inclination" or dataset_of(trajectory) in NORTH
+            if row.quantity in ("up", "orientation") and np.isfinite(row.value) and comparable:
                 errors.setdefault(row.estimator, {})[row.metric] = round(row.value, 4)
         motion = {name: round(value, 3) for name, value in asdict(motion_of(trajectory)).items()}
         dataset = f"{dataset_of(trajectory)}{suffix}"

@@ -181,10 +181,10 @@ def run_task(
     settings = {"offline": offline, "reference": reference, "detailed": True, **task.settings}
     try:
         # kept with the results, and issued when these are collected, also after an interruption
-        with warnings.catch_warnings(record=True) as told:
+        with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
             table = evaluate(contenders(names, channels), trajectories, **settings)
-        found["warnings"] = list(dict.fromkeys(str(one.message) for one in told))
+        found["warnings"] = list(dict.fromkeys(str(one.message) for one in caught))
     except ValueError as reason:  # nothing could be run here; other tasks go on
         found |= {"rows": [], "attrs": {"refused": str(reason)}, "recordings": []}
     else:

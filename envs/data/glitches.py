@@ -99,14 +99,14 @@ def without_glitches(trajectory: Trajectory) -> dict[str, np.ndarray]:
     Warns:
         UserWarning: how many samples there are.
     """
-    measurements, told = dict(trajectory.measurements), []
+    measurements, reports = dict(trajectory.measurements), []
     for name, parts in no_samples(measurements, full_scales(trajectory.metadata)).items():
         wrong = np.logical_or.reduce(list(parts.values()))
         if wrong.any():
             measurements[name] = np.where(wrong[:, None], np.nan, measurements[name])
-            told += [f"{name}: {int(part.sum())} {what}" for what, part in parts.items() if part.any()]
-    if told:
-        warnings.warn(f"{trajectory.name}: {', '.join(told)}; they count as missing samples", stacklevel=4)
+            reports += [f"{name}: {int(part.sum())} {what}" for what, part in parts.items() if part.any()]
+    if reports:
+        warnings.warn(f"{trajectory.name}: {', '.join(reports)}; they count as missing samples", stacklevel=4)
     return measurements
 
 

@@ -89,8 +89,8 @@ def redrawn(
     metadata |= {"noise_scale": float(noise_scale), "mirrored": bool(mirror)}
     if geometry is not None and "geometry" in metadata:
         true = RiderGeometry.read(metadata["geometry"])
-        told = measured(true, tape, lengths=geometry.lengths, places=geometry.places, mass=geometry.mass)
-        metadata |= {"geometry": told.describe(), TRUE_GEOMETRY: metadata["geometry"]}
+        taped = measured(true, tape, lengths=geometry.lengths, places=geometry.places, mass=geometry.mass)
+        metadata |= {"geometry": taped.describe(), TRUE_GEOMETRY: metadata["geometry"]}
     return ride.replace(measurements=measurements, truth=ride.truth | biases, metadata=metadata)
 
 

@@ -122,13 +122,13 @@ def sensors_of(trajectory: Trajectory, channels: Sequence[str] = ()) -> list[Tra
 @contextmanager
 def plain_warnings() -> Iterator[None]:
     """Print warnings of the package in one line each on standard error, every text once."""
-    told: set[str] = set()
+    shown: set[str] = set()
 
     def show(message: Any, category: type[Warning], filename: str, lineno: int, *rest: Any) -> None:
         text = " ".join(str(message).split())
         # What was not run is listed under the tables.
-        if text not in told and " was not run on " not in text:
-            told.add(text)
+        if text not in shown and " was not run on " not in text:
+            shown.add(text)
             print(f"poise: warning: {text}", file=sys.stderr, flush=True)
 
     with warnings.catch_warnings():

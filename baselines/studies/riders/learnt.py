@@ -78,9 +78,9 @@ def learn(paper: str, start: str, source: RideSource, seed: int, *, samples: int
         for each in draws:
             own: Any = make(paper, dt=each.dt, metadata=each.metadata)
             truth = angles_of(outputs, truth_of(own, each))[each.mask][:: 4 * THINNED]
-            told = angles_of(outputs, own.run(each.measurements).pose)[each.mask][:: 4 * THINNED]
+            estimated = angles_of(outputs, own.run(each.measurements).pose)[each.mask][:: 4 * THINNED]
             truths.append(truth)
-            biases.append(rotation.wrap(told - truth))
+            biases.append(rotation.wrap(estimated - truth))
             features, target, _, mask = sequence_of(each, front_end, head)
             inputs.append(moving_averages(features)[mask][::THINNED])
             targets.append(target[mask][::THINNED])

@@ -40,8 +40,8 @@ INSIDE: dict[tuple[int, bytes], str] = {
 
 def other_kind(head: bytes) -> str | None:
     """What a file of another kind is, and what to do; None of unknown ones."""
-    told = next((text for start, text in OTHERS.items() if head.startswith(start)), None)
-    return told or next((text for (at, sign), text in INSIDE.items() if head[at:].startswith(sign)), None)
+    explanation = next((text for start, text in OTHERS.items() if head.startswith(start)), None)
+    return explanation or next((text for (at, sign), text in INSIDE.items() if head[at:].startswith(sign)), None)
 
 
 def read_table(path: Path) -> Table:

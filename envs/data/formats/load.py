@@ -232,14 +232,14 @@ def chosen_map(path: Path, given: Mapping[str, Any]) -> RecordingMap:
     """The mapping of arguments; without columns those that the names of the table tell."""
     arguments = dict(given)
     if "columns" not in arguments:
-        told = mapping_of(read_table(path))
-        if not told.columns:
+        drafted = mapping_of(read_table(path))
+        if not drafted.columns:
             raise ValueError(explanation(path))
-        arguments["columns"] = {name.removeprefix("imu/"): list(names) for name, names in told.columns.items()}
-        arguments.setdefault("time", told.time)
+        arguments["columns"] = {name.removeprefix("imu/"): list(names) for name, names in drafted.columns.items()}
+        arguments.setdefault("time", drafted.time)
         made = make_map(**arguments)
-        units = {name.removeprefix("imu/"): unit for name, unit in told.units.items()} | dict(made.units)
-        return replace(made, units=units, reference=made.reference or told.reference)
+        units = {name.removeprefix("imu/"): unit for name, unit in drafted.units.items()} | dict(made.units)
+        return replace(made, units=units, reference=made.reference or drafted.reference)
     return make_map(**arguments)
 
 

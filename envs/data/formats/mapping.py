@@ -335,8 +335,8 @@ def unit_quaternions(q: np.ndarray, what: str = "quaternions") -> np.ndarray:
         usual = float(np.median(known)) if len(known) else 1.0
         if not 0.9 < usual < 1.1:
             alike = float(np.mean(np.abs(known / usual - 1.0) < 0.02)) > 0.9
-            told = "and are divided by it" if alike else "so that none of them is an orientation"
-            warnings.warn(f"{what} are usually {usual:.5g} long, not 1, {told}", stacklevel=4)
+            remedy = "and are divided by it" if alike else "so that none of them is an orientation"
+            warnings.warn(f"{what} are usually {usual:.5g} long, not 1, {remedy}", stacklevel=4)
             q, length = (q / usual, length / usual) if alike else (q, length)
         return np.where(np.abs(length - 1.0) < 0.1, q / length, np.nan)
 
@@ -348,8 +348,8 @@ def first_of(given: Mapping[str, Any], sensor: str, kind: str) -> Any:
 
 def check_labels(table: Table, elapsed: np.ndarray) -> None:
     """Refuse rows of several sensors at the same times; warn where rows only seem to be those of several."""
-    for name, told in table.labels.items():
-        what = f"rows of several sensors stand under one another (column {name}: {', '.join(told[:5])})"
+    for name, labels in table.labels.items():
+        what = f"rows of several sensors stand under one another (column {name}: {', '.join(labels[:5])})"
         if len(elapsed) > 1 and float((np.diff(elapsed) == 0.0).mean()) > 0.3:
             raise ValueError(f"{what}: give each sensor a file of its own")
         warnings.warn(f"{what}? Then give each a file of its own", stacklevel=6)

@@ -189,9 +189,9 @@ def table_of(text: str, name: str) -> Table:
     arrays, unreadable, labels, texts = {}, {}, {}, {}
     for column, name in enumerate(names):
         values, wrong = numeric(frame[column])
-        told = labels_of(name, frame[column], values)
-        if told:
-            labels[name] = told
+        texts_found = labels_of(name, frame[column], values)
+        if texts_found:
+            labels[name] = texts_found
         if values is None and frame[column].notna().any():
             texts[name] = str(frame[column].dropna().iloc[0])[:40]
         if values is None or (column >= len(names) - 2 and not name and np.isnan(values.astype(float)).all()):
@@ -225,8 +225,8 @@ def labels_of(name: str, column: pandas.Series, values: np.ndarray | None) -> tu
         return ()
     texts = column.dropna().astype("string").str.strip()
     changes = float((texts.to_numpy()[1:] != texts.to_numpy()[:-1]).mean()) if len(texts) > 1 else 0.0
-    told = tuple(texts.unique()) if changes > OFTEN else ()
-    return told if 2 <= len(told) <= MOST_SENSORS else ()
+    texts_found = tuple(texts.unique()) if changes > OFTEN else ()
+    return texts_found if 2 <= len(texts_found) <= MOST_SENSORS else ()
 
 
 def cut_off(rows: list[list[str]], width: int, ended: bool) -> bool:
