@@ -66,8 +66,8 @@ def left_out_policy_errors(
             report(number)
         others = np.flatnonzero(fold != number)
         start = actions[int(tried[:, others].mean(axis=1).argmin())]
-        parts = [part for index in others for part in parts_of(trajectories[index])]
+        parts = [part for index in others.tolist() for part in parts_of(trajectories[index])]
         policy = train_analytically(tuned, parts, start, epochs=passes, net_arch=(32, 32), seed=seed, quantity=quantity)
         mine = np.flatnonzero(fold == number)
-        errors[mine] = policy_errors(tuned.kalman, policy, [trajectories[index] for index in mine], quantity)
+        errors[mine] = policy_errors(tuned.kalman, policy, [trajectories[index] for index in mine.tolist()], quantity)
     return errors
