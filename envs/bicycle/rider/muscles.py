@@ -38,12 +38,12 @@ from .style import intentions
 
 TRUNK_STIFFNESS, TRUNK_DAMPING = 900.0, 90.0
 """N·m/rad and N·m·s/rad of the lumbar joint's muscles"""
-SWIVEL_STIFFNESS, SWIVEL_DAMPING = 60.0, 2.0
+SWIVEL_STIFFNESS, SWIVEL_DAMPING = 120.0, 6.0
 """N·m/rad, N·m·s/rad: hold elbows and knees in their plane"""
 ABDUCTION, ROTATION = 0.6, 0.9
 """rad: beyond these the ligaments of a hip resist, so that a knee never passes behind it"""
-LIGAMENT, LIGAMENT_DAMPING = 300.0, 8.0
-"""N·m/rad, N·m·s/rad: by which they do"""
+LIGAMENT, LIGAMENT_DAMPING = 300.0, 0.3
+"""N·m/rad, s/rad: by which they do; damping grows with the depth (K. H. Hunt, F. R. E. Crossley 1975), without a blow"""
 ARMS = 2
 """limbs before the legs"""
 HEAVIEST = 3.0
@@ -248,7 +248,7 @@ def ligament(angle, rate, limit):  # type: ignore[no-untyped-def]
     beyond = angle - max(-limit, min(limit, angle))
     if beyond == 0.0:
         return 0.0
-    torque = -LIGAMENT * beyond - LIGAMENT_DAMPING * rate
+    torque = -LIGAMENT * beyond * (1.0 + math.copysign(LIGAMENT_DAMPING, beyond) * rate)
     return min(0.0, torque) if beyond > 0.0 else max(0.0, torque)
 
 
