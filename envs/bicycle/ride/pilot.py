@@ -96,7 +96,7 @@ def _skill(
     return PilotParameters(
         name,
         *delays,
-        roll_rate_noise=0.14 * noise * degree,
+        roll_rate_noise=0.16 * noise * degree,
         steer_noise=0.02 * noise * degree,
         steer_rate_noise=0.08 * noise * degree,
         roll_noise=0.1 * noise * degree,

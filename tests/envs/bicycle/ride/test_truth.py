@@ -87,6 +87,14 @@ def test_postures_are_those_of_a_rider():
     assert heights["thigh_left"].min() > 0.1
 
 
+def test_knees_stay_in_their_plane():
+    truth = recorded(2, duration=10.0, scenario="straight", fidelity="full").truth
+    for side in ("left", "right"):
+        _, abduction, turn = np.degrees(truth[f"hip_{side}/angles"]).T
+        assert np.abs(abduction).max() < 20.0
+        assert np.abs(turn).max() < 30.0
+
+
 def test_quaternions_of_the_truth_never_change_sign():
     """Two turns of the circle: a heading that passes 180° is where they would."""
     truth = recorded(scenario="slalom", fidelity="lumped", duration=3.0, style="aggressive").truth

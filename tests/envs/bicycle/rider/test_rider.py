@@ -276,3 +276,5 @@ def test_ligaments_resist_beyond_their_range_and_never_pull_outwards():
     assert ligament(-0.7, 0.0, 0.6) == pytest.approx(0.1 * LIGAMENT)
     assert ligament(0.7, -100.0, 0.6) == 0.0
     assert ligament(0.7, 1.0, 0.6) < ligament(0.7, 0.0, 0.6)
+    # no blow where a fast joint reaches its limit
+    assert abs(ligament(0.601, 8.0, 0.6)) < 5.0
