@@ -43,7 +43,7 @@ SWIVEL_STIFFNESS, SWIVEL_DAMPING = 120.0, 6.0
 ABDUCTION, ROTATION = 0.6, 0.9
 """rad: beyond these the ligaments of a hip resist, so that a knee never passes behind it"""
 LIGAMENT, LIGAMENT_DAMPING = 300.0, 0.3
-"""N·m/rad, s/rad: by which they do; damping grows with the depth (K. H. Hunt, F. R. E. Crossley 1975), without a blow"""
+"""N·m/rad, s/rad: damping grows with the depth, without a blow (K. H. Hunt, F. R. E. Crossley 1975)"""
 ARMS = 2
 """limbs before the legs"""
 HEAVIEST = 3.0
