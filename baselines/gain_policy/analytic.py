@@ -261,7 +261,7 @@ def train_analytically(
     costs = Costs(tuned, reward, quantity)
     sets, unseen = (costs.episodes(some, np.zeros(tuned.actions)) for some in (trajectories, validation))
     generator = np.random.default_rng(seed)
-    best, least, told = None, np.inf, []
+    best, least, history = None, np.inf, []
     if state is None:
         neutral = GainPolicy.constant(tuned, start)
         first = np.concatenate([each.observations(neutral).reshape(-1, tuned.observation_size) for each in sets])
@@ -279,13 +279,13 @@ def train_analytically(
         optimizer.load_state_dict(state["optimizer"])
         schedule.load_state_dict(state["schedule"])
         generator.bit_generator.state = json.loads(state["generator"])
-        told, least = state["told"], state["least"]
+        history, least = state["history"], state["least"]
         if state["best"] is not None:
             best = replace(GainPolicy.neutral(tuned), layers=tuple((a, b) for a, b in state["best"]))
-        for epoch, (cost, unseen_cost) in enumerate(told):
+        for epoch, (cost, unseen_cost) in enumerate(history):
             if report is not None:
                 report(epoch, cost, unseen_cost)
-    for epoch in range(len(told), epochs):
+    for epoch in range(len(history), epochs):
         policy, total = actor.policy(tuned), []
         seen = [each.observations(policy) for each in sets]
         jobs = [
@@ -308,9 +308,9 @@ def train_analytically(
         held_out = costs.of_policy(unseen, actor.policy(tuned)) if unseen else np.nan
         if held_out < least:
             best, least = actor.policy(tuned), held_out
-        told.append([float(np.concatenate(total).mean()), float(held_out)])
+        history.append([float(np.concatenate(total).mean()), float(held_out)])
         if report is not None:
-            report(epoch, *told[-1])
+            report(epoch, *history[-1])
         if save is not None:
             save(
                 {
@@ -319,7 +319,7 @@ def train_analytically(
                     "optimizer": optimizer.state_dict(),
                     "schedule": schedule.state_dict(),
                     "generator": json.dumps(generator.bit_generator.state),
-                    "told": told,
+                    "history": history,
                     "least": float(least),
                     "best": None if best is None else [list(layer) for layer in best.layers],
                 }

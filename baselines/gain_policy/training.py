@@ -141,7 +141,7 @@ def analytic_policy(
     earlier = 0.0 if state is None else state["seconds"]
     costs: list[float] = []
 
-    def told(epoch: int, cost: float, unseen_cost: float) -> None:
+    def report_epoch(epoch: int, cost: float, unseen_cost: float) -> None:
         costs.append(unseen_cost if unseen else cost)
         if report is not None:
             report({"steps": float(decisions * (epoch + 1)), "gain": 1.0 - costs[-1], "seconds": seconds()})
@@ -164,7 +164,7 @@ def analytic_policy(
         error_scale=config.error_scale,
         seed=config.seed,
         validation=unseen,
-        report=told,
+        report=report_epoch,
         save=save,
         state=state,
     )

@@ -226,8 +226,8 @@ class LearnedEstimator(NetworkParts):
                 memory, output, _ = self._advance(seen.features[None], seen.due[None], memory, output)
             else:
                 xp, now = namespace(seen.features), (seen.due == 1.0)[..., None]
-                moved, told = self.network.step(xp.where(now, seen.features, xp.zeros_like(seen.features)), memory)
-                memory, output = xp.where(now, moved, memory), xp.where(now, told, output)
+                moved, updated = self.network.step(xp.where(now, seen.features, xp.zeros_like(seen.features)), memory)
+                memory, output = xp.where(now, moved, memory), xp.where(now, updated, output)
         return LearnedState(front, memory, output), self.head.estimate(seen, output)
 
     def run(self, measurements: Mapping[str, Any]) -> Estimate:

@@ -131,14 +131,14 @@ def fit(
         finally:
             log(None)
         module.load_state_dict(trainer.best)
-        told = np.concatenate([to_numpy(outputs) for _, outputs in whole_sequences(trainer, validation)])
+        raw_output = np.concatenate([to_numpy(outputs) for _, outputs in whole_sequences(trainer, validation)])
     module.eval()
     network: Any = module.export() if hasattr(module, "export") else trainer.network  # type: ignore[operator]
     calibration = None
     if isinstance(head, AngleHead):
         network = WithUnlikeness.of(network, *standardisation(data.features, data.mask))
         errors, unlikeness = (
-            head.errors(told, validation.target, validation.spread),
+            head.errors(raw_output, validation.target, validation.spread),
             network.unlikeness(validation.features),
         )
         calibration = calibrate(errors, unlikeness, validation.mask, validation.names)
@@ -191,11 +191,11 @@ class Trainer:
         """Take the scales of the features if they are not known, check the shapes, score the network as it is."""
         if not self.network.standardised.known:
             self.network.standardised.fit(*standardisation(data.features, data.mask))
-        told, _ = self.forward(torch.from_numpy(data.features[:1, :2]), None)
-        if tuple(told.shape) != (1, 2, self.head.size):
+        raw_output, _ = self.forward(torch.from_numpy(data.features[:1, :2]), None)
+        if tuple(raw_output.shape) != (1, 2, self.head.size):
             raise ValueError(
                 f"module must give (B, N, {self.head.size}) for features (B, N, {data.features.shape[-1]}), "
-                f"got {tuple(told.shape)} for (1, 2, …)"
+                f"got {tuple(raw_output.shape)} for (1, 2, …)"
             )
         self.best = copy.deepcopy(self.module.state_dict())
         self.best_loss, _ = validation_loss(self, validation)
@@ -205,8 +205,8 @@ class Trainer:
         if not hasattr(self.module, "standardised"):
             features = self.network.standardised(features)
         if self.network.remembers:
-            told, memory = self.module(features, memory)
-            return told, memory
+            raw_output, memory = self.module(features, memory)
+            return raw_output, memory
         return self.module(features), None
 
     def learning_rate(self) -> float:
@@ -226,11 +226,11 @@ class Trainer:
         memory: Any = None
         for window in data.windows(self.config.batch, self.config.window, generator, self.head):
             features, target, spread, mask = (torch.from_numpy(np.ascontiguousarray(part)) for part in window[:4])
-            told, last = self.forward(features, None if window.first else memory)
+            raw_output, last = self.forward(features, None if window.first else memory)
             memory = None if last is None else last.detach()
             if not mask.any():
                 continue
-            loss = self.head.loss(told, target, spread, mask)
+            loss = self.head.loss(raw_output, target, spread, mask)
             if self.descend(loss):
                 total, count = total + loss.item(), count + 1
             else:
@@ -296,13 +296,13 @@ def whole_sequences(
     trainer.module.eval()
     for start in range(0, len(data), size):
         part = slice(start, start + size)
-        memory, told = None, []
+        memory, raw_output = None, []
         features = torch.from_numpy(data.features[part])
         with torch.no_grad():
             for begin in range(0, features.shape[1], length):
                 output, memory = trainer.forward(features[:, begin : begin + length], memory)
-                told.append(output)
-        yield part, torch.cat(told, dim=1)
+                raw_output.append(output)
+        yield part, torch.cat(raw_output, dim=1)
 
 
 def validation_loss(trainer: Trainer, data: SequenceData) -> tuple[float, np.ndarray]:

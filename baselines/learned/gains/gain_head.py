@@ -147,10 +147,10 @@ class GainHead:
 
         total = output.new_zeros((), dtype=torch.float64)
         scored = 0
-        for told, given, counted in zip(output, target, mask, strict=True):
+        for raw_output, given, counted in zip(output, target, mask, strict=True):
             if not counted.any():
                 continue
-            error, variance = self._through(told, given)
+            error, variance = self._through(raw_output, given)
             counts = torch.isfinite(error).any(dim=-1)
             square = torch.where(torch.isfinite(error), error * error, 0.0)[counts]
             s2 = variance[counts] + 1e-9
@@ -195,10 +195,10 @@ class GainHead:
         import torch
 
         found = []
-        for told, given in zip(output, target, strict=True):
-            error, _ = self._through(told, given)
+        for raw_output, given in zip(output, target, strict=True):
+            error, _ = self._through(raw_output, given)
             known = torch.isfinite(error)
-            square = torch.where(known, error * error, 0.0).reshape(len(told), -1, error.shape[-1])
+            square = torch.where(known, error * error, 0.0).reshape(len(raw_output), -1, error.shape[-1])
             there = known.reshape(square.shape).sum(dim=1).clamp(min=1)
             found.append(torch.sqrt(square.sum(dim=1) / there))
         return torch.stack(found)
@@ -215,7 +215,7 @@ class GainHead:
 
         return DifferentiableFilter(self.kalman, self.gains)
 
-    def _through(self, told: Any, target: Any) -> tuple[Any, Any]:
+    def _through(self, raw_output: Any, target: Any) -> tuple[Any, Any]:
         """The filter over one sequence: errors and variances ``(T, parts)`` of its outputs, torch.
 
         The output at the end of an interval holds over the next one.
@@ -230,7 +230,7 @@ class GainHead:
         samples = slots[:, :whole].reshape(len(numbers) * whole, -1)
         arrays = split(samples[:, None, :width], self.kalman.channels)
         truth = torch.from_numpy(samples[:, width:])
-        held = torch.cat([torch.zeros_like(told[:1]), told[:-1]]).double()
+        held = torch.cat([torch.zeros_like(raw_output[:1]), raw_output[:-1]]).double()
         model = with_parameters(self.kalman.model, own)
         factors = self.factors(held)
         # what the filter would not take is lowered, without a derivative of its own

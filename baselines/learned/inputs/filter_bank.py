@@ -185,14 +185,14 @@ class FilterBank:
         length = xp.sqrt(xp.sum(horizontal * horizontal, axis=-1) + 1e-6)
         unit = horizontal / (length[..., None] + 0.02)
         x, y = unit[..., VELOCITY, :1], unit[..., VELOCITY, 1:]
-        told = [
+        relative = [
             xp.clip(vectors[..., 2], -3.0, 3.0),
             xp.log(length) / 3.0 + 0.3,
             *(unit[..., part, 0] * x + unit[..., part, 1] * y for part in self._told),
             *(unit[..., part, 0] * y - unit[..., part, 1] * x for part in self._told),
             motion[..., 3 * VECTORS :],
         ]
-        return xp.concat(told, axis=-1)
+        return xp.concat(relative, axis=-1)
 
     @property
     def _told(self) -> tuple[slice, slice]:

@@ -226,10 +226,10 @@ class TorchNetwork:
         with torch.no_grad():
             for k in range(due.shape[1]):
                 rows = np.flatnonzero(due[:, k] == 1.0)
-                told = self._whole(features[rows, k], memory[k]) if len(rows) else output[:0, :]
+                raw_output = self._whole(features[rows, k], memory[k]) if len(rows) else output[:0, :]
                 place = np.searchsorted(rows, np.arange(len(due)), side="right") - 1
                 before = output[k].copy()
-                outputs[:, k] = np.where(place[:, None] < 0, before, told[place] if len(rows) else before)
+                outputs[:, k] = np.where(place[:, None] < 0, before, raw_output[place] if len(rows) else before)
                 output[k] = outputs[-1, k]
         return outputs
 
@@ -238,18 +238,18 @@ class TorchNetwork:
         own = self.standardised(torch.from_numpy(rows).float())
         if self.remembers:
             start = torch.from_numpy(memory[:-1]).float()[None] if memory[-1] else None
-            told, last = self.module(own[None], start)
+            raw_output, last = self.module(own[None], start)
             memory[:-1], memory[-1] = to_numpy(last[0]), 1.0
-            return np.asarray(to_numpy(told[0]), dtype=float)
+            return np.asarray(to_numpy(raw_output[0]), dtype=float)
         filled = int(memory[-1])
         past = torch.from_numpy(memory[:-1].reshape(-1, self.features)[self.context - 1 - filled :]).float()
         both = torch.cat([past, own])
-        told = torch.stack([self._last(both[: filled + index + 1]) for index in range(len(own))])
+        raw_output = torch.stack([self._last(both[: filled + index + 1]) for index in range(len(own))])
         kept = both[max(0, len(both) - self.context + 1) :]
         memory[-1] = len(kept)
         if self.context > 1:
             memory[:-1].reshape(-1, self.features)[self.context - 1 - len(kept) :] = to_numpy(kept)
-        return np.asarray(to_numpy(told), dtype=float)
+        return np.asarray(to_numpy(raw_output), dtype=float)
 
     def _last(self, rows: Tensor) -> Tensor:
         found: Tensor = self.module(rows[None, -self.context :])[0, -1]

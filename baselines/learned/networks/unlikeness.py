@@ -93,13 +93,13 @@ class WithUnlikeness:
     def advance(self, features: np.ndarray, due: np.ndarray, memory: np.ndarray, output: np.ndarray) -> np.ndarray:
         """See :class:`..estimator.Network`."""
         own = np.ascontiguousarray(output[:, :-1])
-        told = self.network.advance(features, due, memory, own)
+        raw_output = self.network.advance(features, due, memory, own)
         found = self.unlikeness(features)
         # the last update that was due, -1 where there was none
         last = latest(due == 1.0)
         kept = np.take_along_axis(found, np.maximum(last, 0), axis=0)
         unlike = np.where(last < 0, output[None, :, -1], kept)
-        outputs = np.concatenate([told, unlike[..., None]], axis=-1)
+        outputs = np.concatenate([raw_output, unlike[..., None]], axis=-1)
         output[:, :-1] = own
         if len(due):
             output[:, -1] = unlike[-1]
