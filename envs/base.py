@@ -19,7 +19,7 @@ from gymnasium import spaces
 
 from ..filters.core import metrics
 from ..filters.core.quantity import ORIENTATION, RELATIVE_ORIENTATION, Quantity
-from .drawn import DrawnEnv, Shown
+from .drawn import DrawnEnv, Shown, finite_action
 from .sensors.observation import Sensing
 
 Observation = dict[str, np.ndarray]
@@ -234,10 +234,8 @@ class PoseEnv(DrawnEnv):
             self._block, self._row = self.next_block(self._last_step + 1 - self._step), 0
 
     def _checked(self, action: np.ndarray) -> np.ndarray:
-        estimate = np.array(action, dtype=float)
+        estimate = finite_action(action, (self._parts[-1].stop,))
         values = estimate.tolist()
-        if estimate.shape != self.action_space.shape or not all(map(math.isfinite, values)):
-            raise ValueError(f"action must hold {self._parts[-1].stop} finite numbers, got {action!r}")
         for quantity, part in zip(self.quantities, self._parts, strict=True):
             if quantity.kind in UNIT_ENTRY and not any(values[part]):
                 estimate[part][UNIT_ENTRY[quantity.kind]] = 1.0

@@ -56,6 +56,21 @@ class Scene(Protocol):
         ...
 
 
+def finite_action(action: Any, shape: tuple[int]) -> np.ndarray:
+    """An action as an array of its own ``(n,)``.
+
+    Raises:
+        ValueError: a wrong shape, or an entry that is no finite real number.
+    """
+    try:
+        values = None if np.iscomplexobj(action) else np.array(action, dtype=float)
+    except (TypeError, ValueError):
+        values = None
+    if values is None or values.shape != shape or not all(map(math.isfinite, values.tolist())):
+        raise ValueError(f"action must hold {shape[0]} finite numbers, got {action!r}")
+    return values
+
+
 class Shown(NamedTuple):
     """What a picture shows: true pose and further truth at one time step, and the estimate of it."""
 

@@ -16,7 +16,7 @@ from ..filters.adaptation.named_features import features_of
 from ..filters.adaptation.tuned import TunedFilter
 from ..filters.core.kalman import KalmanFilter
 from .data.trajectory import Trajectory
-from .drawn import DrawnEnv, Scene, Shown
+from .drawn import DrawnEnv, Scene, Shown, finite_action
 from .gain_episode import PRIVILEGED, GainEpisode
 from .gain_reward import GainReward, RewardKind, errors_of, scored_quantities
 
@@ -150,9 +150,7 @@ class GainTuningEnv(DrawnEnv):
         """
         if self.trajectory is None or self._step + self.tuned.interval_samples > len(self.trajectory):
             raise RuntimeError("call reset first: there is no episode, or it is over")
-        chosen = np.asarray(action, dtype=float)
-        if chosen.shape != self.action_space.shape or not np.isfinite(chosen).all():
-            raise ValueError(f"action must hold {self.tuned.actions} finite numbers, got {action!r}")
+        chosen = finite_action(action, (self.tuned.actions,))
         episode, samples = self.episode, slice(self._step, self._step + self.tuned.interval_samples)
         chunk = {name: values[samples] for name, values in episode.samples.items()}
         estimate, self._state = self.tuned.advance(self.tuned.decide(self._state, chosen), chunk)

@@ -159,3 +159,17 @@ def test_arguments_of_the_base_are_known():
         make_environment("poise/HandMotionGain-v0", foo=1)
     with pytest.raises(ValueError, match="Environment `Nothing` doesn't exist"):
         make_environment("poise/Nothing-v0")
+
+
+@pytest.mark.parametrize("wrong", ["a", None, np.nan, 1j, [[0.0, 0.0]]])
+def test_an_action_that_is_no_finite_number_is_refused_by_name(identity, wrong):
+    env = gym.make(identity, **SHORT.get(identity, {}))
+    env.reset(seed=0)
+    action = env.unwrapped.neutral_action
+    entries = action.astype(object)
+    entries[0] = wrong
+    given = [wrong, entries] if not isinstance(wrong, complex) else [action * wrong]
+    for each in given:
+        with pytest.raises(ValueError, match=f"action must hold {action.size} finite numbers, got"):
+            env.step(each)
+    env.close()

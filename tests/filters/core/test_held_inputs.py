@@ -78,7 +78,7 @@ def test_the_covariance_is_true_after_a_gap(name: str, gap: int) -> None:
     assert 0.1 < with_gap(name, gap, seed=11) < 5.0
 
 
-@pytest.mark.parametrize("name", ["mekf", "bounded-motion"])
+@pytest.mark.parametrize("name", ["mekf", "bounded-motion", "external-acceleration"])
 def test_single_lost_samples_are_harmless(name: str) -> None:
     trajectory = simulate_hand("mixed", 3, rate=100.0, duration=40.0)
     up, kalman = trajectory.truth["up"], make(name, dt=trajectory.dt)
