@@ -233,11 +233,11 @@ def notes_on(trajectory: Trajectory, motion: Motion, near: Sequence[Mapping[str,
         notes.append(f"gyroscope bias {bias:.1f} °/s at rest: subtract it first, vqf follows no more than 2 °/s")
     if motion.lasting > 1.0:
         notes.append(
-            f"acceleration of {motion.lasting:.1f} m/s² lasts for seconds: any six-axis estimate leans with it; "
-            "speed or position aiding would help"
+            f"acceleration of {motion.lasting:.1f} m/s² lasts for a second: "
+            f"taken for gravity, it is {np.degrees(np.arctan2(motion.lasting, 9.81)):.0f}° of inclination"
         )
     if motion.rate < 40.0:
-        notes.append(f"{motion.rate:.0f} Hz is slow: turning between samples is lost")
+        notes.append(f"{motion.rate:.0f} Hz is slow: it turns {motion.turning / motion.rate:.1f}° between two samples")
     return notes
 
 

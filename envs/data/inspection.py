@@ -17,6 +17,8 @@ REST_RATE, REST_FORCE = 0.02, 0.15
 """rad/s and m/s²: standard deviations below which a window is rest, unless a sensor is noisier at its quietest."""
 SLOWEST_TURN = 0.25
 """rad/s: mean rate up to which a steady gyroscope shows a bias rather than a motion."""
+LIKELY_BIAS, CERTAIN_REST = 0.035, 3.0
+"""rad/s, and s of rest: a shorter rest with a larger rate than this, unlike the whole recording's, is a steady turn."""
 
 
 @dataclass(frozen=True)
@@ -112,6 +114,10 @@ def at_rest(trajectory: Trajectory, site: str) -> np.ndarray:
         # A noisy sensor rests where it is quiet for its own standard, if that is not motion already.
         quiet &= (spread < max(limit, min(1.5 * least, 3.0 * limit))) & (mean < centre)
     resting[: count * length] = np.repeat(quiet, length)
+    if gyr is not None and resting.any() and resting.sum() * interval < CERTAIN_REST - 0.5 * REST_WINDOW:
+        rate, usual = np.nanmedian(gyr[resting], axis=0), np.nanmedian(gyr, axis=0)
+        if min(np.linalg.norm(rate), np.linalg.norm(rate - usual)) > LIKELY_BIAS:
+            resting[:] = False
     return resting
 
 

@@ -86,7 +86,8 @@ def test_conditions_are_told(motions):
     assert any("gyroscope bias 4.6 °/s" in note for note in notes)
     assert any("no benchmark recording moves like this one" in note for note in notes)
     slow = still.resampled(20.0)
-    assert any("20 Hz is slow" in note for note in recommend(slow, results=found).notes)
+    (between,) = (note for note in recommend(slow, results=found).notes if "20 Hz is slow" in note)
+    assert f"it turns {motion_of(slow).turning / 20.0:.1f}° between two samples" in between
 
 
 def test_bad_input_is_explained(motions, tmp_path):

@@ -66,3 +66,17 @@ def test_short_and_partial_recordings_are_described():
         found = inspect_recording(part)
         assert found.channels
         assert found.sensors[0]["sensor"] == "imu"
+
+
+@pytest.mark.parametrize(("seconds", "rests"), [(1.0, False), (10.0, True)])
+def test_a_steady_turn_of_a_second_is_no_rest(seconds, rests):
+    """A walker who turns a corner: only who stays so for long has a bias of that size."""
+    generator, time = np.random.default_rng(4), np.arange(6000) / 100.0
+    gyr = 0.5 * generator.normal(size=(len(time), 3))
+    acc = np.array([0.0, 0.0, 9.81]) + generator.normal(size=(len(time), 3))
+    steady = (time >= 30.0) & (time < 30.0 + seconds)
+    gyr[steady] = np.array([0.0, 0.0, 0.2]) + 0.002 * generator.normal(size=(steady.sum(), 3))
+    acc[steady] = np.array([0.0, 0.0, 9.81]) + 0.02 * generator.normal(size=(steady.sum(), 3))
+    trajectory = Trajectory(time, {"imu/gyr": gyr, "imu/acc": acc}, metadata={"name": "corner"})
+    (sensor,) = inspect_recording(trajectory).sensors
+    assert ("bias °/s" in sensor) == rests
