@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -11,6 +10,7 @@ from ..envs.data.trajectory import Trajectory
 from ..filters.core import rotation
 from ..filters.core.consistency import nees
 from ..filters.core.estimator import Estimator
+from ..filters.core.frames import part_of
 from ..filters.core.metrics import metrics_of
 from ..filters.core.quantity import RELATIVE_ORIENTATION, UP, Estimate, Quantity
 from .scoring import Row, innovation_consistency, with_derived_truth, with_up
@@ -108,12 +108,12 @@ def consistency_of(
     quantity: Quantity, estimate: Estimate, truth: np.ndarray, mask: np.ndarray
 ) -> tuple[float, int] | None:
     """Mean NEES a degree of freedom of one quantity, and the degrees of freedom; None without a covariance of it."""
-    parts: Mapping[str, tuple[int, int]] = estimate.layout.error_parts if estimate.layout else {}
-    if estimate.covariance is None or quantity.name not in parts:
+    part = part_of(estimate.layout.error_parts if estimate.layout else {}, quantity.name)
+    if estimate.covariance is None or part is None:
         return None
     value = np.asarray(estimate.pose[quantity.name])
     error, axes = error_vector(quantity, value, truth)
-    start, stop = parts[quantity.name]
+    start, stop = part
     covariance = axes @ np.asarray(estimate.covariance)[..., start:stop, start:stop] @ np.swapaxes(axes, -1, -2)
     variance = np.diagonal(covariance, axis1=-2, axis2=-1)
     scored = (

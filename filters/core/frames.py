@@ -24,6 +24,12 @@ SMALL_TURN = 1e-4
 """rad: step of the difference quotient from rotation vectors to angles."""
 
 
+def part_of(error_parts: Mapping[str, tuple[int, int]], name: str) -> tuple[int, int] | None:
+    """Where the error of a quantity is in the error state, if anywhere; both orientations share theirs."""
+    names = ORIENTATIONS if name in ORIENTATIONS else (name,)
+    return next((error_parts[each] for each in names if each in error_parts), None)
+
+
 @dataclass(frozen=True)
 class SequenceTable:
     """An estimate of one sequence, ready to be a table.
@@ -90,8 +96,7 @@ class SequenceTable:
 
     def covariance_of(self, name: str) -> np.ndarray | None:
         """Covariance ``(T, n, n)`` of the error of a quantity, or None; both orientations share theirs."""
-        names = ORIENTATIONS if name in ORIENTATIONS else (name,)
-        part = next((self.error_parts[each] for each in names if each in self.error_parts), None)
+        part = part_of(self.error_parts, name)
         if part is None or self.covariance is None:
             return None
         start, stop = part

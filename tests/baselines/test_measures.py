@@ -8,6 +8,8 @@ from scipy.spatial.transform import Rotation
 
 import poise
 from poise.baselines.measures import error_vector, measures, of_error, settling
+from poise.baselines.registry import make_estimator
+from poise.envs.hand.sensing import simulate_hand
 from poise.filters.core import rotation
 from poise.filters.core.quantity import ORIENTATION, RELATIVE_ORIENTATION, UP, Estimate, Layout, Quantity
 
@@ -81,3 +83,12 @@ def test_nees_of_an_honest_covariance_is_one(quantity: Quantity) -> None:
     rows = measures(Honest(), estimate, trajectory)  # type: ignore[arg-type]
     (found,) = (result for _, metric, result, _ in rows if metric == "nees")
     assert found == pytest.approx(1.0, abs=0.06)
+
+
+@pytest.mark.parametrize("name", ["mekf", "mekf-9", "bounded-motion-9"])
+def test_filters_with_and_without_a_magnetometer_have_a_nees(name: str) -> None:
+    trajectory = simulate_hand("slow", 4, rate=100.0, duration=12.0)
+    estimator = make_estimator(name, dt=trajectory.dt)
+    rows = measures(estimator, poise.run(estimator, trajectory), trajectory)
+    scored = {quantity.split("/")[-1] for quantity, metric, *_ in rows if metric == "nees"}
+    assert ("orientation" if name.endswith("9") else "relative_orientation") in scored
