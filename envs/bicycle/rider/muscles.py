@@ -38,8 +38,10 @@ from .style import intentions
 
 TRUNK_STIFFNESS, TRUNK_DAMPING = 900.0, 90.0
 """N·m/rad and N·m·s/rad of the lumbar joint's muscles"""
+ARM_SWIVEL, ARM_SWIVEL_DAMPING = 60.0, 2.0
+"""N·m/rad, N·m·s/rad: hold the elbows in their plane"""
 SWIVEL_STIFFNESS, SWIVEL_DAMPING = 120.0, 6.0
-"""N·m/rad, N·m·s/rad: hold elbows and knees in their plane"""
+"""N·m/rad, N·m·s/rad: hold the knees in theirs"""
 ABDUCTION, ROTATION = 0.6, 0.9
 """rad: beyond these the ligaments of a hip resist, so that a knee never passes behind it"""
 LIGAMENT, LIGAMENT_DAMPING = 300.0, 0.3
@@ -283,8 +285,10 @@ def act(numbers, tree, state, frames, links, holds, memory, forces):  # type: ig
         # abduction holds the swivel
         joint = 4 + 4 * limb
         angle, rate = state[first + links[3 + joint]], state[rates + links[3 + joint]]
-        applied[joint] += SWIVEL_STIFFNESS * (memory[SWIVEL][limb] - angle) - SWIVEL_DAMPING * rate
-        if limb >= ARMS:
+        if limb < ARMS:
+            applied[joint] += ARM_SWIVEL * (memory[SWIVEL][limb] - angle) - ARM_SWIVEL_DAMPING * rate
+        else:
+            applied[joint] += SWIVEL_STIFFNESS * (memory[SWIVEL][limb] - angle) - SWIVEL_DAMPING * rate
             turned, turning = state[first + links[4 + joint]], state[rates + links[4 + joint]]
             applied[joint] += ligament(angle, rate, ABDUCTION)
             applied[joint + 1] += ligament(turned, turning, ROTATION)
