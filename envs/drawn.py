@@ -60,7 +60,7 @@ def finite_action(action: Any, shape: tuple[int]) -> np.ndarray:
     """An action as an array of its own ``(n,)``.
 
     Raises:
-        ValueError: a wrong shape, or an entry that is no finite real number.
+        ValueError: a wrong shape, or an entry that is not a finite real number.
     """
     try:
         values = None if np.iscomplexobj(action) else np.array(action, dtype=float)
