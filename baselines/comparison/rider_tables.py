@@ -9,9 +9,9 @@ Numbers = Mapping[str, Any]
 """Paper, method and group, with their numbers; None for one that a method does not have."""
 
 
-def error_cell(found: Numbers) -> str:
-    """Mean RMS error, deg, with its 95 % interval over riders."""
-    return f"{found['error']:.2f} [{found['low']:.2f}, {found['high']:.2f}]"
+def error_cell(found: Numbers) -> str | None:
+    """Mean RMS error, deg, with its 95 % interval over riders; None of what differs in its deviations alone."""
+    return None if found["error"] is None else f"{found['error']:.2f} [{found['low']:.2f}, {found['high']:.2f}]"
 
 
 def consistency_cell(found: Numbers) -> str | None:

@@ -38,6 +38,7 @@ class Calibration(NamedTuple):
         nees: mean of an angle's squared error over its variance, each ride under the calibration of the others; NaN of
             one ride.
         coverage: share of the errors inside the stated 90 %, likewise.
+        constant: ``(K,)`` rad: the deviations if they did not grow, to compare with.
     """
 
     deviations: tuple[float, ...]
@@ -45,6 +46,7 @@ class Calibration(NamedTuple):
     rides: int
     nees: float
     coverage: float
+    constant: tuple[float, ...]
 
 
 def calibrate(errors: np.ndarray, unlikeness: np.ndarray, mask: np.ndarray, names: Sequence[str]) -> Calibration:
@@ -62,10 +64,23 @@ def calibrate(errors: np.ndarray, unlikeness: np.ndarray, mask: np.ndarray, name
     if not mask.any():
         raise ValueError("the covariance needs sequences that are scored, got none")
     rides, ride = np.unique(np.asarray(names)[mask.any(axis=1)], return_inverse=True)
-    counts = mask[mask.any(axis=1)].sum(axis=1)
-    of_sample = np.repeat(ride, counts)
-    squares, u, count = errors[mask].astype(float) ** 2, unlikeness[mask].astype(float), len(rides)
+    of_sample = np.repeat(ride, mask[mask.any(axis=1)].sum(axis=1))
+    squares, u = errors[mask].astype(float) ** 2, unlikeness[mask].astype(float)
+    found = likeliest(squares, u, of_sample, SHARES if len(rides) > 1 else SHARES[:1])
+    return found._replace(constant=likeliest(squares, u, of_sample, SHARES[:1]).deviations)
+
+
+def likeliest(squares: np.ndarray, u: np.ndarray, of_sample: np.ndarray, shares: np.ndarray) -> Calibration:
+    """The covariance with the best of some ρ.
+
+    Args:
+        squares: ``(M, K)`` rad², of the errors of all samples.
+        u: ``(M,)`` unlikeness.
+        of_sample: ``(M,)`` number of the ride of each.
+        shares: ρ that are tried.
+    """
     number = np.bincount(of_sample)
+    count = len(number)
 
     def means(values: np.ndarray) -> np.ndarray:
         """Of each ride."""
@@ -74,7 +89,7 @@ def calibrate(errors: np.ndarray, unlikeness: np.ndarray, mask: np.ndarray, name
     deviations, growth, normalised = [], [], np.empty_like(squares)
     for k in range(squares.shape[1]):
         best, share = np.inf, 0.0
-        for rho in SHARES if count > 1 else SHARES[:1]:
+        for rho in shares:
             profile = 1.0 - rho + rho * u
             each, logs = means(squares[:, k] / profile), means(np.log(profile))
             others = np.maximum(left_out(each), np.finfo(float).tiny)
@@ -96,14 +111,13 @@ def calibrate(errors: np.ndarray, unlikeness: np.ndarray, mask: np.ndarray, name
     nees = coverage = float("nan")
     if count > 1:
         doubt = norm.ppf(INSIDE) / np.sqrt(count - 1)
-        shares = [covered(widened * wider) for wider in WIDER]
-        enough = [share.mean() - doubt * share.std() >= 2.0 * INSIDE - 1.0 for share in shares]
+        each_wider = [covered(widened * wider) for wider in WIDER]
+        enough = [inside.mean() - doubt * inside.std() >= 2.0 * INSIDE - 1.0 for inside in each_wider]
         chosen = enough.index(True) if any(enough) else len(WIDER) - 1
-        widened, coverage = widened * WIDER[chosen], float(shares[chosen].mean())
+        widened, coverage = widened * WIDER[chosen], float(each_wider[chosen].mean())
         nees = float(np.mean([means(column).mean() for column in normalised.T])) / widened
-    return Calibration(
-        tuple(float(np.sqrt(widened)) * each for each in deviations), tuple(growth), count, nees, coverage
-    )
+    wide = tuple(float(np.sqrt(widened)) * each for each in deviations)
+    return Calibration(wide, tuple(growth), count, nees, coverage, wide)
 
 
 def left_out(values: np.ndarray) -> np.ndarray:

@@ -18,6 +18,7 @@ from ....filters.support.resume import is_kept, keep, kept
 from ...learned.presets import PRESETS, seeds_of
 from ...learned.rides import UNSEEN, unseen_rides
 from ...registry import TRAINED, make_estimator
+from ...weights_io import load_weights
 from .bounds import angle_bounds
 from .errors import Errors, angle_names, angles_of, errors_of, score, truth_of
 from .learnt import Learnt, learn
@@ -25,12 +26,13 @@ from .references import moving_averages
 
 PAPERS = ("two-gyro", "force-inertial", "whole-body")
 """Filters of riders that networks correct."""
-MEAN, BIAS, RIDGE, TUNED, ORACLE = (
+MEAN, BIAS, RIDGE, TUNED, ORACLE, CONSTANT = (
     "always the mean",
     "one bias per angle",
     "ridge on moving averages",
     "re-tuned",
     "each ride's mean error removed",
+    "deviations constant",
 )
 """What is no estimator: references of the table."""
 ROLL_ONLY = ("odometry-aided", "balanced-gyro", "platform-gyro+turning", "two-gyro-level+turning")
@@ -112,7 +114,12 @@ def all_errors(
     for name, errors in rolls.items():
         others = np.full((len(errors), published.values.shape[1] - 1), np.nan)
         found[name] = Errors(wrapped(np.concatenate([errors, others], axis=1)))
-    found |= {name: estimated(name, ride, scored) for name in estimators_of(paper) if name != paper}
+    for name in estimators_of(paper):
+        if name != paper:
+            found[name] = errors = estimated(name, ride, scored)
+            constant = constant_deviations(name)
+            if constant is not None:
+                found[f"{name}, {CONSTANT}"] = Errors(errors.values, np.broadcast_to(constant, errors.values.shape))
     return found | {f"{paper}, {ORACLE}": Errors(published.values - published.values.mean(axis=0))}
 
 
@@ -140,6 +147,17 @@ def estimated(name: str, ride: Trajectory, scored: np.ndarray, **parameters: Any
     kept = {"keep_covariance": True} if name in FILTERS else {}
     made: Any = make_estimator(name, dt=ride.dt, metadata=ride.metadata, **kept, **parameters)
     return errors_of(made, ride, made.run(ride.measurements), scored)
+
+
+def constant_deviations(name: str) -> np.ndarray | None:
+    """Standard deviations ``(K,)`` rad of a network's errors if they did not grow with the unlikeness of its inputs.
+
+    None where its card does not tell.
+    """
+    weights = TRAINED[name].fixed.get("weights") if name in TRAINED else None
+    card = {} if weights is None else load_weights(weights)[1]
+    constant = (card.get("calibration") or {}).get("constant")
+    return None if constant is None else np.array(constant)
 
 
 def wrapped(angles: np.ndarray) -> np.ndarray:

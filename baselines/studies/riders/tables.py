@@ -9,7 +9,7 @@ import numpy as np
 
 from ...learned.rides import UNSEEN
 from ...statistics import bootstrap_interval
-from .suite import ROLL_ONLY, Row, names_of
+from .suite import CONSTANT, ROLL_ONLY, Row, names_of
 
 
 def by_method(rows: Iterable[Row], paper: str) -> dict[str, dict[str, list[Row]]]:
@@ -47,7 +47,7 @@ def ride_means(rows: Iterable[Row], paper: str) -> list[tuple[str, str, str, str
     """Means over the draws of each ride, as rows of :func:`poise.evaluate`, of what estimates all angles of a paper."""
     found = []
     for method, groups in by_method(rows, paper).items():
-        for group, own in groups.items() if method not in ROLL_ONLY else ():
+        for group, own in groups.items() if method not in ROLL_ONLY and not method.endswith(CONSTANT) else ():
             for ride in sorted({row.ride for row in own}):
                 draws = [measures(row) for row in own if row.ride == ride]
                 for metric, _, unit in draws[0]:
@@ -71,7 +71,8 @@ def summary(rows: Sequence[Row]) -> list[dict[str, Any]]:
     """Numbers of each paper, method and group, for :mod:`poise.baselines.comparison.rider_tables`, as JSON has them.
 
     Columns: paper, method, group; ``error``, ``low`` and ``high``: mean of the RMS errors over angles, draws and
-    riders, deg, and its 95 % interval over riders; ``over bound``; ``nees`` and ``coverage`` of the stated 90 %.
+    riders, deg, and its 95 % interval over riders; ``over bound``; ``nees`` and ``coverage`` of the stated 90 %. What
+    differs from another method in its deviations alone has the latter two only.
     """
     found = []
     for paper in dict.fromkeys(row.paper for row in rows):
@@ -85,7 +86,8 @@ def summary(rows: Sequence[Row]) -> list[dict[str, Any]]:
                     ("coverage", [row.coverage for row in own]),
                 ):
                     numbers[name] = float(np.mean(values))
-                known = {name: value if np.isfinite(value) else None for name, value in numbers.items()}
+                told_of = ("nees", "coverage") if method.endswith(CONSTANT) else tuple(numbers)
+                known = {n: v if n in told_of and np.isfinite(v) else None for n, v in numbers.items()}
                 found.append({"paper": paper, "method": told(method), "group": group, **known})
     return found
 
@@ -94,7 +96,7 @@ def angle_table(rows: Sequence[Row], paper: str) -> list[dict[str, str]]:
     """Method × angle: means over draws and riders in the three groups, deg, ``1.2 / 1.5 / 1.9``."""
     names = names_of(paper)
     table = []
-    for method, groups in by_method(rows, paper).items():
+    for method, groups in by_method((row for row in rows if not row.method.endswith(CONSTANT)), paper).items():
         errors = [np.array([row.angles for row in own]).mean(axis=0) for own in groups.values()]
         cells = {
             name: " / ".join(f"{each[index]:.2f}" for each in errors)

@@ -41,6 +41,9 @@ def test_the_covariance_is_found_again() -> None:
         np.testing.assert_allclose(found.deviations[k] * np.sqrt(1.0 + found.growth[k] * u), expected, rtol=0.04)
     assert found.nees == pytest.approx(0.99, abs=0.04)
     assert found.coverage == pytest.approx(0.905, abs=0.01)
+    # one deviation for all u is right on average only; that of an error that does not grow is the same
+    assert found.constant[0] == pytest.approx(0.01 * np.sqrt(1.0 + 3.0 * 3.1), rel=0.1)
+    assert found.constant[1] == pytest.approx(0.02, rel=0.04)
 
 
 @pytest.mark.parametrize("tail", [np.inf, 4.0])

@@ -166,6 +166,27 @@ def test_the_comparison_of_one_paper(monkeypatch: pytest.MonkeyPatch, tmp_path: 
     assert suite.MEAN not in {row.method for row in quick}
 
 
+def test_constant_deviations_are_told_of_consistency_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    card = {"calibration": {"constant": [0.1, 0.2]}}
+    monkeypatch.setattr(suite, "load_weights", lambda name: ({}, card))
+    assert suite.constant_deviations("two-gyro") is None
+    assert suite.constant_deviations("two-gyro+network") == pytest.approx([0.1, 0.2])
+    card["calibration"] = {}
+    assert suite.constant_deviations("two-gyro+network") is None
+    methods = ("two-gyro+network", f"two-gyro+network, {suite.CONSTANT}")
+    rows = [
+        suite.Row("two-gyro", method, group, 0, 0, (1.0, 2.0, 3.0, 4.0), nees, 0.9, 2.0)
+        for method, nees in zip(methods, (1.0, 3.0), strict=True)
+        for group in UNSEEN
+    ]
+    numbers = tables.summary(rows)
+    assert [row["method"] for row in by_group(numbers, "two-gyro", "consistency")] == [*methods]
+    for table in ("error", "mean", "bound"):
+        assert [row["method"] for row in by_group(numbers, "two-gyro", table)] == [methods[0]]
+    assert {row[0] for row in tables.ride_means(rows, "two-gyro")} == {methods[0]}
+    assert [row["method"] for row in tables.angle_table(rows, "two-gyro")] == [methods[0]]
+
+
 def test_each_angle_has_a_row_under_one_condition() -> None:
     points = [
         sweeps.Point("geometry", value, "two-gyro", "two-gyro", ride, (1.0 + ride, 2.0, 3.0, 4.0))
