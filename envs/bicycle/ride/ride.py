@@ -189,7 +189,7 @@ class Ride:
             torque = self.foot.steer(torque, self.state)
         if coasting and drive >= -COASTING:
             drive = RESTING
-        self.rider.plan(seen, pilot.curvature_ahead, torque, drive)
+        self.rider.plan(seen, pilot.curvature_ahead, torque, drive, self.foot.engaged)
 
     def _push_aside(self, force: float) -> None:
         """A force (N, to the left) on the frame, at the height of the saddle."""

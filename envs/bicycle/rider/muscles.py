@@ -38,10 +38,8 @@ from .style import intentions
 
 TRUNK_STIFFNESS, TRUNK_DAMPING = 900.0, 90.0
 """N·m/rad and N·m·s/rad of the lumbar joint's muscles"""
-ARM_SWIVEL, ARM_SWIVEL_DAMPING = 60.0, 2.0
-"""N·m/rad, N·m·s/rad: hold the elbows in their plane"""
-SWIVEL_STIFFNESS, SWIVEL_DAMPING = 120.0, 6.0
-"""N·m/rad, N·m·s/rad: hold the knees in theirs"""
+SWIVEL_STIFFNESS, SWIVEL_DAMPING = (60.0, 120.0), (2.0, 6.0)
+"""N·m/rad, N·m·s/rad of arms and of legs: hold elbows and knees in their planes"""
 ABDUCTION, ROTATION = 0.6, 0.9
 """rad: beyond these the ligaments of a hip resist, so that a knee never passes behind it"""
 LIGAMENT, LIGAMENT_DAMPING = 300.0, 0.3
@@ -136,7 +134,7 @@ def added(force, factor, more):  # type: ignore[no-untyped-def]
 
 @jit
 def plan(  # type: ignore[no-untyped-def]
-    numbers, arrays, table, habits, time, curvature, seen, steer_torque, drive, chain, state, links, memory
+    numbers, arrays, table, habits, time, curvature, seen, foot, steer_torque, drive, chain, state, links, memory
 ):
     """Decide what the muscles do during the next control period.
 
@@ -148,6 +146,7 @@ def plan(  # type: ignore[no-untyped-def]
         time: s.
         curvature: of the path a little ahead, 1/m, left positive.
         seen: :attr:`.BicycleState.numbers`.
+        foot: :attr:`.Foot.engaged`.
         steer_torque: N·m on the handlebar, left positive.
         drive: desired propulsive force at the wheel, N, without braking.
         chain: of :func:`.chain_torque`.
@@ -160,7 +159,7 @@ def plan(  # type: ignore[no-untyped-def]
     lying, speed, steer, crank, crank_rate, wheel_rate = seen[3], seen[9], seen[10], seen[12], seen[13], seen[14]
     ratio = chain[0]
     # change of the trunk's flexion, lean and twist, four swivels (rad), unsteady torque (N·m)
-    intended = intentions(table, habits, time, curvature, lying, crank, speed)
+    intended = intentions(table, habits, time, curvature, lying, crank, speed, foot)
     first, rates, joints = 13, 13 + (state.shape[0] - 13) // 2, (memory.shape[0] - MUSCLES) // 2
     target = memory[TARGET]
     target[0] = build.flexion + intended[0]
@@ -285,10 +284,9 @@ def act(numbers, tree, state, frames, links, holds, memory, forces):  # type: ig
         # abduction holds the swivel
         joint = 4 + 4 * limb
         angle, rate = state[first + links[3 + joint]], state[rates + links[3 + joint]]
-        if limb < ARMS:
-            applied[joint] += ARM_SWIVEL * (memory[SWIVEL][limb] - angle) - ARM_SWIVEL_DAMPING * rate
-        else:
-            applied[joint] += SWIVEL_STIFFNESS * (memory[SWIVEL][limb] - angle) - SWIVEL_DAMPING * rate
+        stiffness, damping = SWIVEL_STIFFNESS[limb // 2], SWIVEL_DAMPING[limb // 2]
+        applied[joint] += stiffness * (memory[SWIVEL][limb] - angle) - damping * rate
+        if limb >= ARMS:
             turned, turning = state[first + links[4 + joint]], state[rates + links[4 + joint]]
             applied[joint] += ligament(angle, rate, ABDUCTION)
             applied[joint + 1] += ligament(turned, turning, ROTATION)

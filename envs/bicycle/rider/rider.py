@@ -232,7 +232,7 @@ class Rider:
         found[[ROLL, ROLL_RATE]] -= self._memory[SWUNG]
         return found
 
-    def plan(self, seen: np.ndarray, curvature: float, steer_torque: float, drive: float) -> None:
+    def plan(self, seen: np.ndarray, curvature: float, steer_torque: float, drive: float, foot: float = 0.0) -> None:
         """Compute muscle torques for the next control period.
 
         Args:
@@ -240,12 +240,13 @@ class Rider:
             curvature: of the path a little ahead, 1/m, left positive.
             steer_torque: N·m on the handlebar, left positive.
             drive: desired propulsive force at the wheel, N, without braking.
+            foot: :attr:`.Foot.engaged`.
         """
         motion, bicycle = self.motion, self.bicycle
         since = motion.checked(bicycle.physics.time - self._began)
         plan(
-            self._numbers, self._arrays, motion.table, motion.habits, since, curvature, seen, steer_torque, drive,
-            bicycle.chain, bicycle.body.state, self._links, self._memory,
+            self._numbers, self._arrays, motion.table, motion.habits, since, curvature, seen, foot, steer_torque,
+            drive, bicycle.chain, bicycle.body.state, self._links, self._memory,
         )  # fmt: skip
         if self._standing is not None:
             self._stand(self._standing, BicycleState(0.0, *seen.tolist()), since, drive)

@@ -29,6 +29,9 @@ LARGEST_LEAN = 0.4
 """rad into a turn, to the bicycle"""
 AT_EASE, LEAST_EASE = 3.0, 0.3
 """m/s above which a rider sways and bends freely, and the part of it that is left at walking pace, to keep balance"""
+AT_REST = 1.5
+"""1: how much more than a riding one a rider with a foot on the ground, who has no balance to keep, sways from side to
+side and turns the shoulders; assumed"""
 MOST_TWISTED = 0.2
 """rad by which the shoulders turn at most against the bar: both hands stay on it"""
 MOST_UPRIGHT = 0.04
@@ -116,7 +119,7 @@ STYLES = {
     for style in (
         RiderStyle("still", 0.0, 0.0, 0.0, 0.0, 0.0, swivel=0.0, unsteadiness=0.0),
         RiderStyle(
-            "mild", 0.04, 0.038, 0.05, 0.25, 0.3,
+            "mild", 0.042, 0.05, 0.055, 0.25, 0.3,
             pedalling=0.025, posture=0.01, posture_interval=30.0, glance=0.1, glance_interval=40.0, breath=0.004,
             gaze=0.2, gaze_interval=5.0,
         ),
@@ -167,7 +170,7 @@ def rider_style(style: str | RiderStyle, rng: np.random.Generator | None = None)
 
 
 @jit
-def intentions(table, habits, time, curvature, roll, crank, speed):  # type: ignore[no-untyped-def]
+def intentions(table, habits, time, curvature, roll, crank, speed, foot):  # type: ignore[no-untyped-def]
     """Intended movements ``(8,)`` at a time; see :meth:`RiderMotion.at`.
 
     Args:
@@ -178,13 +181,18 @@ def intentions(table, habits, time, curvature, roll, crank, speed):  # type: ign
         roll: rad.
         crank: rad.
         speed: m/s.
+        foot: 1 on the ground, 0 in the air.
     """
     onset = min(1.0, time / START)
     onset = onset * onset * (3.0 - 2.0 * onset)
     values = row_at(table, time)
     ease = max(LEAST_EASE, min(1.0, speed / AT_EASE))
+    stopped = foot * foot * (3.0 - 2.0 * foot)
+    ease += stopped * (1.0 - ease)
+    freed = 1.0 + stopped * (AT_REST - 1.0)
     values[0] *= ease
-    values[1] *= ease
+    values[1] *= ease * freed
+    values[2] *= freed
     values[0] += 0.5 * habits[2] * math.sin(2.0 * crank + habits[3])
     if values[0] < 0.0:
         values[0] = MOST_UPRIGHT * math.tanh(values[0] / MOST_UPRIGHT)
@@ -236,7 +244,13 @@ class RiderMotion:
         return self.style.standing > 0.0
 
     def at(
-        self, time: float, curvature: float, roll: float, crank: float = 0.0, speed: float = AT_EASE
+        self,
+        time: float,
+        curvature: float,
+        roll: float,
+        crank: float = 0.0,
+        speed: float = AT_EASE,
+        foot: float = 0.0,
     ) -> tuple[np.ndarray, np.ndarray, float]:
         """Intentions at a time.
 
@@ -246,6 +260,7 @@ class RiderMotion:
             roll: of the bicycle, rad, right positive.
             crank: angle of the cranks, rad.
             speed: of the bicycle, m/s.
+            foot: 1 on the ground, 0 in the air.
 
         Returns:
             Change ``(3,)`` of the trunk's flexion, lean (right positive) and twist to the bicycle, rad; swivel
@@ -254,7 +269,7 @@ class RiderMotion:
         Raises:
             ValueError: a time outside the duration.
         """
-        values = intentions(self.table, self.habits, self.checked(time), curvature, roll, crank, speed)
+        values = intentions(self.table, self.habits, self.checked(time), curvature, roll, crank, speed, foot)
         return values[TRUNK], values[SWIVEL], float(values[HANDS])
 
     def checked(self, time: float) -> float:

@@ -18,7 +18,16 @@ from poise.envs.bicycle.rider.body_motion import (
     posture_changes,
     row_at,
 )
-from poise.envs.bicycle.rider.style import START, STYLES, RiderMotion, RiderStyle, random_style, rider_style
+from poise.envs.bicycle.rider.style import (
+    AT_REST,
+    LEAST_EASE,
+    START,
+    STYLES,
+    RiderMotion,
+    RiderStyle,
+    random_style,
+    rider_style,
+)
 
 TIME = np.arange(0.0, 600.0, 1.0 / TABLE_RATE)
 
@@ -99,6 +108,16 @@ def test_a_part_is_locked_to_the_cranks():
         assert values.max() == pytest.approx(size, rel=0.02)
     spectrum = np.abs(np.fft.rfft(flexion))
     assert np.argmax(spectrum) == 2
+
+
+def test_a_rider_moves_least_at_walking_pace_and_most_with_a_foot_on_the_ground():
+    """At rest nobody has a balance to keep; walking pace takes sway and bending away, but no turns of the shoulders."""
+    motion = RiderMotion(replace(STYLES["still"], lean=0.001, twist=0.001), rng())
+    riding, walking, rest = (
+        motion.at(5.0, 0.0, 0.0, **now)[0][1:] for now in ({}, {"speed": 0.5}, {"speed": 0.0, "foot": 1.0})
+    )
+    np.testing.assert_allclose(walking / riding, [LEAST_EASE, 1.0], rtol=1e-6)
+    np.testing.assert_allclose(rest / riding, AT_REST, rtol=1e-3)
 
 
 def test_random_styles_lie_between_mild_and_aggressive():
