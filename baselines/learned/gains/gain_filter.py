@@ -3,26 +3,37 @@
 The network sees statistics of innovations and sensors (:mod:`..inputs.gain_features`) at fixed intervals. What it says
 holds over the next interval, as bounded log factors on the filter's constants (:mod:`.gain_head`): the noises that Q
 and R are made of, or shares of the Kalman gain (:mod:`.gain_shares`). The covariance is the filter's own.
+
+A tuning that is right while errors are small is not right while a large one is corrected: where an input was missing
+for longer than :data:`GAP`, the published gains hold until :data:`RECOVERY` after it. On simulated gestures (mixed,
+fast, slow) the NEES of ``mekf+noise`` 0.2 s after gaps of 2 s is 3 so, as that of ``mekf``, and 15 without; one second
+does as much as ten, and leaves single lost samples to the network.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple, Self
 
 import numpy as np
 
 from ....filters.core.estimator import check_measurements
+from ....filters.core.held_inputs import longest_gap
 from ....filters.core.kalman import KalmanFilter
+from ....filters.core.monitor import GYROSCOPE_GAP as GAP
 from ....filters.core.quantity import Estimate, Measurement, Quantity
-from ....filters.core.sampling import FilterState
+from ....filters.core.sampling import FilterState, latest
 from ....filters.support.names import look_up
 from ...weights_io import load_weights
 from ..estimator import NETWORKS, NetworkParts
 from ..inputs.gain_features import GainFeatures, ObservedState
 from .gain_head import GainHead
+
+RECOVERY = 1.0
+"""s after a gap of an input for which the published gains hold."""
 
 
 class GainFilterState(NamedTuple):
@@ -33,12 +44,14 @@ class GainFilterState(NamedTuple):
         front: of the front end.
         memory: ``(*batch, M)`` of the network.
         output: ``(*batch, gains)`` last output of the network.
+        since: ``(*batch,)`` samples since an input was missing for too long; infinite if none ever was.
     """
 
     filter: FilterState
     front: ObservedState
     memory: np.ndarray
     output: np.ndarray
+    since: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,16 +108,19 @@ class GainFilter(NetworkParts):
         front = self.front_end.init(arrays)
         batch = front.memory.decisions.shape
         memory, output = (np.zeros((*batch, size)) for size in (self.network.memory_size, self.network.outputs))
-        return GainFilterState(self.filter.init(arrays), front, memory, output)
+        return GainFilterState(self.filter.init(arrays), front, memory, output, np.full(batch, np.inf))
 
     def step(self, state: GainFilterState, measurement: Measurement) -> tuple[GainFilterState, Estimate]:
         """Process one sample of every channel, ``(*batch, size)``; NaN where there is none."""
-        inner, estimate = self.filter.step(state.filter, measurement, self.gains(state.output))
+        inner, estimate = self.filter.step(
+            state.filter, measurement, self._unless_recovering(state.output, state.since)
+        )
         front, seen = self.front_end.step(state.front, measurement)
         memory, output = state.memory, state.output
         if (np.asarray(seen.due) == 1.0).any():
             memory, output, _ = self._advance(seen.features[None], seen.due[None], memory, output)
-        return GainFilterState(inner, front, memory, output), estimate
+        since = np.where(self._is_gap(inner.age), 0.0, state.since + 1.0)
+        return GainFilterState(inner, front, memory, output, since), estimate
 
     def run(self, measurements: Mapping[str, Any]) -> Estimate:
         """Estimates of a whole sequence, ``(T, *batch, size)`` in and out; equal to stepping."""
@@ -119,7 +135,7 @@ class GainFilter(NetworkParts):
         memory, output = (np.zeros((*batch, size)) for size in (self.network.memory_size, self.network.outputs))
         _, _, outputs = self._advance(seen.features, seen.due, memory, output)
         # what is said at the end of an interval holds from the next sample on
-        gains = self.gains(np.concatenate([output[None], outputs[:-1]]))
+        gains = self._unless_recovering(np.concatenate([output[None], outputs[:-1]]), self._since_gap(arrays))
         return self.filter.run(arrays, gains), gains
 
     def gains(self, output: np.ndarray) -> dict[str, np.ndarray]:
@@ -127,6 +143,27 @@ class GainFilter(NetworkParts):
         factors = self.head.factors(output)
         named = {name: factors[..., index] for index, name in enumerate(self.head.gains)}
         return self.front_end.kalman.model.limited(named)
+
+    def _unless_recovering(self, output: np.ndarray, since: np.ndarray) -> dict[str, np.ndarray]:
+        """Log factors by gain: zeros, the published tuning, in and after a gap."""
+        going = since >= round(RECOVERY / self.dt)
+        return {name: np.where(going, factor, 0.0) for name, factor in self.gains(output).items()}
+
+    def _is_gap(self, age: np.ndarray) -> np.ndarray:
+        """Whether an input has been missing for too long; of ages ``(..., channels)`` in s."""
+        return (age[..., self._inputs] > GAP + 0.5 * self.dt).any(axis=-1)
+
+    @cached_property
+    def _inputs(self) -> list[int]:
+        return longest_gap(self.front_end.kalman.model)[1]
+
+    def _since_gap(self, arrays: Measurement) -> np.ndarray:
+        """Samples ``(T, *batch)`` from the last gap to the one before each."""
+        there = np.stack([np.isfinite(arrays[each.name]).all(axis=-1) for each in self.channels], axis=-1)
+        rows = np.arange(len(there)).reshape(-1, *(1,) * (there.ndim - 2))
+        gap = latest(self._is_gap((rows[..., None] - latest(there)) * self.dt))
+        since = np.where(gap >= 0, rows - gap, np.inf)
+        return np.concatenate([np.full_like(since[:1], np.inf), since[:-1]])
 
 
 def shipped(weights: str, dt: float = 0.01) -> GainFilter:
