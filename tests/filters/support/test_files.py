@@ -3,6 +3,11 @@
 from __future__ import annotations
 
 import json
+import os
+import signal
+import subprocess
+import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -40,3 +45,30 @@ def test_the_part_keeps_the_suffix(tmp_path: Path) -> None:
         assert part.parent == tmp_path
         assert part.suffix == ".npz"
         part.write_bytes(b"")
+
+
+@pytest.mark.skipif(os.name != "posix", reason="processes of other systems are not asked")
+def test_the_next_write_removes_what_a_killed_one_left(tmp_path: Path) -> None:
+    path = tmp_path / "x [1].csv"
+    code = (
+        "import os, signal, sys; from poise.filters.support.files import replacing\n"
+        "with replacing(sys.argv[1]) as part:\n    part.write_text('half'); os.kill(os.getpid(), signal.SIGKILL)"
+    )
+    for _ in range(2):
+        assert subprocess.run([sys.executable, "-c", code, str(path)], check=False).returncode == -signal.SIGKILL
+    (left,) = tmp_path.iterdir()  # of the second one
+    assert left.read_text() == "half"
+    other = tmp_path / "x.csv"
+    write_text(other, "another file does not touch it")
+    with replacing(path) as part:
+        assert not left.exists()
+        part.write_text("first")
+        write_text(path, "a writer that lives keeps its part")
+    assert path.read_text() == "first"
+    abroad = part.with_name(part.name.replace(part.name.split(".")[-2][:4], "0bad"))
+    abroad.write_text("of another machine")
+    write_text(path, "next")
+    assert abroad.exists()
+    os.utime(abroad, 2 * (time.time() - 2e5,))
+    write_text(path, "next")
+    assert sorted(tmp_path.iterdir()) == sorted([path, other])
