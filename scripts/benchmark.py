@@ -86,7 +86,8 @@ def run(args: Args) -> int:
         raise ValueError(f"--sweep belongs to --suite rider, not {args.suite}")
     check_file("save", args.save, (*args.recordings, *(() if args.baseline is None else (args.baseline,))))
     before = None if args.baseline is None else load_baseline(args.baseline)
-    kept = load_results(args.save) if args.save is not None and args.save.exists() else {}
+    if args.save is not None and args.save.exists():
+        load_results(args.save)  # a damaged file is refused before the work
     with plain_warnings(), Output("benchmark", args) as out:
         recorded, passed_over = load_all(args.recordings) if args.recordings else ([], [])
         tasks, channels = tasks_of(args, recorded)
@@ -120,7 +121,7 @@ def run(args: Args) -> int:
         if args.save is not None:
             recordings = [one for results in suites.values() for one in results.recordings]
             parts = {"recordings": recordings, "riders": [] if ridden is None else ridden.summary}
-            out.say(f"results: {keep(args, folder, kept, parts)}")
+            out.say(f"results: {keep(args, folder, parts)}")
         grown = [] if before is None else show_regressions(table, before, sections, out)
         if passed_over:
             sections["Passed over"] = passed_over_text(passed_over, most=1000)
@@ -203,14 +204,15 @@ def show_data_sets(suites: dict[str, Results], args: Args, folder: Run, out: Out
     return sections
 
 
-def keep(args: Args, folder: Run, kept: dict[str, Any], parts: dict[str, list[dict[str, Any]]]) -> Path:
-    """Write what this run has into the file of ``--save``, with its source, beside what was there.
+def keep(args: Args, folder: Run, parts: dict[str, list[dict[str, Any]]]) -> Path:
+    """Write what this run has into the file of ``--save``, with its source, beside what is there now.
 
     A run of all estimators replaces all errors of recordings, one of named estimators theirs alone.
     """
-    from ..baselines.comparison.recommendation import merged
+    from ..baselines.comparison.recommendation import load_results, merged
 
     assert args.save is not None
+    kept = load_results(args.save) if args.save.exists() else {}
     new = {part: rows for part, rows in parts.items() if rows}
     named = list(new)
     if args.estimators and kept.get("recordings") and "recordings" in new:

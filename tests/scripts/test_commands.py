@@ -2,6 +2,7 @@
 
 import json
 import re
+from types import SimpleNamespace
 
 import pandas
 import pytest
@@ -10,6 +11,8 @@ from poise.baselines.comparison.intervals import is_measure
 from poise.baselines.scoring import COLUMNS
 from poise.envs.data.trajectory import load_trajectory
 from poise.filters.support.seeds import child_seed
+from poise.scripts import benchmark
+from poise.scripts.benchmark import keep
 from poise.scripts.main import main
 from poise.scripts.record import environment_id, option
 
@@ -87,6 +90,15 @@ def test_evaluate_prints_tables_and_leaves_a_run(episodes, tmp_path, capsys):
     assert "recordings-over-time.png" in (folder / "report.md").read_text()
     assert main(["evaluate", str(tmp_path / "nothing"), "--runs", str(tmp_path)]) == 2
     assert "nothing" in capsys.readouterr().err
+
+
+def test_benchmark_keeps_what_was_written_while_it_ran(tmp_path):
+    kept = tmp_path / "kept.json"
+    kept.write_text(json.dumps({"recordings": [], "riders": [{"paper": "two-gyro"}]}))
+    folder = SimpleNamespace(versions={"poise": "0", "python": "3", "packages": {}})
+    keep(benchmark.Args(save=kept), folder, {"recordings": [{"errors": {}}], "riders": []})
+    saved = json.loads(kept.read_text())
+    assert (saved["recordings"], saved["riders"]) == ([{"errors": {}}], [{"paper": "two-gyro"}])
 
 
 def test_benchmark_compares_and_reports(episodes, tmp_path, capsys):
