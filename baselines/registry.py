@@ -208,9 +208,9 @@ def of_weights(path: str) -> Entry:
         FileNotFoundError: there is no such file.
         ValueError: it is damaged, or holds weights of something else than a network of ``poise train``.
     """
-    from .weights_io import load_weights
+    from .weights_io import load_card
 
-    card = load_weights(path)[1]
+    card = load_card(path)
     kind = str(card.get("estimator", "")).rpartition(".")[2]
     if kind not in NETWORKS:
         raise ValueError(f"{path}: its card describes no estimator of `poise train`, but {card.get('kind', kind)!r}")

@@ -75,16 +75,7 @@ def load_weights(path_or_name: str | Path) -> tuple[dict[str, np.ndarray], dict[
         FileNotFoundError: there are no such weights, or their card is missing; the message lists what is shipped.
         ValueError: the weights are not those that the card describes, or one of the files is damaged.
     """
-    path = find_weights(path_or_name)
-    beside = card_path(path)
-    if not beside.is_file():
-        raise FileNotFoundError(f"{path} has no card {beside.name} beside it")
-    try:
-        card = json.loads(beside.read_text(encoding="utf-8"))
-    except ValueError as reason:
-        raise ValueError(f"{beside} is not JSON: {reason}") from None
-    if not isinstance(card, dict) or not isinstance(card.get(DIGEST), str):
-        raise ValueError(f"{beside} must hold the {DIGEST} of {path.name}")
+    path, card = find_weights(path_or_name), load_card(path_or_name)
     data = path.read_bytes()
     found = hashlib.sha256(data).hexdigest()
     if found != card[DIGEST]:
@@ -96,6 +87,21 @@ def load_weights(path_or_name: str | Path) -> tuple[dict[str, np.ndarray], dict[
         return load(data), card
     except SafetensorError as reason:
         raise ValueError(f"{path} is not a safetensors file: {reason}") from None
+
+
+def load_card(path_or_name: str | Path) -> dict[str, Any]:
+    """Read the card of weights alone; arguments and errors are those of :func:`load_weights`."""
+    path = find_weights(path_or_name)
+    beside = card_path(path)
+    if not beside.is_file():
+        raise FileNotFoundError(f"{path} has no card {beside.name} beside it")
+    try:
+        card = json.loads(beside.read_text(encoding="utf-8"))
+    except ValueError as reason:
+        raise ValueError(f"{beside} is not JSON: {reason}") from None
+    if not isinstance(card, dict) or not isinstance(card.get(DIGEST), str):
+        raise ValueError(f"{beside} must hold the {DIGEST} of {path.name}")
+    return card
 
 
 def list_weights() -> list[str]:

@@ -234,8 +234,7 @@ class PoseEnv(DrawnEnv):
             self._block, self._row = self.next_block(self._last_step + 1 - self._step), 0
 
     def _checked(self, action: np.ndarray) -> np.ndarray:
-        estimate = finite_action(action, (self._parts[-1].stop,))
-        values = estimate.tolist()
+        estimate, values = finite_action(action, (self._parts[-1].stop,))
         for quantity, part in zip(self.quantities, self._parts, strict=True):
             if quantity.kind in UNIT_ENTRY and not any(values[part]):
                 estimate[part][UNIT_ENTRY[quantity.kind]] = 1.0

@@ -56,8 +56,8 @@ class Scene(Protocol):
         ...
 
 
-def finite_action(action: Any, shape: tuple[int]) -> np.ndarray:
-    """An action as an array of its own ``(n,)``.
+def finite_action(action: Any, shape: tuple[int]) -> tuple[np.ndarray, list[float]]:
+    """An action as an array of its own ``(n,)``, and its entries.
 
     Raises:
         ValueError: a wrong shape, or an entry that is not a finite real number.
@@ -66,9 +66,9 @@ def finite_action(action: Any, shape: tuple[int]) -> np.ndarray:
         values = None if np.iscomplexobj(action) else np.array(action, dtype=float)
     except (TypeError, ValueError):
         values = None
-    if values is None or values.shape != shape or not all(map(math.isfinite, values.tolist())):
+    if values is None or values.shape != shape or not all(map(math.isfinite, entries := values.tolist())):
         raise ValueError(f"action must hold {shape[0]} finite numbers, got {action!r}")
-    return values
+    return values, entries
 
 
 class Shown(NamedTuple):

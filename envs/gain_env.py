@@ -150,7 +150,7 @@ class GainTuningEnv(DrawnEnv):
         """
         if self.trajectory is None or self._step + self.tuned.interval_samples > len(self.trajectory):
             raise RuntimeError("call reset first: there is no episode, or it is over")
-        chosen = finite_action(action, (self.tuned.actions,))
+        chosen, _ = finite_action(action, (self.tuned.actions,))
         episode, samples = self.episode, slice(self._step, self._step + self.tuned.interval_samples)
         chunk = {name: values[samples] for name, values in episode.samples.items()}
         estimate, self._state = self.tuned.advance(self.tuned.decide(self._state, chosen), chunk)
