@@ -14,7 +14,7 @@ import numpy as np
 from ....filters.core import rotation
 from ..trajectory import Trajectory
 from .mapping import RecordingMap, Reference, apply_map, as_columns, finite
-from .names import Group, counter_column, groups, is_ros, time_column
+from .names import Group, counter_column, groups, is_ros, time_column, time_unit
 from .table import UNITS, Table, factor, plain
 
 RATES = (
@@ -63,8 +63,8 @@ def mapping_of(table: Table, details: dict[str, object] | None = None) -> Record
     # Names of Apple's Core Motion: g, and -1 g on an axis that points up.
     apple = any(name.startswith(("accelerometerAcceleration", "motionRotationRate")) for name in table.arrays)
     time = time_column(table)
-    if time is not None and plain(time) in UNITS["time"] and time not in table.units:
-        units["time"] = plain(time)
+    if time is not None and time_unit(table, time):
+        units["time"] = time_unit(table, time)
     rate = table.rate_in_header(*RATES)
     return RecordingMap(
         columns,

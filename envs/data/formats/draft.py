@@ -63,7 +63,7 @@ def written(path: Path, table: Table, mapping: RecordingMap) -> str:
             note = "" if channel in mapping.units else "  # guessed from the magnitude"
             lines.append(f"{json.dumps(key) if '/' in key else key} = {json.dumps(unit, ensure_ascii=False)}{note}")
     if mapping.time is not None:
-        lines.append(f'time = "{time_unit(table, mapping)}"')
+        lines.append(f'time = "{unit_of_time(table, mapping)}"')
     lines += ["", "# [signs]", "# acc = -1  # devices that report -1 g on an axis that points up, as Apple's do"]
     for reference in mapping.reference:
         lines += [
@@ -80,13 +80,13 @@ def written(path: Path, table: Table, mapping: RecordingMap) -> str:
     return "\n".join(lines) + "\n"
 
 
-def time_unit(table: Table, mapping: RecordingMap) -> str:
+def unit_of_time(table: Table, mapping: RecordingMap) -> str:
     """The unit of the time, from the header or the interval."""
     import warnings
 
     name = str(mapping.time)
-    if mapping.units.get("time") or table.units.get(name):
-        return mapping.units.get("time") or table.units[name]
+    if mapping.units.get("time"):
+        return mapping.units["time"]
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         try:

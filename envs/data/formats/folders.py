@@ -21,7 +21,7 @@ from .arrays import read_table
 from .described import with_checked_orientation
 from .head import Head
 from .mapping import unit_quaternions
-from .names import AXES, groups, time_column, words
+from .names import AXES, groups, time_column, time_unit, words
 from .stamps import Stamps, as_seconds
 from .streams import Stream, joined
 from .table import STANDARD_GRAVITY, Table, factor
@@ -108,7 +108,7 @@ def opened(path: Path) -> File:
             raise ValueError(f"no column is a time; {table.seen()}")
         if "time" in table and "seconds_elapsed" in table:
             name = "time"
-        unit = table.units.get(name, "") or ("ns" if name == "time" and "seconds_elapsed" in table else "")
+        unit = time_unit(table, name) or ("ns" if name == "time" and "seconds_elapsed" in table else "")
         return File(path, table, as_seconds(table.column(name), unit, name))
     except ValueError as reason:
         raise ValueError(f"{path.name}: {reason}") from None

@@ -21,6 +21,7 @@ from ....filters.support.names import unknown
 from ....filters.support.parameters import check_parameters
 from ..ranges import full_scale
 from ..trajectory import Trajectory
+from .names import time_unit
 from .stamps import as_seconds
 from .table import UNITS, Table, factor, split_unit
 
@@ -361,7 +362,7 @@ def recording_time(table: Table, mapping: RecordingMap) -> tuple[np.ndarray, dic
     details: dict[str, Any] = {} if mapping.rate is None else {"nominal_rate": float(mapping.rate)}
     if mapping.time is not None:
         name = str(mapping.time)
-        unit = mapping.units.get("time") or table.units.get(name, "")
+        unit = mapping.units.get("time") or time_unit(table, name)
         values = table.column(name)
         name = name if name in table else split_unit(name)[0]
         rest = fraction_column(name, table)

@@ -197,6 +197,12 @@ def time_column(table: Table) -> str | None:
     return max(known, key=rank, default=timed[0] if timed else None)
 
 
+def time_unit(table: Table, name: str) -> str:
+    """The unit of a column of time, of the header or the end of its name (``t_ms``); empty where neither tells."""
+    last = (words(name) or [""])[-1]
+    return table.units.get(name, "") or (last if last in UNITS["time"] and name.lower().endswith(last) else "")
+
+
 def counter_column(table: Table) -> str | None:
     """The column that counts packets or samples, or None."""
     return next((name for name in table.arrays if "".join(words(name)) in COUNTER), None)

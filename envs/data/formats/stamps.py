@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from ..clock import USUAL_RATES
 from .table import UNITS, factor
 
 if TYPE_CHECKING:
@@ -18,10 +19,16 @@ ZONES |= {"CST": -6, "CDT": -5, "MST": -7, "MDT": -6, "PST": -8, "PDT": -7}
 """Name of a time zone → hours east of Greenwich."""
 CLOCK = r"\d\d?:\d\d(:\d\d([.,:]\d+)?|[.,]\d+)?(\s*[ap]\.?m\.?)?"
 CALENDAR = r"(\d{4}([-/.]\d\d[-/.]\d\d|\d{4})|\d\d?[-/. ](\d\d?|[a-z]{3,9})[-/. ](\d{4}|\d\d))"
-DATE = re.compile(rf"({CALENDAR}(T|_|,?\s+))?{CLOCK}\s*(Z|UTC|GMT|{'|'.join(ZONES)}|[-+]\d\d:?\d\d)?", re.IGNORECASE)
+OTHER_CLOCK = r"(?P<h>\d\d)(?P<mark>[-.]?)(?P<m>\d\d)(?P=mark)(?P<s>\d\d)([-_.,](?P<f>\d+))?"
+"""A time of the day without colons, after a date."""
+DATE = re.compile(
+    rf"(({CALENDAR}(T|_|,?\s+))?{CLOCK}|{CALENDAR}(T|_|\s){OTHER_CLOCK})"
+    rf"\s*(Z|UTC|GMT|{'|'.join(ZONES)}|[-+]\d\d:?\d\d)?",
+    re.IGNORECASE,
+)
 """A date with a time, a time of the day of 24 or twice 12 hours, or minutes, seconds and their fraction; with a time
 zone or without."""
-HOUR, DAY = 3600, 86_400
+HOUR, DAY, WEEK = 3600, 86_400, 604_800
 WRAPS = (
     100,
     2**8,
@@ -34,19 +41,26 @@ WRAPS = (
     2**24,
     2**32,
     10**6,
-    60 * 10**6,
-    HOUR * 10**9,
-    DAY * 10**3,
-    DAY * 10**6,
-    DAY * 10**9,
+    *(period * per_second for period in (60, HOUR, DAY, WEEK) for per_second in (10**3, 10**6, 10**9)),
 )
-"""Ends of counters after which they start again at 0: minutes and seconds every hour, a time of the day at midnight."""
+"""Ends of counters after which they start again at 0 (or at minus the half): seconds every minute, a time of the day at
+midnight, a satellite's time of the week on Sundays."""
+PERIODS = (60, HOUR, DAY, WEEK)
+"""s after which seconds with a fraction start again."""
 FURTHEST_BACK = 2.5
 """Intervals by which rows may be out of order."""
-EPOCHS = {1.0: (3e8, 4e9), 1e-3: (3e11, 4e12), 1e-6: (3e14, 4e15), 1e-7: (1.2e17, 1.5e17), 1e-9: (3e17, 4e18)}
-EPOCHS |= {86_400.0: (2.9e4, 7.7e5)}
-"""s per unit → stamps in that unit since 1970 (since 1601 in 100 ns, as Windows counts; since 1900 or the year 0 in
-days, as Excel and MATLAB do) of the years 1980 to 2090."""
+EPOCHS = (
+    *((1.0, 3e8, 4e9), (1e-3, 3e11, 4e12), (1e-6, 3e14, 4e15), (1e-7, 1.2e17, 1.5e17), (1e-7, 6.2e17, 6.6e17)),
+    *((1e-9, 3e17, 4e18), (86_400.0, 2.9e4, 7.7e5), (86_400.0, 2.44e6, 2.49e6)),
+)
+"""s per unit, and stamps in that unit of the years 1980 to 2090: since 1970 (since 1601 or the year 1 in 100 ns, as
+Windows counts; since 1900 or the year 0 in days, as Excel and MATLAB do, and as Julian dates)."""
+TICKS = {"ticks of 1/32768 s": 1.0 / 32_768.0, "ticks of 39.0625 µs": 39.0625e-6}
+"""Units of clocks of quartzes and of motion sensors, which look like µs of a sensor that is too fast."""
+TICK_RATES = (*USUAL_RATES, 51.2, 102.4, 204.8, 409.6)
+"""Hz; rates of sensors with such a clock."""
+FAST = 1000.0
+"""Hz, faster than most recorders write."""
 PLAUSIBLE = (2e-4, 0.2)
 """s; an interval in these bounds tells the unit of stamps without one: they are a thousand times apart."""
 
@@ -85,13 +99,15 @@ def as_seconds(stamps: np.ndarray, unit: str, name: str = "time") -> Stamps:
     calendar = None if unit or not len(values) else unpacked(values)
     if calendar is not None:
         values, unit = calendar, "ns"
-    if values.dtype.kind == "f":
+    steps = np.diff(values)
+    repaired = unwrapped(steps, values)
+    if values.dtype.kind == "f" and repaired is steps:
         elapsed = values - values[0]
     else:
-        steps = unwrapped(np.diff(values), values)
-        elapsed = np.concatenate([[0], np.cumsum(steps)]).astype(float)
+        elapsed = np.concatenate([[0], np.cumsum(repaired)]).astype(float)
     steps = np.diff(elapsed)
-    usual = float(np.median(np.abs(steps))) if len(steps) else 0.0
+    # The samples of a packet are much nearer to each other than usual.
+    usual = max(float(np.median(np.abs(steps))), float(np.ptp(elapsed)) / len(steps)) if len(steps) else 0.0
     # A few rows that changed places are sorted later; a clock that was set back, or a second recording, is not.
     if len(steps) and ((steps < 0.0).mean() > 0.05 or steps.min() < -FURTHEST_BACK * usual):
         row = int(np.argmin(steps)) + 1
@@ -104,15 +120,19 @@ def as_seconds(stamps: np.ndarray, unit: str, name: str = "time") -> Stamps:
 
 
 def unwrapped(steps: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Steps of a counter without its restarts at 0."""
+    """Steps of a counter, or of a time of the minute, hour, day or week, without its restarts."""
     back = steps < 0
-    if not back.any() or back.sum() > max(2, 0.02 * len(back)) or values.min() < 0:
+    if not back.any() or back.sum() > max(2, 0.02 * len(back)):
         return steps
-    usual = float(np.median(steps[~back])) if (~back).any() else 0.0
-    for end in WRAPS:
+    usual = float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
+    lowest, highest = values.min(), values.max()
+    for end in WRAPS if values.dtype.kind == "i" else PERIODS:
         repaired = np.where(back, steps + end, steps)
         longest = min(50.0 * usual, 0.1 * end + 5.0 * usual)
-        if values.max() < end and np.all(repaired[back] >= 0) and np.all(repaired[back] <= longest):
+        inside = (lowest >= 0 and highest < end) or (
+            lowest >= -end // 2 and highest < end // 2 and end & (end - 1) == 0
+        )
+        if inside and np.all(repaired[back] >= 0) and np.all(repaired[back] <= longest):
             return repaired
     return steps
 
@@ -123,11 +143,19 @@ def likely_unit(elapsed: np.ndarray, name: str, first: float = 0.0) -> float:
     usual = float(np.median(steps[steps > 0.0])) if (steps > 0.0).any() else 0.0
     if PLAUSIBLE[0] <= usual < PLAUSIBLE[1] or usual == 0.0:
         return 1.0
-    for scale, (earliest, latest) in EPOCHS.items():
+    for scale, earliest, latest in EPOCHS:
         if earliest < first < latest and PLAUSIBLE[0] <= usual * scale < PLAUSIBLE[1]:
             return scale
-    for unit in ("ms", "us", "ns"):
-        scale = UNITS["time"][unit]
+    units = {unit: UNITS["time"][unit] for unit in ("ms", "us", "ns")}
+    if PLAUSIBLE[0] <= usual * units["us"] < 1.0 / FAST:
+        each = steps[np.abs(steps - usual) < 1.5].mean()
+        rates = {unit: 1.0 / (each * scale) for unit, scale in TICKS.items()}
+        fitting = {unit: rate for unit, rate in rates.items() if np.isclose(rate, TICK_RATES, rtol=1e-3).any()}
+        if len(fitting) > 1:
+            choices = ", ".join(f"{unit} ({rate:.4g} Hz)" for unit, rate in fitting.items())
+            raise ValueError(f"column {name} counts {usual:g} a sample: {choices}? Say units={{'time': '39.0625 us'}}")
+        units = {unit: TICKS[unit] for unit in fitting} | units
+    for unit, scale in units.items():
         if PLAUSIBLE[0] <= usual * scale < PLAUSIBLE[1] and usual != 1.0:
             warnings.warn(
                 f"column {name} names no unit; its interval of {usual:g} is taken for {unit} "
@@ -148,6 +176,14 @@ def nanoseconds(texts: pandas.Series) -> np.ndarray | None:
     plain = texts.str.replace(",", ".", regex=False).str.replace(r"\s*(UTC|GMT)$", "Z", regex=True, case=False)
     plain = plain.str.replace(r"(\d)_(\d)", r"\1 \2", regex=True).str.replace(r"(\d)\.(\s)", r"\1\2", regex=True)
     plain = plain.str.replace(r"([ap])\.?m\.?$", r"\1m", regex=True, case=False)
+    if ":" not in str(plain.iloc[0]):
+        clock = rf"(?<=[T_\s]){OTHER_CLOCK}"
+        plain = plain.str.replace(clock, r"\g<h>:\g<m>:\g<s>.\g<f>", regex=True, case=False)
+    leap = plain.str.contains(r":\d\d:60\b").to_numpy(dtype=bool)
+    if leap.any():
+        # The rows of a leap second, and all after it, are one second later than the calendar says.
+        found = nanoseconds(plain.str.replace(r"(:\d\d):60\b", r"\1:59", regex=True))
+        return None if found is None else found + 10**9 * (np.arange(len(found)) >= np.flatnonzero(leap)[0])
     plain = plain.str.replace(r"(:\d\d:\d\d):(\d+)", r"\1.\2", regex=True)
     for zone, hours in ZONES.items():
         plain = plain.str.replace(rf"\s*\b{zone}$", f"{hours:+03d}:00", regex=True, case=False)
@@ -171,21 +207,22 @@ def nanoseconds(texts: pandas.Series) -> np.ndarray | None:
 
 
 def with_one_clock(stamps: np.ndarray | None) -> np.ndarray | None:
-    """Local times ``(N,)`` in ns without the hour by which clocks change in spring and autumn, with a warning.
+    """Local times ``(N,)`` in ns without the change of clocks in spring and autumn, with a warning.
 
-    Such a change is a step of an hour, forwards or back, to a full hour.
+    Such a change is a step of an hour or a half, forwards or back, to a full one.
     """
     if stamps is None or len(stamps) < 3:
         return stamps
     steps = np.diff(stamps)
-    near, hour = max(int(3 * np.median(np.abs(steps))), 1), HOUR * 10**9
-    changes = (np.abs(np.abs(steps) - hour) <= near) & (stamps[1:] % hour <= near)
-    if changes.sum() != 1:
-        return stamps
-    row = int(np.flatnonzero(changes)[0]) + 1
-    warnings.warn(f"the local time steps by one hour in row {row}: taken for a change of the clocks", stacklevel=6)
-    stamps = stamps.copy()
-    stamps[row:] -= np.sign(steps[row - 1]) * hour
+    near = max(int(3 * np.median(np.abs(steps))), 1)
+    for change, words in ((HOUR * 10**9, "one hour"), (HOUR * 10**9 // 2, "half an hour")):
+        changes = (np.abs(np.abs(steps) - change) <= near) & (stamps[1:] % change <= near)
+        if changes.sum() == 1:
+            row = int(np.flatnonzero(changes)[0]) + 1
+            warnings.warn(
+                f"the local time steps by {words} in row {row}: taken for a change of the clocks", stacklevel=6
+            )
+            return stamps - change * np.sign(steps[row - 1]) * (np.arange(len(stamps)) >= row)
     return stamps
 
 

@@ -39,12 +39,12 @@ def _spellings(factors: dict[float, str]) -> dict[str, float]:
 UNITS = {
     "gyr": _spellings(
         {
-            1.0: "rad/s rads^-1 rad/sec radians/s radians/sec rads-1 rad*s^-1",
-            np.pi / 180: "deg/s °/s dps degs^-1 degree/s degrees/s deg/sec degs-1 degrees/sec º/s ˚/s d/s",
+            1.0: "rad/s rads-1 rad*s-1",
+            np.pi / 180: "deg/s dps degs-1 d/s",
             np.pi / 180e2: "cdeg/s",
             np.pi / 180e3: "mdps mdeg/s millideg/s millidegrees/s",
-            np.pi / (180.0 * 60.0): "deg/min °/min",
-            np.pi / (180.0 * 3600.0): "deg/h deg/hr °/h",
+            np.pi / (180.0 * 60.0): "deg/min",
+            np.pi / (180.0 * 3600.0): "deg/h deg/hr",
             1e-3: "mrad/s",
             1e-6: "urad/s µrad/s",
             2.0 * np.pi: "rev/s rps turn/s turns/s",
@@ -53,48 +53,70 @@ UNITS = {
     ),
     "acc": _spellings(
         {
-            1.0: "m/s^2 m/s2 m/s² m/(s^2) ms^-2 ms-2 mps2 m/s/s m/sec^2 m*s^-2 m/s**2 meters/second^2 n/kg",
-            STANDARD_GRAVITY: "g g0 gs gee gn g-force gforce",
-            STANDARD_GRAVITY / 1000.0: "mg milli-g",
+            1.0: "m/s2 m/(s2) ms-2 mps2 m/s/s m*s-2 n/kg",
+            STANDARD_GRAVITY: "g g0 gs gee gn g-force gforce g's",
+            STANDARD_GRAVITY / 1000.0: "mg milli-g mgs",
             STANDARD_GRAVITY / 1e6: "ug µg",
-            0.1: "dm/s^2 dm/s2 dm/s²",
-            0.01: "cm/s^2 cm/s2 cm/s² gal",
-            0.001: "mm/s^2 mm/s2 mm/s²",
+            1e3: "km/s2",
+            0.1: "dm/s2",
+            0.01: "cm/s2 gal",
+            0.001: "mm/s2",
             1e-5: "mgal",
-            0.3048: "ft/s^2 ft/s2 ft/s²",
+            0.3048: "ft/s2",
         }
     ),
     "mag": _spellings(
         {
-            1.0: "ut µt μt microt microtesla a.u. au arb.u. local_flux 1 normalized",
+            1.0: "ut µt microt microtesla a.u. au arb.u. local_flux 1 normalized",
             1000.0: "mt",
             1e6: "t tesla",
             0.001: "nt",
             100.0: "gauss gs g ga",
             0.1: "mgauss mg mga milligauss",
+            0.4 * np.pi: "a/m",
         }
     ),
     "time": _spellings(
-        {1.0: "s sec secs second seconds", 1e-3: "ms msec millis milliseconds", 1e-6: "us µs μs usec microseconds"}
-        | {1e-9: "ns nsec nanoseconds", 60.0: "min minutes", 3600.0: "h hours", 86400.0: "days"}
+        {1.0: "s sec secs second seconds", 1e-3: "ms msec millis milliseconds", 1e-6: "us µs usec micros microseconds"}
+        | {1e-9: "ns nsec nanos nanoseconds", 60.0: "min minutes", 3600.0: "h hours", 86400.0: "days"}
     ),
-    "angle": _spellings({1.0: "rad radians", np.pi / 180: "deg ° degree degrees"}),
+    "angle": _spellings({1.0: "rad radians", np.pi / 180: "deg degree degrees"}),
 }
 """Kind of quantity → spelling of a unit without white space, in lower case → factor to rad/s, m/s², µT, s, rad."""
 KNOWN_UNITS = {spelling for spellings in UNITS.values() for spelling in spellings}
 OTHER_UNITS = {"c", "degc", "°c", "kpa", "hpa", "pa", "mv", "v", "%", "m", "mm", "cm", "hz", "counts", "lsb", "n", "nm"}
 
 
+SPELLINGS = (
+    (r"â(?=[°µμ²])", ""),  # a text of UTF-8 that was read as another
+    (r"−", "-"),
+    (r"⁻¹", "-1"),
+    (r"⁻²|\^-2", "-2"),
+    (r"\^-1", "-1"),
+    (r"μ", "µ"),
+    (r"\bper\b", "/"),
+    (r"(?<=[a-z°])\s*[.*·]\s*(?=[a-z])|\s+", " "),
+    (r"[°º˚]|\b(degrees?|grad)\b", "deg"),
+    (r"\bradians?\b", "rad"),
+    (r"\bmet(er|re)s?\b", "m"),
+    (r"(?<=[/ ])(seconds?|sec)\b", "s"),
+    (r" ?squared|\*\*2|\^2|²", "2"),
+    (r"\bmilli[- ]", "m"),
+    (r"\bmicro[- ]", "u"),
+    (r" ", ""),
+)
+"""Ways to write a unit → that of the table of units, one after another."""
+
+
 def plain(unit: str) -> str:
     """A unit as the table of units spells it: ``deg.s⁻¹``, ``radians per second`` and the like by their short forms."""
-    simple = re.sub(r"[\s·]+", "", unit).lower()
-    if simple in KNOWN_UNITS or simple in OTHER_UNITS:
-        return simple
-    short = unit.lower().replace("−", "-").replace("⁻¹", "-1").replace("⁻²", "-2").replace("μ", "µ")
-    short = re.sub(r"(?<=[a-z°])\s*[.*·]\s*(?=[a-z])|\s+", " ", short)
-    short = re.sub(r"\bper\b", "/", short)
-    short = re.sub(r"\bseconds?\b(?! ?squared)", "s", short) if "/" in short else short
-    return re.sub(r"\s+", "", short)
+    short = re.sub(r"\s+", "", unit).lower()
+    if short in KNOWN_UNITS or short in OTHER_UNITS:
+        return short
+    short = unit.strip().lower()
+    for pattern, spelling in SPELLINGS:
+        short = re.sub(pattern, spelling, short)
+    return short
 
 
 def factor(kind: str, unit: str) -> float:
@@ -106,9 +128,11 @@ def factor(kind: str, unit: str) -> float:
     known = UNITS.get(kind)
     if known is None:
         return 1.0
-    if not isinstance(unit, str) or plain(unit) not in known:
-        raise ValueError(f"units[{kind!r}]: {unknown('unit', unit, known)}")
-    return known[plain(unit)]
+    if isinstance(unit, str):
+        times, short = re.fullmatch(r"(\d*\.?\d*)(.*)", plain(unit)).groups()  # type: ignore[union-attr]
+        if plain(unit) in known or (times.strip(".") and short in known and float(times) > 0.0):
+            return known[plain(unit)] if plain(unit) in known else float(times) * known[short]
+    raise ValueError(f"units[{kind!r}]: {unknown('unit', unit, known)}")
 
 
 def split_unit(name: str) -> tuple[str, str]:
@@ -133,7 +157,9 @@ def split_unit(name: str) -> tuple[str, str]:
         stem, said, unit = name.strip().rpartition(", ")
         return (stem, unit) if said and plain(unit) in KNOWN_UNITS and not unit.isdigit() else (name.strip(), "")
     unit = (match["a"] if match["a"] is not None else match["b"]).strip()
+    times, short = re.fullmatch(r"(\d*\.?\d*)(.*)", plain(unit)).groups()  # type: ignore[union-attr]
     known = (plain(unit) in KNOWN_UNITS or plain(unit) in OTHER_UNITS) and not unit.isdigit()
+    known = known or (bool(times) and short in UNITS["time"])
     return (match["name"].strip(), unit) if unit == "" or known else (name.strip(), "")
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from zoneinfo import ZoneInfo
@@ -41,6 +42,8 @@ def written(folder: Path, content: str) -> Path:
                 "%d-%b-%Y %H:%M:%S.%f",
                 "%Y%m%d %H:%M:%S.%f",
                 "%Y%m%d_%H:%M:%S:%f",
+                "%Y%m%dT%H%M%S.%f",
+                "%Y-%m-%d %H-%M-%S-%f",
                 "%Y/%m/%d %I:%M:%S.%f%p",
                 "%d.%m.%Y %H:%M:%S.%f",
             )
@@ -55,6 +58,13 @@ def test_dates_are_times(tmp_path, stamp):
     table = read_table(written(tmp_path, "timestamp,x,y,z\n" + rows))
     seconds = as_seconds(table.column("timestamp"), table.units["timestamp"]).elapsed
     np.testing.assert_allclose(seconds, np.arange(50) / 100.0, atol=1e-6)
+
+
+def test_a_leap_second_is_one_second_long(tmp_path):
+    stamps = [f"2016-12-31T23:59:{59 + k / 100:05.2f}Z" for k in range(200)]
+    stamps += [f"2017-01-01T00:00:{k / 100:05.2f}Z" for k in range(100)]
+    table = read_table(written(tmp_path, "timestamp,x,y,z\n" + "".join(f"{stamp},1,2,3\n" for stamp in stamps)))
+    np.testing.assert_allclose(as_seconds(table.column("timestamp"), "ns").elapsed, np.arange(300) / 100, atol=1e-9)
 
 
 @pytest.mark.parametrize("form", ["%Y%m%d%H%M%S%f", "%H%M%S.%f"])
@@ -75,10 +85,48 @@ def test_whole_nanoseconds_keep_their_digits(tmp_path):
     assert stamps.since(start - 1_000_000_000)[0] == 1.0
 
 
-@pytest.mark.parametrize(("end", "step"), [(2**16, 1), (2**32, 16667), (256, 1), (2**16, 3)])
+@pytest.mark.parametrize(
+    ("end", "step"),
+    [(2**16, 1), (2**32, 16667), (256, 1), (2**16, 3), (60_000, 10), (604_800_000, 5), (604_800 * 10**9, 10**7)],
+)
 def test_counters_wrap(end, step):
     count = (end - 20 * step + step * np.arange(50)) % end
     np.testing.assert_array_equal(as_seconds(count, "s").elapsed, step * np.arange(50.0))
+
+
+@pytest.mark.parametrize("bits", [8, 16, 32])
+def test_signed_counters_wrap(bits):
+    step = max(1, 2**bits // 10_000)
+    count = (2**bits - 20 * step + step * np.arange(50)) % 2**bits - 2 ** (bits - 1)
+    np.testing.assert_array_equal(as_seconds(count, "s").elapsed, step * np.arange(50.0))
+
+
+@pytest.mark.parametrize("period", [60, 3600, 86_400, 604_800])
+def test_seconds_of_a_period_start_again(period):
+    stamps = np.round((period - 0.203 + np.arange(50) / 100) % period, 3)
+    np.testing.assert_allclose(as_seconds(stamps, "s").elapsed, np.arange(50) / 100, atol=1e-9)
+
+
+@pytest.mark.parametrize(("tick", "rate"), [(1 / 32_768, 100.0), (1 / 32_768, 51.2), (39.0625e-6, 50.0)])
+def test_ticks_of_a_quartz_are_told_by_the_rate(tick, rate):
+    with pytest.warns(UserWarning, match="taken for ticks"):
+        stamps = as_seconds(np.rint(np.arange(500) / rate / tick).astype(int), "")
+    np.testing.assert_allclose(stamps.elapsed, np.arange(500) / rate, atol=tick)
+    with pytest.raises(ValueError, match=r"ticks of 1/32768 s \(128 Hz\), ticks of 39.0625 µs \(100 Hz\)"):
+        as_seconds(256 * np.arange(500), "")
+    np.testing.assert_allclose(as_seconds(256 * np.arange(500), "39.0625 us").elapsed, np.arange(500) / 100)
+
+
+@pytest.mark.parametrize(
+    ("name", "scale"), [("t_ms", 1e3), ("timestampUs", 1e6), ("Time (0.1 ms)", 1e4), ("micros", 1e6)]
+)
+def test_the_name_of_a_column_tells_the_unit(tmp_path, name, scale):
+    rows = "".join(f"{k / 100 * scale:.0f},0.1,0.2,0.3,0,0,1\n" for k in range(50))
+    names = "gyr_x [rad/s],gyr_y [rad/s],gyr_z [rad/s],acc_x [g],acc_y [g],acc_z [g]"
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        recording = load_recording(written(tmp_path, f"{name},{names}\n{rows}"))
+    np.testing.assert_allclose(recording.time, np.arange(50) / 100, atol=1e-9)
 
 
 def test_times_that_run_backwards_are_refused_and_neighbours_may_change_places():
