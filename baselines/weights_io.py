@@ -22,6 +22,7 @@ WEIGHTS = Path(__file__).resolve().parent / "weights"
 """Folder of the weights that come with the package."""
 
 SUFFIX = ".safetensors"
+ALIKE = str.maketrans("+-", "__")
 DIGEST = "sha256"
 """Field of the card that :func:`save_weights` adds."""
 
@@ -112,13 +113,18 @@ def list_weights() -> list[str]:
 def find_weights(path_or_name: str | Path) -> Path:
     """Path of the weights of a shipped name or of a file.
 
+    The names of estimators are names of their weights: a + or - of a name matches a _ of a file.
+
     Raises:
         FileNotFoundError: there are none.
     """
     given = Path(path_or_name)
     # A bare name selects shipped weights, independent of the working directory.
     bare = given.name == str(path_or_name) and given.suffix != SUFFIX
-    path = weights_path(WEIGHTS / given if bare else given)
+    if bare:
+        names = {name.translate(ALIKE): name for name in list_weights()}
+        given = WEIGHTS / names.get(given.name.translate(ALIKE), given.name)
+    path = weights_path(given)
     if not path.is_file():
         raise FileNotFoundError(f"no weights {str(path_or_name)!r}; shipped are {', '.join(list_weights()) or 'none'}")
     return path

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Annotated
 
 import tyro
 
@@ -18,7 +17,7 @@ class Args:
     array: tyro.conf.Positional[str]
     """octa, controller, planar or triaxial; or a JSON file with positions (m) and axes (unit vectors), a row for each
     accelerometer, and if wanted name and reference (the point whose acceleration is meant)"""
-    std: Annotated[float, tyro.conf.arg(aliases=["--deviation"])] = 1.0
+    std: float = 1.0
     """σ_a of one accelerometer, m/s² per sample; gains are multiplied by it"""
     json: bool = False
     """print one JSON document instead of tables"""

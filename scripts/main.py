@@ -16,7 +16,7 @@ import os
 import re
 import sys
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Annotated, NamedTuple, get_args, get_type_hints
 
 from gymnasium.error import UnregisteredEnv
 
@@ -150,13 +150,39 @@ def run(name: str, words: Sequence[str]) -> int:
     complaint = io.StringIO()
     try:
         with contextlib.redirect_stderr(complaint):
-            args = tyro.cli(module.Args, args=list(words), prog=f"poise {name}", description=module.__doc__)
+            args = tyro.cli(plain_help(module.Args), args=list(words), prog=f"poise {name}", description=module.__doc__)
     except SystemExit as stop:
         if not stop.code:
             raise
         return fail(unboxed(complaint.getvalue()))
     check_counts(args)
     return int(module.run(args))
+
+
+def plain_help(arguments: type) -> type:
+    """The dataclass ``arguments``, whose help is silent about defaults that are nothing: None, no words, no flag."""
+    import tyro
+
+    for name, hint in get_type_hints(arguments, include_extras=True).items():
+        # What has aliases has a configuration of its own.
+        if not any(isinstance(part, type(tyro.conf.arg())) for part in getattr(hint, "__metadata__", ())):
+            label = placeholder(hint)
+            arguments.__annotations__[name] = Annotated[hint, tyro.conf.arg(metavar=label, help_behavior_hint=stated)]
+    return arguments
+
+
+def placeholder(hint: object) -> str | None:
+    """What stands for a value that may be left out, such as PATH; None for all others."""
+    kinds = [kind for kind in get_args(hint) if kind is not type(None)]
+    if type(None) not in get_args(hint) or len(kinds) > 1:
+        return None
+    names = [kind.__name__.upper() for kind in get_args(kinds[0]) or kinds if isinstance(kind, type)]
+    return f"[{names[0]} [{names[0]} ...]]" if ... in get_args(kinds[0]) else " ".join(names) or None
+
+
+def stated(default: str) -> str:
+    """What a help text says of a default."""
+    return "" if default in ("", "None", "False") else f"(default: {default})"
 
 
 def check_counts(args: object) -> None:

@@ -87,7 +87,8 @@ def channel_row(name: str, values: np.ndarray, time: np.ndarray) -> dict[str, An
         stamps = time[present]
         row["Hz"] = (len(stamps) - 1) / float(stamps[-1] - stamps[0]) if stamps[-1] > stamps[0] else float("nan")
         row |= {"lowest": float(values[present].min()), "highest": float(values[present].max())}
-        row["clipped %"] = 100.0 * clipped_share(values[present])
+        if not name.endswith("orientation"):
+            row["clipped %"] = 100.0 * clipped_share(values[present])
     return row
 
 

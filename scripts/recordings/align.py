@@ -37,7 +37,7 @@ class Args:
     """segment: begin and end, s, of the movement"""
     axis: str = "x"
     """segment: axis of the segment about which it turned (x forward, y left), with - if the first turn was negative"""
-    output: Annotated[Path | None, tyro.conf.arg(aliases=["-o"])] = None
+    output: Annotated[Path | None, tyro.conf.arg(aliases=["-o"], metavar="PATH", help_behavior_hint="")] = None
     """clocks, segment: the aligned recording, as .h5"""
     record: Path = Path("calibration.json")
     """magnetometer: file of the calibration; records of other channels in it are kept"""

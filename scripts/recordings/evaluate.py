@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Literal
 
 import tyro
 
@@ -30,7 +30,7 @@ class Args:
     """take the truth as recorded, or corrected by the measured offset between its clock and that of the gyroscope"""
     offline: bool = False
     """run the smoother of every estimator that has one as well: estimates that use the whole recording"""
-    site: Annotated[str | None, tyro.conf.arg(aliases=["--place"])] = None
+    site: str | None = None
     """in recordings of several sensors, the one to use, such as bicycle_imu or trunk_imu of a ride"""
     calibration: Path | None = None
     """record of `poise calibrate` that turns raw readings of the recordings into SI units"""

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from poise.baselines.weights_io import WEIGHTS, list_weights, load_weights, save_weights
+from poise.baselines.weights_io import WEIGHTS, find_weights, list_weights, load_weights, save_weights
 
 ARRAYS = {"a": np.arange(6, dtype=np.float32).reshape(2, 3), "b": np.array([1.5]), "c": np.array(3)}
 
@@ -99,3 +99,8 @@ def test_shipped_weights_are_sound_and_small(name: str) -> None:
 def test_loading_needs_no_torch() -> None:
     code = "import sys; import poise.baselines.weights_io; assert 'torch' not in sys.modules"
     subprocess.run([sys.executable, "-c", code], check=True)
+
+
+@pytest.mark.parametrize("name", ["bounded-motion+network", "external-acceleration+policy", "mekf+noise", "gru"])
+def test_the_name_of_an_estimator_is_that_of_its_weights(name: str) -> None:
+    assert find_weights(name).stem in list_weights()

@@ -27,7 +27,7 @@ def test_report_of_a_file_as_json(tmp_path, capsys):
     path = tmp_path / "short.json"
     described = planar_controller(0.1).describe()
     path.write_text(json.dumps({name: described[name] for name in ("positions", "axes")}))
-    assert main(["array", str(path), "--deviation", "0.3", "--json"]) == 0
+    assert main(["array", str(path), "--std", "0.3", "--json"]) == 0
     document = json.loads(capsys.readouterr().out)
     report = document["summary"]
     assert (report["array"], report["rank"], report["of"]) == ("short", 4, 4)

@@ -76,6 +76,15 @@ def test_help_of_a_command_shows_the_sentences(capsys: pytest.CaptureFixture[str
     assert "Does nothing, for a test." in out
 
 
+@pytest.mark.parametrize("command", ["estimate", "align", "reproduce"])
+def test_help_is_silent_about_defaults_that_are_nothing(command: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        cli.main([command, "--help"])
+    out = capsys.readouterr().out
+    assert "PATH" in out
+    assert not {part for part in ("{None}", "(default: )", "default: None", "default: False") if part in out}
+
+
 def test_unknown_command_names_the_valid_ones(capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["benchmrak"]) == 2
     err = capsys.readouterr().err

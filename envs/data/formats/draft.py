@@ -1,4 +1,4 @@
-"""Drafts of mappings for files that no reader knows, and what a user is told about such a file."""
+"""Drafts of mappings for files that no reader knows, and the message about such a file."""
 
 from __future__ import annotations
 
@@ -103,10 +103,10 @@ def explanation(path: Path) -> str:
     except (ValueError, ImportError) as reason:
         return str(reason)
     mapping = mapping_of(table)
-    told = ", ".join(f"{channel} = {list(columns)}" for channel, columns in mapping.columns.items())
+    suggested = ", ".join(f"{channel} = {list(columns)}" for channel, columns in mapping.columns.items())
     return (
-        f"it holds a table ({table.seen()}), but neither its format is known nor do its names and units tell gyroscope "
-        f"and accelerometer{f' (they suggest {told})' if told else ''}. Say what the columns mean: "
+        f"it holds a table ({table.seen()}) of an unknown format, whose names and units do not identify gyroscope and "
+        f"accelerometer{f' (they suggest {suggested})' if suggested else ''}. Say what the columns mean: "
         'poise.load_recording(path, columns={"gyr": […], "acc": […]}, units={"gyr": "deg/s", "acc": "g"}, '
         'time="…" or rate=…), or write the same to a TOML file, which `poise inspect FILE --write-map` drafts'
     )
