@@ -180,7 +180,7 @@ def experiment(study: Study, report: Report, simulated: list[Row]) -> None:
         rows,
         f"Largest error of pitch and azimuth over {seeds} motions of {duration:g} s. *Experiment* is a simulated one: "
         f"errors *{SENSORS}*, hand {ACCELERATIONS['controller']:g} and {ACCELERATIONS['octa']:g} m/s² rms an axis, a "
-        "tracker as reference. The printed ± are ranges read off figures, not deviations.",
+        "tracker as reference. The published ± are ranges read off figures, not standard deviations.",
         interval=OVER_MOTIONS,
     )
     worst = {

@@ -237,7 +237,7 @@ def angular_rates(study: Study, report: Report) -> None:
             | {"values": values_of(rows, "rms", method=method, errors=CALIBRATED)}
             for method, row in ROWS_OF_TABLE_2_1.items()
         ],
-        f"Printed: mean and range of six runs of the real device. Ours: {seeds} simulated motions of {duration:g} s "
+        f"Published: mean and range of six runs of the real device. Ours: {seeds} simulated motions of {duration:g} s "
         f"with the errors *{CALIBRATED}* that a calibration leaves.",
         interval=OVER_MOTIONS,
     )

@@ -349,8 +349,8 @@ def spatial(study: Study, report: Report) -> list[Row]:
         "Figures 5.6 to 5.10: every method",
         attitude_table(rows),
         "Degrees: rms means over the motions, the largest error over all of them, the share of samples within ±3° in "
-        "pitch and azimuth, and the rms error of the whole rotation, which the thesis does not show. *Sound* has the "
-        "exact transition and the nearest rotation, *first order* is the thesis' form.",
+        "pitch and azimuth, and the rms error of the whole rotation, which the thesis does not show. *Exact "
+        "rotation* has the exact transition and takes the nearest rotation, *first order* is the thesis' form.",
     )
     report.claims("Chapter 5: what holds here", claims(rows))
     _inclined(study, report, roots[: 2 if study.quick else 5], duration)

@@ -108,7 +108,7 @@ def load_dot(path: Path) -> list[Trajectory]:
     return [
         grid.replace(
             time=grid.time - grid.time[0],
-            metadata=grid.metadata | {"rate": 1.0 / interval, "missing_ticks": len(grid) - len(recorded)},
+            metadata=grid.metadata | {"rate": 1.0 / interval, "missing_samples": len(grid) - len(recorded)},
         )
     ]
 

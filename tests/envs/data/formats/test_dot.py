@@ -60,7 +60,7 @@ def test_lost_packets_are_missing_and_the_clock_may_wrap(tmp_path, columns):
     present = np.isfinite(ride.measurements["imu/acc"]).all(1)
     np.testing.assert_array_equal(np.flatnonzero(present), ticks)
     np.testing.assert_allclose(ride.measurements["imu/acc"][ticks, 0], columns["Acc_X"])
-    assert ride.metadata["missing_ticks"] == 8
+    assert ride.metadata["missing_samples"] == 8
     assert ride.uniform
 
 
@@ -99,7 +99,7 @@ def test_the_rate_of_the_header_is_the_grid(tmp_path, columns):
     with pytest.warns(UserWarning, match="39 of 79 samples at 60 Hz are missing"):
         ride = load_recording(write_dot(tmp_path / "half.csv", clock_of(2 * np.arange(N)), columns))
     assert ride.dt == pytest.approx(1 / 60, rel=1e-4)
-    assert ride.metadata["missing_ticks"] == N - 1
+    assert ride.metadata["missing_samples"] == N - 1
     np.testing.assert_allclose(ride.measurements["imu/acc"][::2, 0], columns["Acc_X"])
 
 

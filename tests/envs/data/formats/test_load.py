@@ -146,6 +146,6 @@ def test_the_two_sensors_of_a_bicycle_ride_share_their_clock(data):
     assert len({ride.metadata["clock_start"] for ride in rides}) == 1
     for ride in rides:
         assert len(ride) == 18391
-        assert ride.metadata["missing_ticks"] == 0
+        assert ride.metadata["missing_samples"] == 0
         assert np.linalg.norm(ride.measurements["imu/acc"].mean(0)) == pytest.approx(9.8, abs=0.6)
         assert np.abs(ride.measurements["imu/gyr"]).max() < 15.0
