@@ -1,4 +1,4 @@
-"""Agents compared over seeds: tables and figures from the run folders of ``poise tune``, and from nothing else.
+"""Agents compared over seeds: tables and figures from run folders of ``poise tune`` or a script, and nothing else.
 
 A score is the share of the published gains' error that a policy saves on a trajectory: 0 as published, 1 without error.
 Runs of one filter are comparable where they were tested on the same trajectories.
@@ -23,8 +23,12 @@ if TYPE_CHECKING:
 
 SETS, CURVE = "sets.json", "curve.csv"
 """Files of a run folder: group → names of its test trajectories; progress of the training."""
+PLAIN = "plain_ppo"
+"""Command of the run folders of ``docs/examples/plain_ppo.py``, which hold the same."""
 PUBLISHED, CONSTANT, POLICY = "published", "constant", "policy"
 """Rows of the results of a run: the reference of scores, the reference of improvement, and what the agent found."""
+CURVE_DRAWS, CURVE_POINTS = 300, 50
+"""Bootstrap draws of each point of a learning curve, and points of a curve."""
 
 
 @dataclass(frozen=True)
@@ -65,7 +69,7 @@ class TuneRun:
             if (folder / CURVE).is_file():
                 with (folder / CURVE).open(encoding="utf-8", newline="") as file:
                     curve = [{name: float(value) for name, value in row.items()} for row in csv.DictReader(file)]
-            if started["command"] != "tune":
+            if started["command"] not in ("tune", PLAIN):
                 raise ValueError(f"it is of the command {started['command']!r}")
             return cls(folder, args["filter"], args["agent"], int(started["seed"]), sets, errors, curve)
         except (KeyError, TypeError, ValueError) as reason:
@@ -141,6 +145,9 @@ def comparison(runs: Sequence[TuneRun], seed: int = 0, draws: int = DRAWS) -> li
                     "published (deg)": round(float(mean[PUBLISHED]), 3),
                     "best constant (deg)": round(float(mean[CONSTANT]), 3),
                     "agent (deg)": round(float(mean[gains]), 3),
+                    "worst seed (deg)": round(
+                        max(float(np.mean([run.errors[gains][name] for name in names])) for run in some), 3
+                    ),
                     "saved, IQM": shown(saved),
                     "saved more than constant": shown(more),
                     "the same, other seeds alone": shown(seeds),
@@ -176,7 +183,10 @@ def profiles_figure(runs: Sequence[TuneRun], group: str) -> Figure:
 
 
 def curves_figure(runs: Sequence[TuneRun]) -> Figure | None:
-    """Learning curves: mean and range over seeds of the reward while training; None where no run has one."""
+    """Learning curves: interquartile mean over seeds of the reward while training, with the interval of other seeds.
+
+    None where no run has a curve.
+    """
     from ...plots import legend_above, new_figure
 
     found = {key: some for key, some in agents_of(runs).items() if all(run.curve for run in some)}
@@ -189,8 +199,10 @@ def curves_figure(runs: Sequence[TuneRun]) -> Figure | None:
             if owner != filter:
                 continue
             steps, values = common_curve([run.curve for run in some])
-            (line,) = ax.plot(steps, values.mean(axis=0), label=agent)
-            ax.fill_between(steps, values.min(axis=0), values.max(axis=0), color=line.get_color(), alpha=0.2, lw=0.0)
+            middle = [bootstrap_interval(interquartile_mean, column[:, None], draws=CURVE_DRAWS) for column in values.T]
+            value, low, high = np.array(middle).T
+            (line,) = ax.plot(steps, value, label=agent)
+            ax.fill_between(steps, low, high, color=line.get_color(), alpha=0.2, lw=0.0)
         ax.set(xlabel="decisions", ylabel=f"reward per decision, {filter}")
         legend_above(ax)
     return figure
@@ -203,5 +215,5 @@ def common_curve(curves: Sequence[Sequence[Mapping[str, float]]]) -> tuple[np.nd
     """
     known = [[(row["steps"], row["gain"]) for row in curve if np.isfinite(row["gain"])] for curve in curves]
     arrays = [np.array(points or [(0.0, 0.0)]).T for points in known]
-    steps = np.linspace(max(each[0, 0] for each in arrays), min(each[0, -1] for each in arrays), 100)
+    steps = np.linspace(max(each[0, 0] for each in arrays), min(each[0, -1] for each in arrays), CURVE_POINTS)
     return steps, np.stack([np.interp(steps, *each) for each in arrays])

@@ -1,6 +1,7 @@
 """Runs of agents become tables and figures; runs that cannot be compared are refused."""
 
 import csv
+import dataclasses
 import json
 
 import numpy as np
@@ -52,6 +53,8 @@ def test_a_table_of_agents(runs):
     assert (ppo["agent"], ppo["seeds"], ppo["trajectories"]) == ("ppo", 5, 6)
     assert ppo["published (deg)"] == pytest.approx(3.5)
     assert ppo["best constant (deg)"] == pytest.approx(3.15)
+    means = [np.mean(list(run.errors["policy"].values())) for run in runs if run.agent == "ppo"]
+    assert ppo["worst seed (deg)"] == pytest.approx(max(means), abs=1e-3)
     value, low, high = (float(each.strip("[],")) for each in ppo["saved, IQM"].split())
     assert low <= value <= high
     assert value == pytest.approx(0.5, abs=0.02)
@@ -70,6 +73,21 @@ def test_figures(runs, tmp_path):
     ppo, sac = (line.get_ydata() for line in axes.lines[:2])
     assert (ppo >= sac - 1e-9).all()
     assert save(curves_figure(runs), tmp_path / "curves.png").stat().st_size > 1000
+
+
+def test_a_curve_is_the_interquartile_mean_over_seeds(runs):
+    first, second = (
+        dataclasses.replace(run, curve=[{"steps": 0.0, "gain": 0.0}, {"steps": 10.0, "gain": 8.0}]) for run in runs[:2]
+    )
+    others = [
+        dataclasses.replace(run, curve=[{"steps": 0.0, "gain": 0.0}, {"steps": 10.0, "gain": 1.0}]) for run in runs[2:5]
+    ]
+    (axes,) = curves_figure([first, second, *others]).axes
+    np.testing.assert_allclose(axes.lines[0].get_ydata()[[0, -1]], [0.0, (1.0 + 1.0 + 8.0) / 3])
+
+
+def test_runs_of_the_script_are_read_too(tmp_path):
+    assert write_run(tmp_path / "plain", command="plain_ppo").errors["policy"]
 
 
 def test_curves_meet_where_all_are_known():
