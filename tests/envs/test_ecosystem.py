@@ -131,9 +131,21 @@ def test_a_single_file_that_knows_only_the_id(words, tmp_path):
     assert example("ppo_single_file").main([*words, *common]) == curve
 
 
+def test_plain_ppo_leaves_runs_that_are_compared(tmp_path, capsys):
+    from poise.scripts.main import main
+
+    words = ["--steps", "1", "--episodes", "4", "--seeds", "0", "1", "--runs", str(tmp_path)]
+    first, second = example("plain_ppo").main(words)
+    assert len(first.curve) == 1
+    assert first.errors["published"] == second.errors["published"]
+    assert first.errors["policy"] != second.errors["policy"]
+    assert main(["tune", "--report", str(first.folder), str(second.folder), "--runs", str(tmp_path)]) == 0
+    assert "PPO default, 1 steps" in capsys.readouterr().out
+
+
 @pytest.mark.slow
-def test_plain_ppo_beats_the_published_gains():
-    (run,) = example("plain_ppo").main(["--steps", "25000", "--episodes", "16"])
+def test_plain_ppo_beats_the_published_gains(tmp_path):
+    (run,) = example("plain_ppo").main(["--steps", "25000", "--episodes", "16", "--runs", str(tmp_path)])
     published, constant, ppo = (
         np.mean(list(run.errors[gains].values())) for gains in ("published", "constant", "policy")
     )
