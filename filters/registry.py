@@ -150,6 +150,9 @@ FILTERS: dict[str, Entry] = {
         HERE,
     ),
     "bounded-motion-9": Entry(".imu.bounded_motion:BoundedMotion9", WITH_HEADING, HERE),
+    "bounded-motion-rest-9": Entry(
+        ".imu.rest:RestingBoundedMotion9", "bounded-motion-rest with the heading of a magnetometer", HERE
+    ),
     "array-orientation": Entry(
         SPATIAL, 'orientation from an accelerometer array; array="controller", "octa" or your own', HE
     ),

@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 
 CONTENDERS = ("bounded-motion", "vqf", "mahony", "tilt", "gyroscope-integration")
 """What a network for one inertial sensor is compared with on the test episodes."""
+NINE = ("bounded-motion-9", "mekf-9", "vqf-9", "mahony-9")
+"""The same for one with a magnetometer."""
 GESTURES = ("slow", "fast", "severe", "mixed")
 """Gestures of the hand-motion environment on which it is tested besides episodes of its recipes."""
 OPTIONS = (
@@ -160,7 +162,8 @@ def test(result: FitResult, preset: Preset, args: Args, out: Output) -> pandas.D
 
     contenders: dict[str, Any] = {args.preset: result.estimator}
     corrected = preset.filter or preset.paper or CONTENDERS[0]
-    others = CONTENDERS if preset.rides is None else (corrected.removesuffix("-consistent"),)
+    others = NINE if preset.magnetic else CONTENDERS
+    others = others if preset.rides is None else (corrected.removesuffix("-consistent"),)
     contenders |= {name: name for name in dict.fromkeys([corrected, *others])}
     if preset.rides is not None:
         groups, tables = test_rides(preset, args.seed, tested(args)), []
@@ -179,7 +182,7 @@ def test(result: FitResult, preset: Preset, args: Args, out: Output) -> pandas.D
     table = evaluate(contenders, test_trajectories(preset, args.seed, tested(args)), progress=True)
     for name, reason in dict.fromkeys((name, reason) for name, _, reason in table.attrs["skipped"]):
         out.say(f"not compared with {name}: {reason}")
-    return table[table["metric"] == "inclination"]
+    return table[table["metric"] == ("heading" if preset.magnetic else "inclination")]
 
 
 def test_trajectories(preset: Preset, seed: int, episodes: int) -> list[Trajectory]:
@@ -193,7 +196,8 @@ def test_trajectories(preset: Preset, seed: int, episodes: int) -> list[Trajecto
     for name in preset.sources:
         for index, each in enumerate(simulate(preset.recipe(name), root, max(1, episodes // len(preset.sources)))):
             trajectories.append(each.replace(metadata={**each.metadata, "name": f"{name}:{index}"}))
-    for index, gesture in enumerate(GESTURES):
+    # their sensor has no magnetometer
+    for index, gesture in enumerate(() if preset.magnetic else GESTURES):
         hand = HandTrajectories((gesture,), rates=(60.0, 100.0, 200.0), sensors=("paper-hand",), duration=60.0)
         for number, trajectory in enumerate(hand.draw_many(root + 1 + index, max(1, episodes // 4))):
             metadata = {**trajectory.metadata, "name": f"{gesture}:{number}"}

@@ -16,17 +16,21 @@ from ...filters.core.sampling import zeros
 from ...filters.support.names import look_up
 from ..weights_io import load_weights, save_weights
 from .head import AngleHead, Head, TiltHead
+from .heading_head import HeadingHead
 from .inputs.filter_bank import FilterBank
 from .inputs.filter_features import FilterFeatures
 from .inputs.front_end import FrontEnd, RawChannels
+from .inputs.heading_bank import HeadingBank
 from .inputs.level_frame import LevelFrame
 from .mixture_head import MixtureHead
 from .networks.gru import GruNetwork
 from .networks.tcn import TcnNetwork
 from .networks.unlikeness import read_network
 
-FRONT_ENDS: dict[str, Any] = {kind.kind: kind for kind in (LevelFrame, FilterBank, FilterFeatures, RawChannels)}
-HEADS: dict[str, Any] = {kind.kind: kind for kind in (TiltHead, MixtureHead, AngleHead)}
+FRONT_ENDS: dict[str, Any] = {
+    kind.kind: kind for kind in (LevelFrame, FilterBank, HeadingBank, FilterFeatures, RawChannels)
+}
+HEADS: dict[str, Any] = {kind.kind: kind for kind in (TiltHead, MixtureHead, HeadingHead, AngleHead)}
 NETWORKS: dict[str, Any] = {kind.kind: kind for kind in (GruNetwork, TcnNetwork)}
 """Kind in a card → class, with ``read`` or ``from_arrays``."""
 

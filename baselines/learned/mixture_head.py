@@ -54,12 +54,16 @@ class MixtureHead(InclinationHead):
     def up(self, output: Array, spread: Array) -> Array:
         """The up vector ``(..., 3)``, of any length, in the level frame."""
         xp, count = namespace(output), self.candidates
-        logits = output + constant([self.preference, *[0.0] * count], output)
-        weights = xp.exp(logits - xp.max(logits, axis=-1, keepdims=True))
-        weights = weights / xp.sum(weights, axis=-1, keepdims=True)
         # Σ w c over the candidates c; the published filter's own tilt in its level frame is zero
         tilts = xp.reshape(spread[..., 1:], (*tuple(spread.shape[:-1]), count, 2))
-        return _vector(xp.sum(weights[..., 1:, None] * tilts, axis=-2))
+        return _vector(xp.sum(self.weights(output)[..., 1:, None] * tilts, axis=-2))
+
+    def weights(self, output: Array) -> Array:
+        """Of the published filter and its candidates ``(..., K + 1)``, with the sum of one."""
+        xp = namespace(output)
+        logits = output + constant([self.preference, *[0.0] * self.candidates], output)
+        weights = xp.exp(logits - xp.max(logits, axis=-1, keepdims=True))
+        return weights / xp.sum(weights, axis=-1, keepdims=True)
 
     def loss(self, output: Any, target: Any, spread: Any, mask: Any) -> Any:
         """Mean over sequences of the ratio of root mean square errors, this one's to the published filter's.

@@ -11,14 +11,18 @@ import numpy as np
 from ...envs.recipes.recipe import Recipe
 from ...envs.recipes.registry import recipe
 from ...envs.recipes.rides import RideSource
+from ...filters.core.quantity import MAGNETOMETER
 from ...filters.registry import make
 from ...filters.support.names import look_up
 from ...filters.support.seeds import child_seeds
 from .config import FitConfig
 from .head import AngleHead, Head, TiltHead
+from .heading_head import HeadingHead
 from .inputs.filter_bank import TUNINGS, FilterBank
 from .inputs.filter_features import FilterFeatures
 from .inputs.front_end import FrontEnd, RawChannels
+from .inputs.heading_bank import TUNINGS as HEADINGS
+from .inputs.heading_bank import HeadingBank
 from .inputs.level_frame import LevelFrame
 from .mixture_head import MixtureHead
 
@@ -78,6 +82,11 @@ class Preset:
         if self.units < 1:
             raise ValueError(f"units must be at least 1, got {self.units}")
 
+    @property
+    def magnetic(self) -> bool:
+        """Whether a bank is of headings: those of a filter that reads a magnetometer."""
+        return self.bank and MAGNETOMETER in make(str(self.filter)).channels
+
     def recipe(self, name: str) -> Recipe:
         """The recipe of a source."""
         return recipe(name)
@@ -86,7 +95,8 @@ class Preset:
         """What the network sees."""
         kalman: Any = None if self.filter is None else make(self.filter, **self.parameters)
         if self.rides is None:
-            return FilterBank(LevelFrame(kalman)) if self.bank else LevelFrame(kalman)
+            bank = HeadingBank if self.magnetic else FilterBank
+            return bank(LevelFrame(kalman)) if self.bank else LevelFrame(kalman)
         if self.paper is None:
             return FilterFeatures(kalman)
         channels = [c for c in make(self.paper).channels if not self.sites or c.name.split("/")[0] in self.sites]
@@ -94,6 +104,8 @@ class Preset:
 
     def head(self) -> Head:
         """What it says: an inclination, or corrections of all angles of a rider's filter."""
+        if self.magnetic:
+            return HeadingHead(len(HEADINGS))
         if self.bank:
             return MixtureHead(len(TUNINGS))
         if self.rides is None:
@@ -162,6 +174,15 @@ PRESETS: dict[str, Preset] = {
         units=48,
         noise=0.05,
         fit=FitConfig(epochs=5, batch=24, learning_rate=3e-3),
+    ),
+    "bounded-motion-9+network": Preset(
+        "bounded-motion-rest-9, its heading one of seven tunings, weighed by a recurrent network",
+        {"hand-held-magnetic": 130, "carried-magnetic": 50},
+        filter="bounded-motion-rest-9",
+        bank=True,
+        units=32,
+        noise=0.05,
+        fit=FitConfig(epochs=6, batch=24, learning_rate=3e-3),
     ),
     **{
         f"{paper}+network": Preset(

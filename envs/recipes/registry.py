@@ -40,6 +40,8 @@ VARYING = PROMPT | {
     "gyroscope_temperature": (INDUSTRIAL.gyroscope.temperature_coefficient, CONSUMER.gyroscope.temperature_coefficient),
 }
 """The same, whose bias depends on the specific force and on the temperature, from one grade to the other."""
+SURROUNDINGS = ["undisturbed", "laboratory", "indoor", "fixed-magnets", "passing-magnets", "attached-magnet"]
+"""Of a magnetometer in the hand."""
 RECIPES: dict[str, ShippedRecipe] = {
     "hand-held": ShippedRecipe(
         "hand",
@@ -80,6 +82,21 @@ RECIPES: dict[str, ShippedRecipe] = {
         "hand",
         "gestures of poise/HandMotion-v0, slow to severe, by the same sensors",
         {"carried_share": 0.0, "gestures": ["slow", "fast", "severe", "mixed"], "sensors": VARYING},
+    ),
+    "hand-held-magnetic": ShippedRecipe(
+        "hand",
+        "hand-held-varying with a magnetometer: in rooms, near magnets, with one on the device, or undisturbed",
+        {"carried_share": 0.0, "sensors": VARYING, "magnetics": SURROUNDINGS},
+    ),
+    "carried-magnetic": ShippedRecipe(
+        "hand",
+        "carried-varying with a magnetometer, in rooms, near magnets or on a street",
+        {
+            "carried_share": 1.0,
+            "carried": {"first_rest": (0.3, 20.0), "running_share": 0.0},
+            "sensors": VARYING,
+            "magnetics": ["undisturbed", "laboratory", "indoor", "passing-magnets", "street"],
+        },
     ),
     "rider": ShippedRecipe("rider", "rides of anybody anywhere with sensors of several grades", {}),
 }

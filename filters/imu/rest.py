@@ -30,8 +30,9 @@ from typing import ClassVar
 from ..core.backend import Array, expand, namespace
 from ..core.matrices import block_diagonal, identity
 from ..core.model import Gain
-from ..core.quantity import Measurement
-from .bounded_motion import BoundedMotion
+from ..core.quantity import Channel, Measurement, Quantity
+from .bounded_motion import BoundedMotion, BoundedMotion9
+from .magnetic_heading import MagneticHeading
 
 
 @dataclass(frozen=True)
@@ -94,7 +95,8 @@ class RestingBoundedMotion(BoundedMotion):
         known = xp.isfinite(both)
         smooth = xp.where(known, x[..., 15:21] + share * (both - x[..., 15:21]), x[..., 15:21])
         calm = self._calm(x, z)
-        return xp.concat([first, smooth, xp.where(calm, x[..., 21:22] + dt, 0.0 * x[..., 21:22])], axis=-1)
+        rested = xp.where(calm, x[..., 21:22] + dt, 0.0 * x[..., 21:22])
+        return xp.concat([first, smooth, rested, x[..., 22:]], axis=-1)
 
     def _bias_variance(self, x: Array, z: Measurement) -> Array:
         """As there, and at rest as much as keeps its deviation at that between rest and motion."""
@@ -118,3 +120,19 @@ class RestingBoundedMotion(BoundedMotion):
         """Whether the device has been at rest for long enough ``(..., 1)``."""
         xp = namespace(x)
         return xp.logical_and(self._calm(x, z), xp.greater(x[..., 21:22], expand(self.rest_time, 1)))
+
+
+@dataclass(frozen=True)
+class RestingBoundedMotion9(MagneticHeading, RestingBoundedMotion):
+    """Nine axes: outputs as of :class:`.bounded_motion.BoundedMotion9`.
+
+    The bias about the vertical is known after a rest, so that the gyroscope keeps the heading for longer.
+
+    State: as for six axes (22), expected norm and dip of the magnetic field (2).
+    """
+
+    channels: ClassVar[tuple[Channel, ...]] = BoundedMotion9.channels
+    outputs: ClassVar[tuple[Quantity, ...]] = BoundedMotion9.outputs
+    state_size: ClassVar[int] = 24
+    residual_size: ClassVar[int] = 7
+    gains: ClassVar[dict[str, Gain]] = BoundedMotion9.gains | RestingBoundedMotion.gains

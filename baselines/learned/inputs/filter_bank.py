@@ -19,7 +19,7 @@ import numpy as np
 from ....filters.core.backend import Array, namespace
 from ....filters.core.estimator import check_measurements
 from ....filters.core.kalman import KalmanFilter
-from ....filters.core.quantity import UP, Channel, Measurement
+from ....filters.core.quantity import UP, Channel, Estimate, Measurement
 from ....filters.core.rotation import rotate
 from ....filters.core.sampling import FilterState, zeros
 from .front_end import Seen
@@ -141,7 +141,7 @@ class FilterBank:
         arrays = check_measurements(self.channels, measurement, time_axis=False)
         level, seen = self.level.step(state.level, arrays)
         others, estimate = self._others.step(state.others, self._repeated(arrays), self._factors())
-        return BankState(level, others), self._seen(seen, estimate.pose[UP.name])
+        return BankState(level, others), self._seen(seen, estimate)
 
     def run(self, measurements: Mapping[str, Any]) -> Seen:
         """See :class:`.front_end.FrontEnd`."""
@@ -149,7 +149,7 @@ class FilterBank:
         repeated = self._repeated(arrays)
         shape = next(iter(repeated.values())).shape[:-1]
         factors = {name: np.broadcast_to(values, shape) for name, values in self._factors().items()}
-        return self._seen(self.level.run(arrays), self._others.run(repeated, factors).pose[UP.name])
+        return self._seen(self.level.run(arrays), self._others.run(repeated, factors))
 
     @property
     def _others(self) -> KalmanFilter:
@@ -164,18 +164,22 @@ class FilterBank:
         xp, count = namespace(*arrays.values()), len(self.tunings)
         return {name: xp.stack([array] * count, axis=-2) for name, array in arrays.items()}
 
-    def _seen(self, seen: Seen, up: Array) -> Seen:
-        xp, batch = namespace(up), tuple(seen.due.shape)
-        turned = rotate(seen.base["relative_orientation"][..., None, :], up)[..., :2]
+    def _seen(self, seen: Seen, others: Estimate) -> Seen:
+        found = self._candidates(seen.base["relative_orientation"], others)
+        xp, batch = namespace(found), tuple(seen.due.shape)
         # before the start there are none
-        tilts = xp.where(xp.isfinite(turned), turned, xp.zeros_like(turned))
+        candidates = xp.where(xp.isfinite(found), found, xp.zeros_like(found))
         sigma = xp.where(xp.isfinite(seen.spread), seen.spread, xp.ones_like(seen.spread))
-        spread = xp.concat([sigma, xp.reshape(tilts, (*batch, -1))], axis=-1)
+        spread = xp.concat([sigma, xp.reshape(candidates, (*batch, -1))], axis=-1)
         now = seen.due == 1.0
         features = zeros(sigma, self.size)
         if bool(xp.any(now)):
-            features = xp.where(now[..., None], self._features(seen.features, tilts, sigma), features)
+            features = xp.where(now[..., None], self._features(seen.features, candidates, sigma), features)
         return seen._replace(features=features, spread=spread)
+
+    def _candidates(self, orientation: Array, others: Estimate) -> Array:
+        """What the others find beside the filter's ``orientation``: tilts ``(..., K, 2)`` in its level frame."""
+        return rotate(orientation[..., None, :], others.pose[UP.name])[..., :2]
 
     def _features(self, motion: Array, tilts: Array, sigma: Array) -> Array:
         """Features of the level frame, and candidates ``(..., K, 2)``, in terms that do not depend on the heading."""

@@ -11,58 +11,13 @@ from ....filters.core.estimator import check_measurements
 from ....filters.core.kalman import KalmanFilter
 from ....filters.core.model import equations_of, parameters_of
 from ....filters.core.observer import Observer
-from ....filters.core.quantity import ACCELEROMETER, GYROSCOPE, Channel, Estimate, Measurement, Quantity
-from ....filters.core.rotation import exp, multiply, rotate
+from ....filters.core.quantity import ACCELEROMETER, GYROSCOPE, Channel, Estimate, Measurement
 from ....filters.core.sampling import FilterState
 from ....filters.registry import make, name_of
 from ..gains.gain_shares import filter_of
+from .filter_frame import ATTITUDE, BIAS, TILT_STD, FilterFrame, frame_of
 from .front_end import Seen, check_interval
-from .gravity_aligned_frame import DUE, FEATURES, GravityAlignedFrame
-
-ATTITUDE = Channel("filter/orientation", 4, "1")
-BIAS = Channel("filter/gyroscope_bias", 3, "rad/s")
-TILT_STD = Channel("filter/tilt_std", 1, "rad")
-"""Outputs of a filter, as channels of :class:`FilterFrame`."""
-FILTERED = Quantity("features", "vector", FEATURES.size + 1, "1")
-"""The features of :class:`GravityAlignedFrame` and the logarithm of the filter's deviation."""
-
-
-@dataclass(frozen=True)
-class FilterFrame(GravityAlignedFrame):
-    """The features of its base class in the level frame of a filter, whose outputs it reads as channels."""
-
-    tilt_gain: float = 0.0
-    """the filter corrects the tilt"""
-    bias_gain: float = 0.0
-    """and the bias"""
-
-    channels: ClassVar[tuple[Channel, ...]] = (GYROSCOPE, ACCELEROMETER, ATTITUDE, BIAS, TILT_STD)
-    outputs: ClassVar[tuple[Quantity, ...]] = (*GravityAlignedFrame.outputs[:1], FILTERED, DUE)
-    state_size: ClassVar[int] = 33
-
-    def prior(self, z: Measurement) -> Array:
-        """The filter's attitude at its first sample."""
-        xp, x = namespace(z["imu/acc"]), super().prior(z)
-        return xp.concat([z[ATTITUDE.name], z[BIAS.name], x[..., 7:], xp.log(z[TILT_STD.name])], axis=-1)
-
-    def predict(self, x: Array, z: Measurement, previous: Measurement) -> Array:
-        """The attitude of the filter; the force in the middle of the interval that ends there."""
-        xp = namespace(x)
-        q, b = z[ATTITUDE.name], z[BIAS.name]
-        moved = super().predict(xp.concat([q, b, x[..., 7:32]], axis=-1), z, previous)
-        middle = multiply(q, exp(-0.5 * self.dt * (z["imu/gyr"] - b)))
-        force = rotate(middle, z["imu/acc"])
-        spread = xp.log(z[TILT_STD.name] + 1e-6)
-        return xp.concat([q, b, moved[..., 7:10], force, moved[..., 13:], spread], axis=-1)
-
-    def finish(self, x: Array, z: Measurement) -> Array:
-        """Integrals and sums."""
-        return namespace(x).concat([super().finish(x[..., :32], z), x[..., 32:]], axis=-1)
-
-    def pose(self, x: Array) -> dict[str, Array]:
-        """Attitude of the frame, features, whether the interval ends."""
-        xp, pose = namespace(x), super().pose(x[..., :32])
-        return {**pose, "features": xp.concat([pose["features"], 0.25 * x[..., 32:] + 1.0], axis=-1)}
+from .gravity_aligned_frame import GravityAlignedFrame
 
 
 class LevelState(NamedTuple):
@@ -74,13 +29,13 @@ class LevelState(NamedTuple):
 
 @dataclass(frozen=True)
 class LevelFrame:
-    """Six axes in a level frame.
+    """One inertial sensor in a level frame, and of a filter that reads a magnetometer, the field beside it.
 
     Without a filter the frame is kept by an observer with fixed gains (:class:`GravityAlignedFrame`); with one, it is
     the filter's, the network corrects the filter's inclination, and ``spread`` is the filter's deviation of tilt.
 
     Attributes:
-        kalman: a filter of six axes with the output ``relative_orientation`` and a covariance, or None.
+        kalman: a filter of six or nine axes whose covariance has a part of the orientation, or None.
         frame: settings of the features; the sampling interval is the filter's if there is one.
         compiled: use compiled loops for NumPy data.
 
@@ -93,7 +48,6 @@ class LevelFrame:
     compiled: bool = True
 
     kind: ClassVar[str] = "level-frame"
-    channels: ClassVar[tuple[Channel, ...]] = (GYROSCOPE, ACCELEROMETER)
 
     def __post_init__(self) -> None:
         if self.kalman is None:
@@ -105,10 +59,15 @@ class LevelFrame:
             )
         if not isinstance(self.frame, FilterFrame):
             kept = {name: value for name, value in asdict(self.frame).items() if name not in ("tilt_gain", "bias_gain")}
-            object.__setattr__(self, "frame", FilterFrame(**{**kept, "dt": self.kalman.dt}))
+            object.__setattr__(self, "frame", frame_of(self.kalman)(**{**kept, "dt": self.kalman.dt}))
         check_interval(self.frame.dt, self.frame.interval)
         kalman = replace(self.kalman, keep_covariance=True, compiled=self.compiled).with_dt(self.frame.dt)
         object.__setattr__(self, "kalman", kalman)
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        """Of the six axes, or of the filter."""
+        return (GYROSCOPE, ACCELEROMETER) if self.kalman is None else self.kalman.channels
 
     @property
     def dt(self) -> float:
@@ -154,7 +113,8 @@ class LevelFrame:
         settings, inner = dict(described["frame"]), described.get("filter")
         if inner is None:
             return cls(None, GravityAlignedFrame(**settings, dt=dt))
-        return cls(filter_of(inner, dt), FilterFrame(**settings, dt=dt))
+        kalman = filter_of(inner, dt)
+        return cls(kalman, frame_of(kalman)(**settings, dt=dt))
 
     def init(self, measurement: Measurement) -> LevelState:
         """See :class:`.front_end.FrontEnd`."""
@@ -191,7 +151,7 @@ class LevelFrame:
 
     def _told(self, estimate: Estimate) -> dict[str, Array]:
         """The filter's outputs as channels."""
-        orientation, bias = estimate.pose["relative_orientation"], estimate.pose["gyroscope_bias"]
+        orientation, bias = _orientation(estimate), estimate.pose["gyroscope_bias"]
         return {ATTITUDE.name: orientation, BIAS.name: bias, TILT_STD.name: self._deviation(estimate)}
 
     def _deviation(self, estimate: Estimate) -> Array:
@@ -206,9 +166,15 @@ class LevelFrame:
         pose = found.pose
         q = pose["relative_orientation"]
         spread = q[..., :0] if estimate is None else self._deviation(estimate)
-        base = q if estimate is None else estimate.pose["relative_orientation"]
+        base = q if estimate is None else _orientation(estimate)
         xp, due = namespace(q), pose["due"][..., 0]
         now = due == 1.0
         # before the start nothing is known, and no interval ends
         features = xp.where(now[..., None], pose["features"], xp.zeros_like(pose["features"]))
         return Seen(features, xp.where(now, due, xp.zeros_like(due)), {"relative_orientation": base}, spread)
+
+
+def _orientation(estimate: Estimate) -> Array:
+    """Of a filter of nine or six axes."""
+    pose = estimate.pose
+    return pose["orientation" if "orientation" in pose else "relative_orientation"]

@@ -11,9 +11,13 @@ import torch
 from poise.baselines.learned.config import FitConfig
 from poise.baselines.learned.data import SequenceData
 from poise.baselines.learned.fit import fit
+from poise.baselines.learned.heading_head import HeadingHead
 from poise.baselines.learned.inputs.filter_bank import TUNINGS, FilterBank
+from poise.baselines.learned.inputs.front_end import Seen
 from poise.baselines.learned.inputs.level_frame import LevelFrame
 from poise.baselines.learned.mixture_head import MixtureHead
+from poise.filters.core import rotation
+from poise.filters.core.metrics import heading_error
 from poise.filters.registry import make
 
 
@@ -67,6 +71,27 @@ def test_it_learns_which_filter_is_right() -> None:
     result = fit(module, front_end, MixtureHead(count), data, data, config)
     assert result.history[0]["validation"] > 0.5
     assert result.history[-1]["validation"] < 0.2
+
+
+def test_a_heading_stays_between_those_of_the_filters() -> None:
+    """It turns about the vertical alone; training counts its error in that of the published filter."""
+    rng = np.random.default_rng(3)
+    head = HeadingHead(2)
+    turns = rng.normal(0.0, 0.2, (100, 2))
+    given = np.concatenate([np.ones((100, 1)), turns], axis=-1)
+    output, base = rng.normal(0.0, 3.0, (100, 3)), np.asarray(rotation.random(rng, (100,)))
+    found = head.estimate(Seen(np.zeros((100, 0)), np.ones(100), {"relative_orientation": base}, given), output)
+    np.testing.assert_allclose(found.pose["up"], rotation.up_in_body(base), atol=1e-9)
+    turn = head.turn(output, given)[:, 0]
+    assert (turn <= np.maximum(turns.max(axis=1), 0.0)).all()
+    assert (turn >= np.minimum(turns.min(axis=1), 0.0)).all()
+    np.testing.assert_allclose(heading_error(found.pose["orientation"], base), np.abs(turn), atol=1e-9)
+    parts: list[Any] = [torch.from_numpy(each[None]) for each in (output, turn[:, None], given)]
+    mask = torch.ones(1, 100, dtype=torch.bool)
+    assert float(head.loss(*parts, mask)) < 1e-6
+    parts[0] = torch.tensor([60.0, 0.0, 0.0]) + 0.0 * parts[0]
+    rms = np.sqrt(np.mean(turn**2))
+    assert float(head.loss(*parts, mask)) == pytest.approx(rms / (rms + head.least), rel=1e-6)
 
 
 def test_it_needs_candidates() -> None:

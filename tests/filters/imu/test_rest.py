@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from poise.filters.core.estimator import run_by_steps
+from poise.filters.core.metrics import heading_error
 from poise.filters.core.quantity import GRAVITY
 from poise.filters.registry import make
 
@@ -73,3 +74,12 @@ def test_stepping_and_gaps(compiled: bool) -> None:
     whole = estimator.run(data)
     other = run_by_steps(estimator, data) if compiled else type(estimator)(estimator.model, compiled=False).run(data)
     np.testing.assert_allclose(other.pose["gyroscope_bias"], whole.pose["gyroscope_bias"], atol=1e-10, equal_nan=True)
+
+
+def test_with_a_magnetometer_too() -> None:
+    data = still(3.0) | {"imu/mag": np.tile([20.0, 0.0, -45.0], (300, 1))}
+    found = bias("bounded-motion-rest-9", data)
+    assert np.degrees(np.abs(found[-1] - BIAS)).max() < 0.05
+    assert np.degrees(np.abs(bias("bounded-motion-9", data)[-1] - BIAS)).max() > 1.0
+    orientation = make("bounded-motion-rest-9", dt=0.01).run(data).pose["orientation"]
+    assert np.degrees(heading_error(orientation[-1], orientation[0])) < 1.0

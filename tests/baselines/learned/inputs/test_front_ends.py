@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,10 +13,12 @@ import pytest
 from poise.baselines.learned.inputs.filter_bank import FilterBank
 from poise.baselines.learned.inputs.filter_features import FilterFeatures, standardisation
 from poise.baselines.learned.inputs.front_end import FrontEnd, RawChannels, Seen, interval_ends
+from poise.baselines.learned.inputs.heading_bank import HeadingBank
 from poise.baselines.learned.inputs.level_frame import LevelFrame
 from poise.envs.hand.sensing import simulate_hand
 from poise.filters.core import rotation
 from poise.filters.core.estimator import run_by_steps
+from poise.filters.core.metrics import heading_error
 from poise.filters.core.model import equations_of
 from poise.filters.core.quantity import ACCELEROMETER, GYROSCOPE, Estimate, Measurement
 from poise.filters.registry import make
@@ -28,6 +31,7 @@ ENDS: dict[str, FrontEnd] = {
     "level": LevelFrame(),
     "level of a filter": LevelFrame(make("bounded-motion")),
     "bank": FilterBank(LevelFrame(make("bounded-motion")), ((0.3, 1.0), (1.0, 4.0)), PAIR),
+    "headings": HeadingBank(LevelFrame(make("mekf-9")), ((1.0, 0.3), (0.5, 30.0))),
     "filter": FilterFeatures(make("mekf")),
 }
 
@@ -36,6 +40,10 @@ ENDS: dict[str, FrontEnd] = {
 def samples() -> dict[str, np.ndarray]:
     motion = simulate_hand("fast", seed=1, duration=4.0, rate=RATE)
     found = {name: motion.measurements[name][:300].copy() for name in ("imu/gyr", "imu/acc")}
+    found["imu/mag"] = np.asarray(rotation.rotate_back(motion.truth["orientation"][:300], np.array([2.0, 20.0, -45.0])))
+    found["imu/mag"][150:200] += [0.0, 8.0, 0.0]
+    found["imu/mag"][::2] = np.nan
+    found["imu/mag"][0] = found["imu/mag"][1]
     found["imu/acc"][:3] = np.nan
     found["imu/acc"][100:140] = np.nan
     found["imu/gyr"][200:205] = np.nan
@@ -122,9 +130,27 @@ def test_a_bank_does_not_see_the_heading(samples: dict[str, np.ndarray]) -> None
     vectors = rotation.rotate(turn, seen.features[:, :18].reshape(-1, 6, 3)).reshape(-1, 18)
     base = {"relative_orientation": rotation.multiply(turn, seen.base["relative_orientation"])}
     turned = seen._replace(features=np.concatenate([vectors, seen.features[:, 18:]], axis=1), base=base)
-    one, other = (bank._seen(each, up.pose["up"]) for each in (seen, turned))
+    one, other = (bank._seen(each, up) for each in (seen, turned))
     np.testing.assert_allclose(one.features, other.features, atol=1e-9)
     assert np.abs(one.spread[10:, 1:] - other.spread[10:, 1:]).max() > 1e-6
+
+
+def test_headings_are_told_apart_by_the_field_alone(samples: dict[str, np.ndarray]) -> None:
+    """A world turned by its field gives the same features; candidates are the filter with other constants."""
+    bank, dt = ENDS["headings"].with_dt(1.0 / RATE), 1.0 / RATE
+    assert isinstance(bank, HeadingBank)
+    kalman: Any = make("mekf-9")
+    seen = bank.run(samples)
+    usual: Any = equations_of(kalman)
+    changed = make("mekf-9", dt=dt, magnetometer_noise=0.3 * usual.magnetometer_noise).run(samples)
+    apart = heading_error(changed.pose["orientation"], seen.base["relative_orientation"])
+    np.testing.assert_allclose(np.abs(seen.spread[10:, 1]), apart[10:], atol=1e-9)
+    assert np.degrees(apart[10:].max()) > 1.0
+    model = replace(usual, declination=1.0)
+    turned = HeadingBank(LevelFrame(replace(kalman, model=model)), bank.tunings).with_dt(dt).run(samples)
+    np.testing.assert_allclose(turned.features[20:], seen.features[20:], atol=1e-6)
+    of_field = seen.features[seen.due == 1.0][:, 17:21]
+    assert np.abs(of_field[27:35, :2]).max() > 5.0 * np.abs(of_field[10:25, :2]).max()
 
 
 def test_filters_are_described_by_what_differs() -> None:
