@@ -184,19 +184,19 @@ def internal_model(
 
     # on to the present: first with fast readings, then by prediction; each stage maps what came before it
     slow, fast = delays(pilot, step)
-    carry, to_inputs, to_readings = identity, np.zeros((STATES, 0)), np.zeros((STATES, 0))
+    read = slow - fast
+    carry, to_inputs, to_readings = identity, np.zeros((STATES, 3 * slow)), np.zeros((STATES, FAST * read))
     for index in range(slow):
-        P = A @ P @ A.T + Q
-        gain = np.zeros((STATES, FAST))
-        if index < slow - fast:
+        acted, heard = to_inputs[:, : 3 * index], to_readings[:, : FAST * min(index, read)]
+        moved, driven = A, B
+        if index < read:
+            P = A @ P @ A.T + Q
             gain = np.linalg.solve(F @ P @ F.T + R[:FAST, :FAST], F @ P).T
-            P = (identity - gain @ F) @ P
-        kept = identity - gain @ F
-        carry = kept @ A @ carry
-        to_inputs = np.hstack([kept @ A @ to_inputs, kept @ B])
-        to_readings = kept @ A @ to_readings
-        if index < slow - fast:
-            to_readings = np.hstack([to_readings, gain])
+            kept = identity - gain @ F
+            P, moved, driven = kept @ P, kept @ A, kept @ B
+            to_readings[:, FAST * index : FAST * (index + 1)] = gain
+        carry, acted[:], heard[:] = moved @ carry, moved @ acted, moved @ heard
+        to_inputs[:, 3 * index : 3 * (index + 1)] = driven
     arrays = [np.ascontiguousarray(each) for each in (A, B, K, carry, to_inputs, to_readings)]
     return InternalModel._make([*arrays, _command_gains(continuous, inputs, pilot, costs, step)])
 
