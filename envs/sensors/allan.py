@@ -61,13 +61,13 @@ def allan_deviation(
 
 
 def allan_floors(time: float = FLOOR_TIME) -> list[dict[str, Any]]:
-    """Allan deviation of every preset but the ideal one at ``time`` (s), at 100 Hz, warm: one row a preset.
+    """Allan deviation of every preset that is a device at ``time`` (s), at 100 Hz, warm: one row a preset.
 
     Returns:
         ``name``, ``gyroscope`` (°/h), ``accelerometer`` (µg), and in ``assumed`` the fields that no data sheet states.
     """
     rows: list[dict[str, Any]] = []
-    for preset in PRESETS[1:]:
+    for preset in (each for each in PRESETS if each.is_device):
         floors = [float(allan_deviation(noise, [time])[0]) for noise in (preset.gyroscope, preset.accelerometer)]
         assumed = [f"{kind}: {', '.join(names)}" for kind, names in preset.assumed.items() if names]
         rows.append(

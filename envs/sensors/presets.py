@@ -47,6 +47,11 @@ class SensorPreset:
     assumed: Mapping[str, tuple[str, ...]] = field(default_factory=dict, hash=False)
     """kind → fields of its noise that no data sheet states, but that are assumed by the grade of the device"""
 
+    @property
+    def is_device(self) -> bool:
+        """Whether it follows a data sheet and assumptions where that is silent; others are ideal, or as in a paper."""
+        return bool(self.assumed)
+
     def noise_of(self, kind: str) -> NoiseModel | None:
         """The noise of its sensor of a kind; None where it has none."""
         own = {"gyroscope": self.gyroscope, "accelerometer": self.accelerometer, "magnetometer": self.magnetometer}

@@ -43,9 +43,10 @@ def test_memory_stays_flat_over_a_thousand_hand_motions(drive):
 
 
 @pytest.mark.slow
-def test_memory_stays_flat_over_a_thousand_rides():
+@pytest.mark.parametrize("fidelity", ["lumped", "full"])
+def test_memory_stays_flat_over_a_thousand_rides(fidelity):
     """Another person and another motion in turn."""
-    env = RiderBicycleEnv("outdoor+bumps", "random", fidelity="lumped", duration=2.0)
+    env = RiderBicycleEnv("outdoor+bumps", "random", fidelity=fidelity, duration=2.0)
     found = sizes(env, ({"subject": 0}, {}))
     # tables of the pilot's gains are kept for a thousand speeds of people
     assert max(found) - found[1] < 60.0

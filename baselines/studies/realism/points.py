@@ -175,8 +175,7 @@ def sensors(study: Study, full: Rides, lumped: Rides) -> Iterator[dict[str, Any]
     """Points 5 to 9: drift, forces over the interval, field, clock, load cells of a lumped rider."""
     floors = allan_floors()
     for kind, before, unit in (("gyroscope", "0.4 … 11.8 °/h", "°/h"), ("accelerometer", "–", "µg")):
-        # "paper-hand" has the white noise that a paper states, and no data sheet
-        drift = {str(each["name"]): float(each[kind]) for each in floors if each["name"] != "paper-hand"}
+        drift = {str(each["name"]): float(each[kind]) for each in floors}
         claim = f"Allan deviation of all devices at 1000 s, {kind}, {unit}"
         yield point(5, claim, before, drift, f"{kind} Allan deviation")
     apart = [float(study.cached("force interval", probes.force_interval))]

@@ -11,7 +11,7 @@ from poise.envs.sensors.assumptions import CONSUMER, FILLED, INDUSTRIAL
 from poise.envs.sensors.noise import NoiseModel, NoiseProcess
 from poise.envs.sensors.presets import PRESETS, sensor_preset
 
-DEVICES = [preset for preset in PRESETS if preset.assumed]
+DEVICES = [preset for preset in PRESETS if preset.is_device]
 
 
 def simulated(model, times, rate, duration, axes=300):
@@ -46,6 +46,12 @@ def test_warming_counts_in_records_that_begin_cold():
         simulated(model, times, 10.0, 60.0), allan_deviation(model, times, 10.0, duration=60.0), rtol=0.12
     )
     assert np.all(allan_deviation(model, times) == 0.0)
+
+
+def test_presets_without_a_data_sheet_are_not_listed():
+    names = [row["name"] for row in allan_floors()]
+    assert names == [preset.name for preset in DEVICES]
+    assert not {"ideal", "paper-hand"} & set(names)
 
 
 def test_consumer_parts_drift_more_than_a_motion_tracker():
