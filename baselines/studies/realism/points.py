@@ -26,6 +26,8 @@ from . import probes
 from .containment import simulated_summaries
 from .environments import medians, rides
 from .ranges import BELIEVABLE, Believable, Covered
+from .ranks import ranked
+from .roles import Recorded
 from .simulators import BUMPY, vibrations
 
 BEFORE = "188cca9"
@@ -47,6 +49,7 @@ TARGETS = {
     "arm": Believable(1.0, 100.0, "mm", "an arm of finite stiffness makes a difference that is seen"),
     "fast hands": Covered(9.0, 30.0, "Hz", BROAD),
     "power above 10 Hz": Covered(0.7, 10.0, "%", BROAD),
+    "order": Believable(0.5, 1.0, "", "of three pairs of estimators in four, the better one is the same"),
     "time 0": Believable(0.0, 1e-6, "mm", "one physical instant"),
     "cadence": Covered(60.0, 90.0, "1/min", "cadences of 50 to 100 a minute, drawn evenly"),
     "coasting": Believable(5.0, 50.0, "%", "legs rest now and then in traffic; how long is assumed"),
@@ -62,9 +65,11 @@ TARGETS = {
     "picture": Believable(20.0, inf, "", "a picture that is not empty"),
 }
 """Quantity → what is asked, besides :data:`.BELIEVABLE`"""
+TAU_BEFORE = {"broad": 0.86, "repoimu": 0.79, "smartphones": 0.79}
+"""group of recordings → Kendall's τ at :data:`BEFORE`: of 60 episodes, ``HandTrajectories().draw_many(0, 60)`` there"""
 
 
-def points(study: Study, report: Report, episodes: int, count: int) -> None:
+def points(study: Study, report: Report, episodes: int, count: int, groups: Sequence[Recorded] = ()) -> None:
     """The table of all points; whether each holds is computed.
 
     Args:
@@ -72,6 +77,7 @@ def points(study: Study, report: Report, episodes: int, count: int) -> None:
         report: what is found.
         episodes: of the recipe of hands.
         count: rides of riders; a fifth of it in every scenario, full and lumped.
+        groups: recordings on which estimators are ranked.
     """
     each = max(2, count // 5)
     full, lumped = (rides(study, list_scenarios(), each, fidelity=fidelity) for fidelity in ("full", "lumped"))
@@ -82,6 +88,7 @@ def points(study: Study, report: Report, episodes: int, count: int) -> None:
         *pilot(study, full, lumped, max(len(SUBJECTS), count // 4)),
         *sensors(study, full, lumped),
         *hands(study, episodes),
+        *orders(study, episodes, groups),
         *riding(study, full),
         *papers(study),
     ]
@@ -207,6 +214,16 @@ def hands(study: Study, episodes: int) -> Iterator[dict[str, Any]]:
         ("share of that power above 10 Hz", "≤ 0.02 %", "acc_above_10", "power above 10 Hz"),
     ):
         yield point(11, claim, before, [each.statistics[width][statistic] for each in found], target)
+
+
+def orders(study: Study, episodes: int, groups: Sequence[Recorded]) -> Iterator[dict[str, Any]]:
+    """Point 11, where there are recordings: estimators have the same order on them and on the recipe."""
+    for group in groups:
+        found = ranked(study, episodes, group)
+        if found is not None:
+            before = f"{TAU_BEFORE[group.group]}" if group.group in TAU_BEFORE else "–"
+            claim = f"order of {len(found.names)} estimators on {group.group} and its recipe, Kendall's τ"
+            yield point(11, claim, before, [found.tau], "order")
 
 
 def riding(study: Study, full: Rides) -> Iterator[dict[str, Any]]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from ....filters.support.optional import MissingExtraError
 from ...evaluation import evaluate
 from ...registry import make_estimator
 from ..kit import Study
+from .roles import ROLES, Recorded
 
 ESTIMATORS = (
     "bounded-motion",
@@ -29,6 +30,21 @@ ESTIMATORS = (
 """Estimators of one inertial sensor that are ranked: those whose packages are installed"""
 DRAWS = 1000
 """bootstrap draws of the episodes, for the interval of τ"""
+
+
+class Ranked(NamedTuple):
+    """Estimators on a group of recordings and on the recipe that should contain them."""
+
+    names: list[str]
+    simulated: np.ndarray
+    """errors ``(episodes, estimators)``, deg"""
+    recorded: np.ndarray
+    """errors ``(recordings, estimators)``, deg"""
+    tau: float
+    low: float
+    """5 % of the bootstrap draws of τ"""
+    high: float
+    """95 % of them"""
 
 
 def installed() -> list[str]:
@@ -62,6 +78,11 @@ def simulated_errors(study: Study, made: Recipe, episodes: int, estimators: Sequ
     seed = study.seed_of("realism", made.name)
     jobs = [(made.describe(), seed, index, tuple(estimators)) for index in range(episodes)]
     return study.map(f"estimators on {made.name}", episode_errors, jobs)
+
+
+def recorded_errors(group: Recorded, estimators: Sequence[str]) -> list[dict[str, float]]:
+    """Errors on the recordings of a group whose inclination is known."""
+    return [inclination_errors(each, estimators) for each in group.load() if "up" in each.quantities]
 
 
 def matrix(errors: Sequence[Mapping[str, float]], estimators: Sequence[str]) -> np.ndarray:
@@ -102,3 +123,24 @@ def agreement(simulated: np.ndarray, recorded: np.ndarray, seed: int) -> tuple[f
     ]
     low, high = np.nanpercentile(drawn, [5.0, 95.0])
     return tau, (float(low), float(high))
+
+
+def ranked(study: Study, episodes: int, group: Recorded) -> Ranked | None:
+    """Order of the estimators on a group of recordings and on its recipe; None where there is no inclination to judge.
+
+    Args:
+        study: where results are kept.
+        episodes: of the recipe.
+        group: recordings of one role.
+    """
+    role, names = ROLES[group.role], installed()
+    errors = (
+        study.cached(f"estimators on recordings {group.group}", recorded_errors, group, names) if role.ranked else []
+    )
+    if not errors:
+        return None
+    simulated, recorded = (
+        matrix(each, names) for each in (simulated_errors(study, recipe(role.recipe), episodes, names), errors)
+    )
+    tau, (low, high) = agreement(simulated, recorded, study.seed_of("bootstrap", group.group))
+    return Ranked(names, simulated, recorded, tau, low, high)

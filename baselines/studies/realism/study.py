@@ -17,7 +17,7 @@ from .containment import HIGH, LOW, Summary, containment_rows, simulated_summari
 from .figures import spectra
 from .motion import SHARE_OF_RATE, UNITS
 from .points import points
-from .ranks import agreement, inclination_errors, installed, matrix, simulated_errors
+from .ranks import ranked
 from .roles import ROLES, Recorded, by_recipe
 from .simulators import hand_motion, ride_motion, roads, sensors, steering
 
@@ -101,32 +101,29 @@ def results(label: str, summaries: Sequence[Summary]) -> list[dict[str, Any]]:
 
 def ranks(study: Study, report: Report, settings: Settings, groups: Sequence[Recorded]) -> None:
     """Order of the estimators on every group of recordings and on its recipe."""
-    names, rows = installed(), []
+    rows = []
     for group in groups:
-        role = ROLES[group.role]
-        known = [each for each in group.load() if "up" in each.quantities] if role.ranked else []
-        if not known:
+        found, name = ranked(study, settings.episodes, group), ROLES[group.role].recipe
+        if found is None:
             continue
-        simulated = matrix(simulated_errors(study, recipe(role.recipe), settings.episodes, names), names)
-        recorded = matrix([inclination_errors(each, names) for each in known], names)
-        tau, (low, high) = agreement(simulated, recorded, study.seed_of("bootstrap", group.group))
+        names, simulated, recorded, tau, low, high = found
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", RuntimeWarning)
             means = (np.nanmean(simulated, axis=0), np.nanmean(recorded, axis=0))
         order = np.argsort(means[1])
         report.table(
-            f"Estimators on {group.group} ({group.role}) and {role.recipe}",
-            [{"estimator": names[i], group.group: means[1][i], f"recipe {role.recipe}": means[0][i]} for i in order],
-            f"τ = {tau:.2f} ({low:.2f} … {high:.2f}) over {len(known)} recordings and {len(simulated)} episodes.",
+            f"Estimators on {group.group} ({group.role}) and {name}",
+            [{"estimator": names[i], group.group: means[1][i], f"recipe {name}": means[0][i]} for i in order],
+            f"τ = {tau:.2f} ({low:.2f} … {high:.2f}) over {len(recorded)} recordings and {len(simulated)} episodes.",
         )
-        rows.append({"recordings": group.group, "recipe": role.recipe, "τ": tau, "from": low, "to": high})
+        rows.append({"recordings": group.group, "recipe": name, "τ": tau, "from": low, "to": high})
     if rows:
         report.table("Rank agreement of the estimators", rows, RANKED)
 
 
 Part = Callable[[Study, Report, Settings, Sequence[Recorded]], None]
 PARTS: Mapping[str, Part] = {
-    "points": lambda study, report, settings, groups: points(study, report, settings.episodes, settings.rides),
+    "points": lambda study, report, settings, groups: points(study, report, settings.episodes, settings.rides, groups),
     "gestures": lambda study, report, settings, groups: hand_motion(study, report, settings.episodes, groups),
     "rides": lambda study, report, settings, groups: ride_motion(study, report, settings.rides, groups),
     "steering": lambda study, report, settings, groups: steering(study, report, max(2, settings.rides // 4)),

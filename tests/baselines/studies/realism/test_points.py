@@ -8,9 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from poise.baselines.studies.realism import points as table
 from poise.baselines.studies.realism import probes
-from poise.baselines.studies.realism.points import TARGETS, TITLE, body, point, saddle
+from poise.baselines.studies.realism.points import TARGETS, TITLE, body, orders, point, saddle
 from poise.baselines.studies.realism.ranges import Covered
+from poise.baselines.studies.realism.ranks import Ranked
+from poise.baselines.studies.realism.roles import Recorded
 from poise.baselines.studies.rides.saddle import saddle_statistics
 from poise.scripts.main import main
 from poise.scripts.pages.studies import update
@@ -52,6 +55,20 @@ def test_bodies_are_compared_scenario_by_scenario() -> None:
     calm = {f"trunk_imu/{name}": 25.0 for name in ("gyr_rms", "force_above_2", "force_above_10", "force_sinusoids")}
     rows = list(body({"slow": calm | {"trunk_imu/gyr_f95": 5.0}, "fast": calm | {"trunk_imu/gyr_f95": 1.1}}))
     assert [row["holds"] for row in rows] == [True, False, False, False, False]
+
+
+def test_the_order_of_estimators_is_a_row_for_every_group_that_has_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    taus = {"broad": 0.8, "mine": 0.2}
+
+    def ranked(study: object, episodes: int, group: Recorded) -> Ranked | None:
+        tau = taus.get(group.group)
+        return None if tau is None else Ranked(["tilt", "vqf"], np.zeros((2, 2)), np.zeros((3, 2)), tau, 0.0, 1.0)
+
+    monkeypatch.setattr(table, "ranked", ranked)
+    groups = [Recorded(role, name, ()) for role, name in (("hand", "broad"), ("carried", "mine"), ("chest", "ride"))]
+    rows = list(orders(None, 2, groups))  # type: ignore[arg-type]
+    assert [(row["before"], row["now"], row["holds"]) for row in rows] == [("0.86", "0.8", True), ("–", "0.2", False)]
+    assert "2 estimators on broad" in rows[0]["claim"]
 
 
 def test_quick_measurements() -> None:
