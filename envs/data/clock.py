@@ -34,6 +34,8 @@ RESOLUTIONS = (1.0, 0.1, 0.01, MILLISECOND)
 """s to which loggers round their stamps."""
 SHARED = 0.03
 """Least share of samples with the stamp of the one before: fewer are rows that were written twice."""
+MANY, COARSEST = 100, 20.0
+"""Samples of one stamp, and s between stamps, of which a rate cannot be told."""
 LONGEST_GAP = 600.0
 """s; an interruption beyond it separates two recordings."""
 USUAL_RATES: tuple[float, ...] = (25, 30, 50, 52, 60, 62.5, 64, 75, 80, 100, 104, 119, 120, 125, 128, 143, 150, 200)
@@ -92,6 +94,11 @@ def fit_clock(time: np.ndarray, nominal_rate: float | None = None) -> Clock:
     stamps, counts = packets(time, steps)
     if len(stamps) < 2:
         raise ValueError(f"all {len(time)} samples share one stamp, {time[0]:g} s: name the sampling rate instead")
+    if nominal_rate is None and counts.max() > MANY and (len(stamps) < 4 or np.median(np.diff(stamps)) > COARSEST):
+        raise ValueError(
+            f"{len(time)} samples share {len(stamps)} stamps, {np.median(np.diff(stamps)):.4g} s apart, too coarse to "
+            "tell a rate; name the device's nominal rate (metadata['nominal_rate'], Hz)"
+        )
     fits = []
     if nominal_rate is not None:
         nominal = 1.0 / nominal_rate

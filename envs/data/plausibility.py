@@ -11,10 +11,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ...filters.core import rotation
-from .rate_consistency import FASTEST_TURN, RateConsistency, rate_consistency
-from .readings import Finding, check_alive, plausible_samples
+from .rate_consistency import RateConsistency, rate_consistency
+from .readings import HELD, Finding, Severity, check_alive, plausible_samples
 from .trajectory import Trajectory
+from .turning import check_rates, compared
 
 GRAVITY = 9.80665
 PLAUSIBLE_FORCE = (7.0, 13.0)
@@ -47,8 +47,14 @@ NORMALISED = 1e-4
 QUIET_FORCE, LARGEST_SCALE = 0.3, 0.06
 """m/s² of scatter up to which an accelerometer is quiet, and by which share of gravity it may be wrong then: twice what
 uncalibrated consumer accelerometers show."""
-LEANING, STILL = 0.2, 0.05
-"""rad by which a specific force must lean for a gyroscope to show it; below which share of that it shows none."""
+LEAST_NOISE, USUAL_NOISE = 7e-5, 8e-3
+"""rad/s of noise at rest below which only gyroscopes of navigation grade are, and m/s² that these are not beside."""
+STEADY_FIELD = 0.25
+"""Scatter of the length of a magnetic field, as a share, below which it is the earth's."""
+LARGE_OFFSET = 0.01
+"""s by which a reference may be late before it decides about errors."""
+FROZEN = 0.2
+"""rad that a gyroscope turns while a reference stands still."""
 REST_WINDOW = 100
 """Samples; the quietest such window is taken for rest."""
 
@@ -76,6 +82,8 @@ def check_recording(trajectory: Trajectory) -> list[Finding]:
     for site in sites(trajectory):
         findings += check_site(trajectory, site, wrong_clock)
     findings += check_reference(trajectory)
+    if not any(finding.channel == "imu/gyr" and finding.severity == "warning" for finding in findings):
+        findings += check_frozen(trajectory)
     return sorted(findings, key=lambda finding: finding.severity != "warning")
 
 
@@ -133,9 +141,9 @@ def check_clock(trajectory: Trajectory) -> Iterator[Finding]:
             yield Finding("note", "time", f"{rate:.3g} Hz", cause, "Motion needs 20 Hz or more; 50 Hz if it is fast.")
         if rate > UNUSUAL_RATE:
             cause = f"time in minutes (in seconds that would be {rate / 60.0:.4g} Hz)"
-            yield Finding(
-                "note", "time", f"{rate:.4g} Hz", cause, "Give time in seconds, unless the sensor is so fast."
-            )
+            severity: Severity = "warning" if in_minutes(trajectory) else "note"
+            remedy = "Give time in seconds, unless the sensor is so fast."
+            yield Finding(severity, "time", f"{rate:.4g} Hz", cause, remedy)
         long = step[step > 1.0]
         if len(long):
             what = f"{len(long)} gaps of more than 1 s, the longest {long.max():.1f} s"
@@ -145,6 +153,16 @@ def check_clock(trajectory: Trajectory) -> Iterator[Finding]:
         if lost > 0.05 and not len(long):
             remedy = "They are treated as missing samples."
             yield Finding("note", "time", f"{100 * lost:.0f} % of the rows are missing", "lost packets", remedy)
+
+
+def in_minutes(trajectory: Trajectory) -> bool:
+    """Whether the rates turn gravity as it moves if the time is read as minutes."""
+    for site in sites(trajectory):
+        gyr, acc = seen(trajectory, f"{site}/gyr"), seen(trajectory, f"{site}/acc")
+        if gyr is not None and acc is not None:
+            found = rate_consistency(60.0 * trajectory.time, gyr, acc)
+            return found is not None and found.confirmed
+    return False
 
 
 def check_site(trajectory: Trajectory, site: str, wrong_clock: bool) -> list[Finding]:
@@ -166,26 +184,13 @@ def check_site(trajectory: Trajectory, site: str, wrong_clock: bool) -> list[Fin
             findings += check_rates(trajectory, site, gyr, turning)
         known = any(finding.channel == f"{site}/gyr" for finding in findings)
         findings += check_rest(f"{site}/gyr", gyr, known or any(one.explains for one in turning.values()))
+        findings += [] if known or acc is None else check_noise(f"{site}/gyr", gyr, acc)
     if mag is not None:
         findings += check_field(f"{site}/mag", mag)
     removed = any(f.channel == f"{site}/acc" and f.severity == "warning" for f in findings)
     if acc is not None and not removed:
         findings += check_sign(trajectory, f"{site}/acc", acc, mag)
     return findings
-
-
-def compared(
-    trajectory: Trajectory, site: str, gyr: np.ndarray, acc: np.ndarray | None, mag: np.ndarray | None
-) -> dict[str, RateConsistency]:
-    """The rates beside the motion of gravity, of the field and of the truth, by name, where these can be compared."""
-    against = {"accelerometer": acc, "magnetometer": mag}
-    if site == "imu" and "orientation" in trajectory.truth:
-        against["reference"] = rotation.rotate_back(trajectory.truth["orientation"], np.array([0.6, 0.0, 0.8]))
-    found = {
-        name: None if vector is None else rate_consistency(trajectory.time, gyr, vector, name != "accelerometer")
-        for name, vector in against.items()
-    }
-    return {name: one for name, one in found.items() if one is not None}
 
 
 def check_force(channel: str, acc: np.ndarray, turning: RateConsistency | None = None) -> Iterator[Finding]:
@@ -241,79 +246,6 @@ def check_field(channel: str, mag: np.ndarray) -> Iterator[Finding]:
         yield Finding("note", channel, f"median length {usual:.4g}", f"readings in {unit} instead of µT", remedy)
 
 
-def check_rates(
-    trajectory: Trajectory, site: str, gyr: np.ndarray, turning: dict[str, RateConsistency]
-) -> Iterator[Finding]:
-    """Unit, signs and axes of the gyroscope, against the motion of gravity, of the field and of the truth."""
-    channel, found = f"{site}/gyr", dict(turning)
-    fastest = float(np.nanquantile(np.linalg.norm(gyr, axis=1), 0.99))
-    yield from check_conjugate(trajectory, gyr, found)
-    turned = 0.0 if "accelerometer" not in found else found["accelerometer"].at_rest
-    if turned > LEANING and 3.0 * fastest < STILL * turned:
-        what = f"rates of {fastest:.2g} rad/s at most, while the specific force leans by {turned:.2g} rad within 3 s"
-        remedy = "Check the unit, and which column holds the rates."
-        yield Finding("warning", channel, what, "a gyroscope that is off, or rates that were scaled down", remedy)
-        return
-    decided = {name: one for name, one in found.items() if one.explains} or found
-    units = {name: one.other_unit for name, one in decided.items() if one.other_unit is not None}
-    if units:
-        unit = max(units.values(), key=list(units.values()).count)
-        what = f"the reported turns are not those of the {' and '.join(units)}"
-        yield Finding("warning", channel, what, f"rates in {unit}", "Convert to rad/s.")
-        return
-    if fastest > FASTEST_TURN:
-        what = f"rates up to {fastest:.4g} rad/s, {np.degrees(fastest):.0f} °/s"
-        yield Finding("warning", channel, what, "rates in deg/s, or raw counts", "Convert to rad/s.")
-        return
-    yield from check_axes(site, decided)
-
-
-def check_conjugate(trajectory: Trajectory, gyr: np.ndarray, found: dict[str, RateConsistency]) -> Iterator[Finding]:
-    """Whether the reference turns as the gyroscope does only if its quaternions are conjugated."""
-    given = found.get("reference")
-    if given is None or given.as_given < 0.3 * given.at_rest or given.at_rest < 0.05:
-        return
-    other = rotation.rotate(trajectory.truth["orientation"], np.array([0.6, 0.0, 0.8]))
-    conjugate = rate_consistency(trajectory.time, gyr, other, constant=True)
-    if conjugate is not None and conjugate.as_given < 0.3 * min(given.as_given, given.axes_residual):
-        what = "gyroscope and reference turn together only if it is read the other way round"
-        cause = "conjugate quaternions, which turn the world into the sensor"
-        del found["reference"]
-        yield Finding("warning", "orientation", what, cause, "Conjugate them.")
-
-
-def check_axes(site: str, found: dict[str, RateConsistency]) -> Iterator[Finding]:
-    """Name the channel whose axes contradict the others."""
-    odd = {name: one.other_axes for name, one in found.items() if one.other_axes is not None}
-    if not odd:
-        return
-    agreeing = [name for name in found if name not in odd]
-    name, axes = next(iter(odd.items()))
-    assert axes is not None
-    what = f"gyroscope and {' and '.join(odd)} do not turn together"
-    proper = float(np.linalg.det(axes)) > 0.0
-    of_gyroscope = f"of the gyroscope {axes_in_words(axes)}"
-    # A vector's own sign does not show: of the two arrangements that look alike, the one with fewer signs is meant.
-    of_vector = f"of the {name} {axes_in_words(min(axes, -axes, key=lambda m: int((m < 0.0).sum())))}"
-    if proper and agreeing:
-        channel = {"accelerometer": f"{site}/acc", "magnetometer": f"{site}/mag", "reference": "orientation"}[name]
-        cause = of_vector
-    else:
-        # No arrangement of a vector's axes looks like a left-handed gyroscope.
-        channel, cause = f"{site}/gyr", f"{of_gyroscope}, or {of_vector}" if proper else of_gyroscope
-    yield Finding("warning", channel, what, cause, "Check signs and order of the axes.")
-
-
-def axes_in_words(axes: np.ndarray) -> str:
-    """What a signed permutation does to x, y, z."""
-    if np.array_equal(axes, -np.eye(3)):
-        return "all signs are reversed (left-handed)"
-    if np.array_equal(np.abs(axes), np.eye(3)):
-        return f"the sign of {' and '.join('xyz'[i] for i in range(3) if axes[i, i] < 0.0)} is reversed"
-    terms = [("-" if row.sum() < 0.0 else "") + "xyz"[int(np.abs(row).argmax())] for row in axes]
-    return f"the axes x, y, z should be {', '.join(terms)}"
-
-
 def quietest(values: np.ndarray) -> np.ndarray | None:
     """The samples of the window that varies least; None if there is no complete window."""
     present = values[np.isfinite(values).all(axis=1)]
@@ -334,6 +266,18 @@ def check_rest(channel: str, gyr: np.ndarray, known: bool) -> Iterator[Finding]:
         what = f"{bias:.3g} rad/s ({np.degrees(bias):.1f} °/s) where it is steady"
         cause = "rates in deg/s, a gyroscope without calibration, or a steady turn about the vertical"
         yield Finding("warning", channel, what, cause, "Convert to rad/s, or subtract the rates at rest.")
+
+
+def check_noise(channel: str, gyr: np.ndarray, acc: np.ndarray) -> Iterator[Finding]:
+    """Noise of a gyroscope at rest that no sensor beside such an accelerometer has."""
+    resting, beside = quietest(gyr), quietest(acc)
+    if resting is None or beside is None or len(np.unique(resting[:, 0])) < REST_WINDOW // 5:
+        return
+    noise, other = float(resting.std(axis=0).max()), float(np.median(beside.std(axis=0)))
+    if noise < LEAST_NOISE and other > USUAL_NOISE:
+        what = f"{noise:.2g} rad/s of noise where it is quiet, beside {other:.2g} m/s² of the accelerometer"
+        cause = "rates in rad/s that were converted from deg/s once too often, or rates that were smoothed"
+        yield Finding("warning", channel, what, cause, "Check the unit.")
 
 
 def check_sign(trajectory: Trajectory, channel: str, acc: np.ndarray, mag: np.ndarray | None) -> Iterator[Finding]:
@@ -364,10 +308,13 @@ def check_sign(trajectory: Trajectory, channel: str, acc: np.ndarray, mag: np.nd
     elif mag is not None:
         field = mag / np.where(mag.any(axis=1), np.linalg.norm(mag, axis=1), np.nan)[:, None]
         upwards = float(np.nanmedian((direction * field).sum(axis=1)))
+        length = np.linalg.norm(mag[mag.any(axis=1)], axis=1)
+        steady = float(np.nanstd(length)) < STEADY_FIELD * float(np.nanmedian(length))
         if upwards > 0.3:
             cause = f"a recording south of the equator, or {apple}"
             what = f"the magnetic field points {np.degrees(np.arcsin(min(upwards, 1.0))):.0f}° above the horizon"
-            yield Finding("note", channel, what, cause, f"{remedy[:-1]} if the recording is from the north.")
+            severity: Severity = "warning" if steady else "note"
+            yield Finding(severity, channel, what, cause, f"{remedy[:-1]} if the recording is from the north.")
 
 
 def check_reference(trajectory: Trajectory) -> Iterator[Finding]:
@@ -376,4 +323,24 @@ def check_reference(trajectory: Trajectory) -> Iterator[Finding]:
     if isinstance(offset, int | float) and abs(offset) > 1e-3:
         what = f"the reference is {1e3 * abs(offset):.1f} ms {'ahead of' if offset > 0.0 else 'behind'} the gyroscope"
         remedy = "Evaluate with the reference clock corrected as well."
-        yield Finding("note", "orientation", what, "two clocks that were not synchronised", remedy)
+        severity: Severity = "warning" if abs(offset) > LARGE_OFFSET else "note"
+        yield Finding(severity, "orientation", what, "two clocks that were not synchronised", remedy)
+
+
+def check_frozen(trajectory: Trajectory) -> Iterator[Finding]:
+    """Stretches in which the reference repeats one orientation while the gyroscope turns."""
+    q, gyr = trajectory.truth.get("orientation"), seen(trajectory, "imu/gyr")
+    if q is None or gyr is None or len(q) < 3:
+        return
+    begins = np.flatnonzero(np.append(True, ~(q[1:] == q[:-1]).all(axis=1)))
+    ends = np.append(begins[1:], len(q))
+    seconds = np.linalg.norm(np.nan_to_num(gyr), axis=1) * np.gradient(trajectory.time)
+    turned = np.add.reduceat(seconds, begins)
+    frozen = (trajectory.time[ends - 1] - trajectory.time[begins] > HELD) & (turned > FROZEN)
+    if frozen.any():
+        share = 100.0 * float((ends - begins)[frozen].sum()) / len(q)
+        what = (
+            f"{share:.3g} % of it repeat one orientation, while the gyroscope turns by {turned[frozen].max():.2g} rad"
+        )
+        cause = "a tracking system that lost its markers and repeats the last value"
+        yield Finding("warning", "orientation", what, cause, "Replace the repeated rows by NaN.")

@@ -36,6 +36,8 @@ STEADY = 0.6
 NEARLY, FEW_WINDOWS = 0.25, 4
 """What a unit that differs by a factor of two only may leave of the motion: a disturbed field may look like it. So much
 for axes, too, in fewer windows: of 48 arrangements one fits by chance."""
+SMALL, CLEAR = 0.01, 0.05
+"""rad of motion of a direction below which it tells nothing, and beyond which it tells axes, too."""
 SPUN = 0.01
 """Variance within a segment, relative to the squared length, that tells nothing."""
 RIGHT = 0.2
@@ -45,10 +47,14 @@ FASTEST_TURN = 70.0
 
 SCALES: dict[str, float] = {
     "rad/s that were converted from deg/s once too often": 180.0 / np.pi,
+    "an eighth of rad/s (another full scale than assumed)": 8.0,
     "rev/s": 2.0 * np.pi,
+    "a quarter of rad/s (another full scale than assumed, or a clock of four times the rate)": 4.0,
     "half rad/s (another full scale than assumed, or a clock of twice the rate)": 2.0,
     "rad/s": 1.0,
     "twice rad/s (another full scale than assumed, or a clock of half the rate)": 0.5,
+    "four times rad/s (another full scale than assumed, or a clock of a quarter of the rate)": 0.25,
+    "eight times rad/s (another full scale than assumed)": 0.125,
     "rpm": 2.0 * np.pi / 60.0,
     "deg/s": np.pi / 180.0,
     "mrad/s": 1e-3,
@@ -103,23 +109,41 @@ class RateConsistency:
 
     @property
     def explains(self) -> bool:
-        """Whether the best hypothesis explains most of the motion: otherwise nothing is decided."""
-        return self.at_rest > 0.05 and self.axes_residual < 0.5 * self.at_rest
+        """Whether the best hypothesis explains most of the motion (of a small one nearly all)."""
+        small = self.at_rest > SMALL and self.windows >= FEW_WINDOWS and self.axes_residual < NEARLY * self.at_rest
+        return small or (self.at_rest > CLEAR and self.axes_residual < 0.5 * self.at_rest)
+
+    @property
+    def confirmed(self) -> bool:
+        """Whether the data as given explain most of the motion."""
+        return self.explains and self.as_given < 0.5 * self.at_rest and self.other_unit is None
 
     @property
     def other_unit(self) -> str | None:
         """A unit that fits clearly better than rad/s, or None."""
-        too_much = self.as_given > 0.3 and self.as_given > 3.0 * self.at_rest
-        better = self.unit_residual < CLEARLY * self.as_given and (self.explains or too_much)
-        if 0.25 < SCALES[self.unit] < 4.0:
-            better = better and self.unit_residual < NEARLY * self.at_rest
+        better = self.unit_residual < CLEARLY * self.as_given and (self.explains or self.too_much)
+        if "full scale" in self.unit:
+            sure = self.windows > FEW_WINDOWS + 1 and self.as_given > self.at_rest
+            enough = self.as_given if sure else self.at_rest
+            better = better and self.unit_residual < NEARLY * enough and self.at_rest > CLEAR
         return self.unit if self.unit != "rad/s" and better else None
+
+    @property
+    def too_much(self) -> bool:
+        """Whether the rates turn a vector that nearly stands still."""
+        return self.as_given > 0.2 and self.as_given > 3.0 * self.at_rest
+
+    @property
+    def worsens(self) -> bool:
+        """Whether the rates as given are further from the motion than none, and no hypothesis explains it."""
+        moves = self.at_rest > CLEAR and self.windows >= FEW_WINDOWS and not self.explains
+        return moves and self.as_given > 1.25 * self.at_rest
 
     @property
     def other_axes(self) -> np.ndarray | None:
         """An arrangement of the axes that fits clearly better than the one given, or None."""
         better = self.axes_residual < CLEARLY * self.unit_residual and self.explains
-        better = better and self.unit_residual > RIGHT * self.at_rest
+        better = better and self.unit_residual > RIGHT * self.at_rest and self.at_rest > CLEAR
         if self.windows < FEW_WINDOWS:
             better = better and self.axes_residual < NEARLY * self.at_rest
         return self.axes if better and not np.array_equal(self.axes, np.eye(3)) else None

@@ -104,14 +104,18 @@ def check_alive(channel: str, values: np.ndarray, dt: float | None = None) -> It
     zero = float(np.mean(~samples.any(axis=1)))
     still = len(samples) > 20 and bool((samples == samples[0]).all())
     what = f"{100 * zero:.0f} % of the samples are 0, 0, 0"
-    if zero > 0.5:
+    if 0.5 < zero < 0.995 and slower(samples):
+        remedy = "Replace the zeros by NaN." if channel.endswith("gyr") else "They are treated as missing samples."
+        severity: Severity = "warning" if channel.endswith("gyr") else "note"
+        yield Finding(severity, channel, what, "a slower sensor, and zeros between its samples", remedy)
+    elif zero > 0.5:
         yield Finding("warning", channel, what, "a sensor that was absent or off", "Leave the channel out.")
         return
     if still:
         remedy = "Leave the channel out."
         yield Finding("warning", channel, f"always {samples[0].tolist()}", "a sensor that is off or stuck", remedy)
         return
-    if zero > 0.01 and not channel.endswith("gyr"):
+    if 0.01 < zero <= 0.5 and not channel.endswith("gyr"):
         yield Finding("note", channel, what, "drop-outs written as zeros", "They are treated as missing samples.")
     impossible = codes(channel.rpartition("/")[2], samples)
     if impossible.any():
@@ -120,6 +124,12 @@ def check_alive(channel: str, values: np.ndarray, dt: float | None = None) -> It
     yield from check_axes_alive(channel, samples[~impossible])
     yield from check_repeats(channel, values, dt)
     yield from check_range(channel, samples[~impossible])
+
+
+def slower(samples: np.ndarray) -> bool:
+    """Whether samples ``(T, 3)`` other than zeros come at equal intervals."""
+    steps = np.diff(np.flatnonzero(samples.any(axis=1)))
+    return len(steps) >= 20 and float((np.abs(steps - np.median(steps)) <= 1).mean()) > SLOWER
 
 
 def check_axes_alive(channel: str, samples: np.ndarray) -> Iterator[Finding]:

@@ -161,7 +161,7 @@ class Trajectory:
         """
         if len(self) == 1:
             return self
-        kept = self._without_repeats()
+        kept = self.without_repeats()
         clock = kept.clock
         if kept.contradicted_rate:
             warnings.warn(f"{self.name}: {kept.contradicted_rate}; the stamps are believed", stacklevel=2)
@@ -224,7 +224,7 @@ class Trajectory:
             metadata=grid.metadata | {"interpolated": {"longest": float(longest), "samples": count}},
         )
 
-    def _without_repeats(self) -> Trajectory:
+    def without_repeats(self) -> Trajectory:
         """Without rows that equal the row before, stamp and values alike."""
         repeated = np.append(False, np.diff(self.time) == 0.0)
         if not repeated.any():

@@ -263,7 +263,10 @@ def apply_map(table: Table, mapping: RecordingMap, path: Path) -> list[Trajector
 def trajectory_of(
     seconds: np.ndarray, measurements: dict[str, np.ndarray], truth: dict[str, np.ndarray], details: dict[str, Any]
 ) -> Trajectory:
-    """A trajectory whose mask is where the truth is known, if it is known at all; rows out of order are sorted."""
+    """A trajectory whose mask is where the truth is known, if it is known at all.
+
+    Rows out of order are sorted, rows that repeat the one before dropped.
+    """
     backwards = int((np.diff(seconds) < 0.0).sum())
     if backwards:
         order = np.argsort(seconds, kind="stable")
@@ -274,7 +277,7 @@ def trajectory_of(
     mask = np.ones(len(seconds), bool)
     if "orientation" in truth:
         mask = np.isfinite(truth["orientation"]).all(axis=1)
-    return Trajectory(seconds, measurements, truth, mask, details)
+    return Trajectory(seconds, measurements, truth, mask, details).without_repeats()
 
 
 def channel(table: Table, mapping: RecordingMap, sensor: str, kind: str, names: Columns) -> tuple[np.ndarray, str]:

@@ -154,6 +154,13 @@ def test_repeated_rows_are_dropped_and_a_shared_stamp_is_not_lost():
     assert spread.dt == pytest.approx(0.01)
 
 
+@pytest.mark.parametrize(("resolution", "start"), [(60.0, 50.0), (60.0, 0.0), (10.0, 5.0)])
+def test_stamps_that_are_too_coarse_have_no_rate(resolution, start):
+    time = np.floor((start + np.arange(2000) / 100) / resolution) * resolution
+    with pytest.raises(ValueError, match=r"share .* stamp"):
+        fit_clock(time)
+
+
 def test_samples_of_one_stamp_have_no_rate():
     with pytest.raises(ValueError, match="time must increase"):
         make(np.zeros(5))

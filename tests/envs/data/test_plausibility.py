@@ -181,7 +181,7 @@ def test_minutes_are_noted(motions):
 
 
 @pytest.mark.parametrize("gesture", GESTURES)
-@pytest.mark.parametrize("factor", [0.5, 2.0])
+@pytest.mark.parametrize("factor", [0.125, 0.25, 0.5, 2.0, 4.0, 8.0])
 def test_another_full_scale_of_the_gyroscope_is_named(motions, gesture, factor):
     (found,) = warnings_of(changed(motions[gesture], gyr=lambda values: factor * values))
     assert "another full scale than assumed" in found
@@ -242,6 +242,64 @@ def test_conjugate_reference_is_named(seed, other):
     kept = {name: motion.measurements[name] for name in {"imu/gyr", other} if name in motion.measurements}
     findings = [str(each) for each in check_recording(motion.replace(measurements=kept, truth=truth))]
     assert any("conjugate quaternions" in each for each in findings)
+
+
+@pytest.mark.parametrize("gesture", ["mixed", "fast"])
+@pytest.mark.parametrize(
+    ("reading", "words"),
+    [
+        (rotation.to_xyzw, "quaternions whose scalar is the last"),
+        (rotation.from_xyzw, "quaternions whose scalar is the first"),
+        (lambda q: q * [1.0, -1.0, 1.0, 1.0], "do not turn together"),
+        (lambda q: np.where((np.arange(len(q)) > len(q) // 2)[:, None], q[len(q) // 2], q), "% of it repeat one"),
+        (lambda q: np.tile(q[:1], (len(q), 1)), "100 % of it repeat"),
+    ],
+)
+def test_a_reference_that_is_misread_is_named(motions, gesture, reading, words):
+    motion = motions[gesture]
+    truth = {"orientation": reading(motion.truth["orientation"])}
+    assert any(words in text for text in warnings_of(motion.replace(truth=truth)))
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.parametrize(
+    ("factor", "words"), [(np.pi / 180, "converted from deg/s once too often"), (180 / np.pi, "rates in deg/s")]
+)
+@pytest.mark.parametrize("sway", [0.0, 0.05])
+def test_rates_of_a_quiet_sensor_are_of_one_unit(seed, factor, words, sway):
+    """Noise tells at rest, a sway of 3° when little else moves."""
+    rng, time = np.random.default_rng(seed), np.arange(800) / 100.0
+    angles = sway * np.sin(0.4 * np.pi * time)[:, None] * [1.0, 0.5, 0.2]
+    gyr = np.gradient(angles, 0.01, axis=0) + 0.002 * rng.standard_normal((800, 3)) + [0.005, -0.004, 0.002]
+    acc = 9.81 * rotation.up_in_body(rotation.exp(angles)) + 0.03 * rng.standard_normal((800, 3))
+    motion = Trajectory(time, {"imu/gyr": gyr, "imu/acc": acc}, metadata={"name": "quiet"})
+    assert warnings_of(motion) == []
+    assert any(words in text for text in warnings_of(changed(motion, gyr=lambda values: factor * values)))
+
+
+@pytest.mark.parametrize("readings", [lambda motion: np.cumsum(motion.measurements["imu/gyr"], axis=0) * 0.01,
+    lambda motion: rotation.rotate(motion.truth["orientation"], motion.measurements["imu/gyr"])])  # fmt: skip
+def test_angles_and_rates_in_the_world_are_no_rates(motions, readings):
+    motion = motions["mixed"]
+    assert warnings_of(changed(motion, gyr=lambda _: readings(motion)))
+
+
+def test_a_wrong_clock_and_a_wrong_sign_are_named(motions):
+    motion = motions["mixed"]
+    for time, words in ((motion.time / 60.0, "time in minutes"), (2.0 * motion.time, "a clock of half the rate")):
+        assert any(words in text for text in warnings_of(motion.replace(time=time, truth={})))
+    assert any("Apple's sign" in text for text in warnings_of(changed(motion, acc=lambda values: -values)))
+    late = motion.replace(metadata={**motion.metadata, "reference_clock_offset": 0.05})
+    assert any("50.0 ms ahead" in text for text in warnings_of(late))
+
+
+@pytest.mark.parametrize(("channel", "severity"), [("mag", "note"), ("acc", "note"), ("gyr", "warning")])
+def test_zeros_between_the_samples_of_a_slow_sensor_are_told(motions, channel, severity):
+    def thinned(values):
+        return np.where((np.arange(len(values)) % 4 == 0)[:, None], values, 0.0)
+
+    findings = check_recording(changed(motions["mixed"], **{channel: thinned}))
+    assert any(each.severity == severity and "a slower sensor, and zeros" in str(each) for each in findings)
 
 
 @pytest.mark.parametrize("given", ["a.csv", None, 3, {}])
