@@ -93,9 +93,9 @@ class HandMotionGainEnv(GainTuningEnv):
 
     ## Version history
 
-    v0: first release. Before it, the default motions were ``mixed``, the reward was ``error``, all gains were acted
-    on and they followed the actions at once: agents with the exploration that libraries have by default then did worse
-    than the published gains.
+    * v0: first release. Before it, the default motions were ``mixed``, the reward was ``error``, all gains were acted
+      on and they followed the actions at once: agents with the exploration that libraries have by default then did
+      worse than the published gains.
     """
 
     def __init__(
@@ -171,8 +171,8 @@ class ReplayGainEnv(GainTuningEnv):
 
     ## Version history
 
-    v0: first release. Before it, the reward was ``error``, all gains were acted on and they followed the actions at
-    once by default.
+    * v0: first release. Before it, the reward was ``error``, all gains were acted on and they followed the actions at
+      once by default.
     """
 
     def __init__(
