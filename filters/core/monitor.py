@@ -15,6 +15,9 @@ later is its own. Equations that keep the field of their start for good, dip inc
 then: a wrong dip turns their estimate for ever, and an error about the field's direction, which their magnetometer does
 not see, hardly decays. Their dip and their east are compared with those of both averages.
 
+Until a start has been confirmed, an average that later samples make too short to be trusted begins anew with them: it
+held samples of two directions, and a start from both is as wrong as their share.
+
 Two rules need no patience. An average of a few samples that the next one contradicts starts anew with that sample, and
 so does the estimator, until a start has been confirmed. After these few a sample that points elsewhere decides
 nothing: a hand that is flung up and checked feels forces from any direction. And a force that no motion explains
@@ -96,7 +99,7 @@ def watch(memory: Array, inputs: Array) -> Array:
     zero = 0.0 * dt
     unconfirmed = xp.less(memory[..., 13:14], CONFIRMED)
 
-    def averaged(part: Array, sample: Array) -> tuple[Array, Array, Array, Array]:
+    def averaged(part: Array, sample: Array, shortest: float) -> tuple[Array, Array, Array, Array]:
         there = xp.all(xp.isfinite(sample), axis=-1)[..., None]
         sample = xp.where(there, sample, xp.zeros_like(sample))
         mean, square = rotate_back(turn, part[..., :3]), part[..., 3:4]
@@ -113,14 +116,20 @@ def watch(memory: Array, inputs: Array) -> Array:
         share = xp.where(there, dt / xp.where(xp.greater(longer, AVERAGED), zero + AVERAGED, longer), zero)
         time = xp.where(there, xp.where(xp.greater(longer, AVERAGED), zero + AVERAGED, longer), time)
         squared = xp.sum(sample * sample, axis=-1)[..., None]
-        return mean + share * (sample - mean), square + share * (squared - square), time, contrary
+        mean, square = mean + share * (sample - mean), square + share * (squared - square)
+        # Samples that point elsewhere shorten the average: what was before them must not bend it. From here on the few
+        # samples behind it are no start that the next one could contradict.
+        short = xp.less(xp.sum(mean * mean, axis=-1)[..., None], shortest**2 * square)
+        short = xp.logical_and(xp.logical_and(there, unconfirmed), xp.logical_and(short, xp.greater(time, FEW)))
+        mean, square = xp.where(short, sample, mean), xp.where(short, squared, square)
+        return mean, square, xp.where(short, zero + FEW + dt, time), contrary
 
     def trusted(mean: Array, square: Array, time: Array, shortest: float) -> Array:
         length = xp.sum(mean * mean, axis=-1)[..., None]
         return xp.logical_and(xp.greater_equal(time, SETTLED), xp.greater(length, shortest**2 * square))
 
-    force, force_square, force_time, force_contrary = averaged(memory[..., :6], inputs[..., 3:6])
-    field, field_square, field_time, field_contrary = averaged(memory[..., 6:12], inputs[..., 6:9])
+    force, force_square, force_time, force_contrary = averaged(memory[..., :6], inputs[..., 3:6], SHORTEST_FORCE)
+    field, field_square, field_time, field_contrary = averaged(memory[..., 6:12], inputs[..., 6:9], SHORTEST_FIELD)
     upright = trusted(force, force_square, force_time, SHORTEST_FORCE)
     aligned = xp.sum(up * force, axis=-1)[..., None]
     length = xp.sqrt(xp.sum(force * force, axis=-1)[..., None] + 1e-30)
@@ -145,12 +154,12 @@ def watch(memory: Array, inputs: Array) -> Array:
     agreeing = xp.logical_and(heading, agreeing)
     if inputs.shape[-1] > INPUTS:
         supposed = inputs[..., INPUTS : INPUTS + 1]
-        force_square, field_square = (xp.sum(part * part, axis=-1)[..., None] + 1e-30 for part in (force, field))
-        sine = xp.sum(force * field, axis=-1)[..., None] / xp.sqrt(force_square * field_square)
+        lengths = xp.sqrt(xp.sum(force * force, axis=-1) * xp.sum(field * field, axis=-1) + 1e-60)[..., None]
+        sine = xp.sum(force * field, axis=-1)[..., None] / lengths
         cosine = xp.sqrt(1.0 + 1e-9 - sine * sine)
         supposed_cosine = xp.sqrt(1.0 + 1e-9 - supposed * supposed)
         dip = sine * supposed + cosine * supposed_cosine
-        eastwards = rotate(q, cross(field, force)) / (cosine * xp.sqrt(force_square * field_square))
+        eastwards = rotate(q, cross(field, force)) / (cosine * lengths)
         about = eastwards[..., :1] * c - eastwards[..., 1:2] * s
         least = xp.where(xp.less(dip, about), dip, about)
         turned = xp.logical_or(turned, xp.logical_and(heading, xp.less(least, math.cos(LARGEST_ERROR))))
