@@ -208,7 +208,9 @@ class AngleHead:
 
     def estimate(self, seen: Seen, output: Array) -> Estimate:
         """See :class:`Head`."""
-        correction = self.correction(output, seen.spread)
+        correction, xp = self.correction(output, seen.spread), namespace(output)
+        if seen.alone is not None:
+            correction = xp.where(seen.alone[..., None], 0.0 * correction, correction)
         pose, start = {}, 0
         for quantity in self.outputs:
             part = correction[..., start : start + quantity.size]
@@ -220,6 +222,10 @@ class AngleHead:
         size = self.corrected
         growth = constant(np.array(self.growth or (0.0,) * size), output)
         variances = constant(np.square(self.deviations), output) * (1.0 + growth * output[..., -1:])
+        if seen.alone is not None:
+            parts = self.error_parts
+            known = [seen.variances.get(name, variances[..., slice(*parts[name])]) for name in parts]
+            variances = xp.where(seen.alone[..., None], xp.concat(known, axis=-1), variances)
         return Estimate(pose, variances[..., None] * constant(np.eye(size), output))
 
     def correction(self, output: Array, spread: Array) -> Array:

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from .backend import Array, constant, expand, is_torch, namespace, stack_channels, to_numpy
+from .held_inputs import longest_gap
 from .model import E, Equations, Gain, parameters_of, with_parameters
 from .monitor import MEMORY, places_of
 from .quantity import Channel, Measurement
@@ -74,6 +77,53 @@ def aged(age: Array, sample: Array, channels: tuple[Channel, ...], dt: Array) ->
     parts = split(sample, channels).values()
     there = xp.stack([xp.all(xp.isfinite(part), axis=-1) for part in parts], axis=-1)
     return xp.where(there, xp.zeros_like(age), age + expand(dt, 1))
+
+
+@dataclass(frozen=True)
+class GapWatch:
+    """Tells the samples in which an estimate still bears a gap of its model's inputs; NumPy only.
+
+    What was learned from small errors is neither accurate nor sure while a large one is corrected.
+
+    Attributes:
+        model: the equations.
+        longest: s for which inputs may be missing.
+        every: whether all of them must be missing, or any.
+        recovery: s after a gap in which its error is corrected.
+    """
+
+    model: Any
+    longest: float
+    every: bool = False
+    recovery: float = 1.0
+
+    def start(self, batch: tuple[int, ...]) -> np.ndarray:
+        """Samples ``(*batch,)`` since a gap, before any: infinite."""
+        return np.full(batch, np.inf)
+
+    def advance(self, since: np.ndarray, age: np.ndarray) -> np.ndarray:
+        """The same a sample later, with the ages ``(*batch, channels)`` in s of all channels then."""
+        return np.where(self._is_gap(age), 0.0, since + 1.0)
+
+    def run(self, measurements: Measurement) -> np.ndarray:
+        """The same after each sample of ``(T, *batch, size)``; equal to advancing."""
+        channels = [measurements[channel.name] for channel in self.model.channels]
+        there = np.stack([np.isfinite(array).all(axis=-1) for array in channels], axis=-1)
+        rows = np.arange(len(there)).reshape(-1, *(1,) * (there.ndim - 2))
+        gap = latest(self._is_gap((rows[..., None] - latest(there)) * self.model.dt))
+        return np.where(gap >= 0, rows - gap, np.inf)
+
+    def bears(self, since: np.ndarray) -> np.ndarray:
+        """Whether that is in a gap, or too soon after it."""
+        return since < round(self.recovery / self.model.dt)
+
+    def _is_gap(self, age: np.ndarray) -> np.ndarray:
+        missing = age[..., self._inputs] > self.longest + 0.5 * self.model.dt
+        return missing.all(axis=-1) if self.every else missing.any(axis=-1)
+
+    @cached_property
+    def _inputs(self) -> list[int]:
+        return longest_gap(self.model)[1]
 
 
 def filled(sample: Array) -> Array:

@@ -5,9 +5,9 @@ holds over the next interval, as bounded log factors on the filter's constants (
 and R are made of, or shares of the Kalman gain (:mod:`.gain_shares`). The covariance is the filter's own.
 
 A tuning that is right while errors are small is not right while a large one is corrected: where an input was missing
-for longer than :data:`GAP`, the published gains hold until :data:`RECOVERY` after it. On simulated gestures (mixed,
-fast, slow) the NEES of ``mekf+noise`` 0.2 s after gaps of 2 s is 3 so, as that of ``mekf``, and 15 without; one second
-does as much as ten, and leaves single lost samples to the network.
+for longer than :data:`.monitor.GYROSCOPE_GAP`, the published gains hold until a second after it. On simulated gestures
+(mixed, fast, slow) the NEES of ``mekf+noise`` 0.2 s after gaps of 2 s is 3 so, as that of ``mekf``, and 15 without; one
+second does as much as ten, and leaves single lost samples to the network.
 """
 
 from __future__ import annotations
@@ -21,19 +21,15 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 
 from ....filters.core.estimator import check_measurements
-from ....filters.core.held_inputs import longest_gap
 from ....filters.core.kalman import KalmanFilter
-from ....filters.core.monitor import GYROSCOPE_GAP as GAP
+from ....filters.core.monitor import GYROSCOPE_GAP
 from ....filters.core.quantity import Estimate, Measurement, Quantity
-from ....filters.core.sampling import FilterState, latest
+from ....filters.core.sampling import FilterState, GapWatch
 from ....filters.support.names import look_up
 from ...weights_io import load_weights
 from ..estimator import NETWORKS, NetworkParts
 from ..inputs.gain_features import GainFeatures, ObservedState
 from .gain_head import GainHead
-
-RECOVERY = 1.0
-"""s after a gap of an input for which the published gains hold."""
 
 
 class GainFilterState(NamedTuple):
@@ -108,7 +104,7 @@ class GainFilter(NetworkParts):
         front = self.front_end.init(arrays)
         batch = front.memory.decisions.shape
         memory, output = (np.zeros((*batch, size)) for size in (self.network.memory_size, self.network.outputs))
-        return GainFilterState(self.filter.init(arrays), front, memory, output, np.full(batch, np.inf))
+        return GainFilterState(self.filter.init(arrays), front, memory, output, self._gaps.start(batch))
 
     def step(self, state: GainFilterState, measurement: Measurement) -> tuple[GainFilterState, Estimate]:
         """Process one sample of every channel, ``(*batch, size)``; NaN where there is none."""
@@ -119,7 +115,7 @@ class GainFilter(NetworkParts):
         memory, output = state.memory, state.output
         if (np.asarray(seen.due) == 1.0).any():
             memory, output, _ = self._advance(seen.features[None], seen.due[None], memory, output)
-        since = np.where(self._is_gap(inner.age), 0.0, state.since + 1.0)
+        since = self._gaps.advance(state.since, inner.age)
         return GainFilterState(inner, front, memory, output, since), estimate
 
     def run(self, measurements: Mapping[str, Any]) -> Estimate:
@@ -135,7 +131,8 @@ class GainFilter(NetworkParts):
         memory, output = (np.zeros((*batch, size)) for size in (self.network.memory_size, self.network.outputs))
         _, _, outputs = self._advance(seen.features, seen.due, memory, output)
         # what is said at the end of an interval holds from the next sample on
-        gains = self._unless_recovering(np.concatenate([output[None], outputs[:-1]]), self._since_gap(arrays))
+        since = np.concatenate([self._gaps.start((1, *batch)), self._gaps.run(arrays)[:-1]])
+        gains = self._unless_recovering(np.concatenate([output[None], outputs[:-1]]), since)
         return self.filter.run(arrays, gains), gains
 
     def gains(self, output: np.ndarray) -> dict[str, np.ndarray]:
@@ -146,24 +143,12 @@ class GainFilter(NetworkParts):
 
     def _unless_recovering(self, output: np.ndarray, since: np.ndarray) -> dict[str, np.ndarray]:
         """Log factors by gain: zeros, the published tuning, in and after a gap."""
-        going = since >= round(RECOVERY / self.dt)
-        return {name: np.where(going, factor, 0.0) for name, factor in self.gains(output).items()}
-
-    def _is_gap(self, age: np.ndarray) -> np.ndarray:
-        """Whether an input has been missing for too long; of ages ``(..., channels)`` in s."""
-        return (age[..., self._inputs] > GAP + 0.5 * self.dt).any(axis=-1)
+        bears = self._gaps.bears(since)
+        return {name: np.where(bears, 0.0, factor) for name, factor in self.gains(output).items()}
 
     @cached_property
-    def _inputs(self) -> list[int]:
-        return longest_gap(self.front_end.kalman.model)[1]
-
-    def _since_gap(self, arrays: Measurement) -> np.ndarray:
-        """Samples ``(T, *batch)`` from the last gap to the one before each."""
-        there = np.stack([np.isfinite(arrays[each.name]).all(axis=-1) for each in self.channels], axis=-1)
-        rows = np.arange(len(there)).reshape(-1, *(1,) * (there.ndim - 2))
-        gap = latest(self._is_gap((rows[..., None] - latest(there)) * self.dt))
-        since = np.where(gap >= 0, rows - gap, np.inf)
-        return np.concatenate([np.full_like(since[:1], np.inf), since[:-1]])
+    def _gaps(self) -> GapWatch:
+        return GapWatch(self.front_end.kalman.model, GYROSCOPE_GAP)
 
 
 def shipped(weights: str, dt: float = 0.01) -> GainFilter:

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
+from types import MappingProxyType
 from typing import Any, NamedTuple, Protocol, Self
 
 import numpy as np
@@ -29,12 +30,16 @@ class Seen(NamedTuple):
         base: quantity → ``(..., size)``: what the head corrects, such as the estimate of a filter.
         spread: ``(..., S)`` standard deviations of the base, or S = 0 where nothing is known of them; and after them
             what else the head needs at every sample.
+        alone: ``(...)`` where the base alone counts, since it bears a gap of its inputs; None: nowhere.
+        variances: quantity → ``(..., size)`` of the base, for where it stands alone; of what is known.
     """
 
     features: Array
     due: Array
     base: dict[str, Array]
     spread: Array
+    alone: Array | None = None
+    variances: Mapping[str, Array] = MappingProxyType({})
 
 
 class FrontEnd(Protocol):

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from poise.baselines.learned.head import AngleHead
 from poise.baselines.learned.inputs.filter_bank import FilterBank
 from poise.baselines.learned.inputs.filter_features import FilterFeatures, standardisation
 from poise.baselines.learned.inputs.front_end import FrontEnd, RawChannels, Seen, interval_ends
@@ -200,3 +201,26 @@ def test_scales_come_from_what_is_scored() -> None:
     np.testing.assert_allclose(deviation[[0, 2]], [2.0, 5.0], rtol=0.05)
     # what hardly varies is removed
     assert np.isinf(deviation[1])
+
+
+def test_a_filter_stands_alone_in_and_after_a_gap_of_its_inputs(samples: dict[str, np.ndarray]) -> None:
+    end = FilterFeatures(make("platform-gyro", dt=0.01))  # type: ignore[arg-type]
+    gyroscope = np.tile(samples["imu/gyr"][:160], (2, 1))
+    gyroscope[60:70], gyroscope[100:170] = np.nan, np.nan
+    data = {end.channels[0].name: gyroscope}
+    seen = end.run(data)
+    assert seen.alone is not None
+    np.testing.assert_array_equal(np.flatnonzero(seen.alone), np.arange(150, 269))
+    state = end.init({name: array[0] for name, array in data.items()})
+    for t in range(len(gyroscope)):
+        state, now = end.step(state, {name: array[t] for name, array in data.items()})
+        assert now.alone == seen.alone[t]
+    head = AngleHead((end.outputs[0],), (0.1,), deviations=(0.02,))
+    found = head.estimate(seen, np.ones((len(gyroscope), 1)))
+    roll, plain = found.pose["bicycle/roll"], end.kalman.run(data)
+    assert found.covariance is not None
+    assert plain.covariance is not None
+    np.testing.assert_allclose(roll[150:269], plain.pose["bicycle/roll"][150:269], atol=1e-15)
+    np.testing.assert_array_equal(found.covariance[150:269, 0, 0], plain.covariance[150:269, 0, 0])
+    np.testing.assert_allclose(roll[269:] - plain.pose["bicycle/roll"][269:], 0.1)
+    np.testing.assert_allclose(found.covariance[:150], 0.02**2)
