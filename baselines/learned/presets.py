@@ -151,8 +151,6 @@ CORRECTED = {
 }
 """Paper → filter that the network corrects: the consistent form where the published one diverges in some rides;
 two-gyro from the published one, whose roll errs less on roads that are not level"""
-GEOMETRIC = ("whole-body",)
-"""Papers whose angles follow so closely from told lengths that a network must learn what is right if those are exact"""
 BICYCLE_SITES = {
     "two-gyro": ("bicycle_imu",),
     "force-inertial": ("bicycle_imu", "wheel"),
@@ -186,11 +184,10 @@ PRESETS: dict[str, Preset] = {
     ),
     **{
         f"{paper}+network": Preset(
-            f"{filter}, all its angles corrected by a recurrent network", rides=rides, filter=filter,
+            f"{filter}, all its angles corrected by a recurrent network", rides=RIDES, filter=filter,
             validation=KEPT, scale=0.03, noise=0.1, fit=RIDDEN,
         )
         for paper, filter in CORRECTED.items()
-        for rides in (replace(RIDES, exact_share=0.25) if paper in GEOMETRIC else RIDES,)
     },
     **{
         f"gru-{paper}{end}": Preset(
