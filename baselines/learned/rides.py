@@ -8,7 +8,6 @@ exchanged; without that, networks memorise the few draws.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -31,15 +30,13 @@ UNSEEN: Mapping[str, Mapping[str, Any]] = {
 def unseen_rides(source: RideSource, seed: int, group: str, first: int = 0) -> Iterator[tuple[int, int, Trajectory]]:
     """Test rides of a group that are long enough: number of the ride, number of the draw, and the drawn ride.
 
-    Riders are measured with a tape, whatever training does.
-
     Args:
         source: as in training; how many rides and draws.
         seed: root seed of test data.
         group: of :data:`UNSEEN`.
         first: number of the first ride.
     """
-    own, root = replace(held_out(source, **UNSEEN[group]), exact_share=0.0), seed + list(UNSEEN).index(group)
+    own, root = held_out(source, **UNSEEN[group]), seed + list(UNSEEN).index(group)
     for index in range(first, own.rides):
         draws = drawn(own, root, index)
         if float(draws[0].time[-1]) >= 2.0 * SETTLED:

@@ -17,7 +17,6 @@ from ..data.trajectory import Trajectory
 from ..episodes import EpisodeStore
 from .faults import FAULTS
 from .recipe import Recipe
-from .redraw import TRUE_GEOMETRY
 from .registry import described_recipe, recipe
 from .slopes import sloped
 
@@ -45,8 +44,6 @@ class RideSource:
     """fields of the recipe that differ"""
     sloped_share: float = 0.0
     """of draws whose ground rises and falls, see :func:`.slopes.sloped`: those have no other channels"""
-    exact_share: float = 0.0
-    """of draws, of which filters are told the geometry itself instead of what a tape measure says"""
     fault: str | None = None
     """one of :data:`.faults.FAULTS` in every draw, at the same time in all of a ride"""
 
@@ -54,9 +51,8 @@ class RideSource:
         for name in ("rides", "draws"):
             if getattr(self, name) < 1:
                 raise ValueError(f"{name} must be at least 1, got {getattr(self, name)}")
-        for name in ("sloped_share", "exact_share"):
-            if not 0.0 <= getattr(self, name) <= 1.0:
-                raise ValueError(f"{name} must lie in [0, 1], got {getattr(self, name)}")
+        if not 0.0 <= self.sloped_share <= 1.0:
+            raise ValueError(f"sloped_share must lie in [0, 1], got {self.sloped_share}")
         if self.fault is not None:
             look_up("fault", self.fault, FAULTS)
 
@@ -89,16 +85,8 @@ def drawn(source: RideSource, seed: int, index: int) -> list[Trajectory]:
     if source.fault is not None:
         sequence = np.random.SeedSequence(seed, spawn_key=(index, 3))
         draws = [FAULTS[source.fault].applied(each, np.random.default_rng(sequence)) for each in draws]
-    told = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(index, 4)))
-    draws = [told_exactly(each) if told.random() < source.exact_share else each for each in draws]
     ground = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(index, 2)))
     return [sloped(each, ground) if ground.random() < source.sloped_share else each for each in draws]
-
-
-def told_exactly(drawn: Trajectory) -> Trajectory:
-    """The same draw with the true geometry for filters."""
-    true = drawn.metadata.get(TRUE_GEOMETRY, drawn.metadata.get("geometry"))
-    return drawn.replace(metadata={**drawn.metadata, "geometry": true})
 
 
 def held_out(source: RideSource, **changes: Any) -> RideSource:

@@ -7,14 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from poise.baselines.learned.rides import unseen_rides
 from poise.envs.bicycle.environment import RiderBicycleEnv
 from poise.envs.bicycle.ride.contact_forces import LoadCells
 from poise.envs.bicycle.ride.truth import isb_yxy, isb_zxy
 from poise.envs.bicycle.rider.limbs import three_turns
 from poise.envs.bicycle.rider.posture import two_turns
 from poise.envs.data.trajectory import Trajectory
-from poise.envs.recipes import rides
 from poise.envs.recipes.devices import VariedTiming
 from poise.envs.recipes.mirror import mirrored
 from poise.envs.recipes.recipe import unspawned
@@ -71,25 +69,6 @@ def test_draws_differ_in_errors_and_measured_geometry_only(ride: Trajectory) -> 
     # the camera is slower than the ideal one
     assert np.isfinite(one.measurements["relative/orientation"][:, 0]).mean() == pytest.approx(0.16, abs=0.01)
     assert np.abs(one.truth["trunk_imu/gyroscope_bias"]).max() > 0.0
-
-
-def test_a_share_of_draws_is_told_the_geometry_itself(ride: Trajectory, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(rides, "ride", lambda *_: ride)
-    source = rides.RideSource(1, 8, exact_share=0.5)
-    exact = [each.metadata["geometry"] == each.metadata[TRUE_GEOMETRY] for each in rides.drawn(source, 3, 0)]
-    assert 1 <= sum(exact) <= 7
-    for taped, told in zip(rides.drawn(replace(source, exact_share=0.0), 3, 0), rides.drawn(source, 3, 0), strict=True):
-        assert taped.metadata["geometry"] != taped.metadata[TRUE_GEOMETRY]
-        np.testing.assert_array_equal(taped.measurements["trunk_imu/gyr"], told.measurements["trunk_imu/gyr"])
-    with pytest.raises(ValueError, match=r"exact_share must lie in \[0, 1\], got 2"):
-        rides.RideSource(exact_share=2.0)
-    # test rides are always measured with a tape
-    tested = unseen_rides(source, 3, "unseen riders")
-    assert not list(tested), "a ride of three seconds is too short to score"
-    monkeypatch.setattr("poise.baselines.learned.rides.SETTLED", 1.0)
-    assert all(
-        e.metadata["geometry"] != e.metadata[TRUE_GEOMETRY] for *_, e in unseen_rides(source, 3, "unseen riders")
-    )
 
 
 def test_only_ideal_rides_are_drawn_again(ride: Trajectory) -> None:
