@@ -21,10 +21,19 @@ from .policy import GainPolicy
 
 
 class WatchedState(NamedTuple):
-    """State of a filter with a policy, and of the filter beside it that estimates the gyroscope bias; arrays only."""
+    """State of a filter with a policy and of the filters beside it; arrays only.
+
+    Attributes:
+        tuned: of the filter whose gains the policy sets.
+        plain: of the same filter with the published gains.
+        witness: of the filter that estimates the gyroscope bias.
+        trusted: ``(*batch,)`` whether the estimates are those of the first, since the last decision.
+    """
 
     tuned: TunedState
+    plain: FilterState
     witness: FilterState
+    trusted: np.ndarray
 
 
 State = TunedState | WatchedState
@@ -37,8 +46,9 @@ class AdaptiveEstimator(Enclosing):
 
     The policy decides once per interval from the samples so far; between decisions the gains are constant. With
     a neutral policy it is the filter itself, bit by bit. Where the gyroscope bias is larger than the policy knows, and
-    in the seconds before it can be told, the published gains stay. The state holds arrays only. At another sampling
-    interval the time between decisions is kept.
+    in the seconds before it can be told, the estimates are those of the published gains. Both filters run side by side:
+    a filter that takes over other gains errs until its covariance suits them, by tens of degrees while it is shaken.
+    The state holds arrays only. At another sampling interval the time between decisions is kept.
 
     Attributes:
         filter: in its published tuning, a KalmanFilter (or the name of one).
@@ -90,7 +100,10 @@ class AdaptiveEstimator(Enclosing):
     def init(self, measurement: Measurement) -> State:
         """Initial state with the batch shape of ``measurement``."""
         state = self.tuned.init(measurement)
-        return state if self.witness is None else WatchedState(state, self.witness.init(measurement))
+        if self.witness is None:
+            return state
+        untrusted = np.zeros(state.action.shape[:-1], dtype=bool)
+        return WatchedState(state, state.filter, self.witness.init(measurement), untrusted)
 
     def step(self, state: State, measurement: Measurement) -> tuple[State, Estimate]:
         """Process one sample ``(*batch, size)`` of every channel, NaN where there is none.
@@ -116,7 +129,7 @@ class AdaptiveEstimator(Enclosing):
     def run_with_actions(
         self, state: State | None, measurements: Mapping[str, Any]
     ) -> tuple[Estimate, State, np.ndarray]:
-        """As :meth:`run_from`, with the action ``(T, *batch, k)`` at every sample."""
+        """As :meth:`run_from`, with the action ``(T, *batch, k)`` of the estimate of every sample."""
         arrays = check_measurements(self.channels, measurements, time_axis=True)
         arrays = {name: np.asarray(array) for name, array in arrays.items()}
         length = len(next(iter(arrays.values())))
@@ -129,24 +142,42 @@ class AdaptiveEstimator(Enclosing):
             estimate, state = self._advance(state, {name: array[start:stop] for name, array in arrays.items()})
             parts.append(estimate)
             action = tuned_part(state).action
+            if isinstance(state, WatchedState):
+                action = np.where(state.trusted[..., None], action, 0.0)
             actions.append(np.broadcast_to(action, (stop - start, *action.shape)))
             start = stop
         return joined(parts), state, np.concatenate(actions)
 
     def _advance(self, state: State, samples: Mapping[str, np.ndarray]) -> tuple[Estimate, State]:
-        tuned, witness = tuned_part(state), self.witness
-        if int(tuned.memory.samples) == 0:
-            action = self.policy(self.tuned.observe(tuned))
-            if witness is not None and isinstance(state, WatchedState):
-                beyond = bias_of(witness, state.witness) > self.policy.bias_limit
-                time = tuned.memory.decisions * (self.tuned.interval_samples * self.dt)
-                action = np.where((beyond | (time < SETTLING))[..., None], 0.0, action)
-            tuned = self.tuned.decide(tuned, action)
+        tuned = tuned_part(state)
+        decides = int(tuned.memory.samples) == 0
+        time = tuned.memory.decisions * (self.tuned.interval_samples * self.dt)
+        if decides:
+            tuned = self.tuned.decide(tuned, self.policy(self.tuned.observe(tuned)))
         estimate, tuned = self.tuned.advance(tuned, samples)
+        witness = self.witness
         if witness is None or not isinstance(state, WatchedState):
             return estimate, tuned
+        trusted = state.trusted
+        if decides:
+            known = bias_of(witness, state.witness) <= self.policy.bias_limit
+            trusted = np.broadcast_to(known & (time >= SETTLING), trusted.shape)
+        published, plain = self.filter.run_from(state.plain, samples)
         seen = {channel.name: samples[channel.name] for channel in witness.channels}
-        return estimate, WatchedState(tuned, witness.run_from(state.witness, seen)[1])
+        after = WatchedState(tuned, plain, witness.run_from(state.witness, seen)[1], trusted)
+        return chosen(trusted, estimate, published), after
+
+
+def chosen(first: np.ndarray, one: Estimate, other: Estimate) -> Estimate:
+    """Of each sequence of the batch the estimates ``(T, *batch, …)`` of ``one`` or ``other``, as ``first`` says."""
+
+    def choose(a: Any, b: Any) -> Any:
+        if a is None:
+            return None
+        return np.where(np.reshape(first, first.shape + (1,) * (a.ndim - 1 - first.ndim)), a, b)
+
+    pose = {name: choose(value, other.pose[name]) for name, value in one.pose.items()}
+    return Estimate(pose, *(choose(a, b) for a, b in zip(one[1:4], other[1:4], strict=True)))
 
 
 def tuned_part(state: State) -> TunedState:

@@ -3,8 +3,8 @@
 A filter without a bias in its state errs by its time constant times the bias. A policy for it learns time constants
 that suit the biases of its training, and nothing that it observes tells a larger bias from a steady acceleration. The
 multiplicative extended Kalman filter as published runs beside it and estimates the bias from the same samples. Beyond
-the largest estimate of the training, apart from a hundredth of the decisions, the published gains stay. So they do in
-the first seconds, since a filter that has become wrong by then may take long to recover.
+the largest estimate of the training, apart from a hundredth of the decisions, and in the first seconds, the estimates
+are those of the filter with its published gains, which runs beside it too.
 """
 
 from __future__ import annotations

@@ -55,6 +55,19 @@ def test_a_large_bias_ends_the_policy_and_a_small_one_does_not(motions):
     assert followed(early, bad)[2][first:].any()
 
 
+def test_a_policy_is_trusted_later_as_if_it_had_been_from_the_start(motions):
+    """Gains that change in the middle of a motion find a covariance that suits other ones: both filters run."""
+    slow = GainPolicy.constant(TUNED, SLOW)
+    estimate, state, _ = followed(replace(slow, bias_limit=np.radians(2.0)), motions[0].measurements)
+    first = round(SETTLING / motions[0].dt)
+    for name, values in AdaptiveEstimator(KALMAN, slow).run(motions[0].measurements).pose.items():
+        np.testing.assert_array_equal(estimate.pose[name][first:], values[first:])
+    for name, values in KALMAN.run(motions[0].measurements).pose.items():
+        np.testing.assert_array_equal(estimate.pose[name][:first], values[:first])
+    assert state.trusted.shape == ()
+    assert state.trusted
+
+
 def test_samples_one_by_one_give_the_same_bit_by_bit(motions):
     limited = replace(GainPolicy.constant(TUNED, SLOW), bias_limit=np.radians(2.0))
     bad = {name: values[:1700].copy() for name, values in biased(motions[0], 2.2).measurements.items()}
