@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import zipfile
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..storage import HDF5_SIGNATURE, LARGEST, LARGEST_RATIO, objects, read_hdf5
+from .cells import labels_of, numeric
 from .table import Table, split_unit
 from .text import is_text, read_text
 
@@ -16,6 +18,10 @@ NPY, ZIP, PARQUET, MATLAB = b"\x93NUMPY", b"PK\x03\x04", b"PAR1", b"MATLAB"
 
 
 OTHERS: dict[bytes, str] = {
+    b"version https://git-lfs": "is a pointer of Git LFS; fetch the file itself (git lfs pull)",
+    b"\x80\x04": "is a pickle, which can run any program; save its arrays as .npz or its table as CSV or Parquet",
+    b"\x80\x05": "is a pickle, which can run any program; save its arrays as .npz or its table as CSV or Parquet",
+    b"ARROW1": "is an Arrow (Feather) file; save it as Parquet",
     b"\x1f\x8b": "is compressed (gzip); unpack it first",
     b"BZh": "is compressed (bzip2); unpack it first",
     b"\xfd7zXZ": "is compressed (xz); unpack it first",
@@ -93,8 +99,7 @@ def as_table(arrays: dict[str, Any], kind: str) -> Table:
         return Table({str(column): matrix[:, column] for column in range(matrix.shape[1])}, kind=kind, named=False)
     if not found:
         raise ValueError(f"the {kind} holds no numeric array")
-    units = {name: split_unit(name)[1] for name in found if split_unit(name)[1]}
-    return Table(found, units={split_unit(name)[0]: unit for name, unit in units.items()}, kind=kind)
+    return as_named(found, kind)
 
 
 def time_first(array: np.ndarray) -> np.ndarray:
@@ -163,6 +168,10 @@ def load_mat(path: Path) -> dict[str, Any]:
             for name, inner in value.items():
                 if not str(name).startswith("__"):
                     visit(f"{prefix}/{name}" if prefix else str(name), inner)
+        elif isinstance(value, list) or (isinstance(value, np.ndarray) and value.dtype == object):
+            # An array of structures.
+            for number, inner in enumerate(np.ravel(np.asarray(value, dtype=object))):
+                visit(f"{prefix}{number + 1}", inner)
         elif isinstance(value, np.ndarray | int | float):
             flat[prefix] = np.asarray(value)
 
@@ -175,7 +184,9 @@ def hdf5_arrays(file: Any, path: Path) -> dict[str, np.ndarray]:
     found = {}
     for name, item in objects(file):
         if hasattr(item, "dtype") and item.dtype.kind in "fiub" and not name.startswith("#refs#"):
-            found[name] = item[()].T if "MATLAB_class" in item.attrs else item[()]
+            unit = item.attrs.get("units", item.attrs.get("Units", item.attrs.get("unit", "")))
+            unit = unit.decode(errors="replace") if isinstance(unit, bytes) else str(unit)
+            found[f"{name} ({unit})" if unit else name] = item[()].T if "MATLAB_class" in item.attrs else item[()]
     return found
 
 
@@ -189,16 +200,27 @@ def read_parquet(path: Path) -> Table:
         raise ImportError(f"{path} is a Parquet file: pip install pyarrow to read it") from None
     except Exception as reason:  # pyarrow raises many kinds for damaged files
         raise ValueError(f"it is not a readable Parquet file: {reason}") from None
-    if frame.index.name:
-        frame = frame.reset_index()
-    arrays = {}
+    if frame.index.name or frame.index.dtype.kind in "mM":
+        frame = frame.rename_axis(index=frame.index.name or "time").reset_index()
+    arrays: dict[str, np.ndarray] = {}
+    labels = {}
     for name, column in frame.items():
-        if column.dtype.kind in "iufb":
-            arrays[str(name)] = column.to_numpy()
+        if column.dtype.kind == "m":
+            values: np.ndarray | None = column.to_numpy("timedelta64[ns]").astype(np.int64)
         elif column.dtype.kind == "M":
-            arrays[str(name)] = pandas.to_datetime(column, utc=True).to_numpy("datetime64[ns]").astype(np.int64)
-    return Table(
-        {split_unit(name)[0]: values for name, values in arrays.items()},
-        units={split_unit(name)[0]: split_unit(name)[1] for name in arrays if split_unit(name)[1]},
-        kind="Parquet table",
-    )
+            values = pandas.to_datetime(column, utc=True).to_numpy("datetime64[ns]").astype(np.int64)
+        elif column.map(np.ndim).any():
+            continue
+        else:
+            values, _ = numeric(column)
+        found = labels_of(str(name), column, values)
+        labels |= {str(name): found} if found else {}
+        if values is not None:
+            arrays[f"{name} (ns)" if column.dtype.kind in "mM" else str(name)] = values
+    return replace(as_named(arrays, "Parquet table"), labels=labels)
+
+
+def as_named(arrays: dict[str, np.ndarray], kind: str) -> Table:
+    """A table of arrays whose names may end with a unit."""
+    units = {split_unit(name)[0]: split_unit(name)[1] for name in arrays if split_unit(name)[1]}
+    return Table({split_unit(name)[0]: values for name, values in arrays.items()}, units=units, kind=kind)

@@ -19,7 +19,18 @@ from .table import UNITS, Table, factor, plain
 
 RATES = (
     *("Update Rate", "Sample Rate", "Sampling Rate", "OutputRate", "Rate", "Frequency", "Sampling Frequency"),
-    *("Sample Frequency", "Sampling Interval", "Sample Interval", "Sampling Period", "Sample Period"),
+    *(
+        "fs",
+        "ODR",
+        "Output Data Rate",
+        "Abtastrate",
+        "Abtastfrequenz",
+        "Sample Frequency",
+        "Sampling Interval",
+        "Sample Interval",
+        "Sampling Period",
+        "Sample Period",
+    ),
 )
 """Keys of a header for the sampling rate."""
 APPS = {("gFx", "wx"): {"acc": ("gFx gFy gFz", "g"), "gyr": ("wx wy wz", "rad/s"), "mag": ("Bx By Bz", "uT")}}

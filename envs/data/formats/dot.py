@@ -1,8 +1,10 @@
-"""Exports of Movella DOT (formerly Xsens DOT) sensors, with any delimiter, decimal mark and line end.
+"""Exports of Movella DOT (formerly Xsens DOT) sensors and of Xsens MT Manager, in any dialect of text.
 
 Xsens DOT User Manual, document XD0502P, sections 4.2.1–4.2.5: ``SampleTimeFine`` counts microseconds and
 wraps at 2³²; ``Acc_*`` m/s², ``Gyr_*`` deg/s, ``Mag_*`` in units of the field at calibration (about 40 µT), ``dq_*``
-and ``dv[*]`` are increments of one sampling interval, all in sensor axes.
+and ``dv[*]`` are increments of one sampling interval, all in sensor axes. MT Manager User Manual (MT0216P), ASCII
+export: a comment with the rate, a packet counter that wraps, ``Acc_*`` m/s², ``Gyr_*`` rad/s, ``Mag_*`` in units of the
+field at calibration; ``Mat[i][j]`` and ``Quat_q*`` turn the sensor into a world whose z axis is up.
 """
 
 from __future__ import annotations
@@ -17,13 +19,17 @@ from ..trajectory import Trajectory
 from .arrays import read_table
 from .described import with_checked_orientation
 from .head import Head
-from .mapping import trajectory_of
+from .mapping import Columns, RecordingMap, Reference, apply_map, trajectory_of
+from .names import groups
 from .stamps import as_seconds
 from .table import Table
 from .text import table_of
 
 DEVICE_KEYS = ("DeviceTag", "DeviceId", "OutputRate", "FilterProfile", "Measurement Mode", "SyncStatus", "Measurement")
 UNITS = {"gyr": "rad/s", "acc": "m/s²", "mag": "calibration field", "onboard_orientation": "1"}
+MT_UNITS = {"gyr": "rad/s", "acc": "m/s^2", "mag": "a.u."}
+FINE_TICK = 1e-4
+"""s per count of an MT's SampleTimeFine."""
 SLOWEST_COUNT = 2000
 """Counts of SampleTimeFine between samples: a DOT at 120 Hz has 8333, an MT at 10 Hz 1000."""
 LONGEST_GAP = 60.0
@@ -43,16 +49,17 @@ def is_dot(head: Head) -> bool:
     if "sampletimefine" not in head.text.lower():
         return False
     lines = [line.lstrip('"') for line in head.text.splitlines()]
-    if any(line.startswith(DEVICE_KEYS) for line in lines):
-        return True
-    # Without a header the clock tells: a DOT counts microseconds, an MT tenths of milliseconds.
+    known = any(line.startswith(DEVICE_KEYS) for line in lines)
+    # The clock tells: a DOT counts microseconds, an MT tenths of milliseconds.
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             clock = table_of(head.text, head.path.name).renamed(spelled).arrays.get("SampleTimeFine")
     except ValueError:
-        return False
-    return clock is not None and len(clock) > 2 and bool(np.median(np.abs(np.diff(clock))) >= SLOWEST_COUNT)
+        return known
+    if clock is None or len(clock) < 3:
+        return known
+    return bool(np.median(np.abs(np.diff(clock))) >= SLOWEST_COUNT) or (known and "OutputRate" in head.text)
 
 
 def load_dot(path: Path) -> list[Trajectory]:
@@ -147,3 +154,44 @@ def channels(table: Table, dt: float) -> dict[str, np.ndarray]:
         roll, pitch, yaw = np.radians(euler).T
         found["onboard_orientation"] = rotation.from_euler_zyx(yaw, pitch, roll)
     return {kind: array for kind, array in found.items() if array is not None}
+
+
+def is_xsens(head: Head) -> bool:
+    """Whether a file is an export of MT Manager: its names of columns, and its comments or its packet counter."""
+    names = head.text.lower()
+    if "acc_x" not in names or "gyr_x" not in names or ("packetcounter" not in names and "sampletimefine" not in names):
+        return False
+    return not is_dot(head)
+
+
+def load_xsens(path: Path) -> list[Trajectory]:
+    """Read an export of one sensor, on the grid of its packet counter.
+
+    Raises:
+        ValueError: the rate is not in the header, or a column is missing or unreadable.
+    """
+    table = read_table(path).renamed(spelled)
+    found = {group.kind: group for group in groups(table)}
+    missing = {"gyr", "acc"} - set(found)
+    if missing:
+        raise ValueError(f"columns of {sorted(missing)} are missing; there are {list(table.arrays)}")
+    rate = table.rate_in_header("Update Rate", "Sample Rate", "Sampling Rate", "Output Rate")
+    columns: dict[str, Columns] = {kind: found[kind].columns for kind in ("gyr", "acc", "mag") if kind in found}
+    onboard = next((found[kind].columns for kind in ("quaternion", "matrix") if kind in found), None)
+    if onboard is None and {"Roll", "Pitch", "Yaw"} <= set(table.arrays):
+        onboard = ["Roll", "Pitch", "Yaw"]
+    references = () if onboard is None else (Reference(tuple(onboard), role="onboard"),)
+    details = {"format": "Xsens MT Manager", "source": "Xsens MT Manager text export"}
+    counter = "PacketCounter" if "PacketCounter" in table.arrays else None
+    if rate is not None and counter is not None:
+        mapping = RecordingMap(columns, MT_UNITS, rate=rate, counter=counter, reference=references, details=details)
+        return [with_checked_orientation(one).on_grid() for one in apply_map(table, mapping, path)]
+    if "SampleTimeFine" not in table.arrays:
+        if rate is None:
+            raise ValueError("neither a comment 'Update Rate' nor a column SampleTimeFine tells the sampling rate")
+        mapping = RecordingMap(columns, MT_UNITS, rate=rate, reference=references, details=details)
+        return [with_checked_orientation(one) for one in apply_map(table, mapping, path)]
+    mapping = RecordingMap(
+        columns, MT_UNITS | {"time": "s"}, time="SampleTimeFine", rate=rate, reference=references, details=details
+    )
+    return [with_checked_orientation(one.replace(time=one.time * FINE_TICK)) for one in apply_map(table, mapping, path)]

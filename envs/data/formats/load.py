@@ -12,19 +12,18 @@ from ....filters.support.files import as_path
 from ....filters.support.names import unknown
 from ..calibration.records import CalibrationRecord, apply_calibration, as_record
 from ..reference_clock import measured
-from ..storage import FORMAT, is_trajectory_file
+from ..storage import FORMAT, HDF5_SIGNATURE, is_trajectory_file
 from ..trajectory import Trajectory, load_trajectory
-from .arrays import PARQUET, read_table
+from .arrays import MATLAB, PARQUET, read_table
 from .benchmarks import is_archive, is_euroc, is_repoimu, load_archive, load_euroc, load_phone, load_repoimu
 from .broad import is_broad, load_broad
 from .described import complete, load_described, mapping_of, with_checked_orientation
-from .dot import is_dot, load_dot
+from .dot import is_dot, is_xsens, load_dot, load_xsens
 from .draft import explanation
 from .folders import is_folder_of_streams, is_member, load_member
 from .head import Head
 from .mapping import RecordingMap, apply_map, make_map, read_map
 from .text import table_of
-from .xsens import is_xsens, load_xsens
 
 
 @dataclass(frozen=True)
@@ -64,14 +63,14 @@ def load_map(path: Path) -> list[Trajectory]:
 
 
 def is_described(head: Head) -> bool:
-    """Whether a table of text or Parquet names its columns and their units."""
-    parquet = head.content.startswith(PARQUET)
-    if not head.text and not parquet:
+    """Whether a table names its columns and their units."""
+    arrays = head.content.startswith((PARQUET, HDF5_SIGNATURE, MATLAB))
+    if not head.text and not arrays:
         return False
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            table = read_table(head.path) if parquet else table_of(head.text, head.path.name)
+            table = read_table(head.path) if arrays else table_of(head.text, head.path.name)
             return complete(table, mapping_of(table))
     except (ValueError, ImportError):
         return False

@@ -23,7 +23,7 @@ from ..ranges import full_scale
 from ..trajectory import Trajectory
 from .names import time_unit
 from .stamps import as_seconds
-from .table import UNITS, Table, factor, split_unit
+from .table import DAMAGED, UNITS, Table, factor, split_unit
 
 Columns = str | Sequence[str | int]
 SIZES = {"gyr": 3, "acc": 3, "mag": 3}
@@ -228,6 +228,7 @@ def apply_map(table: Table, mapping: RecordingMap, path: Path) -> list[Trajector
     Raises:
         ValueError: a column is missing or unreadable, or the time is.
     """
+    table = with_times(table, mapping)
     seconds, clock = recording_time(table, mapping)
     sensors = mapping.sensors()
     for reference in mapping.reference:
@@ -258,6 +259,20 @@ def apply_map(table: Table, mapping: RecordingMap, path: Path) -> list[Trajector
             details.setdefault("full_scale", ranges)
         trajectories.append(trajectory_of(seconds, measurements, truth, details))
     return trajectories
+
+
+def with_times(table: Table, mapping: RecordingMap) -> Table:
+    """The table without the few rows that have no time, with a warning: averages below a table, or damaged lines."""
+    values = None if mapping.time is None else table.column(str(mapping.time))
+    if values is None or values.dtype.kind != "f" or values.ndim != 1 or len(values) != len(table):
+        return table
+    known = np.isfinite(values)
+    lost = int((~known).sum())
+    if not 0 < lost < DAMAGED * len(values):
+        return table
+    first = int(np.flatnonzero(~known)[0])
+    warnings.warn(f"{lost} rows without a time are left out, the first is row {first}", stacklevel=5)
+    return table.rows(known)
 
 
 def trajectory_of(

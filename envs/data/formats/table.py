@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import warnings
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -170,6 +171,10 @@ def units_row(cells: Sequence[str]) -> bool:
     return bool(content) and known > 0.6 * len(content) and not all(len(cell) == 1 for cell in content)
 
 
+DAMAGED = 0.02
+"""Share of rows that may be damaged: from there on the whole table is suspect."""
+
+
 @dataclass(frozen=True)
 class Table:
     """Columns of numbers, equally long in one file where they are text, of any length in others.
@@ -180,7 +185,7 @@ class Table:
         preamble: lines before the table.
         kind: of the file, for messages.
         named: whether the columns have names of their own.
-        unreadable: name → row and content of the first cell that is not a number.
+        unreadable: name → row and content of the first cell that is not a number, and their count.
         labels: name → texts of a column that change from row to row, such as names of sensors.
         texts: name → first content of a column that holds no numbers.
     """
@@ -190,7 +195,7 @@ class Table:
     preamble: tuple[str, ...] = ()
     kind: str = "table"
     named: bool = True
-    unreadable: dict[str, tuple[int, str]] = field(default_factory=dict)
+    unreadable: dict[str, tuple[int, str, int]] = field(default_factory=dict)
     labels: dict[str, tuple[str, ...]] = field(default_factory=dict)
     texts: dict[str, str] = field(default_factory=dict)
 
@@ -212,9 +217,18 @@ class Table:
         if name not in self.arrays:
             raise ValueError(f"{unknown('column', name, self.arrays)}")
         if name in self.unreadable:
-            row, content = self.unreadable[name]
-            raise ValueError(f"column {name} holds no number in row {row} of the table: {content!r}")
+            row, content, count = self.unreadable[name]
+            what = f"column {name} holds no number in row {row} of the table: {content!r}"
+            if count >= DAMAGED * len(self.arrays[name]):
+                raise ValueError(what)
+            warnings.warn(f"{what}; such cells ({count} in all) count as missing", stacklevel=2)
         return self.arrays[name]
+
+    def rows(self, kept: np.ndarray) -> Table:
+        """Some rows of all columns of full length."""
+        length = len(self)
+        arrays = {name: values[kept] if len(values) == length else values for name, values in self.arrays.items()}
+        return replace(self, arrays=arrays, unreadable={})
 
     def matrix(self, names: str | Sequence[str]) -> np.ndarray:
         """Columns side by side, ``(N, k)`` float64; a single name may be an array of several columns."""

@@ -17,32 +17,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .stamps import DATE, nanoseconds
-from .table import Table, split_unit, units_row
+from .cells import MISSING, is_number, is_value, labels_of, numeric
+from .table import DAMAGED, Table, split_unit, units_row
 
 if TYPE_CHECKING:
     import pandas
 
-MISSING = (
-    "", "-", "--", "---", "…", "...", "?", "*", "na", "n/a", "n.a.", "null", "<null>", "none", "nil", "missing",
-    "undef", "undefined", "void", "nat", "<na>", "nan", "-nan", "nan(ind)", "-nan(ind)", "nan(snan)", "1.#qnan",
-    "-1.#qnan", "1.#ind", "-1.#ind", "1.#inf", "-1.#inf", "1.#snan", "#n/a", "#na", "#value!", "#div/0!", "#num!",
-    "#name?", "#ref!", "#null!",
-)  # fmt: skip
-"""Texts for no value, in lower case: of languages, databases, C libraries and spreadsheets."""
-NUMBER = re.compile(r"[-+]?(\d+[.,]?\d*|[.,]\d+)([eEdD][-+]?\d+)?|[-+]?(inf|infinity)", re.IGNORECASE)
-GROUPED = re.compile(r"[-+]?\d{1,3}('\d{3})+([.,]\d*)?|[-+]?\d{1,3}(,\d{3})*\.\d*|[-+]?\d{1,3}(\.\d{3})*,\d*")
-"""Digits in groups of thousands, where the decimal mark is another one."""
-ALIKE = str.maketrans({"\u2212": "-", "\u00a0": " ", "\u202f": " ", "\u2009": " ", "\ufeff": None})
+ALIKE = str.maketrans({"\u2212": "-", "\u00a0": " ", "\u202f": " ", "\u2009": " ", "\ufeff": None, "\x1a": None})
 """Signs and spaces of typesetters → those of numbers."""
 COMMENT = ("#", "//", "%")
 DELIMITERS = (",", ";", "\t", "|", " ")
-SENSOR = re.compile(
-    r"(^|[\W_])(id|sensor|device|node|imu|mac|address|type|kind|channel|topic|stream)s?([\W_]*(id|no|number|name))?$",
-    re.IGNORECASE,
-)
-OFTEN, MOST_SENSORS = 0.3, 64
-"""Share of rows whose label is not that of the row before, and different ones, where labels name sensors."""
 SAMPLE = 400
 """Lines that decide about the delimiter."""
 NAMES = {",": "comma", ";": "semicolon", "\t": "tab", "|": "bar", " ": "white space"}
@@ -50,7 +34,9 @@ NAMES = {",": "comma", ";": "semicolon", "\t": "tab", "|": "bar", " ": "white sp
 
 def decode(content: bytes) -> str:
     """Text of a file with line feeds only."""
-    if content.startswith((b"\xff\xfe", b"\xfe\xff")):
+    if content.startswith((b"\xff\xfe\0\0", b"\0\0\xfe\xff")):
+        text = content.decode("utf-32", errors="replace")
+    elif content.startswith((b"\xff\xfe", b"\xfe\xff")):
         text = content.decode("utf-16", errors="replace")
     elif wide(content):
         text = content.decode(wide(content), errors="replace")
@@ -82,23 +68,13 @@ def is_text(head: bytes) -> bool:
 def fields_of(line: str, delimiter: str) -> list[str]:
     """Fields of a line, without quotes and white space around them."""
     if delimiter == " ":
-        return line.split()
+        return line.split() if '"' not in line else [one.strip('"') for one in re.findall(r'"[^"]*"|\S+', line)]
     if '"' in line:
         try:
             return [field.strip() for field in next(csv.reader([line], delimiter=delimiter, skipinitialspace=True), [])]
         except csv.Error:  # one line of a megabyte, as of JSON
             pass
     return [field.strip() for field in line.split(delimiter)]
-
-
-def is_number(field: str) -> bool:
-    """Whether a field is a number, with either decimal mark."""
-    return NUMBER.fullmatch(field) is not None
-
-
-def is_value(field: str) -> bool:
-    """Whether a field may stand in a table of numbers."""
-    return is_number(field) or field.lower() in MISSING or DATE.fullmatch(field) is not None
 
 
 def numbers(line: str, delimiter: str) -> int:
@@ -175,20 +151,41 @@ def table_of(text: str, name: str) -> Table:
         data = [line for line in data if line.strip() not in heads_above]
     widths = [len(fields_of(line, delimiter)) for line in data[:SAMPLE]]
     width = max(set(widths), key=widths.count)
+    data = whole_rows(data, delimiter, width, name)
     if len(data) > 1 and cut_off([fields_of(line, delimiter) for line in data[-30:]], width, text.endswith("\n")):
         warnings.warn(f"{name}: the last row is cut off ({data[-1][-40:]!r}) and left out", stacklevel=4)
         del data[-1]
     frame = parse(data, delimiter, width)
     above = lines[:begin]
     heads = header_lines(above, delimiter, width)
-    names, units = names_and_units([head for _, head in heads], width)
+    if not heads and delimiter == "," and above:
+        named = max(len(fields_of(line, delimiter)) for line in above[-2:])
+        if 4 <= named < width <= 2 * named:
+            raise ValueError(
+                f"its header names {named} columns, but its rows have {width} fields: commas separate fields and mark "
+                "decimals; export it with another delimiter, or with decimal points"
+            )
+    shifted = bool(heads) and all(not head[-1] for _, head in heads) and numbered(frame)
+    names, units = names_and_units([[""] * shifted + head[: width - shifted] for _, head in heads], width)
     twice = [each for each in names if re.sub(r"\.\d+$", "", each) in names and re.search(r"\.\d+$", each)]
     if twice:
         warnings.warn(f"{name}: names of columns occur more than once; the later ones are called {twice}", stacklevel=4)
     used = {number for number, _ in heads}
     arrays, unreadable, labels, texts = {}, {}, {}, {}
+    read = [numeric(frame[column]) for column in range(width)]
+    # Of dates all must be readable.
+    damaged = np.unique([row for values, wrong in read if values is None for row in wrong])
+    if 0 < len(damaged) < DAMAGED * len(frame):
+        row = int(damaged[0])
+        found = ", ".join(str(frame[column].iloc[row]) for column in range(width))
+        warnings.warn(
+            f"{name}: {len(damaged)} rows hold no date and are left out, the first: {found[:60]}",
+            stacklevel=4,
+        )
+        frame = frame.drop(index=damaged).reset_index(drop=True)
+        read = [numeric(frame[column]) for column in range(width)]
     for column, name in enumerate(names):
-        values, wrong = numeric(frame[column])
+        values, wrong = read[column]
         texts_found = labels_of(name, frame[column], values)
         if texts_found:
             labels[name] = texts_found
@@ -199,8 +196,8 @@ def table_of(text: str, name: str) -> Table:
         arrays[name or str(column)] = values
         if values.dtype.kind == "i" and frame[column].dtype.kind not in "iuf":
             units[name or str(column)] = "ns"
-        if wrong is not None:
-            unreadable[name or str(column)] = wrong
+        if len(wrong):
+            unreadable[name or str(column)] = int(wrong[0]), str(frame[column].iloc[int(wrong[0])]), len(wrong)
     # Rows of texts for missing values alone are blank lines.
     blank = np.all(
         [np.isnan(values) if values.dtype.kind == "f" else values != values for values in arrays.values()], 0
@@ -219,16 +216,6 @@ def table_of(text: str, name: str) -> Table:
     )
 
 
-def labels_of(name: str, column: pandas.Series, values: np.ndarray | None) -> tuple[str, ...]:
-    """Texts (or numbers of sensors) that change from row to row; empty of all other columns."""
-    if values is not None and not SENSOR.search(name):
-        return ()
-    texts = column.dropna().astype("string").str.strip()
-    changes = float((texts.to_numpy()[1:] != texts.to_numpy()[:-1]).mean()) if len(texts) > 1 else 0.0
-    texts_found = tuple(texts.unique()) if changes > OFTEN else ()
-    return texts_found if 2 <= len(texts_found) <= MOST_SENSORS else ()
-
-
 def cut_off(rows: list[list[str]], width: int, ended: bool) -> bool:
     """Whether the last of some rows lacks fields, or (in a file that does not end with its line) digits of the last."""
     *before, last = rows
@@ -237,6 +224,46 @@ def cut_off(rows: list[list[str]], width: int, ended: bool) -> bool:
     digits = {len(row[width - 1]) - row[width - 1].replace(",", ".").rfind(".") for row in before if len(row) >= width}
     own = last[width - 1]
     return not ended and bool(digits) and len(own) - own.replace(",", ".").rfind(".") < min(digits)
+
+
+def whole_rows(data: list[str], delimiter: str, width: int, name: str) -> list[str]:
+    """Rows without the few that have another number of fields, with a warning: lines that were cut off or merged.
+
+    Raises:
+        ValueError: many rows have more fields than there are columns.
+    """
+    quoted = any('"' in line for line in data)
+    count = len if delimiter != " " and not quoted else None
+    lengths = np.array(
+        [line.count(delimiter) + 1 if count else len(fields_of(line, delimiter)) for line in data], dtype=int
+    )
+    bare = np.array([not line.rstrip(" ").endswith(delimiter) for line in data]) if delimiter != " " else True
+    wrong = (lengths < width) | ((lengths > width) & ((lengths > width + 1) | bare))
+    # The last row is looked at more closely than others.
+    wrong[-1] &= lengths[-1] > width
+    if not wrong.any():
+        return data
+    row = int(np.flatnonzero(wrong)[0])
+    if wrong.sum() < DAMAGED * len(data):
+        warnings.warn(
+            f"{name}: {int(wrong.sum())} rows have another number of fields than {width} and are left out, the first, "
+            f"row {row}: {data[row][:60]!r}",
+            stacklevel=5,
+        )
+        return [line for line, bad in zip(data, wrong, strict=True) if not bad]
+    if (lengths[wrong] > width).any():
+        row = int(np.flatnonzero(wrong & (lengths > width))[0])
+        raise ValueError(
+            f"row {row} of its table has {lengths[row]} fields, most rows have {width}: {data[row][:60]!r}"
+        )
+    return data
+
+
+def numbered(frame: pandas.DataFrame) -> bool:
+    """Whether the first column numbers the rows, as R writes them without a name, and the last is not empty."""
+    first, last = frame.iloc[:, 0], frame.iloc[:, -1]
+    steps = np.diff(first.to_numpy()[:SAMPLE]) if first.dtype.kind == "i" else np.zeros(1)
+    return bool((steps == 1).all() and last.notna().any())
 
 
 def parse(data: list[str], delimiter: str, width: int) -> pandas.DataFrame:
@@ -288,8 +315,10 @@ def header_lines(above: list[str], delimiter: str, width: int) -> list[tuple[int
 
 def names_and_units(heads: list[list[str]], width: int) -> tuple[list[str], dict[str, str]]:
     """Unique column names, and the units by name, of the lines of a header."""
-    rows = [list(head) for head in heads]
-    unit_line = [re.sub(r"^[(\[](.*)[)\]]$", r"\1", cell) for cell in rows.pop()] if units_below(rows) else [""] * width
+    rows = [[re.sub(r"^'(.*)'$", r"\1", cell) for cell in head] for head in heads]
+    of_units = [row for row in rows if len(rows) > 1 and units_row(row)][-1:]
+    rows = [row for row in rows if row not in of_units]
+    unit_line = [re.sub(r"^[(\[](.*)[)\]]$", r"\1", cell) for cell in of_units[0]] if of_units else [""] * width
     if len(rows) > 1 and any(not cell for cell in rows[0][1:]):
         # A line of groups over a line of axes: the group's name stands over its first column.
         group = ""
@@ -307,46 +336,3 @@ def names_and_units(heads: list[list[str]], width: int) -> tuple[list[str], dict
         if unit or unit_line[column]:
             units[name] = unit or unit_line[column]
     return names, units
-
-
-def units_below(rows: list[list[str]]) -> bool:
-    """Whether the last line of a header holds units."""
-    return len(rows) > 1 and units_row(rows[-1])
-
-
-def numeric(column: pandas.Series) -> tuple[np.ndarray | None, tuple[int, str] | None]:
-    """Numbers of a column (None for texts), and row and content of the first cell that is none."""
-    import pandas
-
-    if column.dtype.kind in "iufb":
-        return column.to_numpy(), None
-    texts = column.astype("string").str.strip()
-    filled = texts.notna() & ~texts.str.lower().isin(MISSING).fillna(False)
-    values = pandas.to_numeric(texts, errors="coerce")
-    if values[filled].isna().any():
-        values = pandas.to_numeric(texts.str.replace(",", ".", regex=False), errors="coerce")
-    if values[filled].isna().any():
-        values = pandas.to_numeric(spelled_out(texts, filled), errors="coerce")
-    wrong = filled & values.isna()
-    if not filled.any() or wrong.sum() > 0.5 * filled.sum():
-        first = str(texts[filled].iloc[0]) if filled.any() else ""
-        return (nanoseconds(texts), None) if DATE.fullmatch(first) else (None, None)
-    row = int(np.flatnonzero(wrong)[0]) if wrong.any() else None
-    return values.to_numpy(dtype=float), None if row is None else (row, str(texts.iloc[row]))
-
-
-def spelled_out(texts: pandas.Series, filled: pandas.Series) -> pandas.Series:
-    """Numbers as Python writes them, of those with a Fortran exponent or with digits in groups of thousands."""
-    texts = texts.str.replace(r"(?<=\d)[dD](?=[-+]?\d)", "e", regex=True)
-    for mark in (".", ","):
-        # A mark that occurs twice in a number is no decimal mark.
-        whole = texts[filled].str.fullmatch(rf"[-+]?\d{{1,3}}(\{mark}\d{{3}})*").all()
-        if whole and (texts[filled].str.count(rf"\{mark}") > 1).any():
-            return texts.str.replace(mark, "", regex=False)
-    if not texts[filled].str.fullmatch(GROUPED).all():
-        return texts
-    for group, decimal in ((",", "."), (".", ",")):
-        marks = texts[filled].str.rfind(group), texts[filled].str.rfind(decimal)
-        if (marks[1] >= 0).all() and (marks[0] < marks[1]).all():
-            return texts.str.replace(f"[{group}']", "", regex=True).str.replace(decimal, ".", regex=False)
-    return texts.str.replace("'", "", regex=False)
