@@ -16,8 +16,7 @@ class Player:
         begin: s, first time there is.
         end: s, last one; grows where the motion does.
         speed: times real time.
-        playing: whether time advances.
-        loop: begin again at the end, otherwise pause there.
+        playing: whether time advances; after the end it begins again.
         following: show the end while it grows.
     """
 
@@ -25,9 +24,8 @@ class Player:
     end: float = 0.0
     speed: float = 1.0
     playing: bool = True
-    loop: bool = True
     following: bool = False
-    time: float = field(default=0.0)
+    time: float = 0.0
     _clock: float | None = field(default=None, init=False)
 
     def __post_init__(self) -> None:
@@ -53,10 +51,7 @@ class Player:
         self.time += self.speed * passed
         if self.time > self.end:
             span = self.end - self.begin
-            if self.loop and span > 0.0:
-                self.time = self.begin + (self.time - self.begin) % span
-            else:
-                self.time, self.playing = self.end, False
+            self.time = self.begin + (self.time - self.begin) % span if span > 0.0 else self.end
         return self.time
 
     def seek(self, time: float) -> None:
@@ -65,10 +60,8 @@ class Player:
         self.following = False
 
     def toggle(self) -> None:
-        """Play or pause; at the end without loop, play from the beginning."""
+        """Play or pause."""
         self.playing = not self.playing
-        if self.playing and not self.following and self.time >= self.end:
-            self.time = self.begin
 
     def follow(self) -> None:
         """Show the end again while it grows."""

@@ -49,11 +49,6 @@ def usual_estimators(channels: Sequence[str]) -> tuple[str, ...]:
     return tuple(found)
 
 
-def possible_estimators(channels: Sequence[str]) -> tuple[str, ...]:
-    """Names of all estimators that run on these channels."""
-    return tuple(name for name, info in list_estimators().items() if set(info.channels) <= set(channels))
-
-
 def made_estimators(names: Sequence[str], trajectory: Trajectory) -> dict[str, Estimator[Any]]:
     """Estimators by name, configured for a trajectory.
 
@@ -68,27 +63,12 @@ def made_estimators(names: Sequence[str], trajectory: Trajectory) -> dict[str, E
     return made
 
 
-def subject_of(
-    channels: Sequence[str],
-    truth: Sequence[str],
-    metadata: Mapping[str, Any],
-    made: Mapping[str, Estimator[Any]],
-    dt: float,
-) -> Subject:
-    """What a recording is one of: a rider on a bicycle, or a device.
-
-    Args:
-        channels: of the recording.
-        truth: quantities whose truth it has.
-        metadata: of the recording.
-        made: label → estimator.
-        dt: sampling interval, s.
-    """
+def subject_of(trajectory: Trajectory, made: Mapping[str, Estimator[Any]]) -> Subject:
+    """What a trajectory is one of: a rider on a bicycle, or a device; ``made``: label → estimator."""
     outputs = {label: tuple(estimator.outputs) for label, estimator in made.items()}
-    ride = "bicycle/orientation" in truth or "bicycle_imu/gyr" in channels
-    if ride:
-        return Rider(RiderGeometry.of(metadata), outputs)
-    return Device(outputs, dt)
+    if "bicycle/orientation" in trajectory.truth or "bicycle_imu/gyr" in trajectory.measurements:
+        return Rider(RiderGeometry.of(trajectory.metadata), outputs)
+    return Device(outputs, trajectory.dt)
 
 
 def with_derived(truth: Mapping[str, np.ndarray], made: Mapping[str, Estimator[Any]]) -> dict[str, np.ndarray]:
@@ -114,7 +94,7 @@ def finished(trajectory: Trajectory, names: Sequence[str]) -> tuple[Subject, Mot
     """
     grid = trajectory.on_grid()
     made = made_estimators(names, grid)
-    subject = subject_of(tuple(grid.measurements), tuple(grid.truth), grid.metadata, made, grid.dt)
+    subject = subject_of(grid, made)
     poses = {label: run_on(estimator, grid).pose for label, estimator in made.items()}
     truth = dict(grid.truth)
     if "orientation" not in truth and "up" in grid.quantities:
@@ -192,24 +172,19 @@ class LiveMotion:
         self.motion = whole.rows(slice(first, None))
 
 
-def live_motion(names: Sequence[str], trajectory: Trajectory, dt: float) -> LiveMotion:
+def live_motion(names: Sequence[str], trajectory: Trajectory) -> LiveMotion:
     """A live motion like a trajectory, whose samples are not yet part of it.
 
     Args:
         names: of the estimators.
-        trajectory: of one or more samples, with the channels, truth and metadata to come.
-        dt: sampling interval, s.
+        trajectory: of one or more samples, with the channels, truth, sampling interval and metadata to come.
 
     Raises:
         ValueError: an unknown estimator, one that needs the whole recording, or a channel is lacking.
     """
-    made = {name: make_estimator(name, dt=dt, metadata=trajectory.metadata) for name in dict.fromkeys(names)}
-    for name, estimator in made.items():
-        lacking = [each.name for each in estimator.channels if each.name not in trajectory.measurements]
-        if lacking:
-            raise ValueError(f"{name} needs {', '.join(lacking)}; there are {', '.join(trajectory.measurements)}")
-    subject = subject_of(tuple(trajectory.measurements), tuple(trajectory.truth), trajectory.metadata, made, dt)
-    return LiveMotion(subject, {name: OnlineEstimator(each).warm_up() for name, each in made.items()}, dt)
+    made = made_estimators(names, trajectory)
+    online = {name: OnlineEstimator(each).warm_up() for name, each in made.items()}
+    return LiveMotion(subject_of(trajectory, made), online, trajectory.dt)
 
 
 class PlayedEnvironment:
@@ -226,40 +201,18 @@ class PlayedEnvironment:
             named = env.spec.id if env.spec is not None else env
             raise ValueError(f"{named} is not an environment whose agent estimates a pose")
         _, self._info = self.env.reset(seed=seed)
+        self._begin = self._info["time"]
         self.over = False
 
     def block(self, until: float) -> tuple[list[Timed], dict[str, np.ndarray]]:
-        """Samples up to a time of the episode, s, and their truth."""
+        """Samples up to a time after the first one, s, and their truth."""
         samples, rows = [], []
-        while not self.over and self._info["time"] <= until:
+        while not self.over and self._info["time"] - self._begin <= until:
             samples.append(Timed(self._info["time"], self.env.measurement(), False, False))
             rows.append({**self._info["pose"], **self._info["truth"]})
             _, _, terminated, truncated, self._info = self.env.step(self.env.neutral_action)
             self.over = terminated or truncated
         return samples, {name: np.array([row[name] for row in rows]) for name in rows[0]} if rows else {}
-
-
-class PlayedTrajectory:
-    """A trajectory that is played like an environment, see :class:`PlayedEnvironment`."""
-
-    def __init__(self, trajectory: Trajectory) -> None:
-        self.trajectory, self._row = trajectory, 0
-
-    @property
-    def over(self) -> bool:
-        """Whether all samples were played."""
-        return self._row >= len(self.trajectory)
-
-    def block(self, until: float) -> tuple[list[Timed], dict[str, np.ndarray]]:
-        """Samples up to a time after the first one, s, and their truth."""
-        time, channels = self.trajectory.time, self.trajectory.measurements
-        rows = slice(self._row, int(np.searchsorted(time - time[0], until, side="right")))
-        self._row = max(self._row, rows.stop)
-        samples = [
-            Timed(float(time[row]), {name: values[row] for name, values in channels.items()}, False, False)
-            for row in range(rows.start, rows.stop)
-        ]
-        return samples, {name: values[rows] for name, values in self.trajectory.truth.items()} if samples else {}
 
 
 def tuned_episode(env: Any, seed: int) -> Trajectory | None:

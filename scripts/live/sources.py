@@ -56,12 +56,12 @@ def check_port(port: int) -> int:
     return port
 
 
-def datagrams(port: int, host: str = "0.0.0.0") -> Iterator[str | None]:
+def datagrams(port: int) -> Iterator[str | None]:
     """Lines of the datagrams that arrive on a UDP port."""
     check_port(port)
     receiver = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     try:
-        receiver.bind((host, port))
+        receiver.bind(("0.0.0.0", port))
     except OSError as reason:
         receiver.close()
         raise OSError(reason.errno, reason.strerror, f"UDP port {port}") from None

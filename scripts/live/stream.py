@@ -83,18 +83,15 @@ class Counts:
     reason: str = ""
 
     def complain(self, number: int, reason: str) -> None:
-        """Count a bad line, and name it if it is among the first."""
+        """Count a bad line, and name it if it is among the first.
+
+        Raises:
+            ValueError: there was no sample yet after so many lines.
+        """
         self.bad += 1
         self.reason = reason
         if self.bad <= NAMED:
             print(f"poise: warning: line {number}: {reason}; it is skipped", file=sys.stderr, flush=True)
-
-    def refuse(self) -> None:
-        """Give up where there was no sample yet after so many lines.
-
-        Raises:
-            ValueError: there is still no sample.
-        """
         if not self.samples and self.bad >= HOPELESS:
             raise ValueError(f"none of the first {self.bad} lines is a sample; the last one: {self.reason}")
 
@@ -121,7 +118,6 @@ def timed_samples(
             counts.samples += 1
         except BadLineError as reason:
             counts.complain(number, str(reason))
-            counts.refuse()
     yield from clock.finish()
 
 
@@ -243,7 +239,7 @@ def estimate_row(sample: Timed, estimate: Estimate, kinds: Mapping[str, str]) ->
 
 
 @contextmanager
-def writer_of(args: Args) -> Iterator[Callable[[str], None]]:
+def writer_of(args: Args) -> Iterator[Callable[[str], object]]:
     """What writes a line of text: to standard output, a file, or as a datagram.
 
     Raises:
@@ -257,16 +253,12 @@ def writer_of(args: Args) -> Iterator[Callable[[str], None]]:
             raise ValueError(f"send must be HOST:PORT, got {args.send!r}")
         receiver = (host, check_port(int(port)))
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
-            yield lambda line: void(sender.sendto(f"{line}\n".encode(), receiver))
+            yield lambda line: sender.sendto(f"{line}\n".encode(), receiver)
     elif args.output is not None:
         with args.output.open("w", encoding="utf-8") as file:
-            yield lambda line: void(file.write(f"{line}\n"))
+            yield lambda line: file.write(f"{line}\n")
     else:
         yield lambda line: print(line, flush=True)
-
-
-def void(value: Any) -> None:
-    """Nothing, whatever was computed."""
 
 
 def as_line(row: Mapping[str, float], as_json: bool) -> str:

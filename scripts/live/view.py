@@ -215,12 +215,12 @@ def whole(title: str, trajectory: Trajectory, args: Args) -> Opened:
     Raises:
         ValueError: an estimator does not fit to it.
     """
-    from .shown import finished, possible_estimators
+    from ...baselines.registry import list_estimators
+    from .shown import finished
 
     shown = finished(trajectory, chosen(args, trajectory))
-    return Opened(
-        title, *shown, None, possible_estimators(tuple(trajectory.measurements)), partial(finished, trajectory)
-    )
+    addable = [name for name, info in list_estimators().items() if set(info.channels) <= set(trajectory.measurements)]
+    return Opened(title, *shown, None, addable, partial(finished, trajectory))
 
 
 def environment(args: Args) -> tuple[str, Any]:
@@ -284,10 +284,11 @@ Blocks = Iterator["tuple[list[Timed], dict[str, Any], Trajectory | None]"]
 def environment_blocks(env: Any, seed: int) -> Blocks:
     """An environment in real time, as fast as it is simulated."""
     from ...envs.record import describe
-    from .shown import PlayedEnvironment, PlayedTrajectory, tuned_episode
+    from ...envs.replay import ReplayEnv
+    from .shown import PlayedEnvironment, tuned_episode
 
     tuned = tuned_episode(env, seed)
-    played = PlayedEnvironment(env, seed) if tuned is None else PlayedTrajectory(tuned)
+    played = PlayedEnvironment(env if tuned is None else ReplayEnv(tuned), seed)
     metadata = {**describe(env, seed), "rate": env.unwrapped.rate} if tuned is None else tuned.metadata
     begin, shown, kind = time.monotonic(), 0.0, None
     while not played.over:
@@ -345,7 +346,7 @@ def fed(blocks: Blocks, args: Args) -> Iterator[tuple[Subject, Motion, Callable[
     live: LiveMotion | None = None
     for samples, truth, trajectory in blocks:
         if samples and trajectory is not None:
-            live = live_motion(chosen(args, trajectory), trajectory, trajectory.dt)
+            live = live_motion(chosen(args, trajectory), trajectory)
             live.add(samples, truth)
             break
     if live is None or live.motion is None:

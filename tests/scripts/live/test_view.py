@@ -22,7 +22,6 @@ from poise.scripts.live.online import Timed
 from poise.scripts.live.player import Player
 from poise.scripts.live.shown import (
     PlayedEnvironment,
-    PlayedTrajectory,
     finished,
     live_motion,
     tuned_episode,
@@ -55,11 +54,6 @@ def test_the_player_advances_pauses_and_loops():
     assert player.advance(105.5) == pytest.approx(10.5)  # 12.5 is 0.5 s after the end
     player.seek(99.0)
     assert player.time == 12.0
-    player.loop = False
-    assert player.advance(106.0) == 12.0
-    assert not player.playing
-    player.toggle()
-    assert player.time == 10.0
 
 
 def test_the_player_follows_what_grows_until_a_time_is_chosen():
@@ -102,7 +96,7 @@ def samples_of(trajectory: Trajectory) -> list[Timed]:
 
 
 def test_motion_that_grows_equals_the_finished_one(motion):
-    live = live_motion(NAMES, motion[:1].replace(metadata={**motion.metadata, "rate": 100.0}), motion.dt)
+    live = live_motion(NAMES, motion[:1].replace(metadata={**motion.metadata, "rate": 100.0}))
     samples = samples_of(motion)
     for begin in range(0, len(samples), 37):
         part = slice(begin, begin + 37)
@@ -134,13 +128,6 @@ def test_an_environment_of_gains_shows_its_filter_and_what_sets_it():
     gains = shown.curves["accelerometer_noise, set while it runs"]
     assert set(gains) == set(names[1:]), "the published filter sets nothing"
     assert len(gains["external-acceleration+policy"]) == len(shown.time)
-    played, found = PlayedTrajectory(trajectory), []
-    for until in (0.0, 1.0, 100.0):
-        samples, truth = played.block(until)
-        found += samples
-        assert len(truth["orientation"]) == len(samples)
-    assert played.over
-    assert [each.time for each in found] == list(trajectory.time)
 
 
 def test_an_environment_of_gains_is_shown_live():
@@ -154,14 +141,14 @@ def test_an_environment_of_gains_is_shown_live():
     assert kind.dt == pytest.approx(0.01)
     assert set(kind.measurements) == set(samples[0].measurement)
     assert len(truth["orientation"]) == len(samples)
-    live = live_motion(("external-acceleration",), kind, kind.dt)
+    live = live_motion(("external-acceleration",), kind)
     live.add(samples, truth)
     assert live.motion is not None
     assert list(live.motion.figures) == ["truth", "external-acceleration"]
 
 
 def test_old_motion_is_forgotten(motion):
-    live = live_motion(("tilt",), motion[:1].replace(metadata={"rate": 100.0}), motion.dt)
+    live = live_motion(("tilt",), motion[:1].replace(metadata={"rate": 100.0}))
     live.kept = 1.0
     for sample in samples_of(motion):
         live.add([sample])
@@ -198,7 +185,7 @@ def test_channels_decide_what_is_drawn_and_estimated():
     assert usual_estimators(("wheel/speed",)) == ()
     channels = [each.name for each in poise.make_estimator("odometry-aided").channels]
     single = {name: np.zeros((1, 3 if "imu" in name else 1)) + 1.0 for name in channels}
-    live = live_motion(("odometry-aided",), Trajectory([0.0], single, metadata={"rate": 100.0}), 0.01)  # type: ignore[arg-type]
+    live = live_motion(("odometry-aided",), Trajectory([0.0], single, metadata={"rate": 100.0}))  # type: ignore[arg-type]
     assert isinstance(live.subject, Rider)
     live.add([Timed(0.01 * i, {name: values[0] for name, values in single.items()}, False, False) for i in range(3)])
     assert live.motion is not None
@@ -213,7 +200,7 @@ def test_estimators_that_do_not_fit_are_named(names, said, motion):
     with pytest.raises(ValueError, match=said):
         finished(without, names)
     with pytest.raises(ValueError, match=said):
-        live_motion(names, without[:1].replace(metadata={"rate": 100.0}), 0.01)
+        live_motion(names, without[:1].replace(metadata={"rate": 100.0}))
 
 
 @pytest.fixture
