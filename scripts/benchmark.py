@@ -12,7 +12,7 @@ from ..filters.support.optional import MissingExtraError
 from ..filters.support.rows import markdown_table
 from .experiment import COLUMNS, open_run
 from .output import Output
-from .report import draw_example, kinds_of, print_comparison, provenance
+from .report import draw_example, kinds_of, print_comparison
 from .targets import check_file
 
 if TYPE_CHECKING:
@@ -76,7 +76,7 @@ def run(args: Args) -> int:
     from ..baselines.comparison.recommendation import load_results
     from ..baselines.comparison.tasks import run_tasks
     from .comparison.riders import rider_settings, rider_sweeps, rider_tables
-    from .recordings.load import load_all, passed_over_text, plain_warnings
+    from .recordings.load import load_all, plain_warnings, say_passed_over
 
     riders = None if args.suite == "hand" else rider_settings(args.estimators, args.seed, quick=args.quick)
     if args.suite == "rider" and (riders is None or args.recordings):
@@ -95,8 +95,8 @@ def run(args: Args) -> int:
         out.say(f"an interrupted run continues with --resume {folder.folder}")
         if args.sweep:
             assert riders is not None
-            swept = rider_sweeps(riders, args, folder, out) | {"Provenance": provenance(folder)}
-            out.report(folder.write_report("poise benchmark --suite rider --sweep", swept))
+            rider_sweeps(riders, args, folder, out)
+            out.report(folder.write_report("poise benchmark --suite rider --sweep", out.sections))
             return 0
         suites: dict[str, Results] = {}
         if tasks:
@@ -106,30 +106,25 @@ def run(args: Args) -> int:
                 offline=args.offline,
                 reference=args.reference,
             )
-        sections: dict[str, str] = {}
         ridden = None if riders is None else rider_tables(riders, args, folder, out)
         table = all_rows(suites, [] if ridden is None else ridden.rows)
         folder.write_results(table)
         for suite, results in suites.items():
-            sections |= show_suite(suite, results, [task for task in tasks if task.suite == suite], args, folder, out)
-        sections |= show_data_sets(suites, args, folder, out)
+            show_suite(suite, results, [task for task in tasks if task.suite == suite], args, folder, out)
+        show_data_sets(suites, out)
         if args.trials and tasks:
-            sections |= show_paper(1 if args.quick else args.trials, out)
+            show_paper(1 if args.quick else args.trials, out)
         if ridden is not None:
-            sections |= ridden.sections
             suites |= ridden.suites
         if args.save is not None:
             recordings = [one for results in suites.values() for one in results.recordings]
             parts = {"recordings": recordings, "riders": [] if ridden is None else ridden.summary}
             out.say(f"results: {keep(args, folder, parts)}")
-        grown = [] if before is None else show_regressions(table, before, sections, out)
-        if passed_over:
-            sections["Passed over"] = passed_over_text(passed_over, most=1000)
-            out.say(f"passed over:\n{passed_over_text(passed_over)}")
-        more = {"Cost of an update": show_costs(args, channels, sections, out)} if tasks else {}
-        sections["Provenance"] = provenance(folder)
+        grown = [] if before is None else show_regressions(table, before, out)
+        say_passed_over(passed_over, out)
+        more = {"Cost of an update": show_costs(args, channels, out)} if tasks else {}
         write_page(suites, more | ({REGRESSIONS: grown} if grown else {}), folder, out)
-        out.report(folder.write_report("poise benchmark", sections))
+        out.report(folder.write_report("poise benchmark", out.sections))
     return 1 if grown else 0
 
 
@@ -168,40 +163,35 @@ def all_rows(suites: dict[str, Results], more: list[dict[str, Any]]) -> pandas.D
     return pandas.concat([*tables, *([pandas.DataFrame(more)] if more else [])], ignore_index=True)
 
 
-def show_suite(suite: str, results: Results, tasks: list[Task], args: Args, folder: Run, out: Output) -> dict[str, str]:
-    """Tables of a suite, its intervals and an example over time; heading → Markdown."""
+def show_suite(suite: str, results: Results, tasks: list[Task], args: Args, folder: Run, out: Output) -> None:
+    """Tables of a suite, its intervals and an example over time."""
     from ..baselines.comparison.data_sets import contenders
     from ..baselines.comparison.intervals import errors_of, intervals, is_measure
 
     table = results.table[~is_measure(results.table)]
     table.attrs |= results.table.attrs
-    sections = print_comparison(table, folder, out, groups=results.groups, name=suite)
+    print_comparison(table, folder, out, groups=results.groups, name=suite)
     if (table["metric"] == "inclination").any():
         errors = errors_of(table, "inclination", "up")
         rows = intervals(errors) if len(errors) > 1 else []
         if rows:
             title = f"{suite}: inclination, mean with its 95 % interval over {len(errors)} trajectories, deg"
-            sections[title] = markdown_table(rows)
             out.table(rows, title, columns=["estimator", "mean", "low", "high", "difference", "better", "rank"])
     example = tasks[-1].trajectories()[-1:]
     chosen = contenders(args.estimators, list(example[0].measurements))
-    return sections | draw_example(table, example, chosen, folder, suite)
+    draw_example(table, example, chosen, folder, suite, out)
 
 
-def show_data_sets(suites: dict[str, Results], args: Args, folder: Run, out: Output) -> dict[str, str]:
-    """Mean errors of all data sets side by side; heading → Markdown."""
+def show_data_sets(suites: dict[str, Results], out: Output) -> None:
+    """Mean errors of all data sets side by side."""
     from ..baselines.comparison.recommendation import ERRORS, dataset_errors
 
     results = [one for each in suites.values() for one in each.recordings]
-    sections = {}
+    names = dict.fromkeys(one["dataset"] for one in results)
     for metric in ERRORS:
-        rows = [{"estimator": name, **errors} for name, errors in dataset_errors(results, metric).items()]
+        rows = [{"estimator": name, **names, **each} for name, each in dataset_errors(results, metric).items()]
         if rows:
-            names = list(dict.fromkeys(one["dataset"] for one in results))
-            title = f"All data sets: {metric} error, RMS, mean over recordings, deg"
-            sections[title] = markdown_table(rows, ["estimator", *names])
-            out.table(rows, title, columns=["estimator", *names])
-    return sections
+            out.table(rows, f"All data sets: {metric} error, RMS, mean over recordings, deg")
 
 
 def keep(args: Args, folder: Run, parts: dict[str, list[dict[str, Any]]]) -> Path:
@@ -223,15 +213,13 @@ def keep(args: Args, folder: Run, parts: dict[str, list[dict[str, Any]]]) -> Pat
     return write_json(args.save, {"recordings": [], **kept, **new, "source": sources}, indent=None)
 
 
-def show_paper(trials: int, out: Output) -> dict[str, str]:
-    """The tests of the external-acceleration paper; heading → Markdown."""
+def show_paper(trials: int, out: Output) -> None:
+    """The tests of the external-acceleration paper."""
     from ..baselines.studies.external_acceleration.simulation import compare_modes
 
     out.say(f"the three tests of the external-acceleration paper, {trials} trials each")
-    modes = compare_modes(range(trials))
     title = "external-acceleration, tests A to C of the paper, RMS in deg (levels in m/s²)"
-    out.table(modes, title)
-    return {title: markdown_table(modes)}
+    out.table(compare_modes(range(trials)), title)
 
 
 def load_baseline(path: Path) -> pandas.DataFrame:
@@ -253,22 +241,20 @@ def load_baseline(path: Path) -> pandas.DataFrame:
     return table
 
 
-def show_regressions(
-    table: pandas.DataFrame, before: pandas.DataFrame, sections: dict[str, str], out: Output
-) -> list[dict[str, Any]]:
+def show_regressions(table: pandas.DataFrame, before: pandas.DataFrame, out: Output) -> list[dict[str, Any]]:
     """What grew against the baseline."""
     from ..baselines.comparison.intervals import regressions
 
     grown = regressions(table, before)
-    sections[REGRESSIONS] = markdown_table(grown) if grown else "None."
     if grown:
         out.table(grown, REGRESSIONS)
     else:
+        out.sections[REGRESSIONS] = "None."
         out.say("no error grew by more than 2 % against the baseline")
     return grown
 
 
-def show_costs(args: Args, channels: list[str], sections: dict[str, str], out: Output) -> list[dict[str, Any]]:
+def show_costs(args: Args, channels: list[str], out: Output) -> list[dict[str, Any]]:
     """Time of an update, step by step and over a sequence; no result, since results are the same on any machine."""
     from ..baselines.comparison.data_sets import contenders, hand_episode
     from ..baselines.run import fitted
@@ -287,7 +273,7 @@ def show_costs(args: Args, channels: list[str], sections: dict[str, str], out: O
         rows.append({"estimator": label, "step, µs": 1e6 / stepping, "sequence, samples/s": whole})
     kinds = kinds_of(row["estimator"] for row in rows)
     rows = [{"estimator": row["estimator"], "kind": kinds.get(str(row["estimator"]), "–"), **row} for row in rows]
-    sections["Cost of an update"] = markdown_table(rows)
+    out.sections["Cost of an update"] = markdown_table(rows)
     out.show(rows, "Cost of an update")
     return rows
 

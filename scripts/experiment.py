@@ -24,8 +24,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..filters.support.files import write_json as write_plain_json
-from ..filters.support.files import write_text
+from ..filters.support.files import write_json, write_text
 from ..filters.support.parallel import processors
 from ..filters.support.resume import refuse_changes
 from ..filters.support.rows import jsonable, records
@@ -86,9 +85,21 @@ class Run:
         """Write all results so far; see :func:`write_results`."""
         return write_results(self.results, rows)
 
+    @property
+    def provenance(self) -> str:
+        """What a report depends on, in Markdown: command, seed, versions."""
+        state = self.versions
+        packages = ", ".join(f"{name} {version}" for name, version in state["packages"].items() if version)
+        return (
+            f"- command: `poise {self.command}`, arguments in `args.json`, root seed {self.seed}\n"
+            f"- poise {state['poise']['version']}, Python {state['python']}, {state['platform']}\n"
+            f"- {packages}"
+        )
+
     def write_report(self, title: str, sections: Mapping[str, str]) -> Path:
-        """Write ``report.md``: a title, then a heading and Markdown text a section."""
-        parts = [f"# {title}", *(f"## {heading}\n\n{text.strip()}" for heading, text in sections.items())]
+        """Write ``report.md``: a title, a heading and Markdown text a section, and what it depends on."""
+        every = {**sections, "Provenance": self.provenance}
+        parts = [f"# {title}", *(f"## {heading}\n\n{text.strip()}" for heading, text in every.items())]
         return write_text(self.folder / "report.md", "\n\n".join(parts) + "\n")
 
 
@@ -108,7 +119,7 @@ def start_run(command: str, args: Any, seed: int, root: str | Path = "runs") -> 
     folder = new_folder(Path(root) / command, f"{now:%Y%m%d-%H%M%S}-{seed}")
     run = Run(folder, command, seed)
     run.figures.mkdir()
-    write_json(folder / "args.json", {"command": command, "seed": seed, "args": args})
+    write_json(folder / "args.json", jsonable({"command": command, "seed": seed, "args": args}))
     write_json(folder / "versions.json", {"started": now.isoformat(timespec="seconds"), **versions()})
     return run
 
@@ -247,8 +258,3 @@ def _git(checkout: Path, *words: str) -> str:
     return subprocess.run(
         ["git", "-C", str(checkout), *words], capture_output=True, text=True, check=True, timeout=10
     ).stdout.strip()
-
-
-def write_json(path: Path, value: Any) -> Path:
-    """Write ``value`` as indented JSON."""
-    return write_plain_json(path, jsonable(value))

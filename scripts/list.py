@@ -11,6 +11,7 @@ import shutil
 import textwrap
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import tyro
@@ -19,18 +20,7 @@ from ..filters.support.names import look_up
 from ..filters.support.optional import MissingExtraError
 from ..filters.support.rows import markdown_table
 from .output import PIPE_WIDTH, Output
-from .pages.measured import (
-    Rows,
-    benchmark,
-    benchmark_best,
-    benchmark_heading,
-    benchmark_limits,
-    learned,
-    riders,
-    riders_best,
-    riders_bound,
-    riders_consistency,
-)
+from .pages.measured import Rows, benchmark, benchmark_best, benchmark_limits, learned, riders, riders_best
 
 BEGIN, END = "<!-- list: {} -->", "<!-- end of list -->"
 PLACED = re.compile(r"<!-- list: ([a-z-]+) -->\n.*?<!-- end of list -->", re.DOTALL)
@@ -279,24 +269,18 @@ def formats() -> Rows:
 LISTS: Mapping[str, Callable[[], Rows]] = {
     function.__name__.replace("_", "-"): function
     for function in (
-        *(
-            estimators,
-            environments,
-            sensors,
-            sensor_drift,
-            timings,
-            magnetics,
-            sensor_kinds,
-            gestures,
-            scenarios,
-            surfaces,
-            recipes,
-            *(presets, learned),
-            formats,
-        ),
-        *(benchmark, benchmark_best, benchmark_heading, benchmark_limits),
-        *(riders, riders_best, riders_consistency, riders_bound),
+        *(estimators, environments, sensors, sensor_drift, timings, magnetics, sensor_kinds, gestures, scenarios),
+        *(surfaces, recipes, presets, learned, formats),
     )
+} | {
+    "benchmark": benchmark,
+    "benchmark-best": benchmark_best,
+    "benchmark-heading": partial(benchmark, "heading"),
+    "benchmark-limits": benchmark_limits,
+    "riders": riders,
+    "riders-best": riders_best,
+    "riders-consistency": partial(riders, "consistency"),
+    "riders-bound": partial(riders, "bound"),
 }
 """Name → rows."""
 MEASURED = ("sensor-drift", "learned", *(name for name in LISTS if name.startswith(("benchmark", "riders"))))

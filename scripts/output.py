@@ -17,7 +17,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from ..filters.support.rows import cell, columns_of, is_numeric, jsonable, records
+from ..filters.support.rows import cell, columns_of, is_numeric, jsonable, markdown_table, records
 from ..filters.support.version import poise_version
 
 PIPE_WIDTH = 120
@@ -31,6 +31,8 @@ SENTENCE = 20
 class Output:
     """Collects what a command finds; prints it at once, or as one document at the end of a ``with`` block.
 
+    ``sections`` are those of a report: heading → Markdown, of every table and whatever a command adds.
+
     Args:
         command: name of the command.
         args: its arguments; ``json`` and ``seed`` count, if it has them.
@@ -38,6 +40,7 @@ class Output:
 
     def __init__(self, command: str, args: Any) -> None:
         self.as_json = bool(getattr(args, "json", False))
+        self.sections: dict[str, str] = {}
         self.document: dict[str, Any] = {
             "command": command,
             "version": poise_version(),
@@ -55,8 +58,9 @@ class Output:
             print(json.dumps(jsonable(self.document, lambda value: None), ensure_ascii=False, allow_nan=False))
 
     def table(self, rows: Iterable[Any], title: str, **options: Any) -> None:
-        """Rows for both; see :func:`print_table` for the options of the printed table."""
+        """Rows for both and the report; see :func:`print_table` for the options of the printed table."""
         found = records(rows)
+        self.sections[title] = markdown_table(found)
         self.rows(found, title)
         self.show(found, title, **options)
 
@@ -90,6 +94,7 @@ def print_table(
     title: str | None = None,
     columns: Sequence[str] | None = None,
     digits: int = 3,
+    width: int = PIPE_WIDTH,
     console: Console | None = None,
 ) -> None:
     """Print rows as a table, numbers to the right.
@@ -99,10 +104,11 @@ def print_table(
         title: line above the table.
         columns: which fields in which order; by default all, in order of first appearance.
         digits: significant digits of floats.
-        console: where; by default the standard output, of a fixed width if it is not a terminal.
+        width: of the standard output, characters, if it is not a terminal.
+        console: where; by default the standard output.
     """
     data = records(rows)
-    console = console or (Console() if sys.stdout.isatty() else Console(width=PIPE_WIDTH))
+    console = console or Console(width=None if sys.stdout.isatty() else width)
     table = Table(title=title, title_justify="left")
     names = columns_of(data, columns)
     widths = {name: max((len(cell(record.get(name), digits)) for record in data), default=0) for name in names}

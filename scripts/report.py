@@ -24,6 +24,8 @@ TITLES = {
 
 MOST_COLUMNS = 8
 """Groups that a terminal shows one by one; the report has them all."""
+MOST_DRAWN = 5
+"""Estimators in a figure of errors over time."""
 
 
 def kinds_of(labels: Any) -> dict[str, str]:
@@ -147,8 +149,8 @@ def skipped_text(table: pandas.DataFrame) -> str:
 
 def print_comparison(
     table: pandas.DataFrame, run: Run, out: Output, *, groups: Mapping[str, str] | None = None, name: str = ""
-) -> dict[str, str]:
-    """Print a comparison and draw its bars.
+) -> None:
+    """Print a comparison, draw its bars, and add both to the report.
 
     Args:
         table: from :func:`poise.evaluate`.
@@ -156,42 +158,34 @@ def print_comparison(
         out: where tables and rows go.
         groups: trajectory → column of the wide tables.
         name: of the data (simulation, recordings), in titles and file names.
-
-    Returns:
-        Heading → Markdown, for the report.
     """
     from ..baselines.plots import rms_bars, save
 
-    sections = {}
     out.rows(table, name or None)
-    for title, rows in wide_tables(table, groups).items():
-        heading = f"{name}: {title}" if name else title
-        out.show([narrow(row) for row in rows], heading)
-        sections[heading] = markdown_table(rows)
-    for title, rows in agreement_tables(table).items():
-        heading = f"{name}: {title}" if name else title
-        out.show(numbered(rows), heading)
-        sections[heading] = markdown_table(rows)
+    begin = f"{name}: " if name else ""
+    wide, apart = wide_tables(table, groups), agreement_tables(table)
+    for title, rows in (wide | apart).items():
+        out.show(numbered(rows) if title in apart else [narrow(row) for row in rows], begin + title)
+        out.sections[begin + title] = markdown_table(rows)
     if table.attrs.get("reference_clock") and table["metric"].isin(list(TITLES)).any():
         clock = {"recorded": "as recorded", "corrected": "corrected by the measured offset"}[
             table.attrs["reference_clock"]
         ]
-        sections[f"{name}: clock of the reference".lstrip(": ")] = f"{clock[0].upper()}{clock[1:]}."
+        out.sections[f"{begin}clock of the reference"] = f"{clock[0].upper()}{clock[1:]}."
         out.say(f"clock of the reference: {clock}")
     found = list(parts(table))
     for _, metric, part in found:
         several = sum(metric == other for _, other, _ in found) > 1
-        apart = several or part["unit"].iloc[0] != "deg"
-        what = " ".join(word for word in (name, part["quantity"].iloc[0] if apart else "") if word)
+        named = several or part["unit"].iloc[0] != "deg"
+        what = " ".join(word for word in (name, part["quantity"].iloc[0] if named else "") if word)
         figure = rms_bars(part, kinds_of(part["estimator"].unique()), metric, what)
         words = f"{what} {metric}".strip().replace(" ", "-").replace("/", "-")
         path = save(figure, run.figures / f"{words}.png")
-        sections[f"Figure: {words}"] = f"![{words}]({path.relative_to(run.folder)})"
+        out.sections[f"Figure: {words}"] = f"![{words}]({path.relative_to(run.folder)})"
     skipped = skipped_text(table)
     if skipped:
-        sections[f"{name}: not run".lstrip(": ")] = skipped
+        out.sections[f"{begin}not run"] = skipped
         out.say(f"not run:\n{skipped}")
-    return sections
 
 
 def draw_example(
@@ -200,12 +194,11 @@ def draw_example(
     contenders: Mapping[str, Any],
     run: Run,
     name: str,
-    most: int = 5,
-) -> dict[str, str]:
+    out: Output,
+) -> None:
     """Draw the errors of the best estimator of each kind over time, on the last trajectory that has a truth.
 
-    Returns:
-        Heading → Markdown; empty if no trajectory has a truth, or no estimator an inclination.
+    Nothing is drawn if no trajectory has a truth, or no estimator an inclination.
     """
     from ..baselines.error_table import summary
     from ..baselines.plots import error_curves, save
@@ -215,7 +208,7 @@ def draw_example(
     scored = set(table.loc[table["metric"] == "inclination", "trajectory"])
     known = [trajectory for trajectory in trajectories if has_truth(trajectory) and trajectory.name in scored]
     if not known:
-        return {}
+        return
     trajectory = known[-1]
     table = table[table["trajectory"] == trajectory.name]
     kinds = kinds_of(contenders)
@@ -223,20 +216,8 @@ def draw_example(
     for label in summary(table).index.intersection(list(contenders), sort=False):
         best.setdefault(kinds.get(str(label), ""), str(label))
     if not best:
-        return {}
-    estimates = {label: run_estimator(contenders[label], trajectory) for label in list(best.values())[:most]}
+        return
+    estimates = {label: run_estimator(contenders[label], trajectory) for label in list(best.values())[:MOST_DRAWN]}
     figure = error_curves(trajectory, estimates, kinds, f"{name}: {trajectory.name}, best estimator of each kind")
     path = save(figure, run.figures / f"{name}-over-time.png")
-    return {f"Figure: {name} over time": f"![{name} over time]({path.relative_to(run.folder)})"}
-
-
-def provenance(run: Run) -> str:
-    """What a report depends on: command, seed, versions."""
-    state = run.versions
-    packages = ", ".join(f"{name} {version}" for name, version in state["packages"].items() if version)
-    lines = [
-        f"- command: `poise {run.command}`, arguments in `args.json`, root seed {run.seed}",
-        f"- poise {state['poise']['version']}, Python {state['python']}, {state['platform']}",
-        f"- {packages}",
-    ]
-    return "\n".join(lines)
+    out.sections[f"Figure: {name} over time"] = f"![{name} over time]({path.relative_to(run.folder)})"

@@ -20,13 +20,12 @@ from typing import TYPE_CHECKING, Any
 
 import tyro
 
-from ..filters.support.files import write_text
+from ..filters.support.files import write_json, write_text
 from ..filters.support.parallel import in_parallel
 from ..filters.support.resume import is_kept, keep
 from ..filters.support.rows import markdown_table
-from .experiment import Run, command_line, open_run, write_json
-from .output import Output
-from .report import provenance
+from .experiment import Run, command_line, open_run
+from .output import PIPE_WIDTH, Output
 from .targets import check_file
 
 if TYPE_CHECKING:
@@ -127,7 +126,7 @@ def run_every(args: Args, settings: dict[str, Any]) -> int:
         works = {paper: coverage.read(folder.folder / paper) for paper in PAPERS if paper not in failed}
         for paper, rows in works.items():
             shown = [{name: row[name] for name in ("item", "content", "verdict")} for row in rows]
-            out.table(shown, paper, console=console(None))
+            out.table(shown, paper)
         made = made_with(args, folder.folder)
         page = coverage.page(works, made, failed)
         update(args.pages, {paper: folder.folder / paper for paper in works}, made)
@@ -213,7 +212,7 @@ def studying(
     args: Any,
     settings: dict[str, Any],
     title: str,
-    width: int | None = None,
+    width: int = PIPE_WIDTH,
     may_differ: Sequence[str] = (),
 ) -> Iterator[tuple[Study, Output, Report]]:
     """A study in a new or resumed run folder: entries of its report are printed and written as they are found.
@@ -274,10 +273,10 @@ def filled(args: Args) -> Args:
     )
 
 
-def show(entry: Entry, out: Output, width: int | None = None) -> None:
+def show(entry: Entry, out: Output, width: int = PIPE_WIDTH) -> None:
     """Print one entry; the document gets its rows, and figures as they are named."""
     if entry.rows:
-        out.table(entry.rows, entry.title, console=console(width))
+        out.table(entry.rows, entry.title, width=width)
         text = entry.text
     elif entry.figure is not None:
         text = f"figure: {entry.figure} ({entry.title})"
@@ -285,15 +284,6 @@ def show(entry: Entry, out: Output, width: int | None = None) -> None:
         text = "\n".join(part for part in (entry.title, entry.text) if part)
     if not out.as_json:
         out.say(f"{text}\n" if text else "")
-
-
-def console(width: int | None) -> Any:
-    """A console that has this many columns where the output is not a terminal; None for the usual one."""
-    import sys
-
-    from rich.console import Console
-
-    return None if width is None or sys.stdout.isatty() else Console(width=width)
 
 
 def write(title: str, folder: Run, report: Report) -> Path:
@@ -308,5 +298,5 @@ def write(title: str, folder: Run, report: Report) -> Path:
             parts.append(f"![{entry.title}]({entry.figure.relative_to(folder.folder).as_posix()})")
         if entry.text:
             parts.append(entry.text)
-    parts.append(f"## Provenance\n\n{provenance(folder)}")
+    parts.append(f"## Provenance\n\n{folder.provenance}")
     return write_text(folder.folder / "report.md", "\n\n".join(parts) + "\n")

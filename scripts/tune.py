@@ -17,7 +17,6 @@ import tyro
 from ..baselines.gain_policy.compared.runs import CURVE, SETS
 from ..filters.support.files import write_json, write_text
 from ..filters.support.parallel import progress_bar
-from ..filters.support.rows import markdown_table
 from ..filters.support.seeds import child_seed
 from .experiment import Run, command_line, known_recordings, open_run, start_run, versions
 from .output import Output
@@ -176,8 +175,8 @@ def compare(args: Args) -> int:
         for name, figure in figures.items():
             save(figure, folder.figures / f"{name}.png")
         pictures = "\n\n".join(f"![{name}](figures/{name}.png)" for name in figures)
-        sections = {"Errors and scores": markdown_table(rows), "Figures": pictures}
-        out.report(folder.write_report("Agents that tune filters", sections))
+        out.sections["Figures"] = pictures
+        out.report(folder.write_report("Agents that tune filters", out.sections))
     return 0
 
 

@@ -23,13 +23,11 @@ class RiderPart(NamedTuple):
 
     Attributes:
         rows: of ``results.csv``.
-        sections: heading → Markdown.
         suites: title → results, for the page.
         summary: paper, method and group with their numbers, as ``--save`` keeps them.
     """
 
     rows: list[dict[str, Any]]
-    sections: dict[str, str]
     suites: dict[str, Results]
     summary: list[dict[str, Any]]
 
@@ -45,7 +43,7 @@ def rider_settings(estimators: Sequence[str], seed: int, *, quick: bool) -> Ride
 
 
 def rider_tables(settings: RiderSuite, args: Any, folder: Run, out: Output) -> RiderPart:
-    """Errors, each angle, bounds, consistency: printed, and as parts of the report."""
+    """Errors, each angle, bounds, consistency."""
     from ...baselines.comparison.rider_tables import by_group
     from ...baselines.comparison.tasks import Results
     from ...baselines.error_table import ErrorTable
@@ -56,7 +54,6 @@ def rider_tables(settings: RiderSuite, args: Any, folder: Run, out: Output) -> R
     out.say(f"riders: {settings.rides} rides of each group{learning}; rides are simulated once and kept")
     rows = suite.compare(settings, folder.folder / "tasks", processes=args.processes, progress=True)
     numbers = tables.summary(rows)
-    sections = {}
     for paper in settings.papers:
         for title, table in (
             ("mean over angles, RMS in deg [95 % over riders]", by_group(numbers, paper, "error")),
@@ -70,31 +67,25 @@ def rider_tables(settings: RiderSuite, args: Any, folder: Run, out: Output) -> R
                 out.table(table, f"{paper}: {title}")
             else:
                 out.rows(table, f"{paper}: {title}")
-            sections[f"{paper}: {title}"] = markdown_table(table)
+                out.sections[f"{paper}: {title}"] = markdown_table(table)
     means = [mean for paper in settings.papers for mean in tables.ride_means(rows, paper)]
     groups = {trajectory: trajectory.split(":")[0] for _, trajectory, *_ in means}
     page = Results(ErrorTable(means, columns=list(COLUMNS)), groups, [])
     found = [{"suite": SUITE, **row} for row in tables.results(rows)]
-    return RiderPart(found, sections, {SUITE: page}, numbers)
+    return RiderPart(found, {SUITE: page}, numbers)
 
 
-def rider_sweeps(settings: RiderSuite, args: Any, folder: Run, out: Output) -> dict[str, str]:
+def rider_sweeps(settings: RiderSuite, args: Any, folder: Run, out: Output) -> None:
     """Errors while one condition is varied, and a figure."""
     from ...baselines.studies.riders import sweeps
 
     found = sweeps.sweep_points(settings, processes=args.processes, progress=True)
     points = sorted((point for one in found for point in one), key=lambda point: point.ride)
     folder.write_results(sweeps.results(points))
-    sections = {}
     for paper in settings.papers:
         for name, sweep in sweeps.SWEEPS.items():
-            table = sweeps.sweep_table(points, paper, name)
             title = f"{paper}: {sweep.label}; mean over angles and riders, RMS in deg"
-            out.table(table, title)
-            sections[title] = markdown_table(table)
+            out.table(sweeps.sweep_table(points, paper, name), title)
         title = f"{paper}: each angle where geometry is told exactly; mean over riders, RMS in deg"
-        table = sweeps.angle_rows(points, paper, "geometry", 0.0)
-        out.table(table, title)
-        sections[title] = markdown_table(table)
+        out.table(sweeps.angle_rows(points, paper, "geometry", 0.0), title)
     out.say(f"figure: {sweeps.draw_sweeps(points, folder.figures / 'sweeps.png')}")
-    return sections

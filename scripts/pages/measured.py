@@ -14,7 +14,7 @@ BEST = 12
 
 
 def benchmark(metric: str = "inclination") -> Rows:
-    """Every estimator's mean error on every data set of the shipped benchmark, deg."""
+    """Every estimator's mean error on every data set of the shipped benchmark, deg; heading where north is known."""
     from ...baselines.comparison.recommendation import dataset_errors, load_results
 
     recordings = load_results()["recordings"]
@@ -27,11 +27,6 @@ def benchmark(metric: str = "inclination") -> Rows:
 def benchmark_best() -> Rows:
     """The first rows of :func:`benchmark` that have an error on every data set."""
     return [row for row in benchmark() if None not in row.values()][:BEST]
-
-
-def benchmark_heading() -> Rows:
-    """The same for the heading, on data sets whose reference knows north."""
-    return benchmark("heading")
 
 
 def benchmark_limits() -> Rows:
@@ -54,7 +49,7 @@ def benchmark_limits() -> Rows:
 
 
 def riders(table: str = "error") -> Rows:
-    """Errors of the shipped benchmark's riders, deg: mean over the paper's angles [95 % interval over riders]."""
+    """A table of the shipped benchmark's riders, see :func:`.by_group`."""
     from ...baselines.comparison.recommendation import load_results
     from ...baselines.comparison.rider_tables import by_group
 
@@ -71,16 +66,6 @@ def riders_best() -> Rows:
     """The mean errors of what is told apart most easily: the mean, the filter of each paper, and its networks."""
     kept = ("always the mean", "{}", "{}-consistent", "{}+network", "gru-{}")
     return [row for row in riders("mean") if row["name"] in [name.format(row["sensors of"]) for name in kept]]
-
-
-def riders_consistency() -> Rows:
-    """Mean NEES of an angle, and share of the errors inside the stated 90 %, of the same."""
-    return riders("consistency")
-
-
-def riders_bound() -> Rows:
-    """The same errors in multiples of the posterior bound of the published filter's model."""
-    return riders("bound")
 
 
 def learned(trained: Iterable[Path] = ()) -> Rows:

@@ -46,7 +46,7 @@ def run(args: Args) -> int:
     from ...baselines.run import run as run_filter
     from ...baselines.run import smooth
     from ...envs.data.plausibility import check_recording
-    from .load import load_all, passed_over_text, plain_warnings, sensors_of
+    from .load import load_all, plain_warnings, say_passed_over, sensors_of
 
     check_file("output", args.output, args.recordings, tuple(WRITERS))
     check_file("plot", args.plot, args.recordings, FIGURES)
@@ -63,8 +63,7 @@ def run(args: Args) -> int:
             estimates[name] = run_estimator(args.estimator, sensor)
         rows = [summary_row(name, estimate) for name, estimate in estimates.items()]
         out.table(rows, f"Angles by {args.estimator}, deg (±: standard deviation at the end)")
-        if passed_over:
-            out.say(f"passed over:\n{passed_over_text(passed_over)}")
+        say_passed_over(passed_over, out)
         if args.output is not None:
             out.say(f"estimates: {write_estimates(estimates, args.output)}")
         if args.plot is not None:

@@ -10,7 +10,7 @@ import tyro
 
 from ..experiment import start_run
 from ..output import Output
-from ..report import draw_example, print_comparison, provenance
+from ..report import draw_example, print_comparison
 from ..targets import check_folder
 
 
@@ -47,29 +47,25 @@ def run(args: Args) -> int:
     from ...baselines.comparison.data_sets import groups_of
     from ...baselines.evaluation import evaluate
     from ...baselines.registry import list_estimators
-    from .load import load_all, passed_over_text, plain_warnings
+    from .load import load_all, plain_warnings, say_passed_over
 
     check_folder("runs", args.runs)
     names = tuple(list_estimators()) if args.estimators == ("all",) else args.estimators
     with plain_warnings():
         trajectories, passed_over = load_all(args.recordings, args.calibration, args.site)
-        clock = args.reference_clock
         table = evaluate(
             list(names),
             trajectories,
             reference=args.reference,
-            reference_clock=clock,
+            reference_clock=args.reference_clock,
             offline=args.offline,
             progress=True,
         )
     folder = start_run("evaluate", args, args.seed, args.runs)
     folder.write_results(table)
     with Output("evaluate", args) as out:
-        sections = print_comparison(table, folder, out, groups=groups_of(trajectories))
-        sections |= draw_example(table, trajectories, {name: name for name in names}, folder, "recordings")
-        if passed_over:
-            sections["Passed over"] = passed_over_text(passed_over, most=1000)
-            out.say(f"passed over:\n{passed_over_text(passed_over)}")
-        sections["Provenance"] = provenance(folder)
-        out.report(folder.write_report("poise evaluate", sections))
+        print_comparison(table, folder, out, groups=groups_of(trajectories))
+        draw_example(table, trajectories, {name: name for name in names}, folder, "recordings", out)
+        say_passed_over(passed_over, out)
+        out.report(folder.write_report("poise evaluate", out.sections))
     return 0

@@ -31,7 +31,7 @@ def run(args: Args) -> int:
     """Describe, check, draw."""
     from ...envs.data.inspection import inspect_recording
     from ...envs.data.plausibility import check_recording
-    from .load import load_all, passed_over_text, plain_warnings
+    from .load import load_all, plain_warnings, say_passed_over
 
     check_file("plot", args.plot, args.recordings, FIGURES)
     with plain_warnings(), Output("inspect", args) as out:
@@ -62,8 +62,7 @@ def run(args: Args) -> int:
                 out.say(f"{finding.severity}: {finding}")
             if not findings:
                 out.say(f"{trajectory.name}: units, signs, axes and clock are plausible")
-        if passed_over:
-            out.say(f"passed over:\n{passed_over_text(passed_over)}")
+        say_passed_over(passed_over, out)
         if args.plot is not None:
             from ...baselines.plots import save, signals
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from ...envs.data.trajectory import Trajectory
+    from ..output import Output
 
 
 def load_all(
@@ -142,3 +143,10 @@ def passed_over_text(passed_over: Sequence[tuple[Path, str]], most: int = 10) ->
     lines = [f"- {file}: {' '.join(reason.split())}" for file, reason in passed_over[:most]]
     more = len(passed_over) - len(lines)
     return "\n".join([*lines, *([f"- … and {more} more"] if more > 0 else [])])
+
+
+def say_passed_over(passed_over: Sequence[tuple[Path, str]], out: Output) -> None:
+    """Print some of the files that were passed over; all are in the report."""
+    if passed_over:
+        out.sections["Passed over"] = passed_over_text(passed_over, most=1000)
+        out.say(f"passed over:\n{passed_over_text(passed_over)}")

@@ -72,6 +72,7 @@ def test_evaluate_shows_estimators_that_give_no_angle(tmp_path, capsys):
     assert second == "angular_rate: RMS distance, rad/s"
     assert tables[second][0]["estimator"] == "a"
     run = start_run("evaluate", Args("octa"), 0, tmp_path)
-    sections = print_comparison(pandas.DataFrame(rows), run, Output("evaluate", None))
+    out = Output("evaluate", None)
+    print_comparison(pandas.DataFrame(rows), run, out)
     assert "0.8" in capsys.readouterr().out
-    assert "Figure: angular_rate-distance" in sections
+    assert "Figure: angular_rate-distance" in out.sections
