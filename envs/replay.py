@@ -167,19 +167,9 @@ class ReplayEnv(PoseEnv):
 
     def next_block(self, most: int) -> Block:
         """The whole episode."""
-        samples = slice(self._start, self._start + most)
         recorded = self.trajectory
-
-        def cut(arrays: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-            return {name: values[samples] for name, values in arrays.items()}
-
-        return Block(
-            recorded.time[samples],
-            cut(recorded.measurements),
-            cut(self._pose),
-            cut(self._truth),
-            recorded.mask[samples],
-        )
+        whole = Block(recorded.time, recorded.measurements, self._pose, self._truth, recorded.mask)
+        return whole.rows(slice(self._start, self._start + most))
 
     def make_scene(self, gui: bool) -> Scene:
         """A device above the ground, and the axes of the estimate."""

@@ -14,9 +14,9 @@ import numpy as np
 
 from ...filters.core import rotation
 from ...filters.core.model import checked_quaternion
+from ...filters.support.parameters import check_positive
 from .controller_motion import Knots, PointingGesture, RateTableGesture, ShakingGesture, WalkGesture
 from .motion import euler_motion
-from .planar_motion import check_positive
 from .smooth import Series
 
 SHAKING_DRAWS = 20

@@ -22,6 +22,7 @@ from ...filters.arrays.files import load_array
 from ...filters.arrays.planar.orientation import PLANAR_GYROSCOPE
 from ...filters.core import rotation
 from ...filters.core.quantity import GYROSCOPE, Channel
+from ...filters.support.parameters import check_positive
 from ..sensors.ideal import Mounting, Sampling, vector
 from ..sensors.kinds import SensorKind, SiteMotion, sensor_kind
 from ..sensors.magnetics import Magnetics
@@ -60,9 +61,7 @@ class ArrayPreset(SensorPreset):
     """standard deviation of each coordinate of each position, m"""
 
     def __post_init__(self) -> None:
-        for name in ("axis_error", "position_error"):
-            if not 0.0 <= getattr(self, name) < math.inf:
-                raise ValueError(f"{name} must be 0 or more and finite, got {getattr(self, name)}")
+        check_positive(self, or_zero=("axis_error", "position_error"))
 
     def scaled(self, noise_scale: float) -> Self:
         """The same device with errors ``noise_scale`` times as large."""

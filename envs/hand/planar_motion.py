@@ -13,6 +13,7 @@ from typing import ClassVar
 import numpy as np
 
 from ...filters.core import rotation
+from ...filters.support.parameters import check_positive
 from ..sensors.ideal import BodyState
 from .smooth import Jet, smoothstep, smoothstep_integral
 
@@ -53,13 +54,6 @@ def planar_angle(orientation: np.ndarray) -> np.ndarray:
     """φ ``(...)`` in [−π, π] of attitudes ``(..., 4)`` in the vertical plane."""
     along = rotation.rotate(orientation, np.array([1.0, 0.0, 0.0]))
     return np.arctan2(along[..., 2], along[..., 0])
-
-
-def check_positive(config: object, *names: str) -> None:
-    """Refuse numbers that a motion divides by and that are not positive and finite."""
-    for name in names:
-        if not 0.0 < getattr(config, name) < math.inf:
-            raise ValueError(f"{name} must be positive and finite, got {getattr(config, name)}")
 
 
 @dataclass(frozen=True)

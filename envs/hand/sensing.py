@@ -10,6 +10,7 @@ import numpy as np
 
 from ...filters.arrays.array import AccelerometerArray
 from ...filters.core import rotation
+from ...filters.support.parameters import check_positive
 from ...filters.support.seeds import root_seed
 from ..base import Block
 from ..data.trajectory import Trajectory
@@ -43,9 +44,7 @@ class HandVariation:
     mass: float = 0.2
 
     def __post_init__(self) -> None:
-        for name in ("lever_arm", "mounting", "mass"):
-            if not 0.0 <= getattr(self, name) < math.inf:
-                raise ValueError(f"{name} must be 0 or more and finite, got {getattr(self, name)}")
+        check_positive(self, or_zero=("lever_arm", "mounting", "mass"))
 
     def draw(self, mounting: Mounting, generator: np.random.Generator) -> tuple[Mounting, float]:
         """A mounting around ``mounting``, and a factor for the mass."""

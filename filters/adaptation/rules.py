@@ -27,11 +27,13 @@ class Rule(Features):
     Attributes:
         largest: log factor of action 1, of a variance.
         reach: less the log factor of action −1.
+        decay: s, time constant of the averages.
     """
 
     scales: tuple[float, ...] = (0.0,)
     largest: float = 1.0
     reach: float = 1.0
+    decay: float = 0.5
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -41,6 +43,10 @@ class Rule(Features):
     def init(self, kalman: KalmanFilter, batch: tuple[int, ...] = ()) -> FeatureMemory:
         """Empty memory."""
         return self.empty(batch, 2)
+
+    def averaged(self, averages: np.ndarray, means: np.ndarray, duration: float) -> np.ndarray:
+        """Averages over the last ``decay`` seconds."""
+        return averages - math.expm1(-duration / self.decay) * (means[..., None, :] - averages)
 
     def observe(self, memory: FeatureMemory, kalman: KalmanFilter, action: np.ndarray) -> np.ndarray:
         """The feature and the action of the last interval: float32 ``(*batch, 1 + k)``."""
@@ -95,11 +101,9 @@ class InnovationRule(Rule):
     After R. K. Mehra, "Approaches to adaptive filtering", IEEE Trans. Automatic Control 17(5), 1972, on the NIS.
 
     Attributes:
-        decay: s, time constant of the average of the NIS.
         smallest: log factor below which λ does not fall.
     """
 
-    decay: float = 0.5
     smallest: float = 0.0
 
     def moments(
@@ -136,14 +140,12 @@ class TurningRule(Rule):
         channel: gyroscope whose y and z axes are the bicycle's.
         scale: θ, rad/s; with the others chosen on simulated rides.
         least_rate: ω_0, rad/s.
-        decay: s, time constant of the averages.
         smallest: log factor below which λ does not fall.
     """
 
     channel: str = "bicycle_imu/gyr"
     scale: float = math.radians(2.0)
     least_rate: float = math.radians(1.0)
-    decay: float = 0.5
     smallest: float = -2.0
 
     def init(self, kalman: KalmanFilter, batch: tuple[int, ...] = ()) -> FeatureMemory:
@@ -158,10 +160,6 @@ class TurningRule(Rule):
         known = np.isfinite(rate).all(axis=-1)
         y, z = np.moveaxis(np.where(known[..., None], rate, 0.0), -1, 0)
         return np.stack([known, y, y * y, z], axis=-1), memory.previous
-
-    def averaged(self, averages: np.ndarray, means: np.ndarray, duration: float) -> np.ndarray:
-        """All of them over the last ``decay`` seconds."""
-        return averages - math.expm1(-duration / self.decay) * (means[..., None, :] - averages)
 
     def factor(self, averages: np.ndarray) -> np.ndarray:
         """λ; 0 before the first sample."""
@@ -180,7 +178,6 @@ class AccelerationRule(Rule):
     Attributes:
         channel: accelerometer.
         reference: m/s²; excess at which the published variance holds.
-        decay: s, time constant of the mean square.
         gravity: m/s².
         smallest: log factor below which λ does not fall.
     """
@@ -199,10 +196,6 @@ class AccelerationRule(Rule):
         excess = np.sqrt(np.sum(force * force, axis=-1)) - self.gravity
         known = np.isfinite(excess)
         return np.stack([known, np.where(known, excess, 0.0) ** 2], axis=-1), memory.previous
-
-    def averaged(self, averages: np.ndarray, means: np.ndarray, duration: float) -> np.ndarray:
-        """Known share and squared excess, averaged."""
-        return averages - math.expm1(-duration / self.decay) * (means[..., None, :] - averages)
 
     def factor(self, averages: np.ndarray) -> np.ndarray:
         """2 ln(rms / reference); 0 before the first sample."""

@@ -25,8 +25,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..core.estimator import check_measurements
-from ..core.kalman import correct
 from ..core.model import Model
+from ..core.recursion import correct
 from ..core.sampling import filled, join, last_readings, split
 
 

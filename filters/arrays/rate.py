@@ -44,8 +44,9 @@ import numpy as np
 
 from ..core.backend import Array, constant, expand, namespace
 from ..core.matrices import diagonal_matrix, solve_positive
-from ..core.model import Recurrence, check_positive
+from ..core.model import Recurrence
 from ..core.quantity import ANGULAR_RATE, GYROSCOPE, Channel, Measurement, Quantity
+from ..support.parameters import check_positive
 from .array import OCTA, AccelerometerArray
 from .files import ArrayEquations
 from .products import product_jacobian, products, symmetric

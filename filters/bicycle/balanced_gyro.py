@@ -36,9 +36,10 @@ from typing import Any, ClassVar
 from ..core.backend import Array, constant, expand, namespace
 from ..core.held_inputs import ridden
 from ..core.matrices import block_matrix, covariance_of, diagonal, identity, zero_where_known
-from ..core.model import Gain, Model, check_positive
+from ..core.model import Gain, Model
 from ..core.quantity import GRAVITY, Measurement, Quantity
 from ..core.rotation import rotate_back, wrap
+from ..support.parameters import check_positive
 from .geometry import RiderEquations, RiderGeometry
 from .odometry_aided import BIAS, PITCH
 from .platform_gyro import PLATFORM_GYROSCOPE, ROLL

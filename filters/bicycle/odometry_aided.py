@@ -35,10 +35,11 @@ from typing import Any, ClassVar
 from ..core.backend import Array, expand, namespace
 from ..core.held_inputs import ridden
 from ..core.matrices import block_matrix, covariance_of, diagonal_matrix, identity, vector_of, zeros
-from ..core.model import Gain, Model, check_positive
+from ..core.model import Gain, Model
 from ..core.quantity import GRAVITY, Channel, Measurement, Quantity
 from ..core.rotation import cross, level, normalize, roll_pitch, rotate, rotate_back, skew, to_matrix, up_in_body
 from ..imu.strapdown import accelerated, advance, clipped_inflation, corrected, process_noise, transition
+from ..support.parameters import check_positive
 from .geometry import RiderEquations, RiderGeometry
 
 COUNTS = 1024

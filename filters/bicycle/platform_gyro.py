@@ -17,9 +17,10 @@ from typing import Any, ClassVar
 from ..core.backend import Array, constant, expand, namespace
 from ..core.held_inputs import ridden
 from ..core.matrices import covariance_of, diagonal, zero_where_known
-from ..core.model import Gain, Model, Recurrence, check_positive
+from ..core.model import Gain, Model, Recurrence
 from ..core.quantity import Channel, Measurement, Quantity
 from ..core.rotation import conjugate, exp, from_euler_xyz, multiply, normalize, to_euler_zyx
+from ..support.parameters import check_positive
 from .geometry import RiderEquations, RiderGeometry
 from .relative_sensor import relative_angles
 from .two_gyro.kinematics import SIGNS, level_constraint, platform_rate

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..core.model import Equations, parameters_of, structure_of
+from ..core.monitor import starts_of
 from ..core.quantity import Estimate, Measurement
 from ..core.sampling import FilterState, Gains, empty_state, gains_over_time, join
 from ..support.parallel import processors
@@ -60,12 +61,9 @@ class CompiledEquations:
         self.printed = print_model(model)
         self.plan = plan.plan_of(self.printed, native.addresses(self.printed.functions, type(model).__name__))
         self.names = tuple(parameters_of(model))
-        self.columns: dict[str, slice] = {}
-        start = 0
-        for quantity in model.outputs:
-            self.columns[quantity.name] = slice(start, start + quantity.size)
-            start += quantity.size
-        self.pose_size = start
+        starts = starts_of(model.outputs)
+        self.columns = {part.name: slice(starts[part.name], starts[part.name] + part.size) for part in model.outputs}
+        self.pose_size = sum(part.size for part in model.outputs)
         width = sum(channel.size for channel in model.channels)
         state = empty_state(model, np.empty((0, width)))
         samples = [np.empty((0, 0, width)), self._parameters(model, None, 0, ()), True]

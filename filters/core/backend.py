@@ -11,7 +11,6 @@ in-place writes, comparisons by function (``xp.greater(a, b)``), and ``xp.where`
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -108,9 +107,3 @@ def rows(entries: Any) -> Array:
     xp = namespace(array)
     zero = 0.0 * sum((entry for entry in flat if hasattr(entry, "dtype")), start=0.0 * array)
     return xp.stack([xp.stack([zero + entry for entry in row], axis=-1) for row in entries], axis=-2)
-
-
-def stack_channels(measurement: Mapping[str, Array], names: tuple[str, ...]) -> Array:
-    """Concatenate the channels ``names`` of a measurement along their last axis."""
-    arrays = [measurement[name] for name in names]
-    return namespace(*arrays).concat(arrays, axis=-1) if len(arrays) > 1 else arrays[0]

@@ -12,10 +12,10 @@ from typing import Any
 from ..compile.run import compiled_equations
 from .backend import is_torch
 from .estimator import check_measurements
-from .model import Gain, Model
+from .model import Model
 from .quantity import Estimate
-from .recursion import Recursion, correct
-from .sampling import FilterState, Gains, check_gains, scaled
+from .recursion import Recursion
+from .sampling import Gains, check_gains
 
 
 @dataclass(frozen=True)
@@ -65,6 +65,3 @@ class KalmanFilter(Recursion):
         if form is None:
             raise TypeError(f"{type(self.model).__name__} cannot be compiled, which smoothing needs")
         return form.smooth(self.model, arrays, gains, self.restart, self.keep_covariance)
-
-
-__all__ = ["FilterState", "Gain", "Gains", "KalmanFilter", "Model", "correct", "scaled"]

@@ -198,21 +198,6 @@ def equations_of(estimator: Any) -> Any:
     return estimator
 
 
-def check_positive(model: Equations, *names: str, or_zero: tuple[str, ...] = ()) -> None:
-    """Refuse parameters (numbers or tuples of them) that are not positive, or negative where zero is allowed.
-
-    Raises:
-        ValueError: names the parameter and its value.
-    """
-    for name in (*names, *or_zero):
-        value = getattr(model, name)
-        smallest = min(value) if isinstance(value, tuple) else value
-        if name in or_zero and smallest < 0.0:
-            raise ValueError(f"{name} must not be negative, got {value}")
-        if name in names and smallest <= 0.0:
-            raise ValueError(f"{name} must be positive, got {value}")
-
-
 def checked_quaternion(name: str, value: Any) -> tuple[float, ...]:
     """A unit quaternion as four floats.
 

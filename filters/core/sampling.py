@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .backend import Array, constant, expand, is_torch, namespace, stack_channels, to_numpy
+from .backend import Array, constant, expand, is_torch, namespace, to_numpy
 from .held_inputs import longest_gap
 from .model import E, Equations, Gain, parameters_of, with_parameters
 from .monitor import MEMORY, places_of
@@ -50,7 +50,8 @@ def split(sample: Array, channels: tuple[Channel, ...]) -> dict[str, Array]:
 
 def join(measurement: Measurement, channels: tuple[Channel, ...]) -> Array:
     """The samples of all channels, concatenated to ``(..., d)``."""
-    return stack_channels(measurement, tuple(channel.name for channel in channels))
+    arrays = [measurement[channel.name] for channel in channels]
+    return namespace(*arrays).concat(arrays, axis=-1) if len(arrays) > 1 else arrays[0]
 
 
 def hold(sample: Array, held: Array) -> Array:

@@ -51,6 +51,7 @@ from ..core.quantity import (
     Quantity,
 )
 from ..core.rotation import cross, exp, multiply, normalize, rotate, rotate_back, up_in_body
+from ..support.parameters import check_positive
 from .magnetic_heading import align, field_direction, known
 
 STEPS = 4
@@ -104,9 +105,7 @@ class Marins(Model):
         """Check the start and the positive parameters."""
         super().__post_init__()
         object.__setattr__(self, "start_orientation", checked_quaternion("start_orientation", self.start_orientation))
-        for name in ("quaternion_std", "gyroscope_std", "rate_std", "rate_time"):
-            if getattr(self, name) <= 0.0:
-                raise ValueError(f"{name} must be positive, got {getattr(self, name)}")
+        check_positive(self, "quaternion_std", "gyroscope_std", "rate_std", "rate_time")
 
     @property
     def supposed_field(self) -> int:

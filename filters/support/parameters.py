@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import inspect
+import math
 import re
 import types
 import typing
@@ -44,6 +45,20 @@ def check_parameters(maker: Callable[..., Any], given: Mapping[str, Any]) -> Non
             if reason:
                 must = "must not be" if reason == "negative" else "must be"
                 raise ValueError(f"{name} {must} {reason}, got {shown(value)}")
+
+
+def check_positive(of: object, *names: str, or_zero: Sequence[str] = ()) -> None:
+    """Refuse attributes (numbers or tuples of them) that are not positive, or negative where zero is allowed.
+
+    Raises:
+        ValueError: names the attribute and its value.
+    """
+    for name in (*names, *or_zero):
+        value = getattr(of, name)
+        numbers = value if isinstance(value, tuple) else (value,)
+        if not all(0.0 <= number < math.inf and (number > 0.0 or name in or_zero) for number in numbers):
+            wanted = "not be negative or infinite" if name in or_zero else "be positive and finite"
+            raise ValueError(f"{name} must {wanted}, got {value}")
 
 
 def arguments_of(maker: Callable[..., Any], args: Sequence[Any], kwargs: Mapping[str, Any]) -> dict[str, Any]:

@@ -16,10 +16,11 @@ from poise.envs.hand.sensing import simulate_hand
 from poise.filters.core.estimator import run_by_steps
 from poise.filters.core.kalman import KalmanFilter
 from poise.filters.core.matrices import covariance_of, identity
-from poise.filters.core.model import Gain, Model, check_positive
+from poise.filters.core.model import Gain, Model
 from poise.filters.core.quantity import ACCELEROMETER, GYROSCOPE, UP, Channel, Quantity
 from poise.filters.core.rotation import exp_matrix, normalize
 from poise.filters.registry import FILTERS, Entry, make, name_of
+from poise.filters.support.parameters import check_positive
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ....filters.support.parameters import check_positive
+
 Vector3 = tuple[float, float, float]
 
 AIR_DENSITY = 1.2
@@ -35,8 +37,7 @@ class RigidPart:
     """kg·m²: matrix elements xx, yy, zz, xz (= −∫ x z dm) about the centre of mass"""
 
     def __post_init__(self) -> None:
-        if not (self.mass > 0.0 and math.isfinite(self.mass)):
-            raise ValueError(f"mass must be positive and finite (kg), got {self.mass}")
+        check_positive(self, "mass")
         if not np.all(np.isfinite((*self.centre, *self.inertia))):
             raise ValueError(f"centre and inertia must be finite, got {self.centre} and {self.inertia}")
         moments = np.linalg.eigvalsh(self.tensor)
@@ -72,9 +73,7 @@ class WheelParameters:
     """m: radius of the tyre's cross-section; 0 for a knife edge"""
 
     def __post_init__(self) -> None:
-        for name in ("radius", "mass", "inertia_axle", "inertia_diameter"):
-            if not 0.0 < getattr(self, name) < math.inf:
-                raise ValueError(f"{name} must be positive and finite, got {getattr(self, name)}")
+        check_positive(self, "radius", "mass", "inertia_axle", "inertia_diameter")
         if not 0.0 <= self.crown_radius < 0.5 * self.radius:
             raise ValueError(f"crown_radius must lie in [0, radius / 2), got {self.crown_radius} m")
 
@@ -101,9 +100,7 @@ class DriveParameters:
     """N·m·s/rad at the rear hub"""
 
     def __post_init__(self) -> None:
-        for name in ("crank_length", "mass", "chain_stiffness"):
-            if not 0.0 < getattr(self, name) < math.inf:
-                raise ValueError(f"{name} must be positive and finite, got {getattr(self, name)}")
+        check_positive(self, "crank_length", "mass", "chain_stiffness")
         if not self.gears or self.gears[0] <= 0.0 or list(self.gears) != sorted(set(self.gears)):
             raise ValueError(f"gears must be positive and rise, got {self.gears}")
 
@@ -141,8 +138,7 @@ class BicycleParameters:
     """1: ratio of rolling drag to load"""
 
     def __post_init__(self) -> None:
-        if not 0.0 < self.wheelbase < math.inf:
-            raise ValueError(f"wheelbase must be positive and finite (m), got {self.wheelbase}")
+        check_positive(self, "wheelbase")
         if not (math.isfinite(self.trail) and abs(self.steer_axis_tilt) < 1.2):
             raise ValueError(
                 f"trail must be finite and steer_axis_tilt within ±1.2 rad, got {self.trail} m, {self.steer_axis_tilt}"

@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ....filters.compile.cache import jit
+from ....filters.support.parameters import check_positive
 from ...physics.multibody import Tuple3
 from ..course.terrain import Ground, height_and_slope
 
@@ -46,11 +47,9 @@ class TyreParameters:
     """whether a leaning wheel has a camber thrust of tan(camber) times the load"""
 
     def __post_init__(self) -> None:
-        for name in ("stiffness", "shear_stiffness", "relaxation_length", "friction"):
-            if not 0.0 < getattr(self, name) < math.inf:
-                raise ValueError(f"{name} must be positive and finite, got {getattr(self, name)}")
-        if not (self.damping >= 0.0 and self.shear_damping >= 0.0):
-            raise ValueError("damping and shear_damping must not be negative")
+        check_positive(
+            self, "stiffness", "shear_stiffness", "relaxation_length", "friction", or_zero=("damping", "shear_damping")
+        )
 
 
 BENCHMARK_TYRE = TyreParameters(3.0e5, 1500.0, 3.0e5, 1500.0, 2.0, 1.0)

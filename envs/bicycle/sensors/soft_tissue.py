@@ -21,6 +21,7 @@ from scipy.linalg import expm
 
 from ....filters.compile.cache import jit
 from ....filters.core import rotation
+from ....filters.support.parameters import check_positive
 from ...sensors.ideal import STANDARD_GRAVITY, BodyState, Mounting, mounted
 
 CREEP = 3.0
@@ -45,9 +46,7 @@ class SoftTissue:
     """n: outward unit vector, body axes"""
 
     def __post_init__(self) -> None:
-        for name in ("frequency", "damping", "depth"):
-            if not 0.0 < getattr(self, name) < math.inf:
-                raise ValueError(f"{name} must be positive and finite, got {getattr(self, name)}")
+        check_positive(self, "frequency", "damping", "depth")
 
 
 TISSUES = {

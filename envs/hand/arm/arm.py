@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ....filters.support.parameters import check_positive
 from ....filters.support.ranges import Checked
 
 
@@ -58,12 +59,9 @@ class Arm(Checked):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        for name in ("hand_mass", "hand_radius", "stiffness", "wrist_stiffness", "delay", "table_stiffness"):
-            if not 0.0 < getattr(self, name) < math.inf:
-                raise ValueError(f"{name} must be positive and finite, got {getattr(self, name)}")
-        for name in ("damping", "anticipation", "reflex", "noise", "grip", "table_damping", "friction"):
-            if not 0.0 <= getattr(self, name) < math.inf:
-                raise ValueError(f"{name} must be 0 or more and finite, got {getattr(self, name)}")
+        check_positive(self, "hand_mass", "hand_radius", "stiffness", "wrist_stiffness", "delay", "table_stiffness")
+        shares = ("damping", "anticipation", "reflex", "noise", "table_damping", "friction")
+        check_positive(self, or_zero=(*shares, "grip"))
         if self.table is not None and not 0.0 < self.table < math.inf:
             raise ValueError(f"table must be metres below the device, above 0, or None, got {self.table}")
 

@@ -48,7 +48,7 @@ import numpy as np
 
 from ...core.backend import Array, constant, expand, namespace
 from ...core.matrices import block_diagonal, block_matrix, covariance_of, identity, vector_of
-from ...core.model import Gain, Model, check_positive, checked_quaternion
+from ...core.model import Gain, Model, checked_quaternion
 from ...core.quantity import (
     ANGULAR_RATE,
     EXTERNAL_ACCELERATION,
@@ -63,6 +63,7 @@ from ...core.quantity import (
 )
 from ...core.rotation import exp_matrix, from_matrix, nearest_matrix, normalize, rotate, skew, to_matrix
 from ...imu.magnetic_heading import align, field_direction, known
+from ...support.parameters import check_positive
 from ..array import ARRAYS, AccelerometerArray, recorded_channel
 from ..files import ArrayEquations
 from ..products import product_jacobian, products

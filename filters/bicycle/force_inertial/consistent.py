@@ -13,9 +13,9 @@ from typing import Any, ClassVar
 
 from ...core.backend import Array, constant, namespace
 from ...core.matrices import block_diagonal, diagonal, zeros
-from ...core.model import check_positive
 from ...core.quantity import Measurement
 from ...core.rotation import wrap
+from ...support.parameters import check_positive
 from ..geometry import RiderGeometry
 from .filter import ForceInertial
 

@@ -14,8 +14,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...core.model import check_positive
 from ...core.quantity import GRAVITY, Channel
+from ...support.parameters import check_positive
 from ..geometry import ARM_MASS, RiderEquations, RiderGeometry
 from .kinematics import true_angles
 

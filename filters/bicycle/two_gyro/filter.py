@@ -38,9 +38,10 @@ from ...core.matrices import (
     zero_where_known,
     zeros,
 )
-from ...core.model import Gain, Model, check_positive
+from ...core.model import Gain, Model
 from ...core.quantity import Channel, Measurement, Quantity
 from ...core.rotation import rotate_back, wrap
+from ...support.parameters import check_positive
 from ..geometry import Point, RiderEquations, RiderGeometry
 from ..platform_gyro import ROLL
 from ..relative_sensor import MarkerPlaces, marker_distances, relative_angles, relative_orientation

@@ -14,9 +14,10 @@ from typing import Any, ClassVar
 from ...core.backend import Array, constant, expand, namespace
 from ...core.held_inputs import ridden
 from ...core.matrices import block_diagonal, block_matrix, diagonal, diagonal_matrix, zeros
-from ...core.model import Gain, check_positive
+from ...core.model import Gain
 from ...core.quantity import Measurement
 from ...core.rotation import euler_matrix
+from ...support.parameters import check_positive
 from ..geometry import Point, RiderGeometry
 from .blocks import BLOCKS
 from .filter import CONSTRAINTS, WholeBody

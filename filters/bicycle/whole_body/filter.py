@@ -34,9 +34,10 @@ from typing import Any, ClassVar, Literal
 from ...core.backend import Array, constant, expand, namespace
 from ...core.held_inputs import ridden
 from ...core.matrices import diagonal_matrix, identity
-from ...core.model import Gain, Model, check_positive
+from ...core.model import Gain, Model
 from ...core.quantity import STANDARD_GRAVITY, Measurement
 from ...core.rotation import cross, euler_axes, euler_matrix, norm, skew
+from ...support.parameters import check_positive
 from ..geometry import Point, RiderGeometry
 from . import constraints as limb_constraints
 from .blocks import BLOCKS, assemble, row_of

@@ -13,9 +13,10 @@ from poise.filters.compile import kernel
 from poise.filters.compile import run as compiled
 from poise.filters.compile.printer import print_model
 from poise.filters.core.backend import constant
-from poise.filters.core.kalman import KalmanFilter, correct
+from poise.filters.core.kalman import KalmanFilter
 from poise.filters.core.model import Model, parameters_of, structure_of
 from poise.filters.core.quantity import ACCELEROMETER, GYROSCOPE, UP
+from poise.filters.core.recursion import correct
 from poise.filters.imu.external_acceleration import ExternalAcceleration
 
 
