@@ -10,12 +10,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...envs.data.trajectory import Trajectory
-from ...filters.core.quantity import Estimate
+from ...filters.core.quantity import DEG, Estimate
 from ..plots import AMBER, BLUE, GREEN, TRUTH_COLOR, VERMILION, legend_above, new_figure
 from .claims import Claim
 from .report import Report
 from .ride_study import SETTLED, SPACING, RideStudy
-from .signals import DEG
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

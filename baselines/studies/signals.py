@@ -10,7 +10,6 @@ import numpy as np
 
 Function = Callable[[np.ndarray], np.ndarray]
 """Of times ``(...)`` in s."""
-DEG = math.pi / 180.0
 STEP = 1e-3
 """s, of numerical derivatives: of fourth order, so exact to about 1e-9 where a motion is slower than a few Hz"""
 

@@ -11,21 +11,21 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from ...filters.core.quantity import STANDARD_GRAVITY
 from .rate_consistency import RateConsistency, rate_consistency
 from .readings import HELD, Finding, Severity, check_alive, plausible_samples
 from .trajectory import Trajectory
 from .turning import check_rates, compared
 
-GRAVITY = 9.80665
 PLAUSIBLE_FORCE = (7.0, 13.0)
 """m/s²: median length of the specific force of anything that people or vehicles carry."""
 FORCE_UNITS = {
     "g": 1.0,
-    "m/s² that were multiplied by 9.81 once too often": GRAVITY**2,
+    "m/s² that were multiplied by 9.81 once too often": STANDARD_GRAVITY**2,
     "mg": 1e3,
-    "cm/s²": 100.0 * GRAVITY,
-    "ft/s²": GRAVITY / 0.3048,
-    "mm/s²": 1e3 * GRAVITY,
+    "cm/s²": 100.0 * STANDARD_GRAVITY,
+    "ft/s²": STANDARD_GRAVITY / 0.3048,
+    "mm/s²": 1e3 * STANDARD_GRAVITY,
     "counts of ±2 g in 16 bits": 16384.0,
     "counts of ±4 g in 16 bits": 8192.0,
     "counts of ±8 g in 16 bits": 4096.0,
@@ -214,7 +214,7 @@ def check_force(channel: str, acc: np.ndarray, turning: RateConsistency | None =
     unit = min(FORCE_UNITS, key=lambda name: abs(np.log(mean / FORCE_UNITS[name])))
     apart = max(abs(np.log(value / FORCE_UNITS[unit])) if value > 0.0 else np.inf for value in (mean, quiet))
     if apart < 0.25:
-        factor = GRAVITY / FORCE_UNITS[unit]
+        factor = STANDARD_GRAVITY / FORCE_UNITS[unit]
         yield Finding("warning", channel, what, f"readings in {unit}", f"Multiply by {factor:.6g}.")
     elif usual < PLAUSIBLE_FORCE[0] or scattered:
         remedy = "Export the raw acceleration (specific force), which is 9.81 m/s² at rest."
@@ -231,7 +231,7 @@ def check_scale(channel: str, rest: np.ndarray | None) -> Iterator[Finding]:
     if rest is None or float(rest.std(axis=0).max()) > QUIET_FORCE:
         return
     at_rest = float(np.linalg.norm(rest.mean(axis=0)))
-    if abs(at_rest / GRAVITY - 1.0) > LARGEST_SCALE:
+    if abs(at_rest / STANDARD_GRAVITY - 1.0) > LARGEST_SCALE:
         what = f"{at_rest:.4g} m/s² where it is quiet"
         remedy = "Calibrate the sensor (poise calibrate), or check its range."
         yield Finding("warning", channel, what, "a scale error, or a bias of the accelerometer", remedy)

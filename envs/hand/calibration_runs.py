@@ -14,10 +14,11 @@ import numpy as np
 
 from ...filters.arrays.array import AccelerometerArray
 from ...filters.core import rotation
+from ...filters.core.quantity import STANDARD_GRAVITY
 from ..data.calibration.channels import accelerometer_channel, spatial_axes
 from ..data.calibration.data import MagnetometerData, RateTableData, mounting_matrix
 from ..data.calibration.records import CalibrationRecord, ChannelCalibration
-from ..sensors.ideal import STANDARD_GRAVITY, magnetic_field
+from ..sensors.ideal import magnetic_field
 from ..sensors.noise import NoiseModel
 from .controller_gestures import BOTH_WAYS, DOWNWARDS, UPWARDS, RateTable
 from .devices import ArrayPreset, HandDevice, actual_array

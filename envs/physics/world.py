@@ -21,8 +21,9 @@ from typing import Self
 import numpy as np
 
 from ...filters.core import rotation
+from ...filters.core.quantity import STANDARD_GRAVITY
 from ...filters.support.optional import extra
-from ..sensors.ideal import STANDARD_GRAVITY, BodyState
+from ..sensors.ideal import BodyState
 
 with extra("sim"):
     import pybullet

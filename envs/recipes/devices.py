@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from ...filters.core.quantity import DEG
 from ...filters.support.ranges import Checked, Range, log_uniform
 from ...filters.support.seeds import named_generator
 from ..sensors.assumptions import WARM_UP
 from ..sensors.noise import NoiseModel
 from ..sensors.presets import SensorPreset
 from ..sensors.timing import PUNCTUAL, Timing
-
-DEG = math.pi / 180.0
 
 
 @dataclass(frozen=True)

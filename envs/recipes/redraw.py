@@ -14,13 +14,14 @@ import numpy as np
 
 from ...filters.bicycle.geometry import RiderGeometry
 from ...filters.core import rotation
+from ...filters.core.quantity import STANDARD_GRAVITY
 from ...filters.support.ranges import Checked
 from ..bicycle.sensors.measured_geometry import measured
 from ..bicycle.sensors.placement import PLACED
 from ..bicycle.sensors.sites import sensor_sites
 from ..bicycle.sensors.suites import rider_bicycle_suite
 from ..data.trajectory import Trajectory
-from ..sensors.ideal import STANDARD_GRAVITY, Mounting
+from ..sensors.ideal import Mounting
 from ..sensors.late import readings_at
 from ..sensors.noise import TIMES
 from ..sensors.sensor import Sensor, due

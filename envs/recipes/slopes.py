@@ -15,11 +15,11 @@ import math
 import numpy as np
 
 from ...filters.core import rotation
+from ...filters.core.quantity import DEG
 from ...filters.support.ranges import log_uniform
 from ..bicycle.rider.body_motion import smooth_step
 from ..data.trajectory import Trajectory
 
-DEG = math.pi / 180.0
 SLOPE, RISE, TOP = (1.0 * DEG, 20.0 * DEG), (0.4, 3.0), (1.0, 12.0)
 """rad, s, s: angle of a slope, up or down, and how long it takes to begin or end, and lasts"""
 JOLT, JOLT_LENGTH = (1.0 * DEG, 8.0 * DEG), (0.1, 0.4)

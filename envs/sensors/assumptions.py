@@ -8,13 +8,11 @@ of industrial parts, which are calibrated one by one over temperature.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 
-from .ideal import STANDARD_GRAVITY
+from ...filters.core.quantity import DEG, STANDARD_GRAVITY
 from .noise import NoiseModel
 
-DEG = math.pi / 180.0
 DEG_PER_HOUR = DEG / 3600.0
 MICRO_G = 1e-6 * STANDARD_GRAVITY
 PEAK = 0.617

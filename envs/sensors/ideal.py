@@ -14,15 +14,13 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from ...filters.core import rotation
+from ...filters.core.quantity import STANDARD_GRAVITY
 
 Sampling = Literal["interval", "instant"]
 """``interval``: delta angle and delta velocity over the sampling interval, divided by its length.
 ``instant``: the values at the end of the interval."""
 
 SAMPLINGS: tuple[Sampling, ...] = ("interval", "instant")
-
-STANDARD_GRAVITY = 9.80665
-"""m/s², ISO 80000-3."""
 
 NO_ACCELERATION = (
     "instant readings need the acceleration (and, with a lever arm, the angular acceleration) or the state one physics "

@@ -17,9 +17,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Self
 
+from ...filters.core.quantity import DEG, STANDARD_GRAVITY
 from ...filters.support.names import look_up
-from .assumptions import CONSUMER, DEG, DEG_PER_HOUR, INDUSTRIAL, MICRO_G, Grade, completed, model
-from .ideal import STANDARD_GRAVITY
+from .assumptions import CONSUMER, DEG_PER_HOUR, INDUSTRIAL, MICRO_G, Grade, completed, model
 from .kinds import KINDS
 from .noise import NoiseModel
 from .timing import PUNCTUAL, Timing

@@ -10,9 +10,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...filters.core.quantity import Channel
+from ...filters.core.quantity import STANDARD_GRAVITY, Channel
 from ...filters.support.seeds import named_generator
-from .ideal import STANDARD_GRAVITY, BodyState, Mounting, Sampling, magnetic_field, mounted, vector
+from .ideal import BodyState, Mounting, Sampling, magnetic_field, mounted, vector
 from .kinds import SiteMotion, sensor_kind
 from .late import Past
 from .magnetics import BICYCLE, MagneticField, Magnetics, magnetics_of

@@ -28,7 +28,6 @@ balancing takes. (4) does not hold for a bicycle that is leaned against somethin
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
@@ -37,7 +36,7 @@ from ..core.backend import Array, constant, expand, namespace
 from ..core.held_inputs import ridden
 from ..core.matrices import block_matrix, covariance_of, diagonal, identity, zero_where_known
 from ..core.model import Gain, Model
-from ..core.quantity import GRAVITY, Measurement, Quantity
+from ..core.quantity import DEG, GRAVITY, Measurement, Quantity
 from ..core.rotation import rotate_back, wrap
 from ..support.parameters import check_positive
 from .geometry import RiderEquations, RiderGeometry
@@ -45,7 +44,6 @@ from .odometry_aided import BIAS, PITCH
 from .platform_gyro import PLATFORM_GYROSCOPE, ROLL
 from .two_gyro.kinematics import SIGNS, platform_rate
 
-DEG = math.pi / 180.0
 SPEED = Quantity("balanced-gyro/speed", "vector", 1, "m/s")
 """g u: that of a thin wheel below a rider who does not lean beside the bicycle."""
 

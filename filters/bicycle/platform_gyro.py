@@ -9,7 +9,6 @@ This needs neither the body nor the camera. The comparison with this filter show
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
@@ -18,7 +17,7 @@ from ..core.backend import Array, constant, expand, namespace
 from ..core.held_inputs import ridden
 from ..core.matrices import covariance_of, diagonal, zero_where_known
 from ..core.model import Gain, Model, Recurrence
-from ..core.quantity import Channel, Measurement, Quantity
+from ..core.quantity import DEG, Channel, Measurement, Quantity
 from ..core.rotation import conjugate, exp, from_euler_xyz, multiply, normalize, to_euler_zyx
 from ..support.parameters import check_positive
 from .geometry import RiderEquations, RiderGeometry
@@ -26,7 +25,6 @@ from .relative_sensor import relative_angles
 from .two_gyro.kinematics import SIGNS, level_constraint, platform_rate
 from .two_gyro.truth import true_angles
 
-DEG = math.pi / 180.0
 ROLL = Quantity("bicycle/roll", "angle", 1, "rad")
 """Right positive."""
 PLATFORM_GYROSCOPE = Channel("bicycle_imu/gyr", 3, "rad/s")

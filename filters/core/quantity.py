@@ -6,6 +6,7 @@ Names are ``site/kind`` (``imu/gyr``, ``bicycle_imu/acc``); the axes are those o
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal, NamedTuple
@@ -23,7 +24,9 @@ Measurement = Mapping[str, Array]
 GRAVITY = 9.81
 """m/s²: rounded value of gravity in the papers; the default of the filters."""
 STANDARD_GRAVITY = 9.80665
-"""m/s²: standard gravity g_n, used in calibration and simulation of sensors."""
+"""m/s²: standard gravity g_n (ISO 80000-3), used in calibration and simulation of sensors."""
+DEG = math.pi / 180.0
+"""rad in a degree."""
 
 
 LIMITS = {"rad/s": 100.0, "m/s²": 2000.0}

@@ -14,10 +14,10 @@ from ....envs.hand.calibration_runs import (
     magnetometer_run,
     random_calibration,
 )
-from ....envs.sensors.ideal import STANDARD_GRAVITY
 from ....filters.arrays.array import CONTROLLER
 from ....filters.arrays.calibration.magnetometer import align_magnetometer, fit_ellipsoid
 from ....filters.arrays.calibration.rate_table import calibrate_accelerometer, calibrate_gyroscope
+from ....filters.core.quantity import STANDARD_GRAVITY
 from ..claims import Claim
 from ..kit import Study
 from ..report import Report

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from ....envs.data.trajectory import Trajectory
-from ....envs.sensors.ideal import STANDARD_GRAVITY
 from ....filters.arrays.spatial.pointing import pointing_angles
 from ....filters.core import rotation
+from ....filters.core.quantity import STANDARD_GRAVITY
 from ...plots import AMBER, BLUE, GREEN, GREY, PINK, SKY, TRUTH_COLOR, VERMILION, legend_above, new_figure
 from ..report import Report
 

@@ -25,17 +25,17 @@ from ....envs.hand.calibration_runs import (
 from ....envs.hand.controller_gestures import BOTH_WAYS, RateTable
 from ....envs.hand.devices import HandDevice
 from ....envs.hand.sensing import simulate_hand
-from ....envs.sensors.ideal import STANDARD_GRAVITY
 from ....filters.arrays.array import CONTROLLER, AccelerometerArray
 from ....filters.arrays.calibration.magnetometer import fit_ellipsoid
 from ....filters.arrays.calibration.rate_table import calibrate_accelerometer, calibrate_gyroscope
+from ....filters.core.quantity import DEG, STANDARD_GRAVITY
 from ..claims import Claim
 from ..kit import Study
 from ..report import Report
 from .calibration import AXES
 from .rate_table_figures import rate_table_figures
 
-MILLI_G, DPS = 1e-3 * STANDARD_GRAVITY, math.pi / 180.0
+MILLI_G = 1e-3 * STANDARD_GRAVITY
 TABLE_4_1 = {
     "1 x": (4.24, 5.3061),
     "1 y": (4.17, 34.8980),
@@ -47,7 +47,7 @@ TABLE_4_1 = {
 """Axis of the two ADXL345 → scale factor in mg/LSB, offset in mg"""
 TABLE_4_2 = {"x": (8.7700, -0.4978, 0.999994), "y": (8.8805, -0.2228, 0.999993), "z": (8.6502, -0.0655, 0.999992)}
 """Axis of the L3G4200D → scale factor in mdps/digit, offset in dps, correlation coefficient"""
-NONLINEARITY = {"accelerometer": (0.005, 4.0 * STANDARD_GRAVITY), "gyroscope": (0.002, 500.0 * DPS)}
+NONLINEARITY = {"accelerometer": (0.005, 4.0 * STANDARD_GRAVITY), "gyroscope": (0.002, 500.0 * DEG)}
 """Sensor → share of the whole range (m/s², rad/s) by which the data sheets let readings leave a straight line"""
 PLACES = (0.0, 0.2)
 """m from the axis of the table: the two places of Figure 4.15 (the thesis gives none)"""
@@ -60,7 +60,7 @@ def thesis_device(seed: int) -> CalibrationRecord:
     scales, offsets = (MILLI_G * np.array([row[k] for row in TABLE_4_1.values()]) for k in (0, 1))
     found[channel] = ChannelCalibration.scaled(scales, offsets, "m/s²")
     gains, zeros = (np.array([row[k] for row in TABLE_4_2.values()]) for k in (0, 1))
-    found["imu/gyr"] = ChannelCalibration.scaled(1e-3 * DPS * gains, DPS * zeros, "rad/s")
+    found["imu/gyr"] = ChannelCalibration.scaled(1e-3 * DEG * gains, DEG * zeros, "rad/s")
     return CalibrationRecord(found)
 
 
@@ -113,10 +113,10 @@ def measured(seed: int, hold: float) -> dict[str, Any]:
         along = np.char.startswith(turns.mounting, f"+{name} up")
         raw, rate = turns.raw[along, index], turns.rate[along]
         one = calibrate_gyroscope(raw, rate)
-        unsaturated = np.abs(one.scale * raw + one.offset - rate) < 5.0 * DPS
+        unsaturated = np.abs(one.scale * raw + one.offset - rate) < 5.0 * DEG
         correlation = float(np.corrcoef(raw[unsaturated], rate[unsaturated])[0, 1])
-        left = calibrate_gyroscope(bent(raw, one.scale, one.offset, "gyroscope"), rate).largest / DPS
-        found["gyroscope"][name] = [one.scale / DPS * 1e3, one.offset / DPS, correlation, one.largest / DPS, left]
+        left = calibrate_gyroscope(bent(raw, one.scale, one.offset, "gyroscope"), rate).largest / DEG
+        found["gyroscope"][name] = [one.scale / DEG * 1e3, one.offset / DEG, correlation, one.largest / DEG, left]
         if name == "z":
             found["turns"] = {
                 "time": turns.time[along].tolist(),
@@ -125,7 +125,7 @@ def measured(seed: int, hold: float) -> dict[str, Any]:
                 "fitted": [one.scale, one.offset],
                 "kept": unsaturated.tolist(),
             }
-    inside = tuple(rate for rate in BOTH_WAYS if abs(rate) < 240.0 * DPS)
+    inside = tuple(rate for rate in BOTH_WAYS if abs(rate) < 240.0 * DEG)
     pairs = {
         "places": [on_the_table(truth, inside, place, seed + k, hold) for k, place in enumerate(PLACES)],
         "ways": [on_the_table(truth, way, 0.0, seed + 2 + k, hold) for k, way in enumerate((inside, inside[::-1]))],
@@ -141,7 +141,7 @@ def measured(seed: int, hold: float) -> dict[str, Any]:
 
 def line_difference(lines: list[list[float]], largest: float = 240.0) -> float:
     """Largest difference of two best-fit lines within ± that rate (deg/s), digits."""
-    rates = np.array([-largest, largest]) * DPS
+    rates = np.array([-largest, largest]) * DEG
     one, other = (np.polyval(line, rates) for line in lines)
     return float(np.abs(one - other).max())
 

@@ -18,7 +18,6 @@ from ....envs.data.trajectory import Trajectory
 from ....envs.hand.controller_gestures import Pointing
 from ....envs.hand.devices import DEVICES
 from ....envs.hand.sensing import simulate_hand
-from ....envs.sensors.ideal import STANDARD_GRAVITY
 from ....filters.arrays.equivalent_imu import array_to_imu
 from ....filters.arrays.rate import ANGULAR_RATE, ArrayRate
 from ....filters.arrays.spatial.orientation import ArrayOrientation
@@ -27,6 +26,7 @@ from ....filters.core import metrics, rotation
 from ....filters.core.estimator import run
 from ....filters.core.kalman import KalmanFilter
 from ....filters.core.observer import Observer
+from ....filters.core.quantity import STANDARD_GRAVITY
 from ....filters.imu.marins import Marins
 from ..claims import Claim
 from ..kit import Study

@@ -9,12 +9,11 @@ import numpy as np
 from ....envs.data.trajectory import Trajectory
 from ....envs.hand.devices import DEVICES
 from ....envs.hand.sensing import simulate_hand
-from ....envs.sensors.ideal import STANDARD_GRAVITY
 from ....filters.arrays.spatial.orientation import ArrayOrientation
 from ....filters.core import rotation
 from ....filters.core.estimator import run
 from ....filters.core.kalman import KalmanFilter
-from ....filters.core.quantity import Estimate
+from ....filters.core.quantity import STANDARD_GRAVITY, Estimate
 from ...plots import TRUTH_COLOR, legend_above, new_figure, new_spatial_figure
 from ..claims import Claim
 from ..kit import Study

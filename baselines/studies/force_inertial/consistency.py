@@ -10,8 +10,8 @@ import numpy as np
 
 from ....filters.bicycle.force_inertial.filter import ForceInertial
 from ....filters.core.consistency import Consistency
+from ....filters.core.quantity import DEG
 from ..model_draws import consistencies
-from ..signals import DEG
 from .motion import NO_ERRORS, draw_motion, simulate
 
 PRIOR = {"lean_prior": 3.0 * DEG, "pitch_prior": 3.0 * DEG, "spin_prior": 3.0 * DEG, "roll_prior": 2.0 * DEG}

@@ -7,12 +7,12 @@ from pathlib import Path
 from typing import Any
 
 from ....filters.bicycle.force_inertial.filter import ForceInertial
+from ....filters.core.quantity import DEG
 from ...plots import TRUTH_COLOR, legend_above, new_figure
 from ..claims import Claim
 from ..report import Report
 from ..ride_figures import DRAWN, offset_shares, ride_figure, spread_claims, spread_figure
 from ..ride_study import RideStudy, Variant
-from ..signals import DEG
 from .states import from_the_truth, smoothed_torques
 
 WRONG = (35.0, -35.0)

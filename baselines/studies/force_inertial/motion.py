@@ -19,7 +19,8 @@ import numpy as np
 from ....filters.bicycle.force_inertial.filter import ForceInertial
 from ....filters.bicycle.force_inertial.kinematics import DOWN, UP_THE_TRUNK
 from ....filters.core import rotation
-from ..signals import DEG, STEP, Function, Waves, derivative, gauss_markov, second_derivative
+from ....filters.core.quantity import DEG
+from ..signals import STEP, Function, Waves, derivative, gauss_markov, second_derivative
 
 X, Y, Z = np.eye(3)
 Course = Literal["indoor", "outdoor"]

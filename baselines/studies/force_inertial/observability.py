@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 
 from ....filters.bicycle.force_inertial.filter import ForceInertial
+from ....filters.core.quantity import DEG
 from ..claims import Claim
 from ..kit import Study
 from ..report import Report
-from ..signals import DEG
 from .motion import NO_ERRORS
 from .simulation import COURSES, synthetic
 from .states import true_states

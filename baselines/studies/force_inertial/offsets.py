@@ -6,12 +6,12 @@ import numpy as np
 
 from ....filters.bicycle.force_inertial.filter import ForceInertial
 from ....filters.core.kalman import KalmanFilter
+from ....filters.core.quantity import DEG
 from ..averages import rounded
 from ..claims import Claim
 from ..kit import Study
 from ..report import Report
 from ..ride_study import SETTLED
-from ..signals import DEG
 from .motion import Errors
 from .rides import ANGLES
 from .simulation import COURSES, errors_of, synthetic

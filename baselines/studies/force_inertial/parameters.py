@@ -12,10 +12,9 @@ from ....envs.bicycle.sensors.devices import (
     SEAT_WRENCH,
     STRAIN_GAUGES,
 )
-from ....envs.sensors.ideal import STANDARD_GRAVITY
 from ....filters.bicycle.geometry import RiderGeometry
+from ....filters.core.quantity import DEG, STANDARD_GRAVITY
 from ..report import Report
-from ..signals import DEG
 
 RATE = 50.0
 """Hz, section II-A"""

@@ -20,7 +20,7 @@ from ....filters.bicycle.force_inertial.filter import ForceInertial
 from ....filters.bicycle.force_inertial.integration import ForceInertialIntegration
 from ....filters.bicycle.force_inertial.kinematics import true_angles
 from ....filters.bicycle.geometry import RiderGeometry
-from ....filters.core.quantity import Estimate
+from ....filters.core.quantity import DEG, Estimate
 from ..averages import mean_of, mean_rms, rounded, windowed
 from ..claims import Claim
 from ..kit import Study
@@ -28,7 +28,6 @@ from ..report import Report
 from ..ride_figures import ride_figure
 from ..ride_study import MEAN, SETTLED, ZERO, Less, RideStudy, Variant
 from ..sensors import without_errors
-from ..signals import DEG
 from .figures import course_figures
 from .states import from_the_truth, smoothed_torques, true_states
 

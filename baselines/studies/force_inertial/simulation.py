@@ -11,12 +11,12 @@ from ....filters.bicycle.force_inertial.filter import ForceInertial
 from ....filters.core import rotation
 from ....filters.core.kalman import KalmanFilter
 from ....filters.core.metrics import rms
+from ....filters.core.quantity import DEG
 from ..averages import leading, rounded
 from ..claims import Claim
 from ..kit import Study
 from ..report import Report
 from ..ride_study import SETTLED
-from ..signals import DEG
 from .motion import Course, Errors, draw_motion, simulate
 from .rides import ANGLES, OURS, RIDES
 from .states import from_the_truth

@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ....envs.data.trajectory import Trajectory
-from ....envs.sensors.ideal import STANDARD_GRAVITY
 from ....filters.core import rotation
+from ....filters.core.quantity import STANDARD_GRAVITY
 from .spectra import WINDOW, Spectrum, checked, sinusoid_share, spectrum, whole_stretches
 
 UNITS = {

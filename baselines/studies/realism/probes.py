@@ -13,9 +13,9 @@ from ....envs.hand.environment import HandMotionEnv
 from ....envs.hand.sensing import simulate_hand
 from ....envs.recipes.registry import recipe
 from ....envs.record import record_once
-from ....envs.sensors.ideal import STANDARD_GRAVITY
 from ....envs.sensors.timing import PUNCTUAL
 from ....filters.core import rotation
+from ....filters.core.quantity import STANDARD_GRAVITY
 
 SEED = 3
 DRAWS = 400

@@ -25,8 +25,8 @@ from ....envs.bicycle.sensors.sites import BICYCLE_IMU_SITE, BICYCLE_IMU_TILT, p
 from ....envs.data.trajectory import Trajectory
 from ....envs.physics.world import Physics
 from ....envs.record import record_once
-from ....envs.sensors.ideal import STANDARD_GRAVITY
 from ....filters.core import rotation
+from ....filters.core.quantity import STANDARD_GRAVITY
 from .saddle import ACROSS, ALONG, APART, PULL, saddle_statistics
 
 GRAVITY = 9.81

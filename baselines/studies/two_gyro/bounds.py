@@ -11,11 +11,11 @@ import numpy as np
 from ....filters.analysis.bounds import posterior_bound
 from ....filters.analysis.observability import trajectory_observability
 from ....filters.bicycle.two_gyro.truth import true_states
+from ....filters.core.quantity import DEG
 from ...plots import BLUE, GREEN, GREY, VERMILION, legend_above, new_figure
 from ..claims import Claim
 from ..kit import Study
 from ..report import Report
-from ..signals import DEG
 from .motion import MOTIONS, Errors, Motion, filter_of, simulate, turning
 
 DT = 0.02

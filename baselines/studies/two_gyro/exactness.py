@@ -11,9 +11,10 @@ from ....filters.bicycle.two_gyro.kinematics import (
     platform_rate_matrix,
     substitution,
 )
+from ....filters.core.quantity import DEG
 from ..claims import Claim
 from ..report import Report
-from ..signals import DEG, derivative
+from ..signals import derivative
 from .motion import MOTIONS, simulate
 
 LEVEL, PITCHING = "circle", "vibration"

@@ -11,12 +11,11 @@ import numpy as np
 from ....envs.data.trajectory import Trajectory
 from ....filters.bicycle.two_gyro.truth import true_angles
 from ....filters.core import rotation
-from ....filters.core.quantity import Estimate
+from ....filters.core.quantity import DEG, Estimate
 from ...plots import TRUTH_COLOR, legend_above, new_figure
 from ..report import Report
 from ..ride_figures import DRAWN, SCALES, draw_angle, true_angle, with_band
 from ..ride_study import RideStudy
-from ..signals import DEG
 
 ROLL, THETA = ("φ", "error of φ"), ("θ1", "θ2", "θ3")
 PANELS: dict[str, tuple[str, ...]] = {

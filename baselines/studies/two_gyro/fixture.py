@@ -11,14 +11,13 @@ from ....filters.bicycle.platform_gyro import PlatformGyro
 from ....filters.bicycle.two_gyro.filter import TwoGyro
 from ....filters.bicycle.two_gyro.truth import true_angles
 from ....filters.core.kalman import KalmanFilter
-from ....filters.core.quantity import Estimate
+from ....filters.core.quantity import DEG, Estimate
 from ..averages import mean_of, rounded, windowed
 from ..claims import Claim
 from ..kit import Study
 from ..report import Report
 from ..ride_study import MEAN, SETTLED, ZERO
 from ..sensors import without_errors
-from ..signals import DEG
 from .figures import fixture_figure
 from .rides import ALONE, RIDES
 

@@ -18,7 +18,8 @@ from ....filters.bicycle.geometry import RiderGeometry
 from ....filters.bicycle.relative_sensor import relative_orientation
 from ....filters.bicycle.two_gyro.filter import TwoGyro
 from ....filters.core import rotation
-from ..signals import DEG, Function, Waves, gauss_markov
+from ....filters.core.quantity import DEG
+from ..signals import Function, Waves, gauss_markov
 
 NOTHING = Waves()
 

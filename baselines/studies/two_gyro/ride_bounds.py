@@ -15,9 +15,10 @@ from ....filters.bicycle.two_gyro.filter import TwoGyro
 from ....filters.bicycle.two_gyro.truth import true_angles, true_states
 from ....filters.core import rotation
 from ....filters.core.kalman import KalmanFilter
+from ....filters.core.quantity import DEG
 from ..ride_study import SETTLED, RideStudy
 from ..sensors import without_errors
-from ..signals import DEG, gauss_markov
+from ..signals import gauss_markov
 
 FRAME = 1.0 * DEG
 """rad: white noise of the simulated camera's frames"""

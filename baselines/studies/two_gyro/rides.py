@@ -11,14 +11,13 @@ from ....envs.data.trajectory import Trajectory
 from ....filters.bicycle.platform_gyro import PlatformGyro, TwoGyroIntegration
 from ....filters.bicycle.two_gyro.filter import TwoGyro
 from ....filters.bicycle.two_gyro.truth import true_angles
-from ....filters.core.quantity import Estimate
+from ....filters.core.quantity import DEG, Estimate
 from ..averages import leading, mean_of, mean_rms
 from ..claims import Claim
 from ..kit import Study
 from ..report import Report
 from ..ride_study import MEAN, SETTLED, ZERO, Less, RideStudy, Variant
 from ..sensors import without_errors
-from ..signals import DEG
 from .figures import course_figure
 from .ride_bounds import CAMERA, DRAWS, GYROSCOPES, bounds_of_ride
 

@@ -15,6 +15,7 @@ from ....filters.analysis.bounds import posterior_bound
 from ....filters.bicycle.two_gyro.truth import true_angles, true_states
 from ....filters.core.consistency import nees
 from ....filters.core.kalman import KalmanFilter
+from ....filters.core.quantity import DEG
 from ....filters.core.rotation import wrap
 from ...plots import TRUTH_COLOR, legend_above, new_figure
 from ..averages import interval_of_mean, mean_of, rms, rounded
@@ -23,7 +24,7 @@ from ..kit import Study
 from ..report import Report
 from ..ride_figures import DRAWN, with_band
 from ..ride_study import MEAN, ZERO
-from ..signals import DEG, Waves
+from ..signals import Waves
 from .motion import MOTIONS, NOTHING, Errors, Motion, filter_of, simulate
 
 DT, DURATION, LATE = 0.02, 120.0, 60.0

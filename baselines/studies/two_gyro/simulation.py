@@ -14,14 +14,13 @@ from ....filters.bicycle.two_gyro.truth import true_angles, true_states
 from ....filters.core import rotation
 from ....filters.core.consistency import consistency, nees
 from ....filters.core.kalman import KalmanFilter
-from ....filters.core.quantity import Estimate
+from ....filters.core.quantity import DEG, Estimate
 from ...plots import legend_above, new_figure
 from ..averages import rounded, windowed
 from ..claims import Claim
 from ..kit import Study
 from ..report import Report
 from ..ride_figures import DRAWN, with_band
-from ..signals import DEG
 from .motion import MOTIONS, Errors, filter_of, simulate
 from .rides import RIDES
 

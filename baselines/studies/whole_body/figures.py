@@ -9,15 +9,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ....envs.bicycle.sensors.devices import MODEL_605_ACCELEROMETER, MODEL_605_GYROSCOPE, SLIM_GYROSCOPE, Device
-from ....envs.sensors.ideal import STANDARD_GRAVITY
 from ....filters.bicycle.geometry import RiderGeometry
 from ....filters.bicycle.whole_body.filter import WholeBody
 from ....filters.bicycle.whole_body.linkage import true_angles
+from ....filters.core.quantity import DEG, STANDARD_GRAVITY
 from ...plots import TRUTH_COLOR, legend_above, new_figure
 from ..report import Report
 from ..ride_figures import DRAWN, draw_angle, true_angle
 from ..ride_study import SPACING, RideStudy, Variant
-from ..signals import DEG
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

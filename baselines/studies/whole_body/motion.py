@@ -18,9 +18,9 @@ from ....filters.bicycle.geometry import RiderGeometry
 from ....filters.bicycle.whole_body.constraints import hip_angles, limb_frame, shoulder_angles
 from ....filters.bicycle.whole_body.linkage import SIDES, SIGNS, RiderLinkage, paper_axes, seat_moments
 from ....filters.core import rotation
-from ..signals import DEG, Waves, derivative, second_derivative
+from ....filters.core.quantity import DEG, STANDARD_GRAVITY
+from ..signals import Waves, derivative, second_derivative
 
-GRAVITY = 9.80665
 MOST_REACH = 0.998
 """of the straight arm"""
 COURSES = ("indoor", "outdoor", "held")
@@ -113,7 +113,7 @@ class ExactRide:
     def roll(self, t: np.ndarray) -> np.ndarray:
         """φ: leaned into the turn, and swaying."""
         f = self.functions
-        return -np.arctan(f["speed"](t) * f["yaw"](t) / GRAVITY) + f["sway"](t)
+        return -np.arctan(f["speed"](t) * f["yaw"](t) / STANDARD_GRAVITY) + f["sway"](t)
 
     def frame(self, t: np.ndarray) -> np.ndarray:
         """Matrix ``(..., 3, 3)`` of the bicycle, paper's axes: R_y(ϑ) R_x(φ)."""
@@ -190,7 +190,7 @@ class ExactRide:
         ahead = np.stack([np.cos(yaw), 0.0 * yaw, -np.sin(yaw)], axis=-1)
         left = np.stack([-np.sin(yaw), 0.0 * yaw, -np.cos(yaw)], axis=-1)
         contact = derivative(f["speed"], t)[..., None] * ahead + (f["speed"](t) * f["yaw"](t))[..., None] * left
-        acceleration = contact + np.array([0.0, GRAVITY, 0.0]) + second_derivative(places, t)
+        acceleration = contact + np.array([0.0, STANDARD_GRAVITY, 0.0]) + second_derivative(places, t)
         forces = (self.frame(t).mT @ acceleration[..., None])[..., 0]
         return dict(zip(("bicycle_imu", "pivot", "trunk_imu"), forces, strict=True))
 
@@ -234,7 +234,9 @@ class ExactRide:
         if self.bumps is not None:
             shock = 40.0 * rng.uniform(-1.0, 1.0, (t.size, 3)) * ((t >= self.bumps[0]) & (t < self.bumps[1]))[:, None]
             shock *= (rng.random(t.size) < 0.3)[:, None]
-            forces["bicycle_imu"] = np.clip(forces["bicycle_imu"] + shock, -2.0 * GRAVITY, 2.0 * GRAVITY)
+            forces["bicycle_imu"] = np.clip(
+                forces["bicycle_imu"] + shock, -2.0 * STANDARD_GRAVITY, 2.0 * STANDARD_GRAVITY
+            )
             own = own + 0.6 * (R.mT @ shock[..., None])[..., 0]
         turning, sitting = (paper_axes(np.array(part)) for part in seat_moments(self.geometry))
         torque = rotation.cross(sitting + R @ turning, pivot)[..., 0] + errors.torque * rng.standard_normal(t.size)

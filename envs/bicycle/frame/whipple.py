@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...sensors.ideal import STANDARD_GRAVITY
+from ....filters.core.quantity import STANDARD_GRAVITY
 from .parameters import BicycleParameters
 
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ....filters.core import rotation
-from ...sensors.ideal import STANDARD_GRAVITY
+from ....filters.core.quantity import STANDARD_GRAVITY
 from ..course.path import Path
 from ..frame.bicycle import SPEED
 from ..frame.parameters import BicycleParameters

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from ....filters.core.quantity import STANDARD_GRAVITY
 from ...physics.world import BASE, Physics
-from ...sensors.ideal import STANDARD_GRAVITY
 from ..course.events import Events
 from ..course.path import Path
 from ..course.terrain import Ground

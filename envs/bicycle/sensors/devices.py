@@ -13,10 +13,10 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from ...sensors.ideal import STANDARD_GRAVITY
+from ....filters.core.quantity import DEG, STANDARD_GRAVITY
 from ...sensors.noise import Form, NoiseModel
 
-DEG, G = math.pi / 180.0, STANDARD_GRAVITY
+G = STANDARD_GRAVITY
 LINES = 256
 """of the optical encoders (whole-body, section II-A: Grayhill 63R)"""
 COUNTS = 4 * LINES

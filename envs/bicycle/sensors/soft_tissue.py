@@ -21,8 +21,9 @@ from scipy.linalg import expm
 
 from ....filters.compile.cache import jit
 from ....filters.core import rotation
+from ....filters.core.quantity import STANDARD_GRAVITY
 from ....filters.support.parameters import check_positive
-from ...sensors.ideal import STANDARD_GRAVITY, BodyState, Mounting, mounted
+from ...sensors.ideal import BodyState, Mounting, mounted
 
 CREEP = 3.0
 """s: T, after which tissue under a constant load is at rest again"""

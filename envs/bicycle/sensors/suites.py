@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ....filters.core.quantity import Channel
-from ...sensors.ideal import STANDARD_GRAVITY, Mounting, Sampling
+from ....filters.core.quantity import STANDARD_GRAVITY, Channel
+from ...sensors.ideal import Mounting, Sampling
 from ...sensors.kinds import KINDS, SensorKind
 from ...sensors.magnetics import Magnetics, magnetics_of
 from ...sensors.noise import NoiseModel

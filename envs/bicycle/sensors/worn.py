@@ -8,7 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ....filters.core import rotation
-from ...sensors.ideal import STANDARD_GRAVITY, BodyState, Mounting
+from ....filters.core.quantity import STANDARD_GRAVITY
+from ...sensors.ideal import BodyState, Mounting
 from ...sensors.suite import SuiteState
 from ..rider.posture import Posture
 from .placement import PLACED, PlacementErrors

@@ -16,7 +16,7 @@ from ....filters.arrays.calibration.rate_table import (
     calibrate_gyroscope,
 )
 from ....filters.core import rotation
-from ...sensors.ideal import STANDARD_GRAVITY
+from ....filters.core.quantity import STANDARD_GRAVITY
 from .data import AXES, MagnetometerData, RateTableData
 from .records import CalibrationRecord, ChannelCalibration
 

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from ....filters.core import rotation
-from ...sensors.ideal import STANDARD_GRAVITY, BodyState
+from ....filters.core.quantity import STANDARD_GRAVITY
+from ...sensors.ideal import BodyState
 from ..drivers import Device, States
 from ..motion import Gesture
 from ..parts.noise import Noise

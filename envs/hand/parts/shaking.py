@@ -14,8 +14,8 @@ import numpy as np
 from scipy.signal import bilinear, lfilter, lfilter_zi
 
 from ....filters.core import rotation
+from ....filters.core.quantity import STANDARD_GRAVITY
 from ....filters.support.ranges import Checked, Range, log_uniform
-from ...sensors.ideal import STANDARD_GRAVITY
 from ..motion import Gesture
 from ..smooth import product
 from .composition import Gated, Intervals, Offset, gate

@@ -13,13 +13,11 @@ from typing import Any, ClassVar
 
 from ...core.backend import Array, constant, namespace
 from ...core.matrices import block_diagonal, diagonal, zeros
-from ...core.quantity import Measurement
+from ...core.quantity import DEG, Measurement
 from ...core.rotation import wrap
 from ...support.parameters import check_positive
 from ..geometry import RiderGeometry
 from .filter import ForceInertial
-
-DEG = math.pi / 180.0
 
 
 @dataclass(frozen=True)

@@ -41,7 +41,7 @@ from ...core.backend import Array, constant, namespace, rows
 from ...core.held_inputs import ridden
 from ...core.matrices import diagonal
 from ...core.model import Gain, Model
-from ...core.quantity import Channel, Measurement, Quantity
+from ...core.quantity import DEG, Channel, Measurement, Quantity
 from ...core.rotation import wrap
 from .accelerometer import accelerometer_accelerations
 from .forces import Needed, apparent_vertical, in_bicycle, needed_load, pedal_moment
@@ -62,7 +62,6 @@ from .kinematics import (
 from .parameters import CHANNELS, ForceInertialParameters
 from .readings import Readings, readings, static_angles, steering
 
-DEG = math.pi / 180.0
 TRUNK_ANGLES = Quantity("force-inertial/trunk_angles", "angle", 3, "rad")
 """φ_h, θ, φ."""
 ROLL = Quantity("bicycle/roll", "angle", 1, "rad")

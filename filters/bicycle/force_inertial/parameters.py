@@ -14,12 +14,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...core.quantity import GRAVITY, Channel
+from ...core.quantity import DEG, GRAVITY, Channel
 from ...support.parameters import check_positive
 from ..geometry import ARM_MASS, RiderEquations, RiderGeometry
 from .kinematics import true_angles
 
-DEG = math.pi / 180.0
 LEG_MASS = 0.1986
 """of the body's mass: one leg with foot"""
 ARM_AT_GRIP = 0.53

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
+from ...core.quantity import DEG
 from ..geometry import Point
 from .filter import TwoGyro
-
-DEG = math.pi / 180.0
 
 
 @dataclass(frozen=True)

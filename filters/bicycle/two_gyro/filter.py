@@ -20,7 +20,6 @@ without pitch, not "without any approximation". The paper gives neither noises n
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal, Self
@@ -39,7 +38,7 @@ from ...core.matrices import (
     zeros,
 )
 from ...core.model import Gain, Model
-from ...core.quantity import Channel, Measurement, Quantity
+from ...core.quantity import DEG, Channel, Measurement, Quantity
 from ...core.rotation import rotate_back, wrap
 from ...support.parameters import check_positive
 from ..geometry import Point, RiderEquations, RiderGeometry
@@ -60,7 +59,6 @@ from .kinematics import (
 )
 from .truth import true_angles
 
-DEG = math.pi / 180.0
 RELATIVE_ANGLES = Quantity("two-gyro/relative_angles", "angle", 3, "rad")
 """θ₁, θ₂, θ₃ in the paper's axes."""
 PITCH = Quantity("two-gyro/pitch", "angle", 1, "rad")

@@ -15,7 +15,7 @@ from ...core.backend import Array, constant, expand, namespace
 from ...core.held_inputs import ridden
 from ...core.matrices import block_diagonal, block_matrix, diagonal, diagonal_matrix, zeros
 from ...core.model import Gain
-from ...core.quantity import Measurement
+from ...core.quantity import DEG, Measurement
 from ...core.rotation import euler_matrix
 from ...support.parameters import check_positive
 from ..geometry import Point, RiderGeometry
@@ -23,7 +23,6 @@ from .blocks import BLOCKS
 from .filter import CONSTRAINTS, WholeBody
 from .linkage import CRANK, ERROR_SIZE, GYROSCOPES, HIP, SHOULDER, SIDES, STEER, TRUNK
 
-DEG = math.pi / 180.0
 PUBLISHED = WholeBody.state_size
 BIASES, ROLL_BIAS, TRUNK_OFFSET, CONSTRAINED = slice(0, 15), slice(15, 16), slice(16, 19), slice(19, 31)
 """What lasts, in its order after the published state."""
