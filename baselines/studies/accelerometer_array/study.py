@@ -30,8 +30,7 @@ def reproduce(study: Study, report: Report) -> None:
         "Université Laval. Equations are implemented as corrected; where print and correction differ in effect, both "
         "are shown. The thesis does not give all noises, the direction of the magnetic field, the acceleration of the "
         "simulated hand, or the start: those here are stated in the docstrings. Its experiments are of a real device; "
-        "here "
-        "devices with the errors that a calibration leaves stand for them."
+        "here devices with the errors that a calibration leaves stand for them."
     )
     angular_rates(study, report)
     rate_pictures(study, report)

@@ -112,9 +112,7 @@ def observability(study: Study, report: Report) -> None:
         "Observability of gyroscope biases",
         rows,
         f"Along {SECONDS:g} s of exact motion: rank with the biases b of the trunk's gyroscope (7 states) and with "
-        "those "
-        "of the bicycle's, c, too (10), and the standard deviation of each without prior and process noise, deg or "
-        "°/s, "
-        "for output noises as the filter assumes them.",
+        "those of the bicycle's, c, too (10), and the standard deviation of each without prior and process noise, deg "
+        "or °/s, for output noises as the filter assumes them.",
     )
     report.claims("Observability: what holds", claims)

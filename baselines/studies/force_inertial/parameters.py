@@ -55,8 +55,7 @@ def table_i(report: Report) -> None:
     note = (
         "l_b and h_b, the place of the bicycle's centre of mass, enter no equation of the filter. The published saddle "
         "is lower than the unit on the frame (h_s below p_z); the simulated one is where a rider can sit. The paper "
-        "gives "
-        "none of the noises; those here are standard deviations of the simulated sensors."
+        "gives none of the noises; those here are standard deviations of the simulated sensors."
     )
     report.table("Table I: parameters", [{**row, "simulated": _short(row["simulated"])} for row in rows], note)
 

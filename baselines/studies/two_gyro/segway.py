@@ -95,9 +95,8 @@ def segway(study: Study, report: Report) -> None:
     report.table(
         "Segway: equation (6)",
         rows,
-        f"RMS error of the pitch in deg from {LATE:g} to {DURATION:g} s, mean of {count} runs at 50 Hz with the "
-        "noises of "
-        f"the exact motions; the filters start {START:g}° off.",
+        f"RMS error of the pitch in deg from {LATE:g} to {DURATION:g} s, mean of {count} runs at 50 Hz with the noises "
+        f"of the exact motions; the filters start {START:g}° off.",
     )
     error = {key: value["χ"] for key, value in means.items()}
     ours, other = MODELS

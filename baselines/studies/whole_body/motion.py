@@ -234,9 +234,8 @@ class ExactRide:
         if self.bumps is not None:
             shock = 40.0 * rng.uniform(-1.0, 1.0, (t.size, 3)) * ((t >= self.bumps[0]) & (t < self.bumps[1]))[:, None]
             shock *= (rng.random(t.size) < 0.3)[:, None]
-            forces["bicycle_imu"] = np.clip(
-                forces["bicycle_imu"] + shock, -2.0 * STANDARD_GRAVITY, 2.0 * STANDARD_GRAVITY
-            )
+            limit = 2.0 * STANDARD_GRAVITY
+            forces["bicycle_imu"] = np.clip(forces["bicycle_imu"] + shock, -limit, limit)
             own = own + 0.6 * (R.mT @ shock[..., None])[..., 0]
         turning, sitting = (paper_axes(np.array(part)) for part in seat_moments(self.geometry))
         torque = rotation.cross(sitting + R @ turning, pivot)[..., 0] + errors.torque * rng.standard_normal(t.size)

@@ -193,10 +193,8 @@ def rides(study: Study, report: Report) -> None:
         "replaced by (9*) of the true motion. *seat_share 1*: the paper's seat torque, on riders whose hands carry the "
         "lean. *Swivel 0.3*: C3 and C7 trusted ten times more. *Measured geometry*: lengths ±2 %, positions ±1 cm. "
         "*Published forms*: (3), (9), C7 about y and C8 as published. *Encoders alone*: upright, the usual trunk, "
-        "limbs "
-        "by inverse kinematics from steering and crank, without any inertial sensor; the knee (C8) follows from the "
-        "crank "
-        "in the filter too."
+        "limbs by inverse kinematics from steering and crank, without any inertial sensor; the knee (C8) follows from "
+        "the crank in the filter too."
     )
     table_i(report)
     table_ii(report)

@@ -239,8 +239,7 @@ def synthetic(study: Study, report: Report) -> None:
         "Wrong initial values",
         rows,
         f"Random signs; deg. Forgotten: within {FORGOTTEN:g}° of the same ride started at the truth. The mirrored arm "
-        "meets the constraints too. *Trunk and roll*: limbs start by inverse "
-        "kinematics.",
+        "meets the constraints too. *Trunk and roll*: limbs start by inverse kinematics.",
     )
     scores = study.map("exact bumps", bump_scores, [(seed,) for seed in seeds[:2]])
     report.table(
