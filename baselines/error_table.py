@@ -8,7 +8,7 @@ from typing import Any
 
 import pandas
 
-from .scoring import COLUMNS
+from ..filters.support.rows import RESULT
 
 WIDTH = 80
 """Width of a printed line in characters."""
@@ -25,17 +25,17 @@ class ErrorTable(pandas.DataFrame):
         return ErrorTable
 
     def __repr__(self) -> str:
-        if tuple(self.columns) != COLUMNS or not len(self):
+        if tuple(self.columns) != RESULT or not len(self):
             return str(pandas.DataFrame(self))
         shown = pandas.DataFrame(self).head(MOST_ROWS).reset_index(drop=True)
-        texts = shown.astype({name: str for name in COLUMNS if name != "value"})
+        texts = shown.astype({name: str for name in RESULT if name != "value"})
         texts["value"] = [f"{value:.4g}" for value in shown["value"]]
         # What identifies a row is shortened in its middle, the longest column first, until a line fits.
-        widths = {name: max(len(name), int(texts[name].str.len().max())) for name in COLUMNS}
-        while sum(widths.values()) + 2 * len(COLUMNS) > WIDTH:
+        widths = {name: max(len(name), int(texts[name].str.len().max())) for name in RESULT}
+        while sum(widths.values()) + 2 * len(RESULT) > WIDTH:
             longest = max(("estimator", "trajectory", "quantity", "metric"), key=lambda name: widths[name])
             widths[longest] -= 1
-        for name in COLUMNS[:4]:
+        for name in RESULT[:4]:
             texts[name] = [shortened(text, widths[name]) for text in texts[name]]
         text = texts.to_string(index=False, line_width=None, justify="left")
         more = len(self) - len(shown)

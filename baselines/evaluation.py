@@ -20,11 +20,11 @@ from ..filters.core.estimator import Estimator
 from ..filters.core.offline import SUFFIX, Offline
 from ..filters.core.quantity import ORIENTATION
 from ..filters.support.parallel import progress_bar
+from ..filters.support.rows import RESULT
 from .measures import measures
 from .registry import list_estimators, make_estimator
 from .run import fitted, run_on, without_estimate
 from .scoring import (
-    COLUMNS,
     LARGEST_NORTH,
     ONBOARD,
     Row,
@@ -139,7 +139,7 @@ def evaluate(
             alike.setdefault(reason, []).append(label)
         reasons = (f"{', '.join(dict.fromkeys(labels))}: {reason}" for reason, labels in alike.items())
         raise ValueError(f"nothing could be run: {'; '.join(reasons)}")
-    frame = ErrorTable(rows, columns=list(COLUMNS))
+    frame = ErrorTable(rows, columns=list(RESULT))
     frame.attrs |= {"skipped": skipped, "references": references, "reference_clock": reference_clock}
     return frame
 

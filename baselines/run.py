@@ -35,8 +35,7 @@ def run(
 
     With a trajectory, the estimator runs on the uniform grid behind the time stamps. Gaps are missing samples, for
     which it only predicts, and so are glitches (:mod:`poise.envs.data.glitches`); an estimator with another sampling
-    interval is adjusted. Arrays have no time stamps, so
-    their interval must be given.
+    interval is adjusted. Arrays have no time stamps, so their interval must be given.
 
     Args:
         estimator: a name (see :func:`poise.list_estimators`), or an estimator. One given by name is configured for

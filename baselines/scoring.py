@@ -17,8 +17,6 @@ from ..filters.core.model import equations_of
 from ..filters.core.quantity import ORIENTATION, RELATIVE_ORIENTATION, UP, Estimate, Quantity
 from .run import fitted, run_on
 
-COLUMNS = ("estimator", "trajectory", "quantity", "metric", "value", "unit")
-"""Columns of a table of errors, one number per row."""
 ONBOARD = "onboard"
 """Reference: the orientation that the device itself computed."""
 AUTOMATIC = ("mekf-9", "bounded-motion")

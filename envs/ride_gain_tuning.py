@@ -31,10 +31,9 @@ class RiderBicycleGainEnv(GainTuningEnv):
     """An agent tunes the gains of a filter on a ride: of one IMU's attitude, or of rider and bicycle.
 
     Every episode is a ride of ``poise/RiderBicycle-v0`` with its sensor errors, one of ``rides`` different ones: a step
-    runs the filter over ``interval`` seconds (several samples) with the gains of the action. A bicycle
-    is difficult for filters with an accelerometer: it leans into its turns, so that the mean specific force points
-    along the bicycle's upward axis and not along the world's. Observations do not contain the truth, and actions do not
-    change the ride.
+    runs the filter over ``interval`` seconds (several samples) with the gains of the action. A bicycle is difficult for
+    filters with an accelerometer: it leans into its turns, so that the mean specific force points along the bicycle's
+    upward axis and not along the world's. Observations do not contain the truth, and actions do not change the ride.
 
     ## Action Space
 

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from ..filters.support.files import write_json, write_text
 from ..filters.support.optional import MissingExtraError
-from ..filters.support.rows import markdown_table
-from .experiment import COLUMNS, open_run
+from ..filters.support.rows import RESULT, markdown_table
+from .experiment import open_run
 from .output import Output
 from .report import draw_example, kinds_of, print_comparison
 from .targets import check_file
@@ -235,7 +235,7 @@ def load_baseline(path: Path) -> pandas.DataFrame:
         table = pandas.read_csv(path)
     except ValueError as reason:
         raise ValueError(f"--baseline {path} is no table: {reason}") from None
-    lacking = [name for name in ("suite", *COLUMNS) if name not in table.columns]
+    lacking = [name for name in ("suite", *RESULT) if name not in table.columns]
     if lacking:
         raise ValueError(f"--baseline {path} is no results.csv of poise benchmark: it lacks {', '.join(lacking)}")
     return table

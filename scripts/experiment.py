@@ -27,14 +27,11 @@ from typing import TYPE_CHECKING, Any
 from ..filters.support.files import write_json, write_text
 from ..filters.support.parallel import processors
 from ..filters.support.resume import refuse_changes
-from ..filters.support.rows import jsonable, records
+from ..filters.support.rows import RESULT, jsonable, records
 from ..filters.support.version import ROOT, code_version, package_version
 
 if TYPE_CHECKING:
     from ..envs.data.trajectory import Trajectory
-
-COLUMNS = ("estimator", "trajectory", "quantity", "metric", "value", "unit")
-"""Columns of ``results.csv``."""
 
 PACKAGES = (
     "numpy",
@@ -212,7 +209,7 @@ def write_results(path: Path, rows: Iterable[Any]) -> Path:
 
     Args:
         path: file to (re)place.
-        rows: mappings, named tuples, dataclass instances or a data frame, with exactly the fields :data:`COLUMNS`, or
+        rows: mappings, named tuples, dataclass instances or a data frame, with exactly the fields :data:`.RESULT`, or
             all with ``suite`` besides, which then comes first.
 
     Raises:
@@ -221,7 +218,7 @@ def write_results(path: Path, rows: Iterable[Any]) -> Path:
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     found = records(rows)
-    columns = ("suite", *COLUMNS) if found and "suite" in found[0] else COLUMNS
+    columns = ("suite", *RESULT) if found and "suite" in found[0] else RESULT
     writer.writerow(columns)
     for record in found:
         if set(record) != set(columns):

@@ -15,9 +15,10 @@ from ...envs.data.trajectory import Trajectory
 from ...filters.compile.cache import cache_folder
 from ...filters.support.parallel import in_parallel
 from ...filters.support.resume import is_kept, keep, kept
+from ...filters.support.rows import RESULT
 from ...filters.support.seeds import child_seeds
 from ..evaluation import evaluate
-from ..scoring import COLUMNS, has_truth
+from ..scoring import has_truth
 from .data_sets import GESTURES, RIDES, contenders, hand_episode, ride_imus
 from .recommendation import results_of
 
@@ -213,7 +214,7 @@ def collected(files: Sequence[Path]) -> Results:
     rows = [[float("nan") if cell is None else cell for cell in row] for part in parts for row in part["rows"]]
     if not rows:
         raise ValueError("; ".join(dict.fromkeys(part["attrs"]["refused"] for part in parts)))
-    table = ErrorTable(rows, columns=list(COLUMNS))
+    table = ErrorTable(rows, columns=list(RESULT))
     attrs = [part["attrs"] for part in parts]
     table.attrs |= {
         "skipped": [tuple(item) for each in attrs for item in each.get("skipped", [])],

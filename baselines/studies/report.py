@@ -14,7 +14,6 @@ import numpy as np
 from ...filters.support.files import write_text
 from ...filters.support.rows import markdown_table
 from ..plots import save, save_animation
-from ..scoring import COLUMNS
 from .claims import Claim
 
 if TYPE_CHECKING:
@@ -112,47 +111,25 @@ class Report:
         return path
 
     def numbers(self, rows: Sequence[Mapping[str, Any]]) -> None:
-        """Add rows to ``results.csv``: estimator, trajectory, quantity, metric, value, unit.
-
-        Raises:
-            ValueError: a row has other fields.
-        """
-        for row in rows:
-            if set(row) != set(COLUMNS):
-                raise ValueError(f"a result has the fields {', '.join(COLUMNS)}, got {', '.join(map(str, row))}")
-        self.results.extend(dict(row) for row in rows)
+        """Add rows to ``results.csv``: estimator, trajectory, quantity, metric, value, unit."""
+        self.results.extend(map(dict, rows))
 
     def compare(self, title: str, rows: Sequence[Mapping[str, Any]], note: str = "", *, interval: str = RANGE) -> None:
         """Add a table of published values beside ours.
 
         Args:
             title: heading.
-            rows: each with ``quantity``, ``published`` (text or number; None where the paper has none), ``unit``, and
-                ours: either ``values`` (one a ride; NaN are left out), or ``ours`` and ``interval`` ``(low, high)``
-                (for :data:`STD` the deviation). Further keys are columns before the quantity (``filter``, …).
+            rows: each with ``quantity``, ``published`` (text or number; None where the paper has none), ``unit`` and
+                ``values`` (one a ride; NaN are left out). Further keys are columns before the quantity (``filter``, …).
             note: Markdown beneath.
-            interval: what stands behind our value: :data:`RANGE`, :data:`OVER_MOTIONS`, :data:`STD`, or a text of
-                one's own for a pair.
-
-        Raises:
-            ValueError: a row lacks one of these.
+            interval: what stands behind our value: :data:`STD`, or the smallest and largest under another name.
         """
         shown = []
         for row in rows:
-            missing = {"quantity", "published", "unit"} - set(row)
-            if missing or not ("values" in row or {"ours", "interval"} <= set(row)):
-                raise ValueError(
-                    f"a comparison needs quantity, published, unit, and values or ours and interval; got {sorted(row)}"
-                )
-            ours, extent = row.get("ours"), row.get("interval")
-            if "values" in row:
-                ours, extent = summarised(row["values"], interval)
             others = {name: value for name, value in row.items() if name not in OWN}
-            shown.append(
-                others
-                | {"quantity": row["quantity"], "published": row["published"], "ours": ours}
-                | {"interval": interval_text(extent), "unit": row["unit"]}
-            )
+            ours, extent = summarised(row["values"], interval)
+            own = {"quantity": row["quantity"], "published": row["published"], "ours": ours}
+            shown.append(others | own | {"interval": extent, "unit": row["unit"]})
         self.table(title, shown, f"Ours: {interval}. {note}".strip())
 
     def claims(self, title: str, claims: Sequence[Claim], note: str = "") -> None:
@@ -185,26 +162,16 @@ def stem(title: str) -> str:
     return re.sub(r"[^a-z0-9]+", "-", title.lower()).strip("-")[:80]
 
 
-OWN = ("quantity", "published", "ours", "interval", "unit", "values")
+OWN = ("quantity", "published", "unit", "values")
 """Keys of a comparison that have a meaning."""
 
 
-def summarised(values: Any, interval: str = RANGE) -> tuple[float, Any]:
-    """Mean of values (NaN left out), and their smallest and largest, or for :data:`STD` their deviation."""
+def summarised(values: Any, interval: str) -> tuple[float, str | None]:
+    """Mean of values (NaN left out), and as text their smallest and largest, or for :data:`STD` their deviation."""
     found = np.asarray(values, dtype=float).ravel()
     found = found[np.isfinite(found)]
     if len(found) == 0:
         return float("nan"), None
     if interval == STD:
-        return float(found.mean()), float(found.std(ddof=1)) if len(found) > 1 else None
-    return float(found.mean()), (float(found.min()), float(found.max()))
-
-
-def interval_text(extent: Any) -> str | None:
-    """An interval as text: ``± 0.4`` or ``0.9 … 1.6``."""
-    if extent is None:
-        return None
-    if np.ndim(extent) == 0:
-        return f"± {float(extent):.3g}"
-    low, high = extent
-    return f"{float(low):.3g} … {float(high):.3g}"
+        return float(found.mean()), f"± {found.std(ddof=1):.3g}" if len(found) > 1 else None
+    return float(found.mean()), f"{found.min():.3g} … {found.max():.3g}"

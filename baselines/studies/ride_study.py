@@ -16,7 +16,7 @@ from ...filters.core.consistency import nees
 from ...filters.core.kalman import KalmanFilter
 from ...filters.core.observer import Observer
 from ...filters.core.quantity import Estimate
-from ..evaluation import COLUMNS
+from ...filters.support.rows import RESULT
 from .averages import circular_mean, interval_of_mean, largest, leading, mean_of, mean_rms, rounded, windowed
 from .claims import Claim
 from .kit import RideJob, Study, load_ride
@@ -124,6 +124,11 @@ class RideStudy:
     cells: Callable[[Mapping[str, float]], Mapping[str, Any]] | None = None
     bound: str = "for the noises that the filter assumes, white"
 
+    @property
+    def first(self) -> str:
+        """The variant that everything is compared with."""
+        return next(iter(self.variants))
+
     def load(self, path: Path) -> Trajectory:
         """A recorded ride, prepared."""
         ride = load_ride(path)
@@ -190,15 +195,14 @@ class RideStudy:
             "peak": {name: windowed(each, ride.time, SETTLED, statistic=largest) for name, each in errors.items()},
             "consistency": {name: self.consistency(ride, estimates[name], errors[name]) for name in self.checked},
         }
-        first = next(iter(self.variants))
         every = max(1, round(SPACING / ride.dt))
         found["over time"] = {
             name: {angle: error[::every].tolist() for angle, error in errors[name].items()}
-            for name in (first, *self.followed)
+            for name in (self.first, *self.followed)
         }
-        found["yaw"] = yaw_drift(ride, estimates[first].pose[ROLL][:, 0])
+        found["yaw"] = yaw_drift(ride, estimates[self.first].pose[ROLL][:, 0])
         found["nees"] = {
-            angle: self.normalised(ride, estimates[first], errors[first], [angle]) for angle in self.states
+            angle: self.normalised(ride, estimates[self.first], errors[self.first], [angle]) for angle in self.states
         }
         return found | ({} if self.extra is None else self.extra(self, ride, estimates))
 
@@ -293,18 +297,17 @@ class RideStudy:
 
     def skill(self, course: str, results: list[dict[str, Any]]) -> list[dict[str, Any]]:
         """A row for each angle: what is published, the filter, what it must beat, its bound, and its consistency."""
-        first = next(iter(self.variants))
-        published = self.published.get((course, first), {})
-        methods = (first, STRAPDOWN, ZERO, MEAN)
+        published = self.published.get((course, self.first), {})
+        methods = (self.first, STRAPDOWN, ZERO, MEAN)
         means = {name: mean_rms(results, name) for name in methods if name in results[0]["rms"]}
         bound = mean_of(each.get("bound", {}) for each in results)
         rows = []
         for angle in self.angles:
             row: dict[str, Any] = {"angle": angle, "published": published.get(angle)}
-            spread = [each["rms"][first]["settled"].get(angle, np.nan) for each in results]
+            spread = [each["rms"][self.first]["settled"].get(angle, np.nan) for each in results]
             for name, mean in means.items():
                 row[name] = _rounded(mean.get(angle))
-                if name == first:
+                if name == self.first:
                     row["± over rides"] = _rounded(float(np.std(spread, ddof=1))) if len(spread) > 1 else None
             row["posterior bound"] = _rounded(bound.get(angle))
             values = [each["nees"][angle] for each in results if angle in each["nees"]]
@@ -314,12 +317,11 @@ class RideStudy:
 
     def in_short(self, course: str, results: list[dict[str, Any]]) -> list[dict[str, Any]]:
         """The skill of the filter in two rows: roll of the bicycle, and mean over the other published angles."""
-        first = next(iter(self.variants))
-        printed = {angle: leading(text) for angle, text in self.published.get((course, first), {}).items()}
-        tabled = {angle for (_, name), values in self.published.items() if name == first for angle in values}
+        printed = {angle: leading(text) for angle, text in self.published.get((course, self.first), {}).items()}
+        tabled = {angle for (_, name), values in self.published.items() if name == self.first for angle in values}
         columns = {
             "published": printed,
-            "here": mean_rms(results, first),
+            "here": mean_rms(results, self.first),
             MEAN: mean_rms(results, MEAN),
             "posterior bound": mean_of(each.get("bound", {}) for each in results),
         }
@@ -338,9 +340,8 @@ class RideStudy:
 
     def claims(self, course: str, results: list[dict[str, Any]]) -> list[Claim]:
         """What holds of the errors of a course: against the paper, the baselines and each other; and of consistency."""
-        first = next(iter(self.variants))
-        ours, best = mean_rms(results, first), mean_rms(results, MEAN)
-        published = self.published.get((course, first), {})
+        ours, best = mean_rms(results, self.first), mean_rms(results, MEAN)
+        published = self.published.get((course, self.first), {})
         ratios = {angle: ours[angle] / leading(value) for angle, value in published.items()}
         constant = {angle: error / best[angle] for angle, error in ours.items()}
         roll = next(angle for angle, (name, _) in self.angles.items() if name == ROLL)
@@ -365,7 +366,7 @@ class RideStudy:
     def results(self, results: Iterable[dict[str, Any]]) -> list[dict[str, Any]]:
         """Rows of ``results.csv``: RMS error of every method and angle on every ride."""
         return [
-            dict(zip(COLUMNS, (f"{self.name}: {name}", each["name"], angle, "rms", value, "deg"), strict=True))
+            dict(zip(RESULT, (f"{self.name}: {name}", each["name"], angle, "rms", value, "deg"), strict=True))
             for each in results
             for name, spans in each["rms"].items()
             for angle, value in spans["settled"].items()

@@ -2,8 +2,7 @@
 
 A *configuration* (frozen dataclass: :class:`Rest`, :class:`Trial`, :class:`Turn`, :class:`Mixed`) describes how the
 motion is distributed; ``configuration.draw(generator, duration)`` draws one :class:`Gesture`, an analytic function of
-time.
-``slow``, ``fast`` and ``severe`` reproduce the levels of external acceleration of tests A, B and C of J. K. Lee,
+time. ``slow``, ``fast`` and ``severe`` reproduce the levels of external acceleration of tests A, B and C of J. K. Lee,
 E. J. Park, S. N. Robinovitch, "Estimation of Attitude and External Acceleration Using Inertial Sensor Measurement
 During Various Dynamic Conditions", IEEE Trans. Instrum. Meas. 61(8), 2012, doi 10.1109/TIM.2012.2187245; the frequency
 bands and angles are ours, the paper gives none. World: x east, y north, z up; quaternions w, x, y, z, body to world.

@@ -31,8 +31,7 @@ class HandRecipe(Recipe):
     """A distribution of hand motions, devices and mountings; no physics engine is used.
 
     An episode has the channels ``imu/gyr`` (rad/s) and ``imu/acc`` (m/s²), with a magnetometer ``imu/mag`` (µT), NaN
-    where a sample is lost, and the truth
-    ``orientation`` (sensor to world) and ``position`` (of the sensor, m).
+    where a sample is lost, and the truth ``orientation`` (sensor to world) and ``position`` (of the sensor, m).
     """
 
     kind: ClassVar[str] = "hand"

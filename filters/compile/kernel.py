@@ -1,8 +1,8 @@
 """The steps of the Kalman recursion as plain loops, the same for every model.
 
-F and H of most models are mostly zeros, so products run over lists of the
-elements that can be other: line i has ``column[first[i]:first[i + 1]]``. Sums over several columns or rows at a time
-stay in registers; each is formed in the order in which it is written.
+F and H of most models are mostly zeros, so products run over lists of the elements that can be other: line i has
+``column[first[i]:first[i + 1]]``. Sums over several columns or rows at a time stay in registers; each is formed in the
+order in which it is written.
 """
 
 from __future__ import annotations

@@ -9,6 +9,9 @@ from typing import Any
 
 import numpy as np
 
+RESULT = ("estimator", "trajectory", "quantity", "metric", "value", "unit")
+"""Columns of a table of errors, one number a row."""
+
 
 def records(rows: Iterable[Any]) -> list[dict[str, Any]]:
     """Return rows as dictionaries.

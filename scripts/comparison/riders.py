@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from ...filters.support.rows import markdown_table
+from ...filters.support.rows import RESULT, markdown_table
 from ..output import Output
 from ..report import MOST_COLUMNS
 
@@ -47,7 +47,6 @@ def rider_tables(settings: RiderSuite, args: Any, folder: Run, out: Output) -> R
     from ...baselines.comparison.rider_tables import by_group
     from ...baselines.comparison.tasks import Results
     from ...baselines.error_table import ErrorTable
-    from ...baselines.scoring import COLUMNS
     from ...baselines.studies.riders import suite, tables
 
     learning = f"; references learn from {settings.training} others" if settings.training else ""
@@ -70,7 +69,7 @@ def rider_tables(settings: RiderSuite, args: Any, folder: Run, out: Output) -> R
                 out.sections[f"{paper}: {title}"] = markdown_table(table)
     means = [mean for paper in settings.papers for mean in tables.ride_means(rows, paper)]
     groups = {trajectory: trajectory.split(":")[0] for _, trajectory, *_ in means}
-    page = Results(ErrorTable(means, columns=list(COLUMNS)), groups, [])
+    page = Results(ErrorTable(means, columns=list(RESULT)), groups, [])
     found = [{"suite": SUITE, **row} for row in tables.results(rows)]
     return RiderPart(found, {SUITE: page}, numbers)
 

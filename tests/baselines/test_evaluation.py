@@ -7,10 +7,10 @@ import poise
 from poise.baselines.comparison.data_sets import HAND_CHANNELS, contenders
 from poise.baselines.error_table import agreement, summary
 from poise.baselines.evaluation import evaluate
-from poise.baselines.scoring import COLUMNS
 from poise.envs.hand.sensing import simulate_hand
 from poise.filters.core import rotation
 from poise.filters.core.metrics import DEGREES, direction_error, rms
+from poise.filters.support.rows import RESULT
 
 
 @pytest.fixture(scope="module")
@@ -26,7 +26,7 @@ def value(table, estimator, metric, quantity="up"):
 
 def test_the_table_holds_the_errors_that_the_metrics_define(trajectory):
     table = evaluate(["mekf", "mekf-9", "tilt"], trajectory)
-    assert tuple(table.columns) == COLUMNS
+    assert tuple(table.columns) == RESULT
     up = poise.run("mekf", trajectory).pose["up"]
     expected = rms(direction_error(up, trajectory.truth["up"]), trajectory.mask) * DEGREES
     assert value(table, "mekf", "inclination") == pytest.approx(expected, rel=1e-12)

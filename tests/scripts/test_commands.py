@@ -8,8 +8,8 @@ import pandas
 import pytest
 
 from poise.baselines.comparison.intervals import is_measure
-from poise.baselines.scoring import COLUMNS
 from poise.envs.data.trajectory import load_trajectory
+from poise.filters.support.rows import RESULT
 from poise.filters.support.seeds import child_seed
 from poise.scripts import benchmark
 from poise.scripts.benchmark import keep
@@ -85,7 +85,7 @@ def test_evaluate_prints_tables_and_leaves_a_run(episodes, tmp_path, capsys):
     assert output.index("mekf") < output.index("tilt")
     (folder,) = (tmp_path / "evaluate").iterdir()
     table = pandas.read_csv(folder / "results.csv")
-    assert tuple(table.columns) == COLUMNS
+    assert tuple(table.columns) == RESULT
     assert (folder / "figures" / "inclination.png").stat().st_size > 5_000
     assert "recordings-over-time.png" in (folder / "report.md").read_text()
     assert main(["evaluate", str(tmp_path / "nothing"), "--runs", str(tmp_path)]) == 2
@@ -118,7 +118,7 @@ def test_benchmark_compares_and_reports(episodes, tmp_path, capsys):
     assert sum(name.startswith("All data sets: ") for name in parts) == 3
     assert "simulation: inclination, mean with its 95 % interval over 4 trajectories, deg" in parts
     rows = [row for row in document["rows"] if row["table"] in ("simulation", "recordings")]
-    assert all(tuple(row) == ("table", *COLUMNS) for row in rows)
+    assert all(tuple(row) == ("table", *RESULT) for row in rows)
     assert {row["trajectory"] for row in rows} == {"slow-1", "fast-1", "severe-1", "mixed-1", "hand_motion_0000"}
     report = (folder / "report.md").read_text()
     pictures = re.findall(r"!\[[^]]*\]\(([^)]*)\)", report)

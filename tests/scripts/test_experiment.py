@@ -165,7 +165,7 @@ def test_a_write_that_fails_leaves_nothing(tmp_path: Path) -> None:
 
 
 def test_report(run: experiment.Run) -> None:
-    path = run.write_report("Benchmark", {"Errors": rows.markdown_table([ROW], experiment.COLUMNS)})
+    path = run.write_report("Benchmark", {"Errors": rows.markdown_table([ROW], rows.RESULT)})
     text = path.read_text(encoding="utf-8")
     assert text.startswith("# Benchmark\n\n## Errors\n\n| estimator |")
     assert "| vqf | hand-0 | orientation | rmse | 0.333 | deg |" in text

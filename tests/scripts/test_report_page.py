@@ -10,7 +10,7 @@ import pytest
 from poise.baselines.comparison.html_report import html_report
 from poise.baselines.comparison.tasks import Results
 from poise.baselines.error_table import ErrorTable
-from poise.baselines.scoring import COLUMNS
+from poise.filters.support.rows import RESULT
 from poise.scripts.live.picture import OPTIONS, find_browser
 
 
@@ -24,7 +24,7 @@ def results() -> Results:
         for metric in ("inclination", "inclination largest")
     ]
     rows += [(name, trajectory, "up", "valid", 1.0, "1") for name, trajectory, *_ in rows]
-    return Results(ErrorTable(rows, columns=list(COLUMNS)), {}, [])
+    return Results(ErrorTable(rows, columns=list(RESULT)), {}, [])
 
 
 def test_page_works_in_a_browser(tmp_path: Path) -> None:

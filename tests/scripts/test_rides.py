@@ -6,12 +6,12 @@ import numpy as np
 import pandas
 import pytest
 
-from poise.baselines.scoring import COLUMNS
 from poise.baselines.studies.rides.reports import REPORTED, comparison
 from poise.baselines.studies.rides.statistics import ride, trunk_lean
 from poise.envs.bicycle.course.scenarios import list_scenarios
 from poise.envs.data.trajectory import load_trajectory
 from poise.filters.core import rotation
+from poise.filters.support.rows import RESULT
 from poise.scripts.main import main
 
 RECORD = ["--options", "scenario=outdoor", "subject=2", "fidelity=full", "suite=whole-body", "duration=2.0"]
@@ -83,7 +83,7 @@ def test_rides_prints_tables_leaves_a_run_and_goes_on(tmp_path, capsys):
     assert "Saddle by scenario" in output
     (folder,) = (tmp_path / "rides").iterdir()
     table = pandas.read_csv(folder / "results.csv")
-    assert tuple(table.columns) == COLUMNS
+    assert tuple(table.columns) == RESULT
     assert set(table["trajectory"]) == {"slow-0", "slow-4", "indoor_circle-0", "indoor_circle-4"}
     assert "about 1 m/s" in (folder / "report.md").read_text(encoding="utf-8")
 

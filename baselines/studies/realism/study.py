@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ....envs.recipes.registry import recipe
-from ...scoring import COLUMNS
+from ....filters.support.rows import RESULT
 from ..kit import Study
 from ..report import Report
 from .containment import HIGH, LOW, Summary, containment_rows, simulated_summaries, summary, totals
@@ -92,7 +92,7 @@ def recorded_summaries(groups: Sequence[Recorded]) -> dict[str, list[Summary]]:
 def results(label: str, summaries: Sequence[Summary]) -> list[dict[str, Any]]:
     """Rows of ``results.csv``, at the widest bandwidth of each."""
     return [
-        dict(zip(COLUMNS, ("truth", f"{label}/{each.name}", "motion", name, value, UNITS[name] or "1"), strict=True))
+        dict(zip(RESULT, ("truth", f"{label}/{each.name}", "motion", name, value, UNITS[name] or "1"), strict=True))
         for each in summaries
         for name, value in each.statistics[max(each.statistics)].items()
         if np.isfinite(value)

@@ -8,8 +8,8 @@ from typing import Any
 
 from ....envs.bicycle.course.scenarios import list_scenarios
 from ....envs.bicycle.rider.anthropometry import SUBJECTS
+from ....filters.support.rows import RESULT
 from ....filters.support.seeds import child_seeds
-from ...evaluation import COLUMNS
 from ..kit import Study
 from ..report import Report
 from .checks import all_checks
@@ -113,5 +113,5 @@ def results(found: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
             for kind in KINDS
             if f"{quantity}_{kind}" in each
         ]
-        rows += [dict(zip(COLUMNS, ("truth", name, *number), strict=True)) for number in numbers]
+        rows += [dict(zip(RESULT, ("truth", name, *number), strict=True)) for number in numbers]
     return rows

@@ -47,7 +47,7 @@ class Reconstruction:
         self.ride: Trajectory = study.load(path)
         self.geometry = RiderGeometry.of(self.ride.metadata)
         self.truth = true_angles(self.ride.truth)
-        self.found = dict(study.estimate(self.ride, study.variants[method or next(iter(study.variants))]).pose)
+        self.found = dict(study.estimate(self.ride, study.variants[method or study.first]).pose)
 
     def at(self, time: float) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
         """Lines of the true and of the estimated rider at a time, s, in the frame R.

@@ -7,7 +7,7 @@ import pandas
 import pytest
 
 from poise.baselines.comparison.intervals import details, errors_of, intervals, is_measure, regressions, win_matrix
-from poise.baselines.scoring import COLUMNS
+from poise.filters.support.rows import RESULT
 
 
 def table(errors: dict[str, list[float]], metric: str = "inclination") -> pandas.DataFrame:
@@ -17,7 +17,7 @@ def table(errors: dict[str, list[float]], metric: str = "inclination") -> pandas
         for number, value in enumerate(values)
         for kind in (metric, "valid")
     ]
-    return pandas.DataFrame(rows, columns=list(COLUMNS))
+    return pandas.DataFrame(rows, columns=list(RESULT))
 
 
 RNG = np.random.default_rng(0)
@@ -79,7 +79,7 @@ def test_details_are_means_and_the_largest() -> None:
     rows = [("one", f"ride-{n}", "up", "inclination largest", value, "deg") for n, value in enumerate((3.0, 7.0))]
     rows += [("one", f"ride-{n}", "up", "inclination", 1.0, "deg") for n in range(2)]
     rows += [("one", f"ride-{n}", "relative_orientation", "nees", value, "1") for n, value in enumerate((1.0, 3.0))]
-    frame = pandas.DataFrame(rows, columns=list(COLUMNS))
+    frame = pandas.DataFrame(rows, columns=list(RESULT))
     (row,) = details(frame, "inclination", "up")
     assert (row["RMS"], row["largest"], row["NEES"]) == (1.0, 7.0, 2.0)
     assert list(is_measure(frame)) == [True, True, False, False, True, True]
@@ -93,6 +93,6 @@ def test_details_state_where_a_consistent_filter_lies() -> None:
         for n in range(10)
         for metric, value in values.items()
     ]
-    (row,) = details(pandas.DataFrame(rows, columns=list(COLUMNS)), "inclination", "up")
+    (row,) = details(pandas.DataFrame(rows, columns=list(RESULT)), "inclination", "up")
     # chi-square of 20 degrees of freedom: 9.591 and 34.170 (tables)
     assert (row["NEES 95 %"], row["NIS 95 %"]) == ("0.48 – 1.71", "0.90 – 1.10")

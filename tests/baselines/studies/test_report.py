@@ -45,12 +45,11 @@ def test_printed_values_stand_beside_ours_with_what_the_interval_means(tmp_path)
             "values": [1.0, 2.0, 6.0, float("nan")],
             "unit": "deg",
         },
-        {"filter": "y", "quantity": "roll", "published": None, "ours": 5.0, "interval": (4.0, 6.5), "unit": "deg"},
         {"filter": "z", "quantity": "roll", "published": None, "values": [float("nan")], "unit": "deg"},
     ]
     report.compare("Table", rows, "Why.")
     report.compare("Table with deviations", rows[:1], interval=STD)
-    (first, second, third), (deviation,) = (entry.rows for entry in report.entries)
+    (first, third), (deviation,) = (entry.rows for entry in report.entries)
     assert first == {
         "filter": "x",
         "quantity": "roll",
@@ -59,20 +58,8 @@ def test_printed_values_stand_beside_ours_with_what_the_interval_means(tmp_path)
         "interval": "1 … 6",
         "unit": "deg",
     }
-    assert (second["ours"], second["interval"]) == (5.0, "4 … 6.5")
     assert third["ours"] != third["ours"]
     assert third["interval"] is None
     assert deviation["interval"] == "± 2.65"
     assert report.entries[0].text.startswith("Ours: mean, smallest")
     assert report.entries[0].text.endswith("Why.")
-    with pytest.raises(ValueError, match="values or ours and interval"):
-        report.compare("Wrong", [{"quantity": "roll", "published": 1.0, "unit": "deg", "ours": 1.0}])
-
-
-def test_numbers_have_the_columns_of_results(tmp_path):
-    report = Report(tmp_path)
-    row = {"estimator": "a", "trajectory": "b", "quantity": "c", "metric": "d", "value": 1.0, "unit": "deg"}
-    report.numbers([row])
-    assert report.results == [row]
-    with pytest.raises(ValueError, match="a result has the fields"):
-        report.numbers([{"value": 1.0}])
