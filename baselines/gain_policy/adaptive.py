@@ -14,8 +14,9 @@ import numpy as np
 from ...filters.adaptation.gains import tunable_filter
 from ...filters.adaptation.tuned import TunedFilter, TunedState
 from ...filters.core.estimator import Enclosing, check_measurements
-from ...filters.core.kalman import FilterState, KalmanFilter
+from ...filters.core.kalman import KalmanFilter
 from ...filters.core.quantity import Estimate, Measurement
+from ...filters.core.sampling import FilterState
 from .known_bias import SETTLING, bias_of, witness_of
 from .policy import GainPolicy
 

@@ -16,8 +16,9 @@ import numpy as np
 
 from ...envs.data.trajectory import Trajectory
 from ...filters.adaptation.gains import tunable_filter
-from ...filters.core.kalman import FilterState, KalmanFilter
+from ...filters.core.kalman import KalmanFilter
 from ...filters.core.quantity import GYROSCOPE_BIAS
+from ...filters.core.sampling import FilterState
 
 WITNESS = "mekf"
 """The filter that estimates the bias."""

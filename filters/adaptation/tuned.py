@@ -10,8 +10,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..core.estimator import check_measurements
-from ..core.kalman import FilterState, KalmanFilter
+from ..core.kalman import KalmanFilter
 from ..core.quantity import Estimate
+from ..core.sampling import FilterState
 from .gains import GainRange, filter_name, gain_ranges, log_gains
 from .named_features import features_of
 from .time_scales import FeatureMemory, Features

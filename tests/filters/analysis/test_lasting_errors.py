@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from poise.baselines.studies.signals import DEG
 from poise.baselines.studies.two_gyro.motion import MOTIONS, Errors, filter_of, simulate
 from poise.filters.analysis.bounds import posterior_bound
 from poise.filters.analysis.lasting_errors import Lasting, fitted_process, lasting_and_white, lasting_bound
 from poise.filters.bicycle.two_gyro.truth import true_states
+from poise.filters.core.quantity import DEG
 
 
 def test_errors_of_no_size_change_nothing_and_a_gyroscope_bias_is_the_models_own():

@@ -7,12 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from poise.baselines.studies.signals import DEG, Waves
+from poise.baselines.studies.signals import Waves
 from poise.baselines.studies.two_gyro import segway
 from poise.baselines.studies.two_gyro.motion import MOTIONS, Errors, filter_of, simulate
 from poise.baselines.studies.two_gyro.ride_bounds import CONSTANT, DRIFTING, with_alignment
 from poise.filters.analysis.bounds import posterior_bound
 from poise.filters.bicycle.two_gyro.truth import true_states
+from poise.filters.core.quantity import DEG
 
 
 def test_an_unknown_alignment_leaves_theta_as_uncertain_as_it_is():
