@@ -150,7 +150,8 @@ def run(name: str, words: Sequence[str]) -> int:
     complaint = io.StringIO()
     try:
         with contextlib.redirect_stderr(complaint):
-            args = tyro.cli(plain_help(module.Args), args=list(words), prog=f"poise {name}", description=module.__doc__)
+            typed = plain_help(module.Args)
+            args: object = tyro.cli(typed, args=list(words), prog=f"poise {name}", description=module.__doc__)
     except SystemExit as stop:
         if not stop.code:
             raise

@@ -111,9 +111,9 @@ def all_errors(
     """Label → errors of every method on a drawn ride at the samples that count; ``rolls`` as :func:`roll_errors`."""
     published = estimated(paper, ride, scored)
     found = {paper: published} if learnt is None else references(paper, learnt, ride, scored, published)
-    for name, errors in rolls.items():
-        others = np.full((len(errors), published.values.shape[1] - 1), np.nan)
-        found[name] = Errors(wrapped(np.concatenate([errors, others], axis=1)))
+    for name, roll in rolls.items():
+        others = np.full((len(roll), published.values.shape[1] - 1), np.nan)
+        found[name] = Errors(wrapped(np.concatenate([roll, others], axis=1)))
     for name in estimators_of(paper):
         if name != paper:
             found[name] = errors = estimated(name, ride, scored)
