@@ -45,26 +45,24 @@ def errors_of(table: pandas.DataFrame, metric: str, quantity: str | None = None)
     return wide[[name for name in wide.columns if name in complete]].dropna(axis=1)
 
 
-def intervals(errors: pandas.DataFrame, *, against: str | None = None, seed: int = 0) -> list[dict[str, Any]]:
+def intervals(errors: pandas.DataFrame) -> list[dict[str, Any]]:
     """Mean error of every estimator with its 95 % interval over trajectories, best first.
 
-    ``difference`` is the mean of the paired differences to another estimator on the same trajectories, and ``better``
+    ``difference`` is the mean of the paired differences to the best estimator on the same trajectories, and ``better``
     the share of trajectories on which the estimator has the smaller error (ties count half).
 
     Args:
         errors: from :func:`errors_of`.
-        against: with which to compare; None for the best.
-        seed: of the draws.
     """
     order = list(errors.mean().sort_values().index)
     if not order:
         return []
-    other = errors[against if against in errors else order[0]].to_numpy()
+    other = errors[order[0]].to_numpy()
     rows = []
     for name in order:
         own = errors[name].to_numpy()
-        mean = bootstrap_interval(mean_score, own[None], seed=seed, draws=DRAWS, tasks_too=True)
-        paired = bootstrap_interval(mean_score, (own - other)[None], seed=seed, draws=DRAWS, tasks_too=True)
+        mean = bootstrap_interval(mean_score, own[None], draws=DRAWS, tasks_too=True)
+        paired = bootstrap_interval(mean_score, (own - other)[None], draws=DRAWS, tasks_too=True)
         rows.append(
             {
                 "estimator": name,

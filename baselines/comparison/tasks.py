@@ -19,7 +19,7 @@ from ...filters.support.rows import RESULT
 from ...filters.support.seeds import child_seeds
 from ..evaluation import evaluate
 from ..scoring import has_truth
-from .data_sets import GESTURES, RIDES, contenders, hand_episode, ride_imus
+from .data_sets import GESTURES, RIDES, contenders, groups_of, hand_episode, ride_imus
 from .recommendation import results_of
 
 if TYPE_CHECKING:
@@ -178,7 +178,7 @@ def run_task(
     started = time.perf_counter()
     trajectories = task.trajectories()
     made = time.perf_counter()
-    found: dict[str, Any] = {"groups": {one.name: str(one.metadata.get("group") or one.name) for one in trajectories}}
+    found: dict[str, Any] = {"groups": groups_of(trajectories)}
     settings = {"offline": offline, "reference": reference, "detailed": True, **task.settings}
     try:
         # kept with the results, and issued when these are collected, also after an interruption

@@ -39,13 +39,11 @@ class Args:
 
 def run(args: Args) -> int:
     """Estimate, write, print a summary."""
-    import warnings
-
+    from ...baselines.evaluation import report_findings
     from ...baselines.export import WRITERS, write_estimates
     from ...baselines.registry import make_estimator
     from ...baselines.run import run as run_filter
     from ...baselines.run import smooth
-    from ...envs.data.plausibility import check_recording
     from .load import load_all, plain_warnings, say_passed_over, sensors_of
 
     check_file("output", args.output, args.recordings, tuple(WRITERS))
@@ -57,9 +55,7 @@ def run(args: Args) -> int:
         estimates: dict[str, Estimate] = {}
         run_estimator = smooth if args.offline else run_filter
         for name, sensor in sensors.items():
-            for finding in check_recording(sensor):
-                if finding.severity == "warning":
-                    warnings.warn(f"{name}: {finding}", stacklevel=1)
+            report_findings(sensor)
             estimates[name] = run_estimator(args.estimator, sensor)
         rows = [summary_row(name, estimate) for name, estimate in estimates.items()]
         out.table(rows, f"Angles by {args.estimator}, deg (±: standard deviation at the end)")

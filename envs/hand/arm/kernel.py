@@ -11,8 +11,6 @@ import numpy as np
 
 from ....filters.compile.cache import jit
 
-STATE = 13
-"""Position, quaternion, velocity, angular velocity."""
 REFERENCE = 25
 """Position, velocity, acceleration; quaternion, angular velocity and acceleration; unit noise of force and torque."""
 SLIP = 0.1
