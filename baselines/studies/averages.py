@@ -63,9 +63,9 @@ def mean_rms(results: Iterable[Mapping[str, Any]], method: str, window: str = "s
     return mean_of(each["rms"][method][window] for each in results)
 
 
-def leading(printed: str) -> float:
-    """Mean of a printed ``mean ± deviation``."""
-    return float(printed.replace("±", " ").split()[0])
+def leading(published: str) -> float:
+    """Mean of a published ``mean ± standard deviation``."""
+    return float(published.replace("±", " ").split()[0])
 
 
 def interval_of_mean(values: Sequence[float]) -> str:

@@ -317,10 +317,10 @@ class RideStudy:
 
     def in_short(self, course: str, results: list[dict[str, Any]]) -> list[dict[str, Any]]:
         """The skill of the filter in two rows: roll of the bicycle, and mean over the other published angles."""
-        printed = {angle: leading(text) for angle, text in self.published.get((course, self.first), {}).items()}
+        published = {angle: leading(text) for angle, text in self.published.get((course, self.first), {}).items()}
         tabled = {angle for (_, name), values in self.published.items() if name == self.first for angle in values}
         columns = {
-            "published": printed,
+            "published": published,
             "here": mean_rms(results, self.first),
             MEAN: mean_rms(results, MEAN),
             "posterior bound": mean_of(each.get("bound", {}) for each in results),

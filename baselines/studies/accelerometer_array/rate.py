@@ -160,7 +160,7 @@ def claims(rows: list[Row]) -> list[Claim]:
     mean = {method: mean_of(rows, "rms", method=method, errors=CALIBRATED) for method in METHODS}
     white_only = {name: mean_of(rows, "rms", method=name, errors=DATA_SHEET) for name in METHODS if name != WITH_BIASES}
     thesis = PUBLISHED["weighted"]
-    printed = [one < other for one, other in zip(PUBLISHED["polynomial roots"], PUBLISHED["Parsa"], strict=True)]
+    in_thesis = [one < other for one, other in zip(PUBLISHED["polynomial roots"], PUBLISHED["Parsa"], strict=True)]
     named = {row: mean[method] for method, row in ROWS_OF_TABLE_2_1.items() if row}
     weights = next(row for row in weight_table(rows) if row["method"] == DEFAULT and row["errors"] == CALIBRATED)
     slow, *_, fast = (weights[name] for name in SPEEDS)
@@ -185,7 +185,7 @@ def claims(rows: list[Row]) -> list[Claim]:
         Claim.every("Figure 2.11: errors do not grow from the first to the second half", growth_of, 1.5, "×"),
         Claim.best("Table 2.1: the weighted method has the smallest error", "weighted", named, "rad/s"),
         better(
-            rows, CALIBRATED, f"Table 2.1: polynomial roots err less than Parsa in most motions ({sum(printed)} of 6)"
+            rows, CALIBRATED, f"Table 2.1: polynomial roots err less than Parsa in most motions ({sum(in_thesis)} of 6)"
         ),
         *(
             better(rows, kind, f"With {kind} polynomial roots err less than Parsa in most motions")

@@ -233,7 +233,7 @@ def claims(tests: dict[str, Any], still: dict[str, Any]) -> list[Claim]:
     best = {test: min(sweep, key=sweep.__getitem__) for test, sweep in sweeps.items()}
     losses = {test: sweep["0.1"] / min(sweep.values()) for test, sweep in sweeps.items()}
     # the same of table II, by the sum of roll and pitch
-    printed = max(
+    published = max(
         sum(TABLE_II[0.1][index]) / min(sum(row[index]) for row in TABLE_II.values()) for index in range(len(TESTS))
     )
     trials = list(zip(*(tests["B"]["modes"][f"{mode} published"]["inclination"] for mode in (3, 1)), strict=True))
@@ -265,7 +265,7 @@ def claims(tests: dict[str, Any], still: dict[str, Any]) -> list[Claim]:
         Claim.every(
             "A properly chosen c_a works in every test: 0.1 loses no more to the best one than in table II",
             losses,
-            printed,
+            published,
             "of the best",
         ),
         Claim(
