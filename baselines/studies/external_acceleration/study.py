@@ -78,7 +78,7 @@ def reproduce(study: Study, report: Report) -> None:
         "order and shape; the optical tracker's noise and the flexing of its markers; Xsens MTx sensors beyond the "
         "noise, bias and scale that are assumed here. The paper says neither at which frequencies hands moved nor how "
         "the filter was started (here: at rest, P₀ = 10⁻² I).",
-        "What print cannot be asked",
+        "What the paper leaves open",
     )
     cover(report, ITEMS)
 

@@ -56,7 +56,7 @@ def of_grade(recipe: Any, ridden: Trajectory, seed: np.random.SeedSequence, valu
 
 
 def measured_by(recipe: Any, ridden: Trajectory, seed: np.random.SeedSequence, value: float) -> Trajectory:
-    """A rider whose lengths and mass are told ``value`` times as wrongly as with a tape."""
+    """Lengths and mass of the rider with ``value`` times the errors of a tape measure."""
     tape = recipe.sensors.tape
     wrong = {name: value * getattr(tape, name) for name in ("lengths", "places", "mass")}
     return usual(recipe, ridden, seed, tape=replace(tape, **wrong))

@@ -34,7 +34,7 @@ def results(rows: Iterable[Row]) -> list[dict[str, Any]]:
 
 
 def measures(row: Row) -> list[tuple[str, float, str]]:
-    """Metric, value and unit of what is told of all angles together."""
+    """Metric, value and unit of what tables have of all angles together."""
     return [
         ("angle", row.mean, "deg"),
         ("angle over bound", row.over_bound, "1"),
@@ -62,7 +62,7 @@ def riders(rows: Sequence[Row]) -> np.ndarray:
     return np.array([[np.mean([row.mean for row in rows if row.ride == ride]) for ride in rides]])
 
 
-def told(method: str) -> str:
+def labelled(method: str) -> str:
     """Name of a method in tables of means."""
     return f"{method} (roll alone)" if method in ROLL_ONLY else method
 
@@ -86,9 +86,9 @@ def summary(rows: Sequence[Row]) -> list[dict[str, Any]]:
                     ("coverage", [row.coverage for row in own]),
                 ):
                     numbers[name] = float(np.mean(values))
-                told_of = ("nees", "coverage") if method.endswith(CONSTANT) else tuple(numbers)
-                known = {n: v if n in told_of and np.isfinite(v) else None for n, v in numbers.items()}
-                found.append({"paper": paper, "method": told(method), "group": group, **known})
+                numbered = ("nees", "coverage") if method.endswith(CONSTANT) else tuple(numbers)
+                known = {n: v if n in numbered and np.isfinite(v) else None for n, v in numbers.items()}
+                found.append({"paper": paper, "method": labelled(method), "group": group, **known})
     return found
 
 

@@ -37,7 +37,7 @@ class ConsistentWholeBody(WholeBody):
 
     Further states: biases (15) of the gyroscopes of trunk, arms and thighs in the paper's axes of their segments, that
     of the roll rate (1), offset of the trunk's accelerometer (3, the sensor's alignment above all), and what C1–C3 of
-    an arm and C5–C7 of a leg are off by, right side first (12): told lengths and places, elbows that are not quite out.
+    an arm and C5–C7 of a leg are off by, right side first (12): lengths as measured, elbows that are not quite out.
 
     The usual posture, a weak measurement, is that of the rider, who leans and turns with the handlebar.
 
