@@ -10,7 +10,8 @@ from typing import Any, Literal, get_args
 from ...envs.hand.gestures import Mixed
 from ...envs.hand.trajectories import HandTrajectories
 from ...envs.sensors.presets import sensor_preset
-from .motions import DEG, FLOWN_MOTIONS, GradedMotions, MixedMotions, Motions, RiddenMotions, uneven_rides
+from ...filters.core.quantity import DEG
+from .motions import FLOWN_MOTIONS, GradedMotions, MixedMotions, Motions, RiddenMotions, uneven_rides
 
 SUSTAINED = Mixed(lengths=(15.0, 40.0), rest_share=0.1, spread=0.5, single_share=0.25)
 """Sustained motion of one kind, in addition to the quick changes of ``mixed``."""

@@ -15,10 +15,9 @@ from ...envs.hand.parts.shaking import Vibration
 from ...envs.recipes.devices import VariedSensors
 from ...envs.recipes.hand import HandRecipe
 from ...envs.recipes.rides import RideSource, drawn
+from ...filters.core.quantity import DEG
 from ...filters.support.ranges import Range
 from ...filters.support.seeds import child_seed
-
-DEG = math.pi / 180.0
 
 
 class Motions(Protocol):

@@ -21,7 +21,7 @@ from ...filters.arrays.array import CONTROLLER, OCTA, PLANAR, AccelerometerArray
 from ...filters.arrays.files import load_array
 from ...filters.arrays.planar.orientation import PLANAR_GYROSCOPE
 from ...filters.core import rotation
-from ...filters.core.quantity import GYROSCOPE, Channel
+from ...filters.core.quantity import GRAVITY, GYROSCOPE, Channel
 from ...filters.support.parameters import check_positive
 from ..sensors.ideal import Mounting, Sampling, vector
 from ..sensors.kinds import SensorKind, SiteMotion, sensor_kind
@@ -34,8 +34,6 @@ from ..sensors.timing import Timings, check_sites, timing_of
 from .drivers import Device
 from .gestures import GestureConfig
 
-G = 9.81
-"""m/s², the thesis'."""
 PAPER_RATE = 100.0
 """Hz, of the thesis' simulations."""
 
@@ -74,7 +72,7 @@ ARRAY_PRESETS = (
         "paper-array",
         "thesis, section 5.3: σ_a = 0.1 g, σ_ω = 0.1 rad/s, σ_m 1 % of a field of 50 µT; no range is given",
         per_sample(0.1, 100.0),
-        per_sample(0.1 * G, 1000.0),
+        per_sample(0.1 * GRAVITY, 1000.0),
         per_sample(0.5, 1000.0),
     ),
     ArrayPreset(

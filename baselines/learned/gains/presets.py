@@ -10,6 +10,7 @@ from typing import Any
 from ....envs.recipes.recipe import Recipe
 from ....envs.recipes.registry import hand_recipe
 from ....filters.core.kalman import KalmanFilter
+from ....filters.core.quantity import DEG
 from ....filters.registry import make
 from ..config import FitConfig
 from ..inputs.gain_features import GainFeatures
@@ -17,7 +18,6 @@ from ..presets import PRESETS, RIDES, Preset
 from .gain_head import GainHead
 from .gain_shares import with_gain_shares
 
-DEG = math.pi / 180.0
 GYROSCOPE_BIAS = (0.03 * DEG, 6.0 * DEG)
 ACCELEROMETER_BIAS = (0.01, 0.3)
 """rad/s and m/s²: devices as in the hand recipes, also such that were never calibrated"""

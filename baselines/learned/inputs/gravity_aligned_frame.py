@@ -11,7 +11,15 @@ from typing import ClassVar
 
 from ....filters.core.backend import Array, constant, expand, namespace
 from ....filters.core.model import Recurrence
-from ....filters.core.quantity import ACCELEROMETER, GYROSCOPE, RELATIVE_ORIENTATION, Channel, Measurement, Quantity
+from ....filters.core.quantity import (
+    ACCELEROMETER,
+    GYROSCOPE,
+    RELATIVE_ORIENTATION,
+    STANDARD_GRAVITY,
+    Channel,
+    Measurement,
+    Quantity,
+)
 from ....filters.core.rotation import cross, exp, level, multiply, normalize, rotate, rotate_back
 
 VECTORS = 6
@@ -59,7 +67,7 @@ class GravityAlignedFrame(Recurrence):
     """s: time constant of the youth, which is 1 at the start and indicates the initial transient to the network"""
     hold: float = 0.05
     """s: longest time for which the last accelerometer sample replaces missing ones"""
-    gravity: float = 9.80665
+    gravity: float = STANDARD_GRAVITY
     """g, m/s²"""
 
     channels: ClassVar[tuple[Channel, ...]] = (GYROSCOPE, ACCELEROMETER)

@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ....filters.core.quantity import GRAVITY
 from ..course.path import Path
 from ..frame.bicycle import SPEED
 from ..frame.parameters import AIR_DENSITY, BicycleParameters
@@ -138,7 +139,7 @@ class Pilot:
         self,
         bicycle: BicycleParameters,
         settings: ControlSettings | None = None,
-        gravity: float = 9.81,
+        gravity: float = GRAVITY,
         lean_effect: float = 0.0,
     ) -> None:
         self.bicycle, self.lean_effect = bicycle, lean_effect

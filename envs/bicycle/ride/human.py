@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ....filters.core import rotation
-from ....filters.core.quantity import STANDARD_GRAVITY
+from ....filters.core.quantity import GRAVITY, STANDARD_GRAVITY
 from ..course.path import Path
 from ..frame.bicycle import SPEED
 from ..frame.parameters import BicycleParameters
@@ -107,7 +107,7 @@ class HumanPilot(Pilot):
         noise: np.random.SeedSequence,
         trunk: TrunkModel = RIGID,
         settings: ControlSettings | None = None,
-        gravity: float = 9.81,
+        gravity: float = GRAVITY,
     ) -> None:
         self.human, self._trunk, self._noise = human, trunk, HumanNoise(noise)
         super().__init__(bicycle, settings, gravity)

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from ....filters.core import rotation
+from ....filters.core.quantity import STANDARD_GRAVITY
 from ..trajectory import Trajectory
 from .arrays import read_table
 from .described import with_checked_orientation
@@ -24,7 +25,7 @@ from .mapping import unit_quaternions
 from .names import AXES, groups, time_column, time_unit, words
 from .stamps import Stamps, as_seconds
 from .streams import Stream, joined
-from .table import STANDARD_GRAVITY, Table, factor
+from .table import Table, factor
 
 SUFFIXES = (".csv", ".txt", ".tsv")
 PREFERRED = {

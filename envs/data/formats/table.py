@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from ....filters.core.quantity import STANDARD_GRAVITY
 from ....filters.support.names import unknown
 
 UNIT = re.compile(r"^(?P<name>.*?)[\s_]*(\((?P<a>(?:[^()]|\([^()]*\))*)\)|\[(?P<b>[^\[\]]*)\])$")
@@ -30,7 +31,6 @@ ONLY_OF = {"g": "acc", "t": "^m", "s": "^time", "rad": "^gyr"}
 QUOTIENT = re.compile(r"^(?P<name>.*?(?:[xyz]|time|\bt))\s*(?:/|:| - )\s*(?P<unit>\S+)$", re.IGNORECASE)
 """Quantity over unit as ISO 80000 writes it, ``acc_x/(m/s²)`` or ``t/s``, and the same with a colon or a dash."""
 SUFFIX = re.compile(rf"^(?P<name>\w*?[a-z])_(?P<unit>{'|'.join(SPELLED)})(?P<axis>_[xyz]|\[\d\])?$", re.IGNORECASE)
-STANDARD_GRAVITY = 9.80665
 
 
 def _spellings(factors: dict[float, str]) -> dict[str, float]:

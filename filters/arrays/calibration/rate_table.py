@@ -28,6 +28,8 @@ from typing import Any
 
 import numpy as np
 
+from ...core.quantity import STANDARD_GRAVITY
+
 SINGULAR = 1e-5
 """Smallest accepted singular value of columns of unit length, relative to the largest."""
 UPRIGHT = 0.999
@@ -62,7 +64,7 @@ def calibrate_accelerometer(
     mounting: np.ndarray,
     upward: Mapping[str, float],
     *,
-    gravity: float = 9.80665,
+    gravity: float = STANDARD_GRAVITY,
     saturation: float | None = None,
 ) -> AxisCalibration:
     """Calibrate one accelerometer.
@@ -111,7 +113,7 @@ def calibrate_direction(
     mounting: np.ndarray,
     upward: Mapping[str, np.ndarray],
     *,
-    gravity: float = 9.80665,
+    gravity: float = STANDARD_GRAVITY,
     saturation: float | None = None,
 ) -> AxisCalibration:
     """Calibrate one accelerometer and estimate the direction of its sensitive axis.
