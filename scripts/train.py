@@ -162,8 +162,8 @@ def test(result: FitResult, preset: Preset, args: Args, out: Output) -> pandas.D
 
     contenders: dict[str, Any] = {args.preset: result.estimator}
     corrected = preset.filter or preset.paper or CONTENDERS[0]
-    others = NINE if preset.magnetic else CONTENDERS
-    others = others if preset.rides is None else (corrected.removesuffix("-consistent"),)
+    published = NINE if preset.magnetic else CONTENDERS
+    others = published if preset.rides is None else (corrected.removesuffix("-consistent"),)
     contenders |= {name: name for name in dict.fromkeys([corrected, *others])}
     if preset.rides is not None:
         groups, tables = test_rides(preset, args.seed, tested(args)), []

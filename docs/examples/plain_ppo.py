@@ -31,7 +31,8 @@ from poise.baselines.gain_policy.policy import GainPolicy
 from poise.baselines.gain_policy.vec_env import SB3VecEnv
 from poise.envs.hand.trajectories import HandTrajectories
 from poise.filters.adaptation.tuned import TunedFilter
-from poise.scripts.experiment import COLUMNS, start_run
+from poise.filters.support.rows import RESULT
+from poise.scripts.experiment import start_run
 
 IDENTITY = "poise/HandMotionGain-v0"
 EPISODES = 128
@@ -91,7 +92,7 @@ def main(words: list[str] | None = None) -> list[TuneRun]:
         policy, curve = trained(args.settings, seed, args.steps)
         errors[POLICY] = policy_errors(tuned.kalman, policy, test)
         rows = [
-            dict(zip(COLUMNS, (gains, each.name, "up", "inclination", float(np.degrees(value)), "deg"), strict=True))
+            dict(zip(RESULT, (gains, each.name, "up", "inclination", float(np.degrees(value)), "deg"), strict=True))
             for gains, values in errors.items()
             for each, value in zip(test, values, strict=True)
         ]
