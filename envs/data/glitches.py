@@ -36,19 +36,28 @@ FULL = 0.999
 
 
 def glitches(values: np.ndarray, least: float) -> np.ndarray:
-    """Samples ``(T,)`` bool of ``(T, 3)`` that stand alone, far from neighbours that agree."""
+    """Samples ``(T,)`` bool of ``(T, 3)`` that stand alone, far from neighbours that agree.
+
+    At the start and after a gap the neighbours are the next two samples.
+    """
     found = np.zeros(len(values), bool)
     if len(values) < FEWEST:
         return found
+    none = np.full((2, values.shape[1]), np.nan)
+    before, after = np.concatenate([none[:1], values[:-1]]), np.concatenate([values[1:], none[:1]])
     with np.errstate(invalid="ignore", over="ignore"):
-        distance = np.zeros(len(values))
-        distance[1:-1] = np.linalg.norm(values[1:-1] - 0.5 * (values[:-2] + values[2:]), axis=1)
+        first = np.logical_not(np.isfinite(before).all(axis=1, keepdims=True))
+        distance = np.linalg.norm(values - np.where(first, after, 0.5 * (before + after)), axis=1)
         far = np.flatnonzero(distance > least)
         if not len(far):
             return found
-        around = np.sort(np.nan_to_num(distance[np.clip(far[:, None] + AWAY, 0, len(values) - 1)]), axis=1)[:, -2]
-        beyond = np.linalg.norm(values[far + 1] - values[far - 1], axis=1)
-        found[far] = (distance[far] > ISOLATION * around) & (beyond < RETURN * distance[far])
+        index = far[:, None] + AWAY
+        there = (index >= 0) & (index < len(values))
+        around = np.where(there, np.nan_to_num(distance[np.clip(index, 0, len(values) - 1)]), 0.0)
+        other = np.where(first, np.concatenate([values[2:], none]), before)
+        beyond = np.linalg.norm(after[far] - other[far], axis=1)
+        isolated = distance[far] > ISOLATION * np.sort(around, axis=1)[:, -2]
+        found[far] = isolated & (beyond < RETURN * distance[far])
     return found
 
 

@@ -39,6 +39,16 @@ def test_a_sample_that_stands_alone_counts_as_missing(kind: str, size: float) ->
         assert inclination(glitched) < inclination(KNOWN) + 0.3
 
 
+@pytest.mark.parametrize(("kind", "value"), [("gyr", 99.99), ("acc", -999.0)])
+def test_the_first_sample_and_the_first_after_a_gap_may_be_glitches(kind: str, value: float) -> None:
+    rows = np.array([0, *range(600, 641)])
+    glitched = with_samples(kind, rows, np.where(np.isin(rows, (0, 640)), value, np.nan)[:, None])
+    with pytest.warns(UserWarning, match=f"imu/{kind}: 2 glitches"):
+        found = without_glitches(glitched)[f"imu/{kind}"]
+    assert np.isnan(found[[0, 640]]).all()
+    assert np.isnan(found).any(axis=1).sum() == 42
+
+
 @pytest.mark.parametrize("gesture", ["severe", "carried-running"])
 def test_motion_and_impacts_are_left_alone(gesture: str) -> None:
     hand = simulate_hand(gesture, seed=3, duration=20.0)
