@@ -13,7 +13,7 @@ import numpy as np
 
 from ...filters.core.quantity import STANDARD_GRAVITY
 from .rate_consistency import RateConsistency, rate_consistency
-from .readings import HELD, Finding, Severity, check_alive, plausible_samples
+from .readings import HELD, Finding, Severity, check_alive, check_copies, plausible_samples
 from .trajectory import Trajectory
 from .turning import check_rates, compared
 
@@ -172,6 +172,7 @@ def check_site(trajectory: Trajectory, site: str, wrong_clock: bool) -> list[Fin
     for kind, values in recorded.items():
         if values is not None:
             findings += check_alive(f"{site}/{kind}", values, trajectory.dt if not wrong_clock else None)
+    findings += check_copies({f"{site}/{kind}": values for kind, values in recorded.items() if values is not None})
     dead = {finding.channel for finding in findings if finding.severity == "warning"}
     gyr, acc, mag = (
         None if f"{site}/{kind}" in dead else seen(trajectory, f"{site}/{kind}") for kind in ("gyr", "acc", "mag")

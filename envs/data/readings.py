@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from itertools import combinations
 from typing import Literal
 
 import numpy as np
 
 from ...filters.core.quantity import ACCELEROMETER, GYROSCOPE, MAGNETOMETER
+from .glitches import LEAST, glitches
 
 CHANNELS = {"gyr": GYROSCOPE, "acc": ACCELEROMETER, "mag": MAGNETOMETER}
 LONGEST_ABSENCE = 0.3
@@ -68,8 +70,10 @@ def codes(kind: str, values: np.ndarray) -> np.ndarray:
 
 
 def plausible_samples(kind: str, values: np.ndarray) -> np.ndarray:
-    """Samples ``(T, 3)`` with NaN for codes, numbers that are not readings and, except of a gyroscope, for zeros."""
+    """Samples ``(T, 3)`` with NaN for codes, glitches, numbers that are not readings and, but of a gyroscope, zeros."""
     none = codes(kind, values) | (np.abs(values) > UNREADABLE).any(axis=1)
+    if kind in LEAST:
+        none |= glitches(values, LEAST[kind])
     found = np.where(none[:, None], np.nan, values)
     return found if kind == "gyr" else np.where(found.any(axis=1, keepdims=True), found, np.nan)
 
@@ -121,6 +125,11 @@ def check_alive(channel: str, values: np.ndarray, dt: float | None = None) -> It
     if impossible.any():
         what = f"{100 * impossible.mean():.3g} % of the samples reach {np.abs(samples[impossible]).max():g}"
         yield Finding("note", channel, what, "codes for no value", "They are treated as missing samples.")
+    kind = channel.rpartition("/")[2]
+    alone = int((glitches(values, LEAST[kind]) & ~unreadable).sum()) if kind in LEAST and not impossible.any() else 0
+    if alone:
+        what = f"{alone} samples stand alone, far from those beside them"
+        yield Finding("note", channel, what, "errors of the transmission", "They are treated as missing samples.")
     yield from check_axes_alive(channel, samples[~impossible])
     yield from check_repeats(channel, values, dt)
     yield from check_range(channel, samples[~impossible])
@@ -149,7 +158,9 @@ def check_axes_alive(channel: str, samples: np.ndarray) -> Iterator[Finding]:
 
 def check_repeats(channel: str, values: np.ndarray, dt: float | None) -> Iterator[Finding]:
     """Long runs of one sample in a channel whose samples differ otherwise."""
-    repeats = np.append(False, (values[1:] == values[:-1]).all(axis=1) & values[1:].any(axis=1))
+    same = (values[1:] == values[:-1]).all(axis=1)
+    # Zeros of the other sensors are no samples, and told as such.
+    repeats = np.append(False, same if channel.endswith("gyr") else same & values[1:].any(axis=1))
     runs = np.diff(np.flatnonzero(~np.append(repeats, False)))
     usual = int(np.median(runs)) if len(runs) else 1
     if dt is not None and usual > 1 and len(runs) >= 20 and float((runs == usual).mean()) > SLOWER:
@@ -164,8 +175,19 @@ def check_repeats(channel: str, values: np.ndarray, dt: float | None) -> Iterato
         return
     start = int(np.flatnonzero(~np.append(repeats, False))[int(np.argmax(runs))])
     what = f"one sample again and again, for {runs.max() * dt:.1f} s from sample {start}"
-    cause = "a recorder that repeats the last sample where none came"
-    yield Finding("warning", channel, what, cause, "Replace the repeated samples by NaN.")
+    cause, remedy = "a recorder that repeats the last sample where none came", "Replace the repeated samples by NaN."
+    if not values[start].any():
+        what = f"0, 0, 0 for {runs.max() * dt:.1f} s from sample {start}"
+        cause, remedy = "drop-outs written as zeros", "Replace the zeros by NaN, unless the sensor rested there."
+    yield Finding("warning", channel, what, cause, remedy)
+
+
+def check_copies(channels: Mapping[str, np.ndarray]) -> Iterator[Finding]:
+    """Channels whose samples ``(T, 3)`` are those of another one."""
+    for (one, values), (other, others) in combinations(channels.items(), 2):
+        if np.isfinite(values).any() and values.any() and np.array_equal(values, others, equal_nan=True):
+            cause = "columns that were named twice"
+            yield Finding("warning", other, f"the same samples as {one}", cause, "Name the columns of each sensor.")
 
 
 def check_range(channel: str, samples: np.ndarray) -> Iterator[Finding]:

@@ -5,9 +5,9 @@ holds over the next interval, as bounded log factors on the filter's constants (
 and R are made of, or shares of the Kalman gain (:mod:`.gain_shares`). The covariance is the filter's own.
 
 A tuning that is right while errors are small is not right while a large one is corrected: where an input was missing
-for longer than :data:`.monitor.GYROSCOPE_GAP`, the published gains hold until a second after it. On simulated gestures
-(mixed, fast, slow) the NEES of ``mekf+noise`` 0.2 s after gaps of 2 s is 3 so, as that of ``mekf``, and 15 without; one
-second does as much as ten, and leaves single lost samples to the network.
+for longer than :data:`LONGEST_GAP`, the published gains hold until a second after it. On simulated gestures (mixed,
+fast, slow) the NEES of ``mekf+noise`` 0.2 s after gaps of 2 s is 3 so, as that of ``mekf``, and 15 without; one second
+does as much as ten.
 """
 
 from __future__ import annotations
@@ -22,7 +22,6 @@ import numpy as np
 
 from ....filters.core.estimator import check_measurements
 from ....filters.core.kalman import KalmanFilter
-from ....filters.core.monitor import GYROSCOPE_GAP
 from ....filters.core.quantity import Estimate, Measurement, Quantity
 from ....filters.core.sampling import FilterState, GapWatch
 from ....filters.support.names import look_up
@@ -30,6 +29,10 @@ from ...weights_io import load_weights
 from ..estimator import NETWORKS, NetworkParts
 from ..inputs.gain_features import GainFeatures, ObservedState
 from .gain_head import GainHead
+
+LONGEST_GAP = 0.09
+"""s without an input. Where half of all samples of 100 Hz are lost, one by one, most of them are left to the network: a
+shorter one would come up every second."""
 
 
 class GainFilterState(NamedTuple):
@@ -148,7 +151,7 @@ class GainFilter(NetworkParts):
 
     @cached_property
     def _gaps(self) -> GapWatch:
-        return GapWatch(self.front_end.kalman.model, GYROSCOPE_GAP)
+        return GapWatch(self.front_end.kalman.model, LONGEST_GAP)
 
 
 def shipped(weights: str, dt: float = 0.01) -> GainFilter:

@@ -27,6 +27,10 @@ def held(values: np.ndarray) -> np.ndarray:
     return changed
 
 
+def zeroed(values: np.ndarray) -> np.ndarray:
+    return np.where((np.arange(len(values)) >= 400)[:, None] & (np.arange(len(values)) < 600)[:, None], 0.0, values)
+
+
 def wrapped(values: np.ndarray, limit: float) -> np.ndarray:
     return (values + limit) % (2.0 * limit) - limit
 
@@ -46,6 +50,8 @@ def recording(**channels: np.ndarray) -> Trajectory:
         (lambda: recording(acc=with_axis(ACC, 2, 9.81)), "imu/acc", "axis z is always 9.81"),
         (lambda: recording(acc=with_axis(ACC, 1, ACC[:, 0])), "imu/acc", "axes x and y are the same"),
         (lambda: recording(gyr=held(GYR), acc=held(ACC)), "imu/gyr", "again and again, for 2.0 s from sample 400"),
+        (lambda: recording(gyr=zeroed(GYR)), "imu/gyr", "0, 0, 0 for 2.0 s from sample 400; likely cause: drop-outs"),
+        (lambda: recording(acc=KNOWN.measurements["imu/gyr"]), "imu/acc", "the same samples as imu/gyr"),
         (lambda: recording(gyr=wrapped(GYR, 1.0)), "imu/gyr", "overflow"),
         (lambda: recording(gyr=np.clip(GYR, -1.0, 1.0)), "imu/gyr", "saturation"),
         (lambda: recording(gyr=unsigned(GYR)), "imu/gyr", "x, y, z lie near 0 and near 70, none between"),
@@ -59,6 +65,14 @@ def recording(**channels: np.ndarray) -> Trajectory:
 def test_each_kind_is_named(made: Callable[[], Trajectory], channel: str, words: str) -> None:
     told = [str(each) for each in check_recording(made()) if each.channel == channel and each.severity == "warning"]
     assert any(words in text for text in told), told
+
+
+def test_codes_within_the_range_of_a_sensor_are_no_fault_of_another() -> None:
+    coded = ACC.copy()
+    coded[7::50] = -999.0
+    (finding,) = check_recording(recording(acc=coded))
+    assert (finding.severity, finding.channel) == ("note", "imu/acc")
+    assert finding.what.startswith(f"{len(coded[7::50])} samples stand alone")
 
 
 @pytest.mark.parametrize("times", [2, 4])
