@@ -24,10 +24,14 @@ class HeadingHead(MixtureHead):
 
     The network says logarithms of K + 1 weights as for a :class:`.mixture_head.MixtureHead`; the inclination remains
     the filter's (:class:`.heading_bank.HeadingBank`).
+
+    Attributes:
+        largest: rad by which a candidate may differ, smoothly bounded: one that is lost does no harm.
     """
 
-    preference: float = 2.0
+    preference: float = 1.0
     least: float = 0.01
+    largest: float = 0.2
 
     kind: ClassVar[str] = "heading"
     outputs: ClassVar[tuple[Quantity, ...]] = (ORIENTATION, UP)
@@ -35,7 +39,8 @@ class HeadingHead(MixtureHead):
     def turn(self, output: Array, spread: Array) -> Array:
         """What is added to the filter's heading ``(..., 1)``, rad."""
         xp = namespace(output)
-        return xp.sum(self.weights(output)[..., 1:] * spread[..., 1:], axis=-1, keepdims=True)
+        bounded = self.largest * xp.tanh(spread[..., 1:] / self.largest)
+        return xp.sum(self.weights(output)[..., 1:] * bounded, axis=-1, keepdims=True)
 
     def estimate(self, seen: Seen, output: Array) -> Estimate:
         """See :class:`.head.Head`."""
@@ -49,10 +54,14 @@ class HeadingHead(MixtureHead):
         return np.asarray(rotation.wrap(2.0 * np.arctan2(turn[..., 3:], turn[..., :1])))
 
     def loss(self, output: Any, target: Any, spread: Any, mask: Any) -> Any:
-        """Mean over sequences of the ratio of root mean square errors, this one's to the published filter's."""
+        """Mean over sequences of the logarithm of the ratio of root mean square errors, to the published filter's.
+
+        Most of an error of the heading is constant and common to all candidates; its size must not decide.
+        """
+        xp = namespace(output)
         error = of_sequences(length(rotation.wrap(self.turn(output, spread) - target)), mask)
         published = of_sequences(length(target), mask)
-        return (error / (published + self.least)).mean()
+        return xp.log((error + self.least) / (published + self.least)).mean()
 
     def errors(self, output: Array, target: Array, spread: Array) -> Array:
         """See :class:`.head.Head`."""

@@ -174,13 +174,13 @@ PRESETS: dict[str, Preset] = {
         fit=FitConfig(epochs=5, batch=24, learning_rate=3e-3),
     ),
     "bounded-motion-9+network": Preset(
-        "bounded-motion-rest-9, its heading one of seven tunings, weighed by a recurrent network",
-        {"hand-held-magnetic": 130, "carried-magnetic": 50},
+        "bounded-motion-rest-9 in four tunings, whose headings are weighed by a recurrent network",
+        {"hand-held-magnetic": 120, "carried-magnetic": 40},
         filter="bounded-motion-rest-9",
         bank=True,
         units=32,
         noise=0.05,
-        fit=FitConfig(epochs=6, batch=24, learning_rate=3e-3),
+        fit=FitConfig(epochs=5, batch=16, window=1000, learning_rate=8e-3),
     ),
     **{
         f"{paper}+network": Preset(

@@ -2,9 +2,9 @@
 
 A magnetometer shows north where the field is that of the Earth; near iron and magnets the gyroscope keeps the heading
 better, for as long as its bias is known. Here the filter runs with its published constants and, beside them, with other
-noises of the magnetometer: the headings of the others are **candidates**, from one that follows every sample to one
-that keeps the heading of the gyroscope. What the network sees of them, of the field and of the motion depends neither
-on the heading nor on the side to which candidates differ.
+noises of the magnetometer: the headings of the others are **candidates**, from one that follows the field sooner to one
+that keeps the heading of the gyroscope for ten times as long. What the network sees of them, of the field and of the
+motion depends neither on the heading nor on the side to which candidates differ.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from .gravity_aligned_frame import SCALARS, VECTORS
 
 GAINS = ("process", "heading")
 """of bounded-motion-rest-9"""
-TUNINGS = ((1.0, 0.1), (1.0, 0.3), (1.0, 3.0), (1.0, 10.0), (1.0, 30.0), (1.0, 300.0))
+TUNINGS = ((1.0, 0.3), (1.0, 3.0), (1.0, 10.0))
 """Factors on the deviations σ_g of the gyroscope and σ_m of the magnetic heading, one row a candidate; the last one has
 the longest memory, and the sides of the others are told from it."""
 FIELD = 4

@@ -88,10 +88,12 @@ def test_a_heading_stays_between_those_of_the_filters() -> None:
     np.testing.assert_allclose(heading_error(found.pose["orientation"], base), np.abs(turn), atol=1e-9)
     parts: list[Any] = [torch.from_numpy(each[None]) for each in (output, turn[:, None], given)]
     mask = torch.ones(1, 100, dtype=torch.bool)
-    assert float(head.loss(*parts, mask)) < 1e-6
-    parts[0] = torch.tensor([60.0, 0.0, 0.0]) + 0.0 * parts[0]
     rms = np.sqrt(np.mean(turn**2))
-    assert float(head.loss(*parts, mask)) == pytest.approx(rms / (rms + head.least), rel=1e-6)
+    assert float(head.loss(*parts, mask)) == pytest.approx(np.log(head.least / (rms + head.least)), abs=1e-4)
+    parts[0] = torch.tensor([60.0, 0.0, 0.0]) + 0.0 * parts[0]
+    assert float(head.loss(*parts, mask)) == pytest.approx(0.0, abs=1e-6)
+    lost = np.concatenate([np.ones((1, 1)), [[0.0, 3.0]]], axis=-1)
+    assert 0.15 < head.turn(np.array([[-60.0, -60.0, 60.0]]), lost)[0, 0] <= head.largest
 
 
 def test_it_needs_candidates() -> None:
