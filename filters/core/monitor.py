@@ -118,7 +118,7 @@ def watch(memory: Array, inputs: Array) -> Array:
         squared = xp.sum(sample * sample, axis=-1)[..., None]
         mean, square = mean + share * (sample - mean), square + share * (squared - square)
         # Samples that point elsewhere shorten the average: what was before them must not bend it. From here on the few
-        # samples behind it are no start that the next one could contradict.
+        # samples behind it do not make a start that the next one could contradict.
         short = xp.less(xp.sum(mean * mean, axis=-1)[..., None], shortest**2 * square)
         short = xp.logical_and(xp.logical_and(there, unconfirmed), xp.logical_and(short, xp.greater(time, FEW)))
         mean, square = xp.where(short, sample, mean), xp.where(short, squared, square)
