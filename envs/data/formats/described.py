@@ -12,8 +12,9 @@ from pathlib import Path
 import numpy as np
 
 from ....filters.core import rotation
+from ..rate_consistency import rate_consistency
 from ..trajectory import Trajectory
-from .mapping import RecordingMap, Reference, apply_map, as_columns, finite
+from .mapping import RecordingMap, Reference, apply_map, as_columns, finite, recording_time
 from .names import Group, counter_column, groups, is_ros, time_column, time_unit
 from .table import UNITS, Table, factor, plain
 
@@ -109,9 +110,17 @@ def complete(table: Table, mapping: RecordingMap) -> bool:
         return False
     for channel in mapping.columns:
         kind = channel.rpartition("/")[2]
-        if kind in ("gyr", "acc") and plain(mapping.units.get(channel, "")) not in UNITS[kind]:
+        if kind in ("gyr", "acc") and any(plain(unit) not in UNITS[kind] for unit in units_of(table, mapping, channel)):
             return False
     return True
+
+
+def units_of(table: Table, mapping: RecordingMap, channel: str) -> list[str]:
+    """The unit of a channel, or those of its columns, which may differ; empty where none is named."""
+    if channel in mapping.units:
+        return [mapping.units[channel]]
+    columns = as_columns(mapping.columns[channel])
+    return [table.units.get(column, "") for column in ([columns] if isinstance(columns, str) else columns)]
 
 
 def load_described(path: Path, table: Table, name: str) -> list[Trajectory]:
@@ -178,7 +187,7 @@ def plausible_units(table: Table, mapping: RecordingMap) -> dict[str, str]:
     likely = {}
     for channel, names in mapping.columns.items():
         kind = channel.rpartition("/")[2]
-        if channel in mapping.units or kind not in ("gyr", "acc"):
+        if all(units_of(table, mapping, channel)) or kind not in ("gyr", "acc"):
             continue
         with np.errstate(invalid="ignore"):
             size = np.linalg.norm(table.matrix(as_columns(names)), axis=1)
@@ -187,5 +196,22 @@ def plausible_units(table: Table, mapping: RecordingMap) -> dict[str, str]:
             choices = {unit: abs(typical * factor("acc", unit) / 9.81 - 1.0) for unit in ("m/s^2", "g", "mg")}
             likely[channel] = min(choices, key=lambda unit: choices[unit])
         else:
-            likely[channel] = "deg/s" if float(np.nanmax(size)) > 40.0 else "rad/s"
+            likely[channel] = (
+                "deg/s" if float(np.nanmax(size)) > 40.0 or in_degrees(table, mapping, channel) else "rad/s"
+            )
     return likely
+
+
+def in_degrees(table: Table, mapping: RecordingMap, channel: str) -> bool:
+    """Whether rates turn the specific force beside them as it moves if they are read as deg/s."""
+    other = channel.removesuffix("gyr") + "acc"
+    if other not in mapping.columns or (mapping.time is None and mapping.rate is None):
+        return False
+    gyr, acc = (table.matrix(as_columns(mapping.columns[name])) for name in (channel, other))
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            found = rate_consistency(recording_time(table, mapping)[0], gyr, acc)
+    except ValueError:
+        return False
+    return found is not None and found.other_unit == "deg/s"

@@ -93,7 +93,8 @@ def unit_of_time(table: Table, mapping: RecordingMap) -> str:
             scale = as_seconds(table.column(name), "", name).scale
         except ValueError:
             return "s"
-    return {1.0: "s", 1e-3: "ms", 1e-6: "us", 1e-9: "ns"}.get(scale, "s")
+    named = {1.0: "s", 1e-3: "ms", 1e-6: "us", 1e-9: "ns", 86_400.0: "days"}
+    return named.get(scale) or f"{1e6 * scale:.12g} us"
 
 
 def explanation(path: Path) -> str:

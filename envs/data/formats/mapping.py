@@ -307,8 +307,11 @@ def channel(table: Table, mapping: RecordingMap, sensor: str, kind: str, names: 
     if kind in SIZES and not isinstance(columns, str) and len(set(columns)) < len(columns):
         raise ValueError(f"columns[{kind!r}] must be different columns, got {columns}")
     given = first_of(mapping.units, sensor, kind)
-    unit = given or table.unit(columns)
-    scale = factor(kind, unit) if unit and kind in UNITS else 1.0
+    named = [given] if given or isinstance(columns, str) else [table.units.get(name, "") for name in columns]
+    unit = given or (table.unit(columns) if len(set(named)) == 1 or not all(named) else named[0])
+    # Axes may differ in their units.
+    units = named if len(named) == values.shape[1] and not given and all(named) else [unit]
+    scale = np.array([factor(kind, each) if each and kind in UNITS else 1.0 for each in units])
     given_sign = first_of(mapping.signs, sensor, kind)
     try:
         sign = np.asarray(1.0 if given_sign is None else given_sign, dtype=float)

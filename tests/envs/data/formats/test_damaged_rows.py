@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 import scipy.io
 
+from poise.envs.data.formats.draft import draft_map
 from poise.envs.data.formats.load import load_recording, load_recordings
 from poise.envs.data.trajectory import Trajectory
+from poise.filters.core import rotation
 
 from .motion import G, axes, readings, same, write_table
 
@@ -86,6 +88,29 @@ def test_units_may_stand_above_the_names_and_names_in_quotes(tmp_path):
     names = [f"'{name.split(' ')[0]}'" for name in TABLE]
     units = ["s", *["deg/s"] * 3, *["g"] * 3]
     check(loaded(tmp_path, [",".join(units), ",".join(names), *lines_of(tmp_path)[1:]]))
+
+
+def test_axes_may_have_units_of_their_own(tmp_path):
+    table = TABLE | {"gyr_y (deg/s)": GYR[:, 1]}
+    lines = write_table(tmp_path / "a.csv", table).read_text().replace("gyr_y (deg/s)", "gyr_y (rad/s)").splitlines()
+    check(loaded(tmp_path, lines))
+
+
+@pytest.mark.parametrize("degrees", [True, False])
+@pytest.mark.parametrize("clock", [1.0, 1 / 86_400.0])
+def test_a_draft_guesses_the_unit_of_slow_rates_and_of_the_clock(tmp_path, degrees, clock):
+    """A slow sway has no rate that tells the unit by its size."""
+    time = np.arange(1200) / 100.0
+    angles = np.sin(0.4 * np.pi * time)[:, None] * [0.2, 0.1, 0.05]
+    gyr, acc = np.gradient(angles, 0.01, axis=0), rotation.up_in_body(rotation.exp(angles))
+    table = {"time": 45_356.4 + clock * time if clock < 1.0 else time}
+    table |= axes("gyr_{}", np.degrees(gyr) if degrees else gyr, "xyz") | axes("acc_{}", acc, "xyz")
+    text = draft_map(write_table(tmp_path / "a.csv", table))
+    (tmp_path / "a.toml").write_text(text)
+    recording = load_recording(tmp_path / "a.toml")
+    assert f'gyr = "{"deg" if degrees else "rad"}/s"  # guessed' in text
+    np.testing.assert_allclose(recording.time, time, atol=1e-3)
+    same(recording.measurements["imu/gyr"], gyr)
 
 
 def test_decimal_commas_between_commas_are_refused(tmp_path):
