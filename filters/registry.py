@@ -222,7 +222,7 @@ FILTERS: dict[str, Entry] = {
     ),
     "balanced-gyro": Entry(
         f"{BICYCLE}.balanced_gyro:BalancedGyro",
-        "roll and pitch of a bicycle from its gyroscope alone: level on the mean, balanced in turns of unknown speed",
+        "roll and pitch of a bicycle from its gyroscope alone: level on average, balanced in turns of unknown speed",
         HERE,
     ),
     "odometry-aided": Entry(

@@ -1,4 +1,4 @@
-r"""Roll, pitch and speed of a bicycle from its gyroscope alone: level on the mean, and balanced in its turns.
+r"""Roll, pitch and speed of a bicycle from its gyroscope alone: level on average, and balanced in its turns.
 
 A filter of this package, not of a paper. With the rates ω of the platform (x forward, y right, z down) and ψ̇ about the
 vertical, roll φ and pitch χ of a rigid body move with
