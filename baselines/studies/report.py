@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...filters.support.files import write_text
+from ...filters.support.files import replacing, write_text
 from ...filters.support.rows import markdown_table
 from ..plots import save, save_animation
 from .claims import Claim
@@ -76,7 +76,7 @@ class Report:
             raise ValueError(f"a table needs rows, {title!r} has none")
         path = self._new_file("tables", title, ".csv")
         columns = list(dict.fromkeys(name for row in rows for name in row))
-        with path.open("w", encoding="utf-8", newline="") as file:
+        with replacing(path) as part, part.open("w", encoding="utf-8", newline="") as file:
             writer = csv.DictWriter(file, columns, lineterminator="\n")
             writer.writeheader()
             writer.writerows(rows)
