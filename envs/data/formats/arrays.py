@@ -203,7 +203,7 @@ def read_parquet(path: Path) -> Table:
     if frame.index.name or frame.index.dtype.kind in "mM":
         frame = frame.rename_axis(index=frame.index.name or "time").reset_index()
     arrays: dict[str, np.ndarray] = {}
-    labels = {}
+    labels: dict[str, tuple[str, ...]] = {}
     for name, column in frame.items():
         if column.dtype.kind == "m":
             values: np.ndarray | None = column.to_numpy("timedelta64[ns]").astype(np.int64)
