@@ -277,7 +277,7 @@ def check_noise(channel: str, gyr: np.ndarray, acc: np.ndarray) -> Iterator[Find
     noise, other = float(resting.std(axis=0).max()), float(np.median(beside.std(axis=0)))
     if noise < LEAST_NOISE and other > USUAL_NOISE:
         what = f"{noise:.2g} rad/s of noise where it is quiet, beside {other:.2g} m/s² of the accelerometer"
-        cause = "rates in rad/s that were converted from deg/s once too often, or rates that were smoothed"
+        cause = "rates that were converted from deg/s once too often, read in thousandths of a unit, or smoothed"
         yield Finding("warning", channel, what, cause, "Check the unit.")
 
 
