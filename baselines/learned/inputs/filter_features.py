@@ -17,15 +17,7 @@ from ....filters.core.quantity import Channel, Estimate, Measurement, Quantity
 from ....filters.core.sampling import FilterState, GapWatch
 from ....filters.registry import make, name_of
 from ..gains.gain_shares import filter_of
-from .front_end import (
-    IntervalSums,
-    Seen,
-    channel_values,
-    channel_width,
-    check_interval,
-    interval_sums,
-    sine_cosine,
-)
+from .front_end import IntervalSums, Seen, check_interval, interval_sums
 
 LONGEST_GAP = 0.5
 """s without any input after which the filter stands alone: the network was trained on lost samples, not on longer gaps.
@@ -51,8 +43,8 @@ class FilterFeatures:
     """Features of a Kalman filter's run, each the mean over an interval.
 
     In this order: the filter's outputs (angles as sine and cosine, which have means where angles wrap), the logarithms
-    of the standard deviations of its error state, its whitened innovations, and the channels of the sensors (angles
-    again as sine and cosine). Networks learn the scale of each feature from the training data.
+    of the standard deviations of its error state, its whitened innovations, and the channels of the sensors. Networks
+    learn the scale of each feature from the training data.
 
     Attributes:
         kalman: the filter; the head corrects its outputs.
@@ -97,7 +89,7 @@ class FilterFeatures:
         """Number of features."""
         widths = (2 * q.size if q.kind == "angle" else q.size for q in self.kalman.outputs)
         model = self.kalman.model
-        return sum(widths) + model.error_size + model.residual_size + channel_width(self._shown)
+        return sum(widths) + model.error_size + model.residual_size + sum(c.size for c in self._shown)
 
     @property
     def _shown(self) -> list[Channel]:
@@ -159,11 +151,12 @@ class FilterFeatures:
         parts = []
         for quantity in self.kalman.outputs:
             value = np.asarray(estimate.pose[quantity.name])
-            parts.append(sine_cosine(value) if quantity.kind == "angle" else value)
+            parts += [np.sin(value), np.cos(value)] if quantity.kind == "angle" else [value]
         variances = np.diagonal(np.asarray(estimate.covariance), axis1=-2, axis2=-1)
         parts.append(0.5 * np.log(np.maximum(variances, 1e-16)))
         parts.append(np.clip(np.asarray(estimate.innovation), -10.0, 10.0))
-        return np.concatenate([*parts, channel_values(self._shown, arrays)], axis=-1)
+        parts += [np.asarray(arrays[channel.name], dtype=float) for channel in self._shown]
+        return np.concatenate(parts, axis=-1)
 
     def _seen(self, estimate: Estimate, found: IntervalSums, due: np.ndarray, since: np.ndarray) -> Seen:
         features = np.where(due[..., None] > 0.0, found.sums / np.maximum(found.known, 1.0), 0.0)

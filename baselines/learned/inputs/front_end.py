@@ -6,7 +6,7 @@ does not depend on that rate, so that one set of weights serves every rate that 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from types import MappingProxyType
@@ -115,27 +115,6 @@ def interval_ends(first: int, count: int, dt: float, interval: float) -> np.ndar
     return np.diff(numbers) > 0.0
 
 
-def sine_cosine(angle: Array) -> np.ndarray:
-    """An angle ``(..., n)`` as ``(..., 2 n)`` numbers that have means where it wraps."""
-    return np.concatenate([np.sin(angle), np.cos(angle)], axis=-1)
-
-
-def is_angle(channel: Channel) -> bool:
-    """Whether the readings of a channel wrap, as those of a crank."""
-    return channel.unit == "rad"
-
-
-def channel_width(channels: Iterable[Channel]) -> int:
-    """How many numbers :func:`channel_values` gives."""
-    return sum(2 * channel.size if is_angle(channel) else channel.size for channel in channels)
-
-
-def channel_values(channels: Iterable[Channel], arrays: Mapping[str, Array]) -> np.ndarray:
-    """What a network sees of channels ``(..., M)``: their readings, of angles sine and cosine."""
-    values = [(channel, np.asarray(arrays[channel.name], dtype=float)) for channel in channels]
-    return np.concatenate([sine_cosine(each) if is_angle(channel) else each for channel, each in values], axis=-1)
-
-
 class IntervalSums(NamedTuple):
     """Sums over the samples of an interval so far; arrays only, so a copy of them saves it.
 
@@ -185,19 +164,19 @@ def interval_sums(values: np.ndarray, dt: float, interval: float) -> tuple[Inter
 class RawChannels:
     """The channels of the sensors and nothing else: the mean over each interval, and the share of samples that came.
 
-    Angles are sines and cosines, see :func:`channel_values`.
-
     Attributes:
         channels: what is read.
+        scales: unit of each channel in which its numbers are of the order of one; None: 1.
         interval: s between updates of the network.
         dt: sampling interval, s.
         paper: name of the filter whose paper defines the angles that are estimated; None: they are in the truth.
 
     Raises:
-        ValueError: no channels, or sampling slower than the network.
+        ValueError: no channels, another number of scales, or sampling slower than the network.
     """
 
     channels: tuple[Channel, ...]
+    scales: tuple[float, ...] | None = None
     interval: float = 0.04
     dt: float = 0.01
     paper: str | None = None
@@ -207,6 +186,8 @@ class RawChannels:
     def __post_init__(self) -> None:
         if not self.channels:
             raise ValueError("channels must name at least one, got none")
+        if self.scales is not None and len(self.scales) != len(self.channels):
+            raise ValueError(f"scales must be {len(self.channels)}, one a channel, got {len(self.scales)}")
         check_interval(self.dt, self.interval)
 
     @cached_property
@@ -217,8 +198,8 @@ class RawChannels:
 
     @property
     def size(self) -> int:
-        """Two for each number that the channels give."""
-        return 2 * channel_width(self.channels)
+        """Two for each element of the channels."""
+        return 2 * sum(channel.size for channel in self.channels)
 
     def with_dt(self, dt: float) -> Self:
         """See :class:`FrontEnd`."""
@@ -231,14 +212,17 @@ class RawChannels:
     def describe(self) -> dict[str, Any]:
         """See :class:`FrontEnd`."""
         channels = [[channel.name, channel.size, channel.unit] for channel in self.channels]
-        usual = {"kind": self.kind, "channels": channels, "interval": self.interval}
+        scales = None if self.scales is None else list(self.scales)
+        usual = {"kind": self.kind, "channels": channels, "scales": scales, "interval": self.interval}
         return usual | ({} if self.paper is None else {"paper": self.paper})
 
     @classmethod
     def read(cls, described: Mapping[str, Any], dt: float) -> Self:
         """The inverse of :meth:`describe`."""
         channels = tuple(Channel(str(name), int(size), str(unit)) for name, size, unit in described["channels"])
-        return cls(channels, float(described["interval"]), dt, described.get("paper"))
+        scales = described.get("scales")
+        scales = None if scales is None else tuple(scales)
+        return cls(channels, scales, float(described["interval"]), dt, described.get("paper"))
 
     def init(self, measurement: Measurement) -> IntervalSums:
         """See :class:`FrontEnd`."""
@@ -246,14 +230,19 @@ class RawChannels:
 
     def step(self, state: IntervalSums, measurement: Measurement) -> tuple[IntervalSums, Seen]:
         """See :class:`FrontEnd`."""
-        values = channel_values(self.channels, check_measurements(self.channels, measurement, time_axis=False))
+        values = self._scaled(check_measurements(self.channels, measurement, time_axis=False))
         after, now, due = state.add(values, self.dt, self.interval)
         return after, self._seen(now, due)
 
     def run(self, measurements: Mapping[str, Any]) -> Seen:
         """See :class:`FrontEnd`."""
-        values = channel_values(self.channels, check_measurements(self.channels, measurements, time_axis=True))
+        values = self._scaled(check_measurements(self.channels, measurements, time_axis=True))
         return self._seen(*interval_sums(values, self.dt, self.interval))
+
+    def _scaled(self, arrays: Mapping[str, Array]) -> np.ndarray:
+        scales = self.scales or (1.0,) * len(self.channels)
+        parts = [np.asarray(arrays[c.name], dtype=float) / s for c, s in zip(self.channels, scales, strict=True)]
+        return np.concatenate(parts, axis=-1)
 
     def _seen(self, found: IntervalSums, due: np.ndarray) -> Seen:
         length = max(1.0, round(self.interval / self.dt))

@@ -21,14 +21,14 @@ from poise.filters.core import rotation
 from poise.filters.core.estimator import run_by_steps
 from poise.filters.core.metrics import heading_error
 from poise.filters.core.model import equations_of
-from poise.filters.core.quantity import ACCELEROMETER, GYROSCOPE, Channel, Estimate, Measurement
+from poise.filters.core.quantity import ACCELEROMETER, GYROSCOPE, Estimate, Measurement
 from poise.filters.registry import make
 
 RATE = 137.0
 PAIR = ("process", "velocity")
 """Gains of the bank."""
 ENDS: dict[str, FrontEnd] = {
-    "raw": RawChannels((GYROSCOPE, ACCELEROMETER)),
+    "raw": RawChannels((GYROSCOPE, ACCELEROMETER), (3.0, 10.0)),
     "level": LevelFrame(),
     "level of a filter": LevelFrame(make("bounded-motion")),
     "bank": FilterBank(LevelFrame(make("bounded-motion")), ((0.3, 1.0), (1.0, 4.0)), PAIR),
@@ -166,21 +166,11 @@ def test_too_slow_a_sensor_is_refused(name: str) -> None:
         ENDS[name].with_dt(0.05)
 
 
-def test_an_angle_may_wrap_inside_an_interval() -> None:
-    """The mean of readings on both sides of ±180° is no angle; that of sine and cosine is."""
-    crank = Channel("crank/angle", 1, "rad")
-    front_end = RawChannels((crank, GYROSCOPE), dt=0.01)
-    angle = np.pi + 0.1 * (np.arange(8) - 1.5)
-    wrapped = np.arctan2(np.sin(angle), np.cos(angle))[:, None]
-    seen = front_end.run({"crank/angle": wrapped, "imu/gyr": np.ones((8, 3))})
-    assert seen.features.shape == (8, front_end.size) == (8, 10)
-    due = seen.features[seen.due == 1.0]
-    np.testing.assert_allclose(np.arctan2(due[0, 0], due[0, 1]) % (2.0 * np.pi), angle[:4].mean(), atol=1e-9)
-
-
 def test_what_cannot_be_is_refused() -> None:
     with pytest.raises(ValueError, match="at least one"):
         RawChannels(())
+    with pytest.raises(ValueError, match="scales must be 1"):
+        RawChannels((GYROSCOPE,), (1.0, 2.0))
     with pytest.raises(ValueError, match="must estimate a relative orientation"):
         LevelFrame(make("external-acceleration"))
     with pytest.raises(ValueError, match="must have a filter with the gains"):
