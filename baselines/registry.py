@@ -80,6 +80,14 @@ TRAINED: dict[str, Entry] = {
         "learned",
         {"weights": "bounded-motion_network"},
     ),
+    "bounded-motion-9+network": Entry(
+        NETWORKS["LearnedEstimator"],
+        "bounded-motion-rest-9 in four tunings, headings weighed by a recurrent network trained on simulated motion",
+        HERE,
+        "learned",
+        {"weights": "bounded-motion-9_network"},
+        experimental=True,
+    ),
     **{
         f"{name}+network": Entry(
             NETWORKS["LearnedEstimator"],
