@@ -22,10 +22,10 @@ import numpy as np
 
 from ...filters.core import rotation
 from ...filters.core.quantity import STANDARD_GRAVITY
-from ...filters.support.optional import extra
+from ...filters.support.optional import extra, silent
 from ..sensors.ideal import BodyState
 
-with extra("sim"):
+with extra("sim"), silent():
     import pybullet
 
 BASE = -1

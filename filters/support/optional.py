@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -40,3 +41,16 @@ def extra(name: str | None = None) -> Iterator[None]:
         if found is None:
             raise
         raise MissingExtraError(f"{module} is not installed: pip install 'poise[{found}]'", name=module) from None
+
+
+@contextmanager
+def silent() -> Iterator[None]:
+    """Surround an import whose machine code writes to standard error, as that of PyBullet writes when it was built."""
+    kept, nothing = os.dup(2), os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(nothing, 2)
+        yield
+    finally:
+        os.dup2(kept, 2)
+        os.close(kept)
+        os.close(nothing)
