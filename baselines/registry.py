@@ -118,7 +118,7 @@ TRAINED: dict[str, Entry] = {
             {"weights": f"gru-{name}-bicycle"},
             experimental=True,  # a comparison: all lose to the filter of the paper
         )
-        for name in ("two-gyro", "force-inertial")
+        for name in ("two-gyro", "force-inertial", "whole-body")
     },
     **{
         f"{name}+noise": Entry(

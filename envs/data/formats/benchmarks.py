@@ -23,11 +23,11 @@ from .. import reference_clock
 from ..trajectory import Trajectory
 from .arrays import ZIP, load_mat, load_npz, read_table, time_first
 from .folders import load_streams
-from .head import Head
 from .mapping import RecordingMap, Reference, apply_map
 from .names import groups, time_column
 from .stamps import as_seconds
 from .streams import Stream, interpolated
+from .text import Head
 
 SI_UNITS = {"gyr": "rad/s", "acc": "m/s^2"}
 EUROC_TRUTH = ("state_groundtruth_estimate0", "vicon0", "mocap0")

@@ -14,7 +14,7 @@ import numpy as np
 from ....filters.core import rotation
 from ..rate_consistency import rate_consistency
 from ..trajectory import Trajectory
-from .mapping import RecordingMap, Reference, apply_map, as_columns, finite, recording_time
+from .mapping import RecordingMap, Reference, apply_map, as_columns, finite
 from .names import Group, counter_column, groups, is_ros, time_column, time_unit
 from .table import UNITS, Table, factor, plain
 
@@ -211,7 +211,7 @@ def in_degrees(table: Table, mapping: RecordingMap, channel: str) -> bool:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            found = rate_consistency(recording_time(table, mapping)[0], gyr, acc)
+            found = rate_consistency(mapping.times(table)[0], gyr, acc)
     except ValueError:
         return False
     return found is not None and found.other_unit == "deg/s"

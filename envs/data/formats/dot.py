@@ -18,12 +18,11 @@ from ....filters.core import rotation
 from ..trajectory import Trajectory
 from .arrays import read_table
 from .described import with_checked_orientation
-from .head import Head
 from .mapping import Columns, RecordingMap, Reference, apply_map, trajectory_of
 from .names import groups
 from .stamps import as_seconds
 from .table import Table
-from .text import table_of
+from .text import Head, table_of
 
 DEVICE_KEYS = ("DeviceTag", "DeviceId", "OutputRate", "FilterProfile", "Measurement Mode", "SyncStatus", "Measurement")
 UNITS = {"gyr": "rad/s", "acc": "m/s²", "mag": "calibration field", "onboard_orientation": "1"}

@@ -20,12 +20,12 @@ from ....filters.core.quantity import STANDARD_GRAVITY
 from ..trajectory import Trajectory
 from .arrays import read_table
 from .described import with_checked_orientation
-from .head import Head
 from .mapping import unit_quaternions
 from .names import AXES, groups, time_column, time_unit, words
 from .stamps import Stamps, as_seconds
 from .streams import Stream, joined
 from .table import Table, factor
+from .text import Head
 
 SUFFIXES = (".csv", ".txt", ".tsv")
 PREFERRED = {

@@ -21,9 +21,8 @@ from .described import complete, load_described, mapping_of, with_checked_orient
 from .dot import is_dot, is_xsens, load_dot, load_xsens
 from .draft import explanation
 from .folders import is_folder_of_streams, is_member, load_member
-from .head import Head
 from .mapping import RecordingMap, apply_map, make_map, read_map
-from .text import table_of
+from .text import Head, table_of
 
 
 @dataclass(frozen=True)

@@ -21,9 +21,8 @@ from ....filters.support.names import unknown
 from ....filters.support.parameters import check_parameters
 from ..ranges import full_scale
 from ..trajectory import Trajectory
-from .names import time_unit
-from .stamps import as_seconds
-from .table import DAMAGED, UNITS, Table, factor, split_unit
+from .row_times import row_times, with_times
+from .table import UNITS, Table, factor
 
 Columns = str | Sequence[str | int]
 SIZES = {"gyr": 3, "acc": 3, "mag": 3}
@@ -36,9 +35,6 @@ FRAMES = {
     "y-up": (np.sqrt(0.5), np.sqrt(0.5), 0.0, 0.0),
 }
 """World axes of a reference → quaternion to east, north, up."""
-FRACTIONS = {"nanosec": 1, "nsecs": 1, "nsec": 1, "nanosecs": 1, "ns": 1, "usec": 10**3, "us": 10**3, "msec": 10**6}
-FRACTIONS |= {"usecs": 10**3, "msecs": 10**6, "millis": 10**6, "ms": 10**6}
-"""End of the name of a column that holds fractions of seconds → its unit in ns."""
 CODES = (99.0, 888.0, 999.0, 8888.0, 9999.0, 32767.0, 32768.0, 65535.0, 99999.0, 999999.0, 9999999.0)
 """Magnitudes that loggers write where there is no value."""
 
@@ -137,6 +133,11 @@ class RecordingMap:
             found.setdefault(sensor or "imu", {})[kind] = names
         return found
 
+    def times(self, table: Table) -> tuple[np.ndarray, dict[str, Any]]:
+        """Time ``(N,)`` in s of the rows of a table, and metadata on the clock."""
+        time = None if self.time is None else str(self.time)
+        return row_times(table, time, self.rate, self.counter, self.units.get("time"))
+
 
 def as_columns(names: Columns) -> str | list[str]:
     """Names of columns; numbers count columns from 0."""
@@ -228,8 +229,8 @@ def apply_map(table: Table, mapping: RecordingMap, path: Path) -> list[Trajector
     Raises:
         ValueError: a column is missing or unreadable, or the time is.
     """
-    table = with_times(table, mapping)
-    seconds, clock = recording_time(table, mapping)
+    table = with_times(table, None if mapping.time is None else str(mapping.time))
+    seconds, clock = mapping.times(table)
     sensors = mapping.sensors()
     for reference in mapping.reference:
         if reference.sensor is not None and reference.sensor.lower() not in [name.lower() for name in sensors]:
@@ -259,20 +260,6 @@ def apply_map(table: Table, mapping: RecordingMap, path: Path) -> list[Trajector
             details.setdefault("full_scale", ranges)
         trajectories.append(trajectory_of(seconds, measurements, truth, details))
     return trajectories
-
-
-def with_times(table: Table, mapping: RecordingMap) -> Table:
-    """The table without the few rows that have no time, with a warning: averages below a table, or damaged lines."""
-    values = None if mapping.time is None else table.column(str(mapping.time))
-    if values is None or values.dtype.kind != "f" or values.ndim != 1 or len(values) != len(table):
-        return table
-    known = np.isfinite(values)
-    lost = int((~known).sum())
-    if not 0 < lost < DAMAGED * len(values):
-        return table
-    first = int(np.flatnonzero(~known)[0])
-    warnings.warn(f"{lost} rows without a time are left out, the first is row {first}", stacklevel=5)
-    return table.rows(known)
 
 
 def trajectory_of(
@@ -366,52 +353,3 @@ def unit_quaternions(q: np.ndarray, what: str = "quaternions") -> np.ndarray:
 def first_of(given: Mapping[str, Any], sensor: str, kind: str) -> Any:
     """What a channel or, failing that, its kind is given."""
     return given.get(f"{sensor}/{kind}", given.get(kind))
-
-
-def check_labels(table: Table, elapsed: np.ndarray) -> None:
-    """Refuse rows of several sensors at the same times; warn where rows only seem to be those of several."""
-    for name, labels in table.labels.items():
-        what = f"rows of several sensors stand under one another (column {name}: {', '.join(labels[:5])})"
-        if len(elapsed) > 1 and float((np.diff(elapsed) == 0.0).mean()) > 0.3:
-            raise ValueError(f"{what}: give each sensor a file of its own")
-        warnings.warn(f"{what}? Then give each a file of its own", stacklevel=6)
-
-
-def recording_time(table: Table, mapping: RecordingMap) -> tuple[np.ndarray, dict[str, Any]]:
-    """Time ``(N,)`` in s from the first row, and metadata on the clock."""
-    length = len(table)
-    details: dict[str, Any] = {} if mapping.rate is None else {"nominal_rate": float(mapping.rate)}
-    if mapping.time is not None:
-        name = str(mapping.time)
-        unit = mapping.units.get("time") or time_unit(table, name)
-        values = table.column(name)
-        name = name if name in table else split_unit(name)[0]
-        rest = fraction_column(name, table)
-        if rest is not None:
-            values, unit = values.astype(np.int64) * 10**9 + table.column(rest[0]).astype(np.int64) * rest[1], "ns"
-        stamps = as_seconds(values, unit, name)
-        check_labels(table, stamps.elapsed)
-        return stamps.elapsed, details | {"clock_start": stamps.first}
-    if mapping.rate is None:
-        raise ValueError("name the column of the time (time=…) or the sampling rate in Hz (rate=…)")
-    if mapping.counter is not None:
-        stamps = as_seconds(table.column(mapping.counter), "s", mapping.counter)
-        return stamps.elapsed / mapping.rate, details | {"clock_start": stamps.first}
-    return np.arange(length) / mapping.rate, details
-
-
-def fraction_column(name: str, table: Table) -> tuple[str, int] | None:
-    """The column of the fraction beside one of whole seconds, and its unit in ns; None if there is none.
-
-    Such are ROS's ``stamp.secs`` and ``stamp.nsecs``, and ``sec`` and ``msec`` of data loggers.
-    """
-    stem, seconds = re.sub(r"(secs?|seconds?|s)$", "", name), table.arrays.get(name)
-    if table.units.get(name) == "s":
-        stem = f"{name}_"  # the unit was cut off
-    if stem == name or seconds is None or not np.array_equal(seconds, np.rint(seconds)):
-        return None
-    for end, unit in FRACTIONS.items():
-        rest = table.arrays.get(stem + end)
-        if rest is not None and rest.ndim == 1 and rest.min() >= 0 and rest.max() < 10**9 // unit:
-            return stem + end, unit
-    return None

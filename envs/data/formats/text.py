@@ -12,6 +12,8 @@ import csv
 import io
 import re
 import warnings
+from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -25,6 +27,8 @@ if TYPE_CHECKING:
 
 ALIKE = str.maketrans({"\u2212": "-", "\u00a0": " ", "\u202f": " ", "\u2009": " ", "\ufeff": None, "\x1a": None})
 """Signs and spaces of typesetters → those of numbers."""
+HEAD_LENGTH = 16384
+"""Bytes of a file that recognisers see."""
 COMMENT = ("#", "//", "%")
 DELIMITERS = (",", ";", "\t", "|", " ")
 SAMPLE = 400
@@ -336,3 +340,39 @@ def names_and_units(heads: list[list[str]], width: int) -> tuple[list[str], dict
         if unit or unit_line[column]:
             units[name] = unit or unit_line[column]
     return names, units
+
+
+@dataclass(frozen=True)
+class Head:
+    """The beginning of a file, or the names in a folder."""
+
+    path: Path
+
+    @cached_property
+    def folder(self) -> bool:
+        """Whether it is a folder."""
+        return self.path.is_dir()
+
+    @cached_property
+    def content(self) -> bytes:
+        """First bytes of a file; none of a folder."""
+        if self.folder:
+            return b""
+        with self.path.open("rb") as file:
+            return file.read(HEAD_LENGTH)
+
+    @cached_property
+    def text(self) -> str:
+        """First lines of a text file; empty of others."""
+        if not is_text(self.content):
+            return ""
+        text = decode(self.content)
+        # The last line is cut off, perhaps within quotes.
+        return text[: text.rfind("\n") + 1] or text if len(self.content) == HEAD_LENGTH else text
+
+    @cached_property
+    def names(self) -> dict[str, Path]:
+        """Visible files of a folder by their names in lower case."""
+        if not self.folder:
+            return {}
+        return {each.name.lower(): each for each in sorted(self.path.iterdir()) if not each.name.startswith(".")}
