@@ -17,6 +17,7 @@ import numpy as np
 
 from ...envs.data.plausibility import seen
 from ...envs.data.trajectory import Trajectory
+from ...filters.core.quantity import GRAVITY
 from ..registry import list_estimators
 from .data_sets import NORTH, dataset_of
 
@@ -234,7 +235,7 @@ def notes_on(trajectory: Trajectory, motion: Motion, near: Sequence[Mapping[str,
     if motion.lasting > 1.0:
         notes.append(
             f"acceleration of {motion.lasting:.1f} m/s² lasts for a second: "
-            f"taken for gravity, it is {np.degrees(np.arctan2(motion.lasting, 9.81)):.0f}° of inclination"
+            f"taken for gravity, it is {np.degrees(np.arctan2(motion.lasting, GRAVITY)):.0f}° of inclination"
         )
     if motion.rate < 40.0:
         notes.append(f"{motion.rate:.0f} Hz is slow: it turns {motion.turning / motion.rate:.1f}° between two samples")

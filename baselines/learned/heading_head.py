@@ -12,7 +12,7 @@ from ...filters.core import rotation
 from ...filters.core.backend import Array, namespace
 from ...filters.core.metrics import length
 from ...filters.core.quantity import ORIENTATION, UP, Estimate, Quantity
-from ...filters.imu.magnetic_heading import turn_heading
+from ...filters.imu.magnetic_heading import heading_between, turn_heading
 from .head import of_sequences
 from .inputs.front_end import Seen
 from .mixture_head import MixtureHead
@@ -49,9 +49,7 @@ class HeadingHead(MixtureHead):
 
     def target(self, seen: Seen, trajectory: Trajectory) -> np.ndarray:
         """See :class:`.head.Head`: the true heading less that of the filter, rad."""
-        base = rotation.conjugate(seen.base["relative_orientation"])
-        turn = np.asarray(rotation.multiply(trajectory.truth_of(ORIENTATION.name), base))
-        return np.asarray(rotation.wrap(2.0 * np.arctan2(turn[..., 3:], turn[..., :1])))
+        return np.asarray(heading_between(trajectory.truth_of(ORIENTATION.name), seen.base["relative_orientation"]))
 
     def loss(self, output: Any, target: Any, spread: Any, mask: Any) -> Any:
         """Mean over sequences of the logarithm of the ratio of root mean square errors, to the published filter's.

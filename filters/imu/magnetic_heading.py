@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from ..core.backend import Array, constant, expand, namespace
 from ..core.model import Model
 from ..core.quantity import Measurement
-from ..core.rotation import from_axis_angle, level, multiply, norm, rotate, wrap
+from ..core.rotation import conjugate, from_axis_angle, level, multiply, norm, rotate, wrap
 
 
 def heading_error(q: Array, field: Array, declination: Array) -> Array:
@@ -37,6 +37,12 @@ def turn_heading(q: Array, angle: Array) -> Array:
     xp = namespace(q)
     zero = 0.0 * angle
     return multiply(from_axis_angle(xp.concat([zero, zero, zero + 1.0], axis=-1), angle[..., 0]), q)
+
+
+def heading_between(q: Array, other: Array) -> Array:
+    """Heading of an orientation ``(..., 4)`` less that of another, ``(..., 1)`` rad: that of ``q ⊗ other⁻¹``."""
+    turn = multiply(q, conjugate(other))
+    return wrap(2.0 * namespace(turn).atan2(turn[..., 3:], turn[..., :1]))
 
 
 def align(specific_force: Array, field: Array, declination: Array) -> Array:

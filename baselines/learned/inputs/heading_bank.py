@@ -14,7 +14,7 @@ from typing import ClassVar
 
 from ....filters.core.backend import Array, namespace
 from ....filters.core.quantity import Estimate
-from ....filters.core.rotation import conjugate, multiply
+from ....filters.imu.magnetic_heading import heading_between
 from .filter_bank import FilterBank
 from .gravity_aligned_frame import SCALARS, VECTORS
 
@@ -53,10 +53,7 @@ class HeadingBank(FilterBank):
 
     def _candidates(self, orientation: Array, others: Estimate) -> Array:
         """Headings ``(..., K)`` of the others less that of the filter, rad."""
-        turn = multiply(others.pose["orientation"], conjugate(orientation)[..., None, :])
-        xp = namespace(turn)
-        twice = 2.0 * xp.atan2(turn[..., 3], turn[..., 0])
-        return xp.atan2(xp.sin(twice), xp.cos(twice))
+        return heading_between(others.pose["orientation"], orientation[..., None, :])[..., 0]
 
     def _features(self, motion: Array, candidates: Array, sigma: Array) -> Array:
         """Features of the level frame, and of candidates ``(..., K)``, in terms that depend on no heading."""

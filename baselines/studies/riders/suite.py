@@ -18,7 +18,7 @@ from ....filters.support.resume import is_kept, keep, kept
 from ...learned.presets import PRESETS, seeds_of
 from ...learned.rides import UNSEEN, unseen_rides
 from ...registry import TRAINED, make_estimator
-from ...weights_io import load_weights
+from ...weights_io import load_card
 from .bounds import angle_bounds
 from .errors import Errors, angle_names, angles_of, errors_of, score, truth_of
 from .learnt import Learnt, learn
@@ -155,7 +155,7 @@ def constant_deviations(name: str) -> np.ndarray | None:
     None where its card does not tell.
     """
     weights = TRAINED[name].fixed.get("weights") if name in TRAINED else None
-    card = {} if weights is None else load_weights(weights)[1]
+    card = {} if weights is None else load_card(weights)
     constant = (card.get("calibration") or {}).get("constant")
     return None if constant is None else np.array(constant)
 

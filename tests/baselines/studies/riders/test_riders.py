@@ -168,7 +168,7 @@ def test_the_comparison_of_one_paper(monkeypatch: pytest.MonkeyPatch, tmp_path: 
 
 def test_constant_deviations_are_told_of_consistency_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     card = {"calibration": {"constant": [0.1, 0.2]}}
-    monkeypatch.setattr(suite, "load_weights", lambda name: ({}, card))
+    monkeypatch.setattr(suite, "load_card", lambda name: card)
     assert suite.constant_deviations("two-gyro") is None
     assert suite.constant_deviations("two-gyro+network") == pytest.approx([0.1, 0.2])
     card["calibration"] = {}
