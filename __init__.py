@@ -31,8 +31,8 @@ if TYPE_CHECKING:
     from .baselines.run import run, smooth
     from .envs.data.calibration.records import apply_calibration, load_calibration
     from .envs.data.formats.load import load_recording, load_recordings
-    from .envs.data.plausibility import check_recording
-    from .envs.data.readings import Finding
+    from .envs.data.plausibility.readings import Finding
+    from .envs.data.plausibility.recording import check_recording
     from .envs.data.trajectory import Trajectory
     from .envs.exchange.minari_data import from_minari, to_minari
     from .envs.record import record
@@ -70,12 +70,12 @@ _HOMES = {
     "Estimate": ".filters.core.quantity",
     "Estimator": ".filters.core.estimator",
     "EstimatorInfo": ".baselines.registry",
-    "Finding": ".envs.data.readings",
+    "Finding": ".envs.data.plausibility.readings",
     "OnlineEstimator": ".baselines.online",
     "SensorKind": ".envs.sensors.kinds",
     "Trajectory": ".envs.data.trajectory",
     "apply_calibration": ".envs.data.calibration.records",
-    "check_recording": ".envs.data.plausibility",
+    "check_recording": ".envs.data.plausibility.recording",
     "evaluate": ".baselines.evaluation",
     "from_minari": ".envs.exchange.minari_data",
     "list_estimators": ".baselines.registry",

@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 import numpy as np
 
 from ..envs.data.formats.load import load_recordings
-from ..envs.data.plausibility import check_recording, sites
+from ..envs.data.plausibility.recording import check_recording
+from ..envs.data.plausibility.sites import sites
 from ..envs.data.reference_clock import measured
 from ..envs.data.trajectory import REFERENCE_CLOCK, Trajectory
 from ..filters.core.estimator import Estimator

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 
-from ...envs.data.plausibility import seen
+from ...envs.data.plausibility.sites import seen
 from ...envs.data.trajectory import Trajectory
 from ...filters.core.quantity import GRAVITY
 from ..registry import list_estimators

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from .plausibility import seen, sites
-from .readings import clipped_share
+from .plausibility.readings import clipped_share
+from .plausibility.sites import seen, sites
 from .trajectory import Trajectory
 
 REST_WINDOW = 1.0

@@ -194,7 +194,7 @@ class FirstSamples:
     def _check(self) -> None:
         import numpy as np
 
-        from ...envs.data.plausibility import check_recording
+        from ...envs.data.plausibility.recording import check_recording
         from ...envs.data.trajectory import Trajectory
 
         # A restart would be a gap.

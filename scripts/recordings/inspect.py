@@ -30,7 +30,7 @@ class Args:
 def run(args: Args) -> int:
     """Describe, check, draw."""
     from ...envs.data.inspection import inspect_recording
-    from ...envs.data.plausibility import check_recording
+    from ...envs.data.plausibility.recording import check_recording
     from .load import load_all, plain_warnings, say_passed_over
 
     check_file("plot", args.plot, args.recordings, FIGURES)

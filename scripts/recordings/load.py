@@ -85,7 +85,7 @@ def at_site(trajectory: Trajectory, site: str) -> Trajectory:
         return imu_of(trajectory, site)
     channels = site_channels(trajectory, site)
     if not channels:
-        from ...envs.data.plausibility import sites
+        from ...envs.data.plausibility.sites import sites
 
         raise ValueError(f"{trajectory.name!r} has no sensor {site!r}; there are {', '.join(sites(trajectory))}")
     truth = {
@@ -112,7 +112,7 @@ def sensors_of(trajectory: Trajectory, channels: Sequence[str] = ()) -> list[Tra
         trajectory: the recording.
         channels: what an estimator reads: the recording itself if it has them all.
     """
-    from ...envs.data.plausibility import sites
+    from ...envs.data.plausibility.sites import sites
 
     if "imu/gyr" in trajectory.measurements or (channels and set(channels) <= set(trajectory.measurements)):
         return [trajectory]

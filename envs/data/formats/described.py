@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from ....filters.core import rotation
-from ..rate_consistency import rate_consistency
+from ..plausibility.rate_consistency import rate_consistency
 from ..trajectory import Trajectory
 from .mapping import RecordingMap, Reference, apply_map, as_columns, finite
 from .names import Group, counter_column, groups, is_ros, time_column, time_unit

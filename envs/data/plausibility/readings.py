@@ -9,8 +9,8 @@ from typing import Literal
 
 import numpy as np
 
-from ...filters.core.quantity import ACCELEROMETER, GYROSCOPE, MAGNETOMETER
-from .glitches import LEAST, glitches
+from ....filters.core.quantity import ACCELEROMETER, GYROSCOPE, MAGNETOMETER
+from ..glitches import LEAST, glitches
 
 CHANNELS = {"gyr": GYROSCOPE, "acc": ACCELEROMETER, "mag": MAGNETOMETER}
 LONGEST_ABSENCE = 0.3

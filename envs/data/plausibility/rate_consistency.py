@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...filters.core import rotation
+from ....filters.core import rotation
 
 SEGMENT = 1.0
 """s over which acceleration averages out; three of them are one window."""

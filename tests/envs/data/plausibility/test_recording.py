@@ -7,8 +7,8 @@ import pytest
 
 import poise
 from poise.envs.data.inspection import inspect_recording
-from poise.envs.data.plausibility import check_recording
-from poise.envs.data.rate_consistency import rate_consistency
+from poise.envs.data.plausibility.rate_consistency import rate_consistency
+from poise.envs.data.plausibility.recording import check_recording
 from poise.envs.data.trajectory import Trajectory
 from poise.envs.hand.sensing import simulate_hand
 from poise.filters.core import rotation

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from poise.envs.data.plausibility import check_recording
+from poise.envs.data.plausibility.recording import check_recording
 from poise.envs.data.trajectory import Trajectory
 from poise.envs.hand.sensing import simulate_hand
 

@@ -6,10 +6,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ...filters.core import rotation
+from ....filters.core import rotation
+from ..trajectory import Trajectory
 from .rate_consistency import FASTEST_TURN, RateConsistency, rate_consistency
 from .readings import Finding
-from .trajectory import Trajectory
 
 LEANING, STILL = 0.2, 0.05
 """rad by which a specific force must lean for a gyroscope to show it; below which share of that it shows none."""

@@ -1,0 +1,1 @@
+"""Plausibility of recordings: clocks, units, signs, axes, and sensors that contradict one another."""

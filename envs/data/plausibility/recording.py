@@ -1,0 +1,74 @@
+"""Plausibility of a recording: SI units, signs and axes of a right-handed sensor, time in seconds.
+
+An estimator cannot distinguish a wrong unit from strong motion. Each check here compares a number with limits from
+physics and other channels, and names the most likely mistake.
+"""
+
+from __future__ import annotations
+
+import warnings
+
+from ..trajectory import Trajectory
+from .clocks import check_clock
+from .readings import Finding, check_alive, check_copies
+from .reference import check_frozen, check_reference
+from .sites import seen, sites, vectors
+from .turning import check_rates, compared
+from .units import check_field, check_force, check_noise, check_rest, check_sign
+
+
+def check_recording(trajectory: Trajectory) -> list[Finding]:
+    """Look for wrong units, signs, axes and clocks.
+
+    Args:
+        trajectory: any; every ``site/gyr``, ``site/acc`` and ``site/mag`` is checked.
+
+    Returns:
+        Findings, warnings first; empty for a plausible recording.
+
+    Raises:
+        ValueError: ``trajectory`` is not a :class:`.Trajectory`.
+    """
+    if not isinstance(trajectory, Trajectory):
+        raise ValueError(f"trajectory must be a Trajectory, such as poise.load_recording gives, got {trajectory!r}")
+    findings = list(check_clock(trajectory))
+    wrong_clock = any(finding.severity == "warning" for finding in findings)
+    if not wrong_clock:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            trajectory = trajectory.on_grid()
+    for site in sites(trajectory):
+        findings += check_site(trajectory, site, wrong_clock)
+    findings += check_reference(trajectory)
+    if not any(finding.channel == "imu/gyr" and finding.severity == "warning" for finding in findings):
+        findings += check_frozen(trajectory)
+    return sorted(findings, key=lambda finding: finding.severity != "warning")
+
+
+def check_site(trajectory: Trajectory, site: str, wrong_clock: bool) -> list[Finding]:
+    """All checks of one sensor."""
+    recorded = {kind: vectors(trajectory, f"{site}/{kind}") for kind in ("gyr", "acc", "mag")}
+    findings: list[Finding] = []
+    for kind, values in recorded.items():
+        if values is not None:
+            findings += check_alive(f"{site}/{kind}", values, trajectory.dt if not wrong_clock else None)
+    findings += check_copies({f"{site}/{kind}": values for kind, values in recorded.items() if values is not None})
+    dead = {finding.channel for finding in findings if finding.severity == "warning"}
+    gyr, acc, mag = (
+        None if f"{site}/{kind}" in dead else seen(trajectory, f"{site}/{kind}") for kind in ("gyr", "acc", "mag")
+    )
+    turning = {} if gyr is None or wrong_clock else compared(trajectory, site, gyr, acc, mag)
+    if acc is not None:
+        findings += check_force(f"{site}/acc", acc, turning.get("accelerometer"))
+    if gyr is not None:
+        if not wrong_clock:
+            findings += check_rates(trajectory, site, gyr, turning)
+        known = any(finding.channel == f"{site}/gyr" for finding in findings)
+        findings += check_rest(f"{site}/gyr", gyr, known or any(one.explains for one in turning.values()))
+        findings += [] if known or acc is None else check_noise(f"{site}/gyr", gyr, acc)
+    if mag is not None:
+        findings += check_field(f"{site}/mag", mag)
+    removed = any(f.channel == f"{site}/acc" and f.severity == "warning" for f in findings)
+    if acc is not None and not removed:
+        findings += check_sign(trajectory, f"{site}/acc", acc, mag)
+    return findings
