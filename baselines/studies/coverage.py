@@ -7,7 +7,7 @@ decide it; the verdict is computed from them and is never written down.
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -26,13 +26,16 @@ VERDICTS = (REPRODUCED, CORRECTED, DIFFERS, IMPOSSIBLE, UNDECIDED, ABSENT)
 COLUMNS = ("item", "content", "verdict", "what decides", "shown in")
 Decided = tuple[str, str]
 """Beginnings of the title of a table of claims and of a statement in it."""
-INDOOR, OUTDOOR = "What holds, indoor", "What holds, outdoor"
-"""Beginnings of the titles of the claims of each course."""
 
 
-def both(statement: str) -> tuple[Decided, ...]:
-    """A claim of both courses."""
-    return ((INDOOR, statement), (OUTDOOR, statement))
+def claims_in(*titles: str) -> Callable[..., tuple[Decided, ...]]:
+    """Takes beginnings of statements, gives those claims of every table whose title begins with one of ``titles``."""
+    return lambda *statements: tuple((title, each) for each in statements for title in titles)
+
+
+INDOOR, OUTDOOR = claims_in("What holds, indoor"), claims_in("What holds, outdoor")
+BOTH = claims_in("What holds, indoor", "What holds, outdoor")
+"""Claims of the courses that every study of rides has."""
 
 
 @dataclass(frozen=True)
@@ -43,8 +46,8 @@ class Item:
     """such as ``Figure 15``; for a statement, where it is made"""
     content: str
     """what it shows or says"""
-    shown: tuple[str, ...] = ()
-    """beginnings of titles of the report's entries that show it"""
+    shown: str | tuple[str, ...] = ()
+    """beginning of the title of the report's entry that shows it, or of several"""
     decided: tuple[Decided, ...] = ()
     """claims that say what the item says; it is reproduced if all hold"""
     corrected: tuple[Decided, ...] = ()
@@ -55,6 +58,8 @@ class Item:
     """why no run can answer it; where one can, claims say why: no sentence stays that no number changes"""
 
     def __post_init__(self) -> None:
+        if isinstance(self.shown, str):
+            object.__setattr__(self, "shown", (self.shown,))
         if not (self.shown or self.decided or self.because):
             raise ValueError(f"{self.label}: an item that nothing shows or decides needs a reason in 'because'")
         if self.because and (self.shown or self.decided):
