@@ -6,8 +6,7 @@ import numpy as np
 import pandas
 import pytest
 
-from poise.baselines.studies.rides.reports import REPORTED, comparison
-from poise.baselines.studies.rides.statistics import ride, trunk_lean
+from poise.baselines.studies.rides.statistics import REPORTED, comparison, ride, trunk_lean
 from poise.envs.bicycle.course.scenarios import list_scenarios
 from poise.envs.data.trajectory import load_trajectory
 from poise.filters.core import rotation

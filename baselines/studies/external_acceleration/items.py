@@ -1,14 +1,55 @@
-"""Tables, figures and statements of the external-acceleration paper, and what of the study answers each."""
+"""Published values, tables, figures and statements of the external-acceleration paper, and what answers each.
+
+J. K. Lee, E. J. Park, S. N. Robinovitch, 2012.
+"""
 
 from __future__ import annotations
 
 from ..coverage import Item, claims_in
 
-SAYS, LEVELS = claims_in("What the paper says"), claims_in("Levels of the tests: what holds")
+LEVELS = {"A": (0.40, 1.83), "B": (3.06, 16.71), "C": (6.29, 37.22)}
+"""Section III-B: test → mean and largest size of the reference acceleration, m/s²."""
+
+TABLE_I = {
+    ("A", 1): (1.84, 1.39, 0.23, 0.26, 0.15, 0.27),
+    ("A", 2): (1.86, 1.40, 0.23, 0.27, 0.15, 0.28),
+    ("A", 3): (1.86, 1.39, 0.23, 0.27, 0.15, 0.27),
+    ("B", 1): (1.77, 0.92, 0.15, 0.17, 0.24, 0.23),
+    ("B", 2): (18.21, 10.88, 1.71, 1.86, 2.31, 2.01),
+    ("B", 3): (1.15, 0.76, 0.12, 0.11, 0.16, 0.15),
+    ("C", 1): (5.28, 4.00, 0.55, 0.53, 0.69, 0.52),
+    ("C", 2): (17.08, 6.78, 0.98, 2.09, 1.41, 1.77),
+    ("C", 3): (7.41, 5.19, 0.81, 0.91, 0.71, 0.81),
+}
+"""(Test, mode) → root mean square errors of roll, pitch (deg), a_x, a_y, a_z and ‖a‖ (m/s²)."""
+
+TABLE_II = {
+    0.001: ((1.86, 1.40), (17.98, 10.80), (13.02, 7.43)),
+    0.01: ((1.86, 1.40), (9.03, 6.28), (6.92, 8.87)),
+    0.05: ((1.85, 1.40), (2.86, 1.76), (5.79, 5.42)),
+    0.1: ((1.84, 1.39), (1.77, 0.92), (5.28, 4.00)),
+    0.3: ((1.85, 1.35), (1.11, 0.74), (6.43, 4.76)),
+    0.5: ((1.99, 1.38), (1.05, 0.82), (9.40, 7.09)),
+    0.7: ((17.72, 10.87), (1.09, 1.02), (11.93, 8.54)),
+    1.0: ((44.13, 19.96), (1.20, 1.53), (16.25, 10.34)),
+}
+"""c_a of mode 1 → roll and pitch error of tests A, B and C, deg."""
+
+TABLE_III = {
+    (0.05, 1): ((1.89, 1.34), (1.29, 0.77), (8.46, 4.11)),
+    (0.1, 2): ((1.82, 1.38), (1.28, 0.78), (8.50, 4.04)),
+    (0.2, 4): ((1.86, 1.39), (1.15, 0.76), (7.41, 5.19)),
+    (0.5, 7): ((1.86, 1.40), (3.59, 1.67), (5.85, 3.48)),
+    (1.0, 10): ((1.86, 1.40), (9.13, 7.45), (5.57, 3.47)),
+}
+"""(ε_A in m/s², n) of mode 3 → roll and pitch error of tests A, B and C, deg."""
+
+
+SAYS, MOTION = claims_in("What the paper says"), claims_in("Levels of the tests: what holds")
 
 ITEMS = (
     Item("Figure 1", "frames and sensor", because="it shows no result"),
-    Item("Section III-B", "levels of acceleration of tests A, B and C", "Levels of the tests", LEVELS("Test")),
+    Item("Section III-B", "levels of acceleration of tests A, B and C", "Levels of the tests", MOTION("Test")),
     Item("Table I, test A", "all modes are the same", ("Table I", "Skill: inclination"), SAYS("Test A: all modes")),
     Item("Table I, tests B and C", "mode 2 fails", "Table I", SAYS("Mode 2 fails in test B", "Mode 2 fails in test C")),
     Item(

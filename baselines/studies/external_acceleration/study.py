@@ -23,8 +23,7 @@ from ..coverage import cover
 from ..kit import Study
 from ..report import Report
 from .figures import FIGURES
-from .items import ITEMS
-from .published import LEVELS, TABLE_I, TABLE_II, TABLE_III
+from .items import ITEMS, LEVELS, TABLE_I, TABLE_II, TABLE_III
 from .simulation import MODES, RATE, TESTS, Trial, errors, reference, simulate
 from .skill import beyond_the_trial, long_errors, skill, skill_of_test
 

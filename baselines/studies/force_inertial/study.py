@@ -6,13 +6,11 @@ from ..coverage import cover
 from ..kit import Study
 from ..model_draws import within_bounds
 from ..report import Report
-from .consistency import ideal_consistency
+from .figures import table_i
 from .items import ITEMS
-from .observability import observability
-from .offsets import offsets
-from .parameters import table_i
+from .observability import ideal_consistency, observability
 from .rides import lively, rides
-from .simulation import simulations
+from .simulation import offsets, simulations
 
 
 def reproduce(study: Study, report: Report) -> None:

@@ -1,16 +1,21 @@
-"""Errors of all angles of a paper at the updates of a network, and what they amount to on one ride."""
+"""Errors of all angles of a paper at the updates of a network, what they amount to on one ride, and their bounds."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ....envs.data.trajectory import Trajectory
+from ....filters.analysis.bounds import posterior_bound
+from ....filters.bicycle.two_gyro import truth as two_gyro
 from ....filters.core import rotation
 from ....filters.core.estimator import Estimator
 from ....filters.core.quantity import Estimate, Quantity
+from ....filters.registry import make
+from ..force_inertial import states as force_inertial
+from ..whole_body import states as whole_body
 
 COVERED = 1.6449
 """standard deviations about the mean in which 90 % of a normal variable lie"""
@@ -108,3 +113,33 @@ def deviation_parts(estimator: Any) -> list[int | None]:
         if quantity.kind == "angle":
             found += range(*parts[quantity.name]) if quantity.name in parts else [None] * quantity.size
     return found
+
+
+States = Callable[[Any, Mapping[str, np.ndarray], Mapping[str, np.ndarray]], np.ndarray]
+
+STATES: Mapping[str, States] = {
+    "two-gyro": lambda model, samples, truth: two_gyro.true_states(truth, model),
+    "force-inertial": force_inertial.true_states,
+    "whole-body": whole_body.true_states,
+}
+"""Paper → true states ``(T, n)`` of its filter from model, samples and truth."""
+
+
+def angle_bounds(paper: str, ride: Trajectory, scored: np.ndarray) -> np.ndarray:
+    """Root mean square ``(K,)`` of the bound of every angle over the samples that count, deg.
+
+    It is the bound of the published filter's equations and noises, linearised along the ride. An estimator that knows
+    more (a network that has seen rides) may fall below it; one without such knowledge stays above if the noises are
+    those of the sensors.
+
+    Args:
+        paper: name of its filter.
+        ride: on its grid, with truth.
+        scored: ``(T,)`` samples that count.
+    """
+    kalman: Any = make(paper, dt=ride.dt, metadata=ride.metadata)
+    samples = {channel.name: ride.measurements[channel.name] for channel in kalman.channels}
+    held = {name: whole_body.held_samples(values) for name, values in samples.items()}
+    states = STATES[paper](kalman.model, held, truth_of(kalman, ride))
+    variances = np.diagonal(posterior_bound(kalman.model, states, samples), axis1=1, axis2=2)
+    return np.degrees(np.sqrt([np.nanmean(variances[scored, part]) for part in deviation_parts(kalman)]))

@@ -19,8 +19,7 @@ from ...learned.presets import PRESETS, seeds_of
 from ...learned.rides import UNSEEN, unseen_rides
 from ...registry import TRAINED, make_estimator
 from ...weights_io import load_card
-from .bounds import angle_bounds
-from .errors import Errors, angle_names, angles_of, errors_of, score, truth_of
+from .errors import Errors, angle_bounds, angle_names, angles_of, errors_of, score, truth_of
 from .learnt import Learnt, learn
 from .references import moving_averages
 

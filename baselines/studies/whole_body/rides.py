@@ -28,9 +28,8 @@ from ..sensors import without_errors
 from .angles import ANGLES, STATES, TABLE_III, short
 from .figures import CONSTRAINTS, SHOWN, bump_figure, residual_figure, table_i, table_ii
 from .reconstruction import reconstruction
-from .ride_bounds import bound_of_ride
 from .speed import by_speed, speed_claims, squares_by_speed
-from .states import Encoders
+from .states import Encoders, bound_of_ride
 
 COURSES = {"indoor": "indoor_circle", "outdoor": "outdoor"}
 """The paper's → the environment's."""

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from poise.baselines.studies import find_paper
-from poise.baselines.studies.external_acceleration.published import LEVELS, TABLE_I, TABLE_II, TABLE_III
+from poise.baselines.studies.external_acceleration.items import LEVELS, TABLE_I, TABLE_II, TABLE_III
 from poise.baselines.studies.external_acceleration.simulation import MODES, RATE, errors, estimate, reference, simulate
 from poise.baselines.studies.external_acceleration.study import (
     QUANTITIES,

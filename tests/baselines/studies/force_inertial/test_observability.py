@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from poise.baselines.studies.force_inertial import observability
-from poise.baselines.studies.force_inertial.offsets import CASES, offset_errors
+from poise.baselines.studies.force_inertial.simulation import CASES, offset_errors
 
 
 def test_the_bias_of_the_bicycle_about_y_is_never_seen(monkeypatch):

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from poise.baselines.studies.force_inertial.consistency import ideal_consistency
 from poise.baselines.studies.force_inertial.motion import NO_ERRORS, Errors, draw_motion, simulate
+from poise.baselines.studies.force_inertial.observability import ideal_consistency
 from poise.baselines.studies.force_inertial.simulation import synthetic, variant, without_forces
 from poise.baselines.studies.force_inertial.states import from_the_truth, torques, true_states
 from poise.baselines.studies.force_inertial.study import reproduce

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from poise.baselines.studies.whole_body.motion import ExactRide
-from poise.baselines.studies.whole_body.skeleton import skeleton
+from poise.baselines.studies.whole_body.reconstruction import skeleton
 from poise.baselines.studies.whole_body.speed import by_speed, speed_claims, squares_by_speed
 from poise.baselines.studies.whole_body.states import true_angles_state, true_states
 from poise.filters.bicycle.geometry import RiderGeometry
