@@ -1,26 +1,28 @@
 """Draw the layers of the package from its own imports: ``python docs/draw_layers.py`` writes docs/figures/layers.svg.
 
-A box is a folder, or a module that lies beside folders; its color is that of its layer. A line leads down to what a box
-imports; a line that a longer way implies is left out.
+A row imports from the rows below it only. A box is a folder, or all modules beside the folders of a layer that stand
+between the same rows.
 """
 
 from __future__ import annotations
 
 import ast
+import textwrap
 from collections.abc import Iterator
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 LAYERS = ("scripts", "baselines", "envs", "filters")
 COLORS = {"scripts": "#f2e2c9", "baselines": "#d9e8d3", "envs": "#d4e4f1", "filters": "#e6dcee"}
-WIDTH, HEIGHT, GAP, BETWEEN = 130, 28, 10, 24
-TOGETHER = {"filters/core": "filters/core+compile", "filters/compile": "filters/core+compile"}
+WIDTH, LABEL, GAP, LINE, LETTER = 760, 100, 8, 16, 6.4
+"""Width of the picture and of the names of layers, distances, height of a line of text, width of a letter, px."""
+TOGETHER = {"filters/core": "filters/core, compile", "filters/compile": "filters/core, compile"}
 """Folders whose modules import each other in both directions, though no two of them do."""
 SHIPPED = ROOT / "docs" / "figures" / "layers.svg"
 
 
 def room(parts: tuple[str, ...]) -> str:
-    """The box of a module: its folder, at most two levels deep; a module beside folders has a box of its own."""
+    """Layer and folder of a module, or the module itself where it lies beside folders."""
     name = "scripts" if parts[0] == "scripts" else "/".join(parts[:2])
     return TOGETHER.get(name, name)
 
@@ -39,7 +41,7 @@ def imports(path: Path) -> Iterator[tuple[str, ...]]:
 
 
 def edges() -> dict[str, set[str]]:
-    """Box → boxes that it imports."""
+    """Folder or module → folders and modules that it imports."""
     found: dict[str, set[str]] = {}
     for layer in LAYERS:
         for path in sorted((ROOT / layer).rglob("*.py")):
@@ -51,73 +53,90 @@ def edges() -> dict[str, set[str]]:
     return found
 
 
-def reduced(graph: dict[str, set[str]]) -> dict[str, set[str]]:
-    """The same graph without the edges that a longer way implies.
+def heights(graph: dict[str, set[str]]) -> dict[str, float]:
+    """Rank of everything in its layer: whole for folders, half a step above the highest folder used for modules.
 
     Raises:
-        ValueError: boxes import each other in a circle.
+        ValueError: folders import each other in a circle.
     """
-    reach: dict[str, set[str]] = {}
+    modules = {name for name in graph if (ROOT / f"{name}.py").is_file()}
+    found: dict[str, float] = {}
 
-    def below(name: str, above: tuple[str, ...] = ()) -> set[str]:
+    def height(name: str, above: tuple[str, ...] = ()) -> float:
         if name in above:
-            raise ValueError(f"boxes import each other: {' > '.join((*above[above.index(name) :], name))}")
-        if name not in reach:
-            reach[name] = set().union(*({other} | below(other, (*above, name)) for other in sorted(graph[name])))
-        return reach[name]
+            raise ValueError(f"imports in a circle: {' > '.join((*above[above.index(name) :], name))}")
+        if name not in found:
+            layer = name.split("/")[0]
+            used = [height(other, (*above, name)) for other in sorted(graph[name]) if other.split("/")[0] == layer]
+            highest = max(used, default=-0.5)
+            # a module keeps the half step of the modules that it uses; a folder stands on the next whole one
+            half = highest % 1 == 0.5
+            found[name] = highest + 0.5 * (not half) if name in modules else highest + (0.5 if half else 1.0)
+        return found[name]
 
     for name in sorted(graph):
-        below(name)
-    return {
-        name: {other for other in others if not any(other in reach[third] for third in others - {other})}
-        for name, others in graph.items()
-    }
+        height(name)
+    return found
 
 
-def rows(graph: dict[str, set[str]]) -> list[list[str]]:
-    """Rows of boxes from top to bottom: layer by layer, inside a layer by the longest way down."""
+def rows(graph: dict[str, set[str]]) -> list[tuple[str, list[list[str]]]]:
+    """Layer and boxes, each a list of names, of every row from top to bottom."""
+    rank = heights(graph)
     found = []
     for layer in LAYERS:
-        own = {name for name in graph if name.split("/")[0] == layer}
-        level: dict[str, int] = {}
-        while len(level) < len(own):
-            ready = [name for name in own - set(level) if graph[name] & own <= set(level)]
-            level |= {name: 1 + max((level[other] for other in graph[name] & own), default=-1) for name in ready}
-        for number in sorted(set(level.values()), reverse=True):
-            found.append(sorted(name for name in own if level[name] == number))
+        own = sorted(name for name in graph if name.split("/")[0] == layer)
+        for number in sorted({rank[name] for name in own}, reverse=True):
+            names = [name for name in own if rank[name] == number]
+            found.append((layer, [names] if number % 1 == 0.5 else [[name] for name in names]))
     return found
+
+
+def label(name: str) -> str:
+    """What a box says: folders with a slash at the end."""
+    inside = name.partition("/")[2] or name
+    return inside if (ROOT / f"{name}.py").is_file() else inside.replace(",", "/,") + "/"
 
 
 def draw() -> str:
     """The picture as SVG."""
-    graph = edges()
-    lines_down = reduced(graph)
-    levels = rows(graph)
-    across = max(len(names) for names in levels)
-    width, height = across * (WIDTH + GAP) + GAP, len(levels) * (HEIGHT + BETWEEN) + GAP
-    lines = [
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" '
-        'font-family="sans-serif" font-size="11">',
-        f'<rect width="{width}" height="{height}" fill="white"/>',
-    ]
-    middle: dict[str, tuple[float, float]] = {}
-    for number, names in enumerate(levels):
-        left = 0.5 * (width - len(names) * (WIDTH + GAP) + GAP)
-        for place, name in enumerate(names):
-            middle[name] = (
-                left + place * (WIDTH + GAP) + 0.5 * WIDTH,
-                GAP + number * (HEIGHT + BETWEEN) + 0.5 * HEIGHT,
+    boxes, y, tops = [], float(GAP), dict.fromkeys(LAYERS, 0.0)
+    last = ""
+    for layer, row in rows(edges()):
+        if layer != last:
+            y += GAP
+            tops[layer], last = y, layer
+            y += GAP
+        texts = [textwrap.wrap(", ".join(map(label, names)), 96) for names in row]
+        size = max(map(len, texts)) * LINE + GAP
+        wide = [max(map(len, text)) * LETTER + 2 * GAP for text in texts]
+        x = LABEL + 0.5 * (WIDTH - LABEL - sum(wide) - GAP * (len(wide) - 1))
+        for text, width in zip(texts, wide, strict=True):
+            boxes.append(
+                f'<rect x="{x:g}" y="{y:g}" width="{width:g}" height="{size:g}" rx="4" fill="white" stroke="#777"/>'
             )
-    for name, others in sorted(lines_down.items()):
-        for other in sorted(others):
-            (x0, y0), (x1, y1) = middle[name], middle[other]
-            lines.append(f'<line x1="{x0:g}" y1="{y0:g}" x2="{x1:g}" y2="{y1 - 0.5 * HEIGHT:g}" stroke="#888"/>')
-    for name, (x, y) in middle.items():
-        layer, _, label = name.partition("/")
-        box = f'x="{x - 0.5 * WIDTH:g}" y="{y - 0.5 * HEIGHT:g}" width="{WIDTH}" height="{HEIGHT}" rx="4"'
-        lines.append(f'<rect {box} fill="{COLORS[layer]}" stroke="#777"/>')
-        lines.append(f'<text x="{x:g}" y="{y + 4:g}" text-anchor="middle">{layer}/{label}</text>')
-    return "\n".join([*lines, "</svg>", ""])
+            boxes += [
+                f'<text x="{x + 0.5 * width:g}" y="{y + 0.5 * GAP + (number + 0.75) * LINE:g}" text-anchor="middle">'
+                f"{line}</text>"
+                for number, line in enumerate(text)
+            ]
+            x += width + GAP
+        y += size + GAP
+    bands = []
+    for layer, below in zip(LAYERS, [*list(tops.values())[1:], y + GAP], strict=True):
+        top, size = tops[layer], below - tops[layer] - GAP
+        bands.append(f'<rect x="0" y="{top:g}" width="{WIDTH}" height="{size:g}" rx="6" fill="{COLORS[layer]}"/>')
+        bands.append(f'<text x="{GAP}" y="{top + 0.5 * size + 5:g}" font-size="15" font-weight="bold">{layer}</text>')
+    return "\n".join(
+        [
+            f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {y + GAP:g}" font-family="sans-serif" '
+            'font-size="12">',
+            f'<rect width="{WIDTH}" height="{y + GAP:g}" fill="white"/>',
+            *bands,
+            *boxes,
+            "</svg>",
+            "",
+        ]
+    )
 
 
 if __name__ == "__main__":
