@@ -57,6 +57,8 @@ class Preset:
     """filter whose sensors and angles a network has that stands alone on rides"""
     sites: tuple[str, ...] = ()
     """whose channels such a network sees; empty for all of the paper"""
+    told: tuple[str, ...] = ()
+    """parameters of a rider's filter that the network sees: how exactly the rider was measured"""
     limit: float | None = None
     """of corrections, in standard deviations of the filter"""
     scale: float = 0.1
@@ -98,7 +100,7 @@ class Preset:
             bank = HeadingBank if self.magnetic else FilterBank
             return bank(LevelFrame(kalman)) if self.bank else LevelFrame(kalman)
         if self.paper is None:
-            return FilterFeatures(kalman)
+            return FilterFeatures(kalman, parameters_seen=self.told)
         channels = [c for c in make(self.paper).channels if not self.sites or c.name.split("/")[0] in self.sites]
         return RawChannels(tuple(channels), paper=self.paper)
 
@@ -143,6 +145,8 @@ TRAINED = {"scenarios": ["indoor_circle", "outdoor", "straight", "slalom"], "sty
 RIDES = RideSource(rides=160, draws=4, duration=40.0, changes=TRAINED)
 KEPT = 0.4
 """Rides for the best epoch and the covariance, as a share of those of the training; riders differ: 24 are too few."""
+MEASURED = {"whole-body": (replace(RIDES, exact_draws=1), ("leg_offsets[0]",))}
+"""Paper whose filter knows how exactly a rider was measured → rides, of which some are exact, and what tells which"""
 RIDDEN = FitConfig(epochs=14, window=125, learning_rate=3e-3)
 CORRECTED = {
     "two-gyro": "two-gyro",
@@ -184,10 +188,11 @@ PRESETS: dict[str, Preset] = {
     ),
     **{
         f"{paper}+network": Preset(
-            f"{filter}, all its angles corrected by a recurrent network", rides=RIDES, filter=filter,
+            f"{filter}, all its angles corrected by a recurrent network", rides=rides, filter=filter, told=told,
             validation=KEPT, scale=0.03, noise=0.1, fit=RIDDEN,
         )
         for paper, filter in CORRECTED.items()
+        for rides, told in (MEASURED.get(paper, (RIDES, ())),)
     },
     **{
         f"gru-{paper}{end}": Preset(

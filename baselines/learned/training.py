@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ...envs.data.trajectory import Trajectory
+from ...envs.recipes.rides import held_out
 from ...filters.support.optional import extra
 from .data import SequenceData, taught, with_errors
 from .estimator import LearnedEstimator
@@ -67,7 +68,8 @@ def train_preset(
     def simulated(root: int, share: float, words: str) -> SequenceData:
         if preset.rides is not None:
             label = "" if say is None else f"{words} rides"
-            some = replace(preset.rides, rides=max(2, round(share * preset.rides.rides)))
+            source = preset.rides if root == train_seed else held_out(preset.rides)
+            some = replace(source, rides=max(2, round(share * source.rides)))
             return ride_data(some, root, front_end, head, processes=processes, label=label)
         parts = [
             SequenceData.from_recipe(

@@ -7,15 +7,14 @@ then applies the errors of other devices, as the environment would have with the
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
 
-from ...filters.bicycle.geometry import RiderGeometry
+from ...filters.bicycle.geometry import GEOMETRY_STD, RiderGeometry, TapeMeasure
 from ...filters.core import rotation
 from ...filters.core.quantity import STANDARD_GRAVITY
-from ...filters.support.ranges import Checked
 from ..bicycle.sensors.measured_geometry import measured
 from ..bicycle.sensors.placement import PLACED
 from ..bicycle.sensors.sites import sensor_sites
@@ -32,24 +31,6 @@ from .recipe import unspawned
 
 TRUE_GEOMETRY = "true_geometry"
 """Key of the metadata: the geometry itself, where ``geometry`` is what was measured of it"""
-
-
-@dataclass(frozen=True)
-class TapeMeasure(Checked):
-    """Standard deviations with which a rider's geometry is measured, see :func:`.measured`."""
-
-    lengths: float = 0.02
-    """of each segment's length, relative"""
-    places: float = 0.01
-    """of each coordinate of a joint or sensor on the body, m"""
-    mass: float = 0.03
-    """of the trunk's mass, relative"""
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        for name in ("lengths", "places", "mass"):
-            if not getattr(self, name) >= 0.0:
-                raise ValueError(f"{name} must not be negative, got {getattr(self, name)}")
 
 
 def redrawn(
@@ -71,7 +52,8 @@ def redrawn(
         noise_scale: factor on all errors.
         mirror: exchange left and right, see :func:`.mirrored`.
         geometry: measure the rider anew: ``metadata["geometry"]``, with which filters are configured, is then
-            measured, and ``metadata["true_geometry"]`` the geometry itself. None leaves the true one.
+            measured, ``metadata["geometry_std"]`` says how exactly, and ``metadata["true_geometry"]`` is the geometry
+            itself. None leaves the true one.
         timing: of all sensors, or of each site, as of the environment. Late readings are interpolated between the ideal
             ones, so that a part of their highest frequencies is lost.
 
@@ -90,8 +72,8 @@ def redrawn(
     metadata |= {"noise_scale": float(noise_scale), "mirrored": bool(mirror)}
     if geometry is not None and "geometry" in metadata:
         true = RiderGeometry.read(metadata["geometry"])
-        taped = measured(true, tape, lengths=geometry.lengths, places=geometry.places, mass=geometry.mass)
-        metadata |= {"geometry": taped.describe(), TRUE_GEOMETRY: metadata["geometry"]}
+        taped = measured(true, tape, geometry).describe()
+        metadata |= {"geometry": taped, TRUE_GEOMETRY: metadata["geometry"], GEOMETRY_STD: asdict(geometry)}
     return ride.replace(measurements=measurements, truth=ride.truth | biases, metadata=metadata)
 
 

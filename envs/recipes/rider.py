@@ -7,6 +7,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from ...filters.bicycle.geometry import TapeMeasure
 from ...filters.support.ranges import Checked, Range, log_uniform
 from ...filters.support.seeds import named_generator
 from ..bicycle.course.scenarios import list_scenarios, scenario
@@ -21,7 +22,7 @@ from ..data.trajectory import Trajectory
 from ..sensors.presets import list_sensor_presets
 from .devices import VariedTiming
 from .recipe import Recipe, check_some, chosen, unspawned
-from .redraw import TapeMeasure, redrawn
+from .redraw import redrawn
 
 RIDDEN = tuple(name for name, bicycle in BICYCLES.items() if bicycle.drive is not None)
 """Bicycles with pedals"""

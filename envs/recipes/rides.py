@@ -7,16 +7,18 @@ draw of errors and half of them with left and right exchanged.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
+from ...filters.bicycle.geometry import GEOMETRY_STD, TapeMeasure
 from ...filters.support.names import look_up
 from ..data.trajectory import Trajectory
 from ..episodes import EpisodeStore
 from .faults import FAULTS
 from .recipe import Recipe
+from .redraw import TRUE_GEOMETRY
 from .registry import described_recipe, recipe
 from .slopes import sloped
 
@@ -31,7 +33,7 @@ class RideSource:
     """Rides of the ``rider`` recipe.
 
     Raises:
-        ValueError: no rides or no draws, or an unknown fault.
+        ValueError: no rides or no draws, a share outside [0, 1], or an unknown fault.
     """
 
     rides: int = 80
@@ -44,13 +46,15 @@ class RideSource:
     """fields of the recipe that differ"""
     sloped_share: float = 0.0
     """of draws whose ground rises and falls, see :func:`.slopes.sloped`: those have no other channels"""
+    exact_draws: int = 0
+    """further draws on each ride, whose rider is measured exactly, not with a tape"""
     fault: str | None = None
     """one of :data:`.faults.FAULTS` in every draw, at the same time in all of a ride"""
 
     def __post_init__(self) -> None:
-        for name in ("rides", "draws"):
-            if getattr(self, name) < 1:
-                raise ValueError(f"{name} must be at least 1, got {getattr(self, name)}")
+        for name, least in (("rides", 1), ("draws", 1), ("exact_draws", 0)):
+            if getattr(self, name) < least:
+                raise ValueError(f"{name} must be at least {least}, got {getattr(self, name)}")
         if not 0.0 <= self.sloped_share <= 1.0:
             raise ValueError(f"sloped_share must lie in [0, 1], got {self.sloped_share}")
         if self.fault is not None:
@@ -80,8 +84,9 @@ def drawn(source: RideSource, seed: int, index: int) -> list[Trajectory]:
     """The draws of devices and geometry on one ride; what is not settled is left out of the mask."""
     made: Any = source.recipe()
     ridden = ride(source, seed, index)
-    children = np.random.SeedSequence(seed, spawn_key=(index, 1)).spawn(source.draws)
+    children = np.random.SeedSequence(seed, spawn_key=(index, 1)).spawn(source.draws + source.exact_draws)
     draws = [made.sensed(ridden, child).replace(mask=ridden.time > SETTLED) for child in children]
+    draws[source.draws :] = map(measured_exactly, draws[source.draws :])
     if source.fault is not None:
         sequence = np.random.SeedSequence(seed, spawn_key=(index, 3))
         draws = [FAULTS[source.fault].applied(each, np.random.default_rng(sequence)) for each in draws]
@@ -89,6 +94,13 @@ def drawn(source: RideSource, seed: int, index: int) -> list[Trajectory]:
     return [sloped(each, ground) if ground.random() < source.sloped_share else each for each in draws]
 
 
+def measured_exactly(drawn: Trajectory) -> Trajectory:
+    """The same draw with the geometry itself in place of what was measured of it."""
+    exact = {"geometry": drawn.metadata[TRUE_GEOMETRY], GEOMETRY_STD: asdict(TapeMeasure(0.0, 0.0, 0.0))}
+    return drawn.replace(metadata={**drawn.metadata, **exact})
+
+
 def held_out(source: RideSource, **changes: Any) -> RideSource:
-    """The same distribution but for some fields of the recipe, such as ``styles=("aggressive",)``."""
-    return replace(source, changes={**source.changes, **{name: list(value) for name, value in changes.items()}})
+    """The same distribution but for some fields of the recipe, such as ``styles=("aggressive",)``; tapes alone."""
+    changed = {**source.changes, **{name: list(value) for name, value in changes.items()}}
+    return replace(source, changes=changed, exact_draws=0)

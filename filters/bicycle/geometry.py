@@ -12,8 +12,12 @@ from dataclasses import asdict, dataclass, fields
 from typing import Any, Self
 
 from ..core.model import Equations
+from ..support.parameters import check_positive
+from ..support.ranges import Checked
 
 Point = tuple[float, float, float]
+GEOMETRY_STD = "geometry_std"
+"""Key of the metadata: how exactly ``geometry`` was measured, the fields of :class:`TapeMeasure`"""
 ARM_MASS = 0.0494
 """Mass of an arm with its hand, share of the rider's (P. de Leva, J. Biomechanics 29(9), 1996, table 4, men)."""
 
@@ -153,6 +157,41 @@ POSITIVE = frozenset(
     ]
 )
 """Fields that must be positive."""
+
+
+@dataclass(frozen=True)
+class TapeMeasure(Checked):
+    """Standard deviations with which a rider's geometry is measured; all zero where it is exact.
+
+    Raises:
+        ValueError: one is negative or not finite.
+    """
+
+    lengths: float = 0.02
+    """of each segment's length, relative"""
+    places: float = 0.01
+    """of each coordinate of a joint or sensor on the body, m"""
+    mass: float = 0.03
+    """of the trunk's mass, relative"""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        check_positive(self, or_zero=("lengths", "places", "mass"))
+
+    @classmethod
+    def of(cls, metadata: Mapping[str, Any]) -> Self:
+        """What a recording's metadata say (:data:`GEOMETRY_STD`); the defaults where they do not say.
+
+        Raises:
+            ValueError: the metadata contain something else.
+        """
+        described = metadata.get(GEOMETRY_STD)
+        if described is None:
+            return cls()
+        known = [field.name for field in fields(cls)]
+        if not isinstance(described, Mapping) or not set(described) <= set(known):
+            raise ValueError(f"{GEOMETRY_STD} must map some of {known} to standard deviations, got {described}")
+        return cls(**{name: float(value) for name, value in described.items()})
 
 
 class RiderEquations(Equations):

@@ -43,21 +43,25 @@ class FilterFeatures:
     """Features of a Kalman filter's run, each the mean over an interval.
 
     In this order: the filter's outputs (angles as sine and cosine, which have means where angles wrap), the logarithms
-    of the standard deviations of its error state, its whitened innovations, and the channels of the sensors. Networks
+    of the standard deviations of its error state, its whitened innovations, the channels of the sensors, and parameters
+    that the metadata of a recording determine, such as the standard deviation of what the geometry is off by. Networks
     learn the scale of each feature from the training data.
 
     Attributes:
         kalman: the filter; the head corrects its outputs.
         interval: s between updates of the network.
         channels_seen: names of the channels that are features; None for all of the filter.
+        parameters_seen: names of parameters that are features (:func:`.parameters_of`), relative to their defaults, and
+            1 where they are larger: nothing beyond is trained on.
 
     Raises:
-        ValueError: sampling slower than the network, or a channel that the filter does not read.
+        ValueError: sampling slower than the network, or a channel or parameter that the filter does not have.
     """
 
     kalman: KalmanFilter
     interval: float = 0.04
     channels_seen: tuple[str, ...] | None = None
+    parameters_seen: tuple[str, ...] = ()
 
     kind: ClassVar[str] = "filter-features"
 
@@ -68,6 +72,9 @@ class FilterFeatures:
         unknown = sorted(set(self.channels_seen or ()) - set(names))
         if unknown:
             raise ValueError(f"channels_seen must be channels of the filter, {names}, got {unknown}")
+        unknown = sorted(name for name in self.parameters_seen if not self._usual.get(name, 0.0) > 0.0)
+        if unknown:
+            raise ValueError(f"parameters_seen must be positive parameters of the filter, got {unknown}")
 
     @property
     def dt(self) -> float:
@@ -88,8 +95,8 @@ class FilterFeatures:
     def size(self) -> int:
         """Number of features."""
         widths = (2 * q.size if q.kind == "angle" else q.size for q in self.kalman.outputs)
-        model = self.kalman.model
-        return sum(widths) + model.error_size + model.residual_size + sum(c.size for c in self._shown)
+        model, told = self.kalman.model, len(self.parameters_seen)
+        return sum(widths) + model.error_size + model.residual_size + sum(c.size for c in self._shown) + told
 
     @property
     def _shown(self) -> list[Channel]:
@@ -113,15 +120,15 @@ class FilterFeatures:
         noises = {key: own[key] for key in own if key != "dt" and key in usual and own[key] != usual[key]}
         seen = None if self.channels_seen is None else list(self.channels_seen)
         filter = {"name": name, "parameters": {key: value for key, value in noises.items() if "[" not in key}}
-        return {"kind": self.kind, "filter": filter, "interval": self.interval, "channels_seen": seen}
+        told = {"parameters_seen": list(self.parameters_seen)} if self.parameters_seen else {}
+        return {"kind": self.kind, "filter": filter, "interval": self.interval, "channels_seen": seen, **told}
 
     @classmethod
     def read(cls, described: Mapping[str, Any], dt: float) -> Self:
         """The inverse of :meth:`describe`."""
         seen = described.get("channels_seen")
-        return cls(
-            filter_of(described["filter"], dt), float(described["interval"]), None if seen is None else tuple(seen)
-        )
+        channels, told = None if seen is None else tuple(seen), tuple(described.get("parameters_seen", ()))
+        return cls(filter_of(described["filter"], dt), float(described["interval"]), channels, told)
 
     def init(self, measurement: Measurement) -> FeatureState:
         """See :class:`.front_end.FrontEnd`."""
@@ -156,6 +163,7 @@ class FilterFeatures:
         parts.append(0.5 * np.log(np.maximum(variances, 1e-16)))
         parts.append(np.clip(np.asarray(estimate.innovation), -10.0, 10.0))
         parts += [np.asarray(arrays[channel.name], dtype=float) for channel in self._shown]
+        parts.append(np.broadcast_to(self._told, (*variances.shape[:-1], len(self._told))))
         return np.concatenate(parts, axis=-1)
 
     def _seen(self, estimate: Estimate, found: IntervalSums, due: np.ndarray, since: np.ndarray) -> Seen:
@@ -165,6 +173,16 @@ class FilterFeatures:
         parts = self.kalman.model.error_parts
         variances = {name: every[..., slice(*parts[name])] for name in base if name in parts}
         return Seen(features, due, base, features[..., :0], self._gaps.bears(since), variances)
+
+    @cached_property
+    def _told(self) -> np.ndarray:
+        """What :attr:`parameters_seen` are here."""
+        own = parameters_of(self.kalman.model)
+        return np.array([min(own[name] / self._usual[name], 1.0) for name in self.parameters_seen])
+
+    @cached_property
+    def _usual(self) -> Mapping[str, float]:
+        return parameters_of(type(self.kalman.model)())
 
     @cached_property
     def _gaps(self) -> GapWatch:

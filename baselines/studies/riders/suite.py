@@ -15,7 +15,7 @@ from ....filters.core import rotation
 from ....filters.registry import FILTERS, make
 from ....filters.support.parallel import in_parallel
 from ....filters.support.resume import is_kept, keep, kept
-from ...learned.presets import PRESETS, seeds_of
+from ...learned.presets import PRESETS, RIDES, seeds_of
 from ...learned.rides import UNSEEN, unseen_rides
 from ...registry import TRAINED, make_estimator
 from ...weights_io import load_card
@@ -173,7 +173,7 @@ def scored_samples(ride: Trajectory, interval: float = 0.04) -> np.ndarray:
 
 def ride_rows(settings: RiderSuite, learnt: Mapping[str, Learnt], group: str, index: int) -> list[Row]:
     """Scores of all methods on all draws of one ride; for parallel processes."""
-    source = replace(training_rides(settings), rides=index + 1, draws=settings.draws)
+    source = replace(RIDES, rides=index + 1, draws=settings.draws)
     rows: list[Row] = []
     bounds: dict[str, np.ndarray] = {}
     for _, draw, ride in unseen_rides(source, seeds_of(settings.seed)[3], group, index):
@@ -190,18 +190,11 @@ def ride_rows(settings: RiderSuite, learnt: Mapping[str, Learnt], group: str, in
     return rows
 
 
-def training_rides(settings: RiderSuite) -> Any:
-    """The source of the rides that the networks are trained on."""
-    source = PRESETS[f"{settings.papers[0]}+network"].rides
-    assert source is not None
-    return source
-
-
 def learnt_by(settings: RiderSuite, *, processes: int = 1, progress: bool = False) -> dict[str, Learnt]:
     """What the references of each paper learn; nothing without training rides."""
     if not settings.training:
         return {}
-    source = replace(training_rides(settings), rides=settings.training, draws=settings.draws)
+    source = replace(RIDES, rides=settings.training, draws=settings.draws)
     seed = seeds_of(settings.seed)[0]
     label = "ride" if progress else ""
     for _ in in_parallel(simulate, [(source, seed, index) for index in range(source.rides)], processes, label=label):

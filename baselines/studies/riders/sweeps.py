@@ -15,11 +15,11 @@ from ....envs.recipes.rides import SETTLED, ride
 from ....filters.core import rotation
 from ....filters.support.parallel import in_parallel
 from ....filters.support.ranges import Range
-from ...learned.presets import seeds_of
+from ...learned.presets import RIDES, seeds_of
 from ...plots import new_figure, save
 from ...registry import make_estimator
 from .errors import errors_of, score
-from .suite import RiderSuite, estimators_of, names_of, scored_samples, training_rides
+from .suite import RiderSuite, estimators_of, names_of, scored_samples
 
 BURST = 0.2
 """s: mean length of a gap"""
@@ -136,8 +136,8 @@ class Point:
 
 def ride_points(settings: RiderSuite, index: int) -> list[Point]:
     """All conditions on one ride of an unseen rider; for parallel processes."""
-    source, root = training_rides(settings), seeds_of(settings.seed)[3]
-    ridden, recipe = ride(source, root, index), source.recipe()
+    root = seeds_of(settings.seed)[3]
+    ridden, recipe = ride(RIDES, root, index), RIDES.recipe()
     if float(ridden.time[-1]) < 2.0 * SETTLED:
         return []
     points = []

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ....filters.bicycle.geometry import Point, RiderGeometry
+from ....filters.bicycle.geometry import Point, RiderGeometry, TapeMeasure
 from ..ride.contact_forces import CELLS_BEHIND, CELLS_LONG, CELLS_WIDE
 from ..rider.posture import ANKLE_ANGLE, ANKLE_TO_PEDAL, Posture
 from .sites import BICYCLE_IMU_SITE, BICYCLE_IMU_TILT, POST_LENGTH, POST_TILT, SensorSites, sensor_sites
@@ -62,35 +62,21 @@ def rider_geometry(posture: Posture, sites: SensorSites | None = None) -> RiderG
     )
 
 
-def measured(
-    geometry: RiderGeometry,
-    rng: np.random.Generator,
-    *,
-    lengths: float = 0.02,
-    places: float = 0.01,
-    mass: float = 0.03,
-) -> RiderGeometry:
+def measured(geometry: RiderGeometry, rng: np.random.Generator, tape: TapeMeasure | None = None) -> RiderGeometry:
     """The same, as measured with a tape measure and a table of segment masses.
 
     Args:
         geometry: the true one.
         rng: draws the errors.
-        lengths: standard deviation of each segment's length, relative (2 %, as in the whole-body study).
-        places: standard deviation of each coordinate of a joint or sensor on the body, m (likewise: 1 cm).
-        mass: standard deviation of the trunk's mass, relative.
-
-    Raises:
-        ValueError: a deviation that is negative or not finite.
+        tape: their standard deviations; None: the usual ones (2 % and 1 cm, as in the whole-body study).
     """
-    for name, value in (("lengths", lengths), ("places", places), ("mass", mass)):
-        if not 0.0 <= value < math.inf:
-            raise ValueError(f"{name} must not be negative and be finite, got {value}")
+    tape = TapeMeasure() if tape is None else tape
     changed: dict[str, float | Point] = {
-        name: getattr(geometry, name) * (1.0 + lengths * float(rng.standard_normal())) for name in BODY_LENGTHS
+        name: getattr(geometry, name) * (1.0 + tape.lengths * float(rng.standard_normal())) for name in BODY_LENGTHS
     }
     for name in BODY_PLACES:
-        changed[name] = _point(np.array(getattr(geometry, name)) + places * rng.standard_normal(3))
-    changed["trunk_mass"] = geometry.trunk_mass * (1.0 + mass * float(rng.standard_normal()))
+        changed[name] = _point(np.array(getattr(geometry, name)) + tape.places * rng.standard_normal(3))
+    changed["trunk_mass"] = geometry.trunk_mass * (1.0 + tape.mass * float(rng.standard_normal()))
     return replace(geometry, **changed)  # type: ignore[arg-type]
 
 

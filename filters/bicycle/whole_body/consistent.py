@@ -8,6 +8,7 @@ tens of degrees, and the trunk with it.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -18,7 +19,7 @@ from ...core.model import Gain
 from ...core.quantity import DEG, Measurement
 from ...core.rotation import euler_matrix
 from ...support.parameters import check_positive
-from ..geometry import Point, RiderGeometry
+from ..geometry import GEOMETRY_STD, Point, RiderGeometry, TapeMeasure
 from .blocks import BLOCKS
 from .filter import CONSTRAINTS, WholeBody
 from .linkage import CRANK, ERROR_SIZE, GYROSCOPES, HIP, SHOULDER, SIDES, STEER, TRUNK
@@ -27,6 +28,11 @@ PUBLISHED = WholeBody.state_size
 BIASES, ROLL_BIAS, TRUNK_OFFSET, CONSTRAINED = slice(0, 15), slice(15, 16), slice(16, 19), slice(19, 31)
 """What lasts, in its order after the published state."""
 ADDED = CONSTRAINED.stop
+BY_LENGTHS = (0.13, 0.0, 0.39, 0.0)
+"""Share of lengths of segments in the variances of the offsets of C1, C2, C5, C6; the rest is that of joints' places.
+Those of C3 and C7 are the rider's."""
+LEAST_OFFSET = 0.002
+"""of them where the geometry is exact: joints are not points"""
 MIRRORED = 60.0 * DEG
 """Angle between an upper segment and its direction with elbows out or knees forward; mirrored postures are beyond."""
 
@@ -43,7 +49,8 @@ class ConsistentWholeBody(WholeBody):
 
     Noises and offsets were chosen on simulated rides of training riders with devices from laboratory to phone grade,
     worn with placement errors, and a rider measured with a tape: offsets as they are there, noises by the likelihood of
-    the true angles.
+    the true angles. Where the metadata of a recording say how exactly the rider was measured
+    (:class:`.geometry.TapeMeasure`), the priors of what C1, C2, C5 and C6 are off by follow from that.
     """
 
     usual_flexion: float = WholeBody.trunk_flexion
@@ -107,6 +114,20 @@ class ConsistentWholeBody(WholeBody):
     def rider_parameters(cls, geometry: RiderGeometry) -> dict[str, Any]:
         """As of the published filter, with the usual lean of the trunk."""
         return {**super().rider_parameters(geometry), "usual_flexion": geometry.trunk_flexion}
+
+    @classmethod
+    def parameters_from(cls, metadata: Mapping[str, Any]) -> dict[str, Any]:
+        """As of every filter of a rider; offsets of lengths and hinges as the geometry was measured."""
+        parameters = super().parameters_from(metadata)
+        if parameters and metadata.get(GEOMETRY_STD) is not None:
+            tape, usual = TapeMeasure.of(metadata), TapeMeasure()
+            lengths, places = (tape.lengths / usual.lengths) ** 2, (tape.places / usual.places) ** 2
+            wider = [math.sqrt(share * lengths + (1.0 - share) * places) for share in BY_LENGTHS]
+            for name, factors in (("arm_offsets", wider[:2]), ("leg_offsets", wider[2:])):
+                length, hinge, swivel = getattr(cls, name)
+                some = (max(each * by, LEAST_OFFSET) for each, by in zip((length, hinge), factors, strict=True))
+                parameters[name] = (*some, swivel)
+        return parameters
 
     @property
     def residual_size(self) -> int:  # type: ignore[override]

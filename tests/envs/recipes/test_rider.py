@@ -13,14 +13,16 @@ from poise.envs.bicycle.ride.truth import isb_yxy, isb_zxy
 from poise.envs.bicycle.rider.limbs import three_turns
 from poise.envs.bicycle.rider.posture import two_turns
 from poise.envs.data.trajectory import Trajectory
+from poise.envs.recipes import rides
 from poise.envs.recipes.devices import VariedTiming
 from poise.envs.recipes.mirror import mirrored
 from poise.envs.recipes.recipe import unspawned
-from poise.envs.recipes.redraw import TRUE_GEOMETRY, TapeMeasure, redrawn, with_errors
+from poise.envs.recipes.redraw import TRUE_GEOMETRY, redrawn, with_errors
 from poise.envs.recipes.registry import rebuilt, recipe
 from poise.envs.recipes.rider import RiderRecipe, RideSensors
 from poise.envs.record import record
 from poise.envs.sensors.timing import Timing
+from poise.filters.bicycle.geometry import TapeMeasure
 from poise.filters.core import rotation
 
 SHORT = RiderRecipe("short", duration=2.0, scenarios=("straight",), fidelity=("lumped",))
@@ -64,11 +66,27 @@ def test_draws_differ_in_errors_and_measured_geometry_only(ride: Trajectory) -> 
     assert 0.5 < np.abs(error["one"] - error["other"]).max() < 50.0
     assert one.metadata["geometry"] != other.metadata["geometry"]
     assert one.metadata[TRUE_GEOMETRY] == ride.metadata["geometry"]
+    assert TapeMeasure.of(one.metadata) == TapeMeasure()
     for name in ("bicycle/roll", "trunk/orientation"):
         np.testing.assert_array_equal(one.truth[name], ride.truth[name])
     # the camera is slower than the ideal one
     assert np.isfinite(one.measurements["relative/orientation"][:, 0]).mean() == pytest.approx(0.16, abs=0.01)
     assert np.abs(one.truth["trunk_imu/gyroscope_bias"]).max() > 0.0
+
+
+def test_some_draws_are_measured_exactly(ride: Trajectory, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(rides, "ride", lambda *_: ride)
+    source = rides.RideSource(1, 2, exact_draws=1)
+    *taped, exact = rides.drawn(source, 3, 0)
+    assert exact.metadata["geometry"] == exact.metadata[TRUE_GEOMETRY] == ride.metadata["geometry"]
+    assert TapeMeasure.of(exact.metadata) == TapeMeasure(0.0, 0.0, 0.0)
+    # the others are as without it
+    for one, other in zip(taped, rides.drawn(rides.held_out(source), 3, 0), strict=True):
+        assert one.metadata == other.metadata
+        assert one.metadata["geometry"] != one.metadata[TRUE_GEOMETRY]
+        np.testing.assert_array_equal(one.measurements["trunk_imu/gyr"], other.measurements["trunk_imu/gyr"])
+    with pytest.raises(ValueError, match="exact_draws must be at least 0, got -1"):
+        rides.RideSource(exact_draws=-1)
 
 
 def test_only_ideal_rides_are_drawn_again(ride: Trajectory) -> None:

@@ -17,6 +17,7 @@ from poise.baselines.learned.inputs.front_end import FrontEnd, RawChannels, Seen
 from poise.baselines.learned.inputs.heading_bank import HeadingBank
 from poise.baselines.learned.inputs.level_frame import LevelFrame
 from poise.envs.hand.sensing import simulate_hand
+from poise.filters.bicycle.geometry import GEOMETRY_STD, RiderGeometry
 from poise.filters.core import rotation
 from poise.filters.core.estimator import run_by_steps
 from poise.filters.core.metrics import heading_error
@@ -159,6 +160,20 @@ def test_filters_are_described_by_what_differs() -> None:
     assert end.describe()["filter"] == {"name": "bounded-motion", "parameters": {"velocity_bound": 0.4}}
 
 
+def test_a_network_sees_how_exactly_a_rider_was_measured() -> None:
+    plain = FilterFeatures(make("whole-body-consistent"))
+    end = replace(plain, parameters_seen=("leg_offsets[0]",))
+    assert end.size == plain.size + 1
+    assert FilterFeatures.read(end.describe(), end.dt) == end
+    assert "parameters_seen" not in plain.describe()
+    channels = {channel.name: np.full(channel.size, np.nan) for channel in end.channels}
+    for lengths, seen in ((0.0, 0.002 / 0.033), (1.0, 1.0), (3.0, 1.0)):
+        tape = {"lengths": 0.02 * lengths, "places": 0.01 * lengths}
+        told = end.configured({"geometry": RiderGeometry().describe(), GEOMETRY_STD: tape})
+        state, _ = told.step(told.init(channels), channels)
+        assert state.sums.sums[-1] == pytest.approx(seen)
+
+
 @pytest.mark.parametrize("name", ENDS)
 def test_too_slow_a_sensor_is_refused(name: str) -> None:
     ENDS[name].with_dt(0.04)
@@ -179,6 +194,8 @@ def test_what_cannot_be_is_refused() -> None:
         FilterBank(LevelFrame(make("bounded-motion")), ((1.0, 0.0),), PAIR)
     with pytest.raises(ValueError, match=r"channels_seen must be channels of the filter"):
         FilterFeatures(make("mekf"), channels_seen=("imu/mag",))
+    with pytest.raises(ValueError, match=r"parameters_seen must be positive parameters of the filter, got \['tape'\]"):
+        FilterFeatures(make("mekf"), parameters_seen=("tape",))
 
 
 @pytest.mark.parametrize("rate", [25.0, 60.0, 286.0, 1000.0 / 7.0])

@@ -13,7 +13,7 @@ from poise.envs.bicycle.rider.anthropometry import RiderBody
 from poise.envs.bicycle.rider.limbs import reach_to
 from poise.envs.bicycle.rider.posture import KNEE_OUT, sit
 from poise.envs.bicycle.sensors.measured_geometry import measured, rider_geometry
-from poise.filters.bicycle.geometry import RiderGeometry
+from poise.filters.bicycle.geometry import GEOMETRY_STD, RiderGeometry, TapeMeasure
 from poise.filters.core import rotation
 
 POSTURE = sit(MOUNTAIN_BIKE, RiderBody())
@@ -45,9 +45,19 @@ def test_measuring_errs_as_it_says() -> None:
     drawn = [measured(geometry, np.random.default_rng(seed)) for seed in range(300)]
     assert np.std([each.thigh / geometry.thigh for each in drawn]) == pytest.approx(0.02, rel=0.15)
     assert np.std([each.hip[0] for each in drawn]) == pytest.approx(0.01, rel=0.15)
-    assert measured(geometry, np.random.default_rng(0), lengths=0.0, places=0.0, mass=0.0) == geometry
-    with pytest.raises(ValueError, match="lengths must not be negative"):
-        measured(geometry, np.random.default_rng(0), lengths=-1.0)
+    assert measured(geometry, np.random.default_rng(0), TapeMeasure(0.0, 0.0, 0.0)) == geometry
+
+
+def test_metadata_say_how_exactly_it_was_measured() -> None:
+    assert TapeMeasure.of({}) == TapeMeasure()
+    assert TapeMeasure.of({GEOMETRY_STD: {"lengths": 0.005}}) == TapeMeasure(lengths=0.005)
+    with pytest.raises(ValueError, match=r"geometry_std must map some of .*'places'.*got \{'hips': 0"):
+        TapeMeasure.of({GEOMETRY_STD: {"hips": 0.0}})
+    with pytest.raises(ValueError, match="geometry_std must map some of"):
+        TapeMeasure.of({GEOMETRY_STD: 0.0})
+    for wrong in (-1.0, np.inf, np.nan):
+        with pytest.raises(ValueError, match="places must"):
+            TapeMeasure.of({GEOMETRY_STD: {"places": wrong}})
 
 
 @pytest.mark.parametrize(

@@ -10,6 +10,7 @@ import pytest
 
 from poise.baselines.studies.whole_body.motion import IDEAL, ExactRide
 from poise.envs.data.trajectory import Trajectory
+from poise.filters.bicycle.geometry import GEOMETRY_STD
 from poise.filters.bicycle.whole_body.consistent import ADDED, BIASES, PUBLISHED, ConsistentWholeBody
 from poise.filters.bicycle.whole_body.filter import WholeBody
 from poise.filters.bicycle.whole_body.linkage import ERROR_SIZE, GYROSCOPES, HIP, OUTPUTS, SHOULDER, paper_axes
@@ -122,3 +123,29 @@ def test_the_usual_posture_is_that_of_the_rider() -> None:
     assert FILTERS["whole-body"].outputs == FILTERS["whole-body-consistent"].outputs
     with pytest.raises(ValueError, match="posture_noise must be positive"):
         ConsistentWholeBody(posture_noise=(0.0, 1.0, 1.0))
+
+
+def test_offsets_follow_from_how_exactly_the_rider_was_measured() -> None:
+    usual, geometry = ConsistentWholeBody(), RIDER.describe()
+
+    def offsets(**tape: float) -> list[np.ndarray]:
+        model = usual.configured({"geometry": geometry, GEOMETRY_STD: tape})
+        return [np.array(each) for each in (model.arm_offsets, model.leg_offsets)]
+
+    unsaid = usual.configured({"geometry": geometry})
+    assert (unsaid.arm_offsets, unsaid.leg_offsets) == (usual.arm_offsets, usual.leg_offsets)
+    for told, own in zip(offsets(), (usual.arm_offsets, usual.leg_offsets), strict=True):
+        np.testing.assert_array_equal(told, own)
+    for exact, twice, own in zip(
+        offsets(lengths=0.0, places=0.0), offsets(lengths=0.04, places=0.02), offsets(), strict=True
+    ):
+        # an elbow or a knee that is not quite out is the rider's, not the tape's
+        np.testing.assert_allclose(exact, [0.002, 0.002, own[2]])
+        np.testing.assert_allclose(twice, [2.0 * own[0], 2.0 * own[1], own[2]])
+    arm, leg = offsets(lengths=0.0)
+    assert arm[0] == pytest.approx(0.06 * math.sqrt(0.87))
+    assert leg[0] == pytest.approx(0.033 * math.sqrt(0.61))
+    # without a geometry it tells nothing
+    assert usual.configured({GEOMETRY_STD: {"lengths": 0.0}}) == usual
+    with pytest.raises(ValueError, match="geometry_std must map"):
+        usual.configured({"geometry": geometry, GEOMETRY_STD: {"tape": 0.01}})
