@@ -26,8 +26,9 @@ class OnlineEstimator:
         ranges: channel → range of the sensor in its unit; what reaches it is not a sample.
         seconds: of every step.
 
-    Glitches count as missing, as in :func:`poise.run`: what looks like one does at once, and where later samples show
-    that it is one or is none, the estimate begins again from there.
+    Glitches and repeats count as missing, as in :func:`poise.run`: what looks like a glitch does at once, and where
+    later samples show that it is one or is none, the estimate begins again from there; repeats do from the first one
+    that a sensor would not give.
 
     Raises:
         ValueError: the estimator needs the whole recording.
@@ -45,7 +46,7 @@ class OnlineEstimator:
             raise ValueError(
                 "a smoother needs the whole recording: name an estimator with steps, or use `poise estimate`"
             )
-        self._samples = SamplesSoFar(self.ranges)
+        self._samples = SamplesSoFar(self.ranges, self.estimator.dt)
 
     def warm_up(self) -> Self:
         """Compute an estimate of a resting sensor, so that compiled code is loaded before the first sample comes."""
@@ -68,7 +69,7 @@ class OnlineEstimator:
         sample = check_measurements(self.estimator.channels, measurement, time_axis=False)
         if self._state is None or restart:
             self._state = self.estimator.init(sample)
-            self._samples = SamplesSoFar(self.ranges)
+            self._samples = SamplesSoFar(self.ranges, self.estimator.dt)
             self._before.clear()
         others = {name: np.asarray(values, float) for name, values in measurement.items() if name not in sample}
         changed = self._samples.add({**others, **sample})

@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 
+from .repeats import CHANNELS, RunsSoFar, moves, repeated
 from .trajectory import Trajectory
 
 LEAST = {"gyr": 3.0, "acc": 30.0}
@@ -76,22 +77,32 @@ def full_scales(metadata: Mapping[str, Any]) -> dict[str, float]:
     return {str(name): float(limit) for name, limit in given.items()} if isinstance(given, Mapping) else {}
 
 
-def no_samples(measurements: Mapping[str, np.ndarray], ranges: Mapping[str, float]) -> dict[str, dict[str, np.ndarray]]:
+def no_samples(
+    measurements: Mapping[str, np.ndarray], ranges: Mapping[str, float], dt: float | None = None
+) -> dict[str, dict[str, np.ndarray]]:
     """Channel → kind of what is no sample → where ``(T,)`` bool.
 
     That is a glitch of a gyroscope or an accelerometer; a gyroscope's 0, 0, 0 beside an accelerometer's, which is how a
-    logger writes that nothing came; and what reaches the range of a sensor.
+    logger writes that nothing came; what reaches the range of a sensor; and samples that were written again where none
+    came (:mod:`.repeats`).
 
     Args:
         measurements: channel → ``(T, size)``, on a grid.
         ranges: channel → range in its unit, where it is known.
+        dt: s between samples; None to look for no repeats.
     """
     found: dict[str, dict[str, np.ndarray]] = {}
     for name, values in measurements.items():
         site, _, kind = name.rpartition("/")
-        if kind not in LEAST or values.shape[1] != 3:
+        if kind not in CHANNELS or values.shape[1] != 3:
             continue
-        found[name] = {"glitches": glitches(values, LEAST[kind])}
+        if dt is not None:
+            rates = measurements.get(f"{site}/gyr")
+            moving = None if rates is None else moves(rates)
+            found[name] = {"repeats of an earlier sample": repeated(values, dt, moving)}
+        if kind not in LEAST:
+            continue
+        found.setdefault(name, {})["glitches"] = glitches(values, LEAST[kind])
         force = measurements.get(f"{site}/acc")
         if kind == "gyr" and force is not None:
             found[name]["rows of zeros"] = np.logical_not(values.any(axis=1) | force.any(axis=1))
@@ -109,7 +120,8 @@ def without_glitches(trajectory: Trajectory) -> dict[str, np.ndarray]:
         UserWarning: how many samples there are.
     """
     measurements, reports = dict(trajectory.measurements), []
-    for name, parts in no_samples(measurements, full_scales(trajectory.metadata)).items():
+    dt = trajectory.dt if len(trajectory) > 1 else None
+    for name, parts in no_samples(measurements, full_scales(trajectory.metadata), dt).items():
         wrong = np.logical_or.reduce(list(parts.values()))
         if wrong.any():
             measurements[name] = np.where(wrong[:, None], np.nan, measurements[name])
@@ -125,9 +137,12 @@ class SamplesSoFar:
 
     Attributes:
         ranges: channel → range of the sensor in its unit.
+        dt: s between samples; None to look for no repeats. They count as missing from the first that is too many.
     """
 
     ranges: Mapping[str, float] = field(default_factory=dict)
+    dt: float | None = None
+    _runs: RunsSoFar = field(default_factory=RunsSoFar, init=False)
     _raw: deque[dict[str, np.ndarray]] = field(default_factory=lambda: deque(maxlen=2 * REACH + 1), init=False)
     _clean: deque[dict[str, np.ndarray]] = field(default_factory=lambda: deque(maxlen=FEWEST), init=False)
     _watched: int = field(default=0, init=False)
@@ -137,7 +152,7 @@ class SamplesSoFar:
 
         All of them are the last ones of the stream, in their order.
         """
-        sample = dict(measurement)
+        sample = dict(measurement) if self.dt is None else self._runs.without_repeats(measurement, self.dt)
         odd = self._odd(sample)
         self._raw.append(sample)
         self._watched = 2 * REACH + 1 if odd else max(0, self._watched - 1)

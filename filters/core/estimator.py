@@ -14,7 +14,7 @@ from typing import Any, Protocol, Self, TypeVar, runtime_checkable
 import numpy as np
 
 from .backend import Array, is_torch, namespace
-from .quantity import Channel, Estimate, Measurement, Quantity
+from .quantity import SHORTEST, Channel, Estimate, Measurement, Quantity
 
 S = TypeVar("S")
 
@@ -130,18 +130,20 @@ def without_impossible(channel: Channel, samples: Array) -> Array:
     """The samples ``(..., size)`` with NaN for what no sensor can have measured.
 
     That is what lies beyond the channel's limit or is infinite; of a vector, all of it if one coordinate is missing or
-    impossible; and zeros where a direction is needed, which is how some devices write that there is no sample.
+    impossible; and zeros where a direction is needed, which is how some devices write that there is no sample. Next to
+    nothing counts as zeros.
     """
     if samples.ndim == 1 and not is_torch(samples):  # a single sample, at every time step of a loop: without NumPy
         numbers, limit = samples.tolist(), channel.limit
-        if all(-limit <= number <= limit for number in numbers) and (any(numbers) or not channel.has_direction):
+        possible = all(-limit <= number <= limit for number in numbers)
+        if possible and (not channel.has_direction or any(abs(number) >= SHORTEST for number in numbers)):
             return samples
     xp = namespace(samples)
     good = xp.abs(samples) <= channel.limit
     if channel.is_vector:
         good = xp.all(good, axis=-1)[..., None]
     if channel.has_direction:
-        good = good & xp.any(samples != 0.0, axis=-1)[..., None]
+        good = good & xp.any(xp.abs(samples) >= SHORTEST, axis=-1)[..., None]
     return samples if bool(xp.all(good)) else xp.where(good, samples, xp.nan)
 
 

@@ -34,6 +34,9 @@ LIMITS = {"rad/s": 100.0, "m/s²": 2000.0}
 LARGEST_NUMBER = 1e8
 """The same for all other units: the field of the earth is 65 000 nT, a converter of 24 bits counts to 1.7·10⁷."""
 
+SHORTEST = 1e-9
+"""What no vector with a direction is shorter than, in any unit: the field of the earth is 2·10⁻⁵ T or more."""
+
 
 @dataclass(frozen=True)
 class Channel:
@@ -60,7 +63,7 @@ class Channel:
 
     @property
     def has_direction(self) -> bool:
-        """Whether the direction of the vector is used: zeros, which have none, count as missing."""
+        """Whether the direction of the vector is used: what is shorter than any has none, and counts as missing."""
         return (self.kind in ("acc", "mag") and self.size == 3) or (self.kind == "orientation" and self.size == 4)
 
 

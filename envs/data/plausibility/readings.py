@@ -9,8 +9,9 @@ from typing import Literal
 
 import numpy as np
 
-from ....filters.core.quantity import ACCELEROMETER, GYROSCOPE, MAGNETOMETER
+from ....filters.core.quantity import ACCELEROMETER, GYROSCOPE, MAGNETOMETER, SHORTEST
 from ..glitches import LEAST, glitches
+from ..repeats import HELD, foreign_runs, moves, runs_of, usual_run
 
 CHANNELS = {"gyr": GYROSCOPE, "acc": ACCELEROMETER, "mag": MAGNETOMETER}
 LONGEST_ABSENCE = 0.3
@@ -19,10 +20,6 @@ UNREADABLE = 1e12
 """Beyond any reading in any unit of a sensor: numbers that were damaged, or read as another type."""
 MOST_CODES = 3
 """Magnitudes of codes for no value in one channel."""
-HELD = 0.5
-"""s for which no sensor in use gives one sample again and again."""
-RARELY = 0.05
-"""Share of samples that repeat the one before, up to which a sensor shows noise."""
 OVERFLOW = 0.8
 """Share of the largest reading beyond which a jump to the other sign is the overflow of a counter."""
 SLOWER = 0.8
@@ -75,16 +72,19 @@ def plausible_samples(kind: str, values: np.ndarray) -> np.ndarray:
     if kind in LEAST:
         none |= glitches(values, LEAST[kind])
     found = np.where(none[:, None], np.nan, values)
-    return found if kind == "gyr" else np.where(found.any(axis=1, keepdims=True), found, np.nan)
+    return found if kind == "gyr" else np.where((np.abs(found) >= SHORTEST).any(axis=1, keepdims=True), found, np.nan)
 
 
-def check_alive(channel: str, values: np.ndarray, dt: float | None = None) -> Iterator[Finding]:
+def check_alive(
+    channel: str, values: np.ndarray, dt: float | None = None, moving: np.ndarray | None = None
+) -> Iterator[Finding]:
     """Zeros, constants, copies, repeats, clipping, overflow, absent and impossible samples.
 
     Args:
         channel: ``site/gyr`` and so on.
         values: ``(T, 3)``.
         dt: s between samples; None where it is unknown.
+        moving: where the gyroscope of the same site moves (:func:`poise.envs.data.repeats.moves`); None without one.
     """
     present = np.isfinite(values).all(axis=1)
     if not present.any():
@@ -105,9 +105,10 @@ def check_alive(channel: str, values: np.ndarray, dt: float | None = None) -> It
         what = f"{100 * longest:.0f} % of the samples are missing in one stretch"
         remedy = "Cut the recording, or choose another channel: without rates nothing follows a rotation."
         yield Finding("warning", channel, what, "a gyroscope that failed or was switched off", remedy)
-    zero = float(np.mean(~samples.any(axis=1)))
+    nothing = ~(samples.any(axis=1) if channel.endswith("gyr") else (np.abs(samples) >= SHORTEST).any(axis=1))
+    zero = float(np.mean(nothing))
     still = len(samples) > 20 and bool((samples == samples[0]).all())
-    what = f"{100 * zero:.0f} % of the samples are 0, 0, 0"
+    what = f"{100 * zero:.0f} % of the samples are 0, 0, 0" + (" or nearly" if samples[nothing].any() else "")
     if 0.5 < zero < 0.995 and slower(samples):
         remedy = "Replace the zeros by NaN." if channel.endswith("gyr") else "They are treated as missing samples."
         severity: Severity = "warning" if channel.endswith("gyr") else "note"
@@ -131,7 +132,7 @@ def check_alive(channel: str, values: np.ndarray, dt: float | None = None) -> It
         what = f"{alone} samples stand alone, far from those beside them"
         yield Finding("note", channel, what, "errors of the transmission", "They are treated as missing samples.")
     yield from check_axes_alive(channel, samples[~impossible])
-    yield from check_repeats(channel, values, dt)
+    yield from check_repeats(channel, values, dt, moving)
     yield from check_range(channel, samples[~impossible])
 
 
@@ -156,30 +157,31 @@ def check_axes_alive(channel: str, samples: np.ndarray) -> Iterator[Finding]:
             yield Finding("warning", channel, what, "a column that was named twice", "Name three different columns.")
 
 
-def check_repeats(channel: str, values: np.ndarray, dt: float | None) -> Iterator[Finding]:
-    """Long runs of one sample in a channel whose samples differ otherwise."""
-    same = (values[1:] == values[:-1]).all(axis=1)
-    # Zeros of the other sensors are no samples, and told as such.
-    repeats = np.append(False, same if channel.endswith("gyr") else same & values[1:].any(axis=1))
-    runs = np.diff(np.flatnonzero(~np.append(repeats, False)))
-    usual = int(np.median(runs)) if len(runs) else 1
-    if dt is not None and usual > 1 and len(runs) >= 20 and float((runs == usual).mean()) > SLOWER:
+def check_repeats(
+    channel: str, values: np.ndarray, dt: float | None, moving: np.ndarray | None = None
+) -> Iterator[Finding]:
+    """Runs of one sample, of a slower sensor or in place of missing samples (:mod:`poise.envs.data.repeats`)."""
+    if dt is None:
+        return
+    lengths = runs_of(values)[1]
+    usual = usual_run(lengths)
+    if usual > 1 and float((lengths == usual).mean()) > SLOWER:
         what = f"every sample stands {usual} times: the sensor runs at {1.0 / (usual * dt):.4g} Hz"
         cause = "a recorder that is faster than the sensor"
         yield Finding("note", channel, what, cause, "Replace the repeated samples by NaN, or keep every first one.")
-        return
-    if dt is None or not len(runs) or float(runs.max()) * dt < HELD or runs.max() < 10:
-        return
-    long = runs * dt >= HELD
-    if float((runs[~long] - 1).sum()) > RARELY * len(values):
-        return
-    start = int(np.flatnonzero(~np.append(repeats, False))[int(np.argmax(runs))])
-    what = f"one sample again and again, for {runs.max() * dt:.1f} s from sample {start}"
-    cause, remedy = "a recorder that repeats the last sample where none came", "Replace the repeated samples by NaN."
-    if not values[start].any():
-        what = f"0, 0, 0 for {runs.max() * dt:.1f} s from sample {start}"
-        cause, remedy = "drop-outs written as zeros", "Replace the zeros by NaN, unless the sensor rested there."
-    yield Finding("warning", channel, what, cause, remedy)
+    own = channel.endswith("gyr")
+    begins, lengths = foreign_runs(values, dt, None if own else moving)
+    zero = ~(moves(values[begins]) if own else values[begins].any(axis=1))
+    if own and zero.any() and lengths[zero].max() * dt >= HELD:
+        start, length = begins[zero][lengths[zero].argmax()], lengths[zero].max()
+        what, remedy = f"0, 0, 0 for {length * dt:.1f} s from sample {start}", "Replace the zeros by NaN, unless"
+        yield Finding("warning", channel, what, "drop-outs written as zeros", f"{remedy} the sensor rested there.")
+    if not zero.all():
+        start, length = begins[~zero][lengths[~zero].argmax()], lengths[~zero].max()
+        what = f"one sample again and again, for {length * dt:.1f} s from sample {start}"
+        severity: Severity = "warning" if length * dt >= HELD else "note"
+        cause = "a recorder that repeats the last sample where none came"
+        yield Finding(severity, channel, what, cause, "They are treated as missing samples.")
 
 
 def check_copies(channels: Mapping[str, np.ndarray]) -> Iterator[Finding]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import warnings
 
+from ..repeats import moves
 from ..trajectory import Trajectory
 from .clocks import check_clock
 from .readings import Finding, check_alive, check_copies
@@ -49,9 +50,10 @@ def check_site(trajectory: Trajectory, site: str, wrong_clock: bool) -> list[Fin
     """All checks of one sensor."""
     recorded = {kind: vectors(trajectory, f"{site}/{kind}") for kind in ("gyr", "acc", "mag")}
     findings: list[Finding] = []
+    moving = None if recorded["gyr"] is None else moves(recorded["gyr"])
     for kind, values in recorded.items():
         if values is not None:
-            findings += check_alive(f"{site}/{kind}", values, trajectory.dt if not wrong_clock else None)
+            findings += check_alive(f"{site}/{kind}", values, trajectory.dt if not wrong_clock else None, moving)
     findings += check_copies({f"{site}/{kind}": values for kind, values in recorded.items() if values is not None})
     dead = {finding.channel for finding in findings if finding.severity == "warning"}
     gyr, acc, mag = (

@@ -6,8 +6,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from ..repeats import HELD
 from ..trajectory import Trajectory
-from .readings import HELD, Finding, Severity
+from .readings import Finding, Severity
 from .sites import seen
 
 LARGE_OFFSET = 0.01

@@ -51,11 +51,12 @@ def test_zeros_without_a_direction_are_a_missing_sample(name: str, motion: Calla
     for channel in estimator.channels:
         if channel.has_direction:
             results = []
-            for value in (0.0, np.nan):
+            for value in (np.nan, 0.0, 5e-324, -1e-12):
                 changed = {key: array.copy() for key, array in data.items()}
                 changed[channel.name][[0, 1, 40, 41]] = value
                 results.append(poses(estimator, changed))
-            np.testing.assert_array_equal(*results, err_msg=channel.name)
+            for result in results[1:]:
+                np.testing.assert_array_equal(result, results[0], err_msg=channel.name)
             assert np.isfinite(results[0][2:]).all()
 
 
@@ -68,6 +69,9 @@ def test_zeros_without_a_direction_are_a_missing_sample(name: str, motion: Calla
         (GYROSCOPE, [1.0, np.nan, 0.0], False),
         (ACCELEROMETER, [0.0, 0.0, 0.0], False),
         (ACCELEROMETER, [0.0, 1e-9, 0.0], True),
+        (ACCELEROMETER, [0.0, 1e-10, 0.0], False),
+        (MAGNETOMETER, [1e-12, -2e-12, 3e-12], False),
+        (MAGNETOMETER, [1e-5, 0.0, -4e-5], True),
         (ACCELEROMETER, [0.0, -2001.0, 9.81], False),
         (MAGNETOMETER, [0.0, 0.0, 0.0], False),
         (MAGNETOMETER, [20e3, -5e3, 40e3], True),

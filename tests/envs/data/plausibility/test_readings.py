@@ -52,6 +52,11 @@ def recording(**channels: np.ndarray) -> Trajectory:
         (lambda: recording(gyr=held(GYR), acc=held(ACC)), "imu/gyr", "again and again, for 2.0 s from sample 400"),
         (lambda: recording(gyr=zeroed(GYR)), "imu/gyr", "0, 0, 0 for 2.0 s from sample 400; likely cause: drop-outs"),
         (lambda: recording(acc=KNOWN.measurements["imu/gyr"]), "imu/acc", "the same samples as imu/gyr"),
+        (
+            lambda: recording(mag=1e-12 * GYR),
+            "imu/mag",
+            "100 % of the samples are 0, 0, 0 or nearly; likely cause: a sens",
+        ),
         (lambda: recording(gyr=wrapped(GYR, 1.0)), "imu/gyr", "overflow"),
         (lambda: recording(gyr=np.clip(GYR, -1.0, 1.0)), "imu/gyr", "saturation"),
         (lambda: recording(gyr=unsigned(GYR)), "imu/gyr", "x, y, z lie near 0 and near 70, none between"),

@@ -1,0 +1,111 @@
+"""Samples that are none, because a recorder wrote its last one again where nothing came.
+
+No sensor with noise gives one sample several times in a row: three axes with a standard deviation of one step of
+their digits repeat by chance in 2 % of the samples, five times in a row in less than one of a million.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+CHANNELS = ("gyr", "acc", "mag")
+"""Kinds of channels, of three axes, in which repeats are looked for."""
+HELD = 0.5
+"""s for which no sensor in use gives one sample again and again."""
+RARELY = 0.05
+"""Share of samples that repeat the one before, up to which a sensor shows noise."""
+LONGEST = 4
+"""Longest run of one sample, in usual ones, that counts as the sensor's own."""
+HARMLESS = 0.03
+"""s for which a sample may stand in for others whatever it is."""
+FEWEST_CHANGES = 20
+"""Of a channel that shows noise, or how slow it is."""
+STANDSTILL = 1e-6
+"""rad/s below which no gyroscope reads but a simulated one without errors, or one that writes zeros at rest."""
+
+
+def runs_of(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """First row and length of each run of equal rows of ``(T, d)``; a row with NaN equals none."""
+    begins = np.flatnonzero(np.append(True, (values[1:] != values[:-1]).any(axis=1)))
+    return begins, np.diff(np.append(begins, len(values)))
+
+
+def usual_run(lengths: np.ndarray) -> int:
+    """Samples for which one reading stands in a table: more than one of a sensor that is slower than the table."""
+    return int(np.median(lengths)) if len(lengths) > FEWEST_CHANGES else 1
+
+
+def longest_own(usual: int, dt: float) -> int:
+    """Samples of the longest run that may be the sensor's own."""
+    return max(LONGEST * usual, round((HELD if usual > 1 else HARMLESS) / dt) + 1)
+
+
+def foreign_runs(values: np.ndarray, dt: float, moving: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+    """First row and length of the runs of one sample in ``(T, 3)`` that are not the sensor's own.
+
+    Runs of a sensor that is slower than its table, or whose digits are coarse, are its own.
+
+    Args:
+        values: of one channel, on a grid.
+        dt: s between samples.
+        moving: ``(T,)`` bool, :func:`moves` of the gyroscope at the same site: what is still beside one that is still
+            may rest, in a simulation without errors. None without a gyroscope.
+    """
+    begins, lengths = runs_of(values)
+    usual = usual_run(lengths)
+    own = lengths <= longest_own(usual, dt)
+    coarse = usual == 1 and float((lengths[own] - 1).sum()) > RARELY * len(values)
+    noisy = int(own.sum()) > FEWEST_CHANGES or (moving is not None and float(moving.mean()) > 0.5)
+    if coarse or not noisy:
+        return begins[:0], lengths[:0]
+    if moving is not None:
+        own |= np.add.reduceat(moving.astype(float), begins) < 0.5 * lengths
+    return begins[~own], lengths[~own]
+
+
+def repeated(values: np.ndarray, dt: float, moving: np.ndarray | None = None) -> np.ndarray:
+    """Samples ``(T,)`` bool that repeat an earlier one in place of a missing one; arguments as above."""
+    found = np.zeros(len(values), bool)
+    for begin, length in zip(*foreign_runs(values, dt, moving), strict=True):
+        found[begin + 1 : begin + length] = values[begin].any()
+    return found
+
+
+def moves(gyroscope: np.ndarray) -> np.ndarray:
+    """Where ``(T,)`` bool a gyroscope ``(T, 3)`` does not read exactly nothing."""
+    return ~np.asarray((np.abs(gyroscope) <= STANDSTILL).all(axis=1))
+
+
+@dataclass
+class RunsSoFar:
+    """The runs of a stream so far: repeats are none from the first that is one too many for a run of the sensor."""
+
+    _last: dict[str, list[float]] = field(default_factory=dict)
+    _run: dict[str, int] = field(default_factory=dict)
+    _changes: dict[str, int] = field(default_factory=dict)
+    _repeats: dict[str, int] = field(default_factory=dict)
+
+    def without_repeats(self, measurement: Mapping[str, np.ndarray], dt: float) -> dict[str, np.ndarray]:
+        """The next sample (channel → ``(size,)``), NaN where it repeats one in place of a missing one."""
+        result, longest = dict(measurement), longest_own(1, dt)
+        for name, values in measurement.items():
+            site, _, kind = name.rpartition("/")
+            if kind not in CHANNELS or len(values) != 3:
+                continue
+            now = values.tolist()
+            if now != self._last.get(name):
+                own = self._run.get(name, 0)
+                self._repeats[name] = self._repeats.get(name, 0) + (own - 1 if 0 < own <= longest else 0)
+                self._changes[name] = self._changes.get(name, 0) + 1
+                self._last[name], self._run[name] = now, 1
+                continue
+            self._run[name] += 1
+            changes, repeats = self._changes[name], self._repeats[name]
+            if self._run[name] > longest and changes > FEWEST_CHANGES and repeats <= RARELY * (changes + repeats):
+                rates = measurement.get(f"{site}/gyr")
+                if any(now) and (rates is None or bool(moves(rates[None])[0])):
+                    result[name] = np.full(3, np.nan)
+        return result

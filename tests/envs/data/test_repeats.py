@@ -1,0 +1,112 @@
+"""Samples that a recorder wrote again where none came: found, and left alone where they are a sensor's own."""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+import pytest
+
+import poise
+from poise.baselines.online import OnlineEstimator
+from poise.envs.data.plausibility.recording import check_recording
+from poise.envs.data.repeats import RunsSoFar, moves, repeated, runs_of
+from poise.envs.data.trajectory import Trajectory
+from poise.envs.hand.sensing import simulate_hand
+from poise.filters.core import metrics
+
+KNOWN = simulate_hand("mixed", seed=22, duration=30.0)
+
+
+def frozen(*kinds: str, begin: int = 1000, end: int | None = 1200, every: int | None = None) -> Trajectory:
+    """The recording with the last sample instead of those of some rows, once or again and again."""
+    changed = {name: np.array(values) for name, values in KNOWN.measurements.items()}
+    length = (len(KNOWN) if end is None else end) - begin
+    for start in range(begin, len(KNOWN), every) if every else (begin,):
+        for kind in kinds:
+            changed[f"imu/{kind}"][start + 1 : start + length] = changed[f"imu/{kind}"][start]
+    return KNOWN.replace(measurements=changed)
+
+
+def largest(name: str, trajectory: Trajectory) -> float:
+    up = poise.run(name, trajectory).pose["up"]
+    return float(np.degrees(metrics.direction_error(up, KNOWN.truth_of("up")))[1400:].max())
+
+
+@pytest.mark.parametrize(
+    ("trajectory", "channels"),
+    [
+        (frozen("gyr", "acc", "mag"), ("gyr", "acc", "mag")),
+        (frozen("gyr", end=1020), ("gyr",)),
+        (frozen("acc", end=1500), ("acc",)),
+        (frozen("mag", end=2000), ("mag",)),
+        (frozen("gyr", "acc", begin=600, end=610, every=200), ("gyr", "acc")),
+        (frozen("acc", begin=1500, end=None), ("acc",)),
+        (frozen("mag", begin=0, end=None), ("mag",)),
+    ],
+)
+def test_a_sensor_that_is_stuck_gives_no_samples(trajectory: Trajectory, channels: tuple[str, ...]) -> None:
+    for name, values in trajectory.measurements.items():
+        wrong = (values != KNOWN.measurements[name]).any(axis=1)
+        found = repeated(values, 0.01, moves(trajectory.measurements["imu/gyr"]))
+        if name == "imu/mag" and wrong[1:].all():
+            wrong[0] = False
+        np.testing.assert_array_equal(found, wrong, err_msg=name)
+        assert wrong.any() == (name.rpartition("/")[2] in channels)
+    told = {finding.channel for finding in check_recording(trajectory)}
+    assert told >= {f"imu/{kind}" for kind in channels}
+
+
+@pytest.mark.parametrize("name", ["mekf", "bounded-motion-9", "vqf"])
+def test_what_it_repeats_misleads_nobody(name: str) -> None:
+    trajectory = frozen("gyr", "acc", "mag", end=1040)
+    with pytest.warns(UserWarning, match="imu/gyr: 39 repeats of an earlier sample"):
+        error = largest(name, trajectory)
+    absent = {key: np.where(repeated(v, 0.01)[:, None], np.nan, v) for key, v in trajectory.measurements.items()}
+    assert error == largest(name, KNOWN.replace(measurements=absent))
+
+
+def test_a_sensor_s_own_repeats_are_left_alone() -> None:
+    rng = np.random.default_rng(0)
+    gyr, acc, mag = (np.array(KNOWN.measurements[f"imu/{kind}"]) for kind in ("gyr", "acc", "mag"))
+    turning = np.ones(len(gyr), bool)
+    slow = np.repeat(mag[::10], 10, axis=0)[: len(mag)]
+    irregular = mag[np.minimum.accumulate(np.sort(rng.choice(len(mag), len(mag)))[::-1])[::-1]]
+    coarse = np.round(0.3 * rng.standard_normal((3000, 3)))
+    for values in (gyr, acc, mag, slow, irregular, coarse):
+        assert not repeated(values, 0.01, turning).any()
+    assert int(runs_of(coarse)[1].max()) > 4
+    # a rest without noise
+    still = np.concatenate([acc[:500], np.tile(acc[500], (300, 1)), acc[500:]])
+    rates = np.concatenate([gyr[:500], np.zeros((300, 3)), gyr[500:]])
+    assert not repeated(still, 0.01, moves(rates)).any()
+    assert not repeated(rates, 0.01, moves(rates)).any()
+    # a pause of a slow sensor
+    slow[1000:1200] = slow[1000]
+    assert repeated(slow, 0.01, turning)[1001:1200].all()
+
+
+@pytest.mark.parametrize("sensors", [None, "ideal"])
+@pytest.mark.parametrize("gesture", ["slow", "fast", "walk", "pointing"])
+def test_nothing_is_found_in_simulations(gesture: str, sensors: str | None) -> None:
+    hand = simulate_hand(gesture, seed=3, sensors=sensors, duration=15.0)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        poise.run("tilt", hand)
+
+
+def test_repeats_that_arrive_are_none_from_the_first_that_is_too_many() -> None:
+    trajectory, runs = frozen("gyr", "acc", end=1040), RunsSoFar()
+    rows = [{name: values[row] for name, values in trajectory.measurements.items()} for row in range(1100)]
+    found = [runs.without_repeats(row, 0.01) for row in rows]
+    missing = np.array([np.isnan(each["imu/gyr"]).all() for each in found])
+    np.testing.assert_array_equal(np.flatnonzero(missing), np.arange(1004, 1040))
+    assert all(np.isfinite(each["imu/mag"]).all() for each in found)
+
+
+def test_a_loop_that_is_stuck_predicts() -> None:
+    trajectory, stepping = frozen("gyr", "acc", "mag", end=1100), OnlineEstimator(poise.make_estimator("mekf", dt=0.01))
+    for row in range(1100):
+        estimate = stepping.step({name: values[row] for name, values in trajectory.measurements.items()})
+    assert estimate.covariance is not None
+    assert np.degrees(np.sqrt(np.trace(estimate.covariance[:3, :3]) / 3.0)) > 10.0
