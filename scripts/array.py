@@ -15,10 +15,10 @@ class Args:
     """Arguments of ``poise array``."""
 
     array: tyro.conf.Positional[str]
-    """octa, controller, planar or triaxial; or a JSON file with positions (m) and axes (unit vectors), a row for each
-    accelerometer, and if wanted name and reference (the point whose acceleration is meant)"""
+    """octa, controller, planar or triaxial; or a JSON file with positions (m) and axes (unit vectors), a row
+    for each accelerometer, and optionally name and reference (the point whose acceleration is meant)"""
     std: float = 1.0
-    """σ_a of one accelerometer, m/s² per sample; gains are multiplied by it"""
+    """σ_a of one accelerometer, m/s² per sample, a factor on the gains"""
     json: bool = False
     """print one JSON document instead of tables"""
 

@@ -32,9 +32,9 @@ class Args:
     """Arguments of ``poise benchmark``."""
 
     suite: Literal["all", "hand", "rider"] = "all"
-    """hand: estimators of one IMU on simulated motion of a hand-held device and on recordings; rider: the papers'
-    filters of rider and bicycle beside networks that correct them and what a network should beat, on riders, scenarios
-    and styles kept from training; all: both, and the inclination of an IMU on the bicycle and on the rider's trunk"""
+    """hand: estimators of one IMU on simulated hand motion and on recordings; rider: the papers' filters of
+    rider and bicycle, networks and simple references, on riders, scenarios and styles kept from training; all:
+    both, and the inclination of an IMU on the bicycle and on the rider's trunk"""
     seed: int = 0
     """root seed of motions and sensor errors"""
     episodes: int = 3
@@ -54,19 +54,19 @@ class Args:
     baseline: Path | None = None
     """results.csv of an earlier run: errors that grew by more than 2 % are listed, and the exit status is 1"""
     save: Path | None = None
-    """file for the errors of recordings, simulations and riders, from which `poise recommend` and `poise list` read;
-    what this run has nothing of stays in it as it is"""
+    """file for the errors that `poise recommend` and `poise list` read; those that this run does not compute
+    stay in it"""
     quick: bool = False
-    """one episode of each gesture, one scenario of single IMUs, one trial of each test, and of the rider suite one ride
-    of each group without the references that learn"""
+    """small version: one episode, trial or ride of each kind, without the references that learn"""
     sweep: bool = False
-    """of the rider suite: instead of the tables, vary sensor grade, gaps, mounting, measured geometry and rate"""
+    """of the rider suite: vary noise scale, gaps, mounting, measured geometry and rate instead of printing the
+    tables"""
     processes: int = 2
     """number of parallel processes"""
     runs: Path = Path("runs")
     """parent of the run folder"""
     resume: Path | None = None
-    """folder of an earlier run to continue: what it has finished is kept, and the results are those of one run"""
+    """folder of an interrupted run; its results are kept"""
     json: bool = False
     """print one JSON document instead of tables"""
 

@@ -1,4 +1,4 @@
-"""Export a trained network for programs without Python."""
+"""Export a trained network as ONNX, for programs without Python."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class Args:
     weights: tyro.conf.Positional[str]
     """name of shipped weights, such as gru, or a file of weights"""
     onnx: Path
-    """file to write: one graph with its memory as input and output, the card of the weights in its metadata"""
+    """ONNX file to write: a graph with its memory as input and output, and the model card in its metadata"""
     json: bool = False
     """print one JSON document instead of tables"""
 

@@ -34,18 +34,18 @@ class Args:
     """Arguments of ``poise list``."""
 
     lists: tyro.conf.Positional[tuple[str, ...]] = ()
-    """which lists, by the titles that are printed if none is named"""
+    """names of lists; without one the names in all lists are printed"""
     markdown: bool = False
-    """print the tables in Markdown, as the documentation has them; all if none is named"""
+    """print Markdown tables, of all lists if none is named"""
     update: tuple[Path, ...] = ()
-    """pages whose lists are updated, for instance `poise list --update docs/*.md`"""
+    """pages in which the lists are replaced, such as docs/*.md"""
     weights: tuple[Path, ...] = ()
-    """files of trained weights, or folders that are searched for them, for the list `learned` instead of the shipped
-    ones; several trainings of one preset stand in one row"""
+    """for the list `learned`: files of trained weights, or folders that are searched for them, instead of the
+    shipped ones; trainings of one preset are in one row"""
     environments: Path | None = None
-    """folder in which the page of every environment is written anew, for instance docs/environments"""
+    """folder to which the page of every environment is written, such as docs/environments"""
     json: bool = False
-    """print one JSON document instead of tables; of all lists if none is named"""
+    """print one JSON document, of all lists if none is named"""
 
 
 def run(args: Args) -> int:

@@ -54,31 +54,31 @@ class Command(NamedTuple):
 
 
 COMMANDS: dict[str, Command] = {
-    "list": Command(".list", "estimators, environments, sensors, gestures, scenarios, file formats by name"),
+    "list": Command(".list", "list estimators, environments, sensors, gestures, scenarios, file formats"),
     "record": Command(".record", "record trajectories of an environment into files"),
-    "rides": Command(".rides", "simulate every scenario with every rider; statistics beside those of the papers"),
-    "realism": Command(
-        ".realism", "compare simulated motion with recordings and publications: how true simulators are"
-    ),
+    "rides": Command(".rides", "simulate every scenario with every rider, with statistics beside those of the papers"),
+    "realism": Command(".realism", "compare simulated motion with recordings and publications"),
     "train": Command(".train", "train a learned estimator"),
-    "export": Command(".export", "write a trained network as a file of ONNX, for programs without Python"),
-    "tune": Command(".tune", "fit the gains of a filter: constant ones, or a policy that sets them"),
+    "export": Command(".export", "write a trained network as ONNX, for programs without Python"),
+    "tune": Command(".tune", "tune the gains of a filter: constant ones, or a policy that sets them"),
     "adapt": Command(
-        ".recordings.adapt", "compare whatever may set the gains of a filter: constants, rules, policies, bounds"
+        ".recordings.adapt", "compare what can set the gains of a filter: constants, rules, policies, bounds"
     ),
-    "inspect": Command(".recordings.inspect", "what a recording holds; whether units, signs and clock are plausible"),
-    "recommend": Command(".recordings.recommend", "which estimator suits a recording, by errors on similar ones"),
-    "estimate": Command(".recordings.estimate", "angles, quaternions, standard deviations of a recording, as a file"),
-    "evaluate": Command(".recordings.evaluate", "measure estimators on recorded trajectories"),
+    "inspect": Command(".recordings.inspect", "check a recording: format, channels, units, signs, clock"),
+    "recommend": Command(".recordings.recommend", "rank estimators for a recording by their errors on similar ones"),
+    "estimate": Command(".recordings.estimate", "write angles, quaternions and standard deviations of a recording"),
+    "evaluate": Command(".recordings.evaluate", "compare estimators on recordings"),
     "stream": Command(".live.stream", "estimate sample by sample while lines of samples arrive: stdin, serial, UDP"),
-    "align": Command(".recordings.align", "clocks of several devices, axes of worn sensors, magnetometers"),
+    "align": Command(".recordings.align", "align clocks of several devices, axes of worn sensors, magnetometers"),
     "calibrate": Command(
-        ".recordings.calibrate", "scale, offset and axes of raw sensors, from rate-table and tumbling runs"
+        ".recordings.calibrate", "calibrate scale, offset and axes of raw sensors from rate-table and tumbling runs"
     ),
-    "view": Command(".live.view", "see motion and estimates in the browser: recordings, environments, live samples"),
+    "view": Command(".live.view", "show motion and estimates in the browser: recordings, environments, live samples"),
     "array": Command(".array", "analyse an array of accelerometers: rank and noise gains"),
     "benchmark": Command(".benchmark", "compare all estimators on simulated motion and on recordings"),
-    "reproduce": Command(".reproduce", "reproduce the study of a paper: its tables and figures beside ours"),
+    "reproduce": Command(
+        ".reproduce", "reproduce the study of a paper: published tables and figures beside those of this package"
+    ),
     "speed": Command(".speed", "measure steps per second of environments and estimators"),
 }
 

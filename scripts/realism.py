@@ -1,4 +1,4 @@
-"""How true the simulators are: motion, roads, control, saddle and sensors beside recordings and publications."""
+"""Compare the simulators with recordings and publications: motion, roads, control, saddle, sensors."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ class Args:
     recordings: tuple[str, ...] = ()
     """recorded data as role=path, where path is a file or folder and role one of hand, carried, chest, head"""
     parts: tuple[str, ...] = ()
-    """parts of the report: points (a table of them all), gestures, rides, steering, roads, sensors; with recordings
-    motion, ranks (default: all)"""
+    """parts of the report: points (fifteen properties in one table), gestures, rides, steering, roads, sensors;
+    with recordings motion, ranks (default: all)"""
     episodes: int = 60
     """simulated episodes of each recipe of hands"""
     rides: int = 20
     """simulated rides of each recipe of riders"""
     pages: tuple[Path, ...] = ()
-    """pages whose blocks of realism are replaced by tables of this run"""
+    """pages in which the tables of realism are replaced by those of this run"""
     processes: int = 2
     """number of parallel processes"""
     seed: int = 0

@@ -37,7 +37,7 @@ class Args:
     recipe: str | None = None
     """instead of an environment: a recipe of domain randomisation, by name (`poise list recipes`) or as a JSON file"""
     minari: str | None = None
-    """keep the episodes as a Minari data set of this name (poise/hand-motion-v0) instead of files in a folder"""
+    """write a Minari data set of this name (poise/hand-motion-v0) instead of files"""
     json: bool = False
     """print one JSON document instead of tables"""
 

@@ -1,8 +1,8 @@
-"""Reproduce the study of a paper: its tables and figures beside the results of this package.
+"""Reproduce the study of a paper: published tables and figures beside the results of this package.
 
-Papers: two-gyro, force-inertial, whole-body, accelerometer-array, external-acceleration; all does the five, several at
-a time, and prints one page of coverage. Results are kept in the run folder; --resume continues an interrupted study.
-If one of the five fails, the others are finished, the exit status is 1, and --resume does the failed one again.
+Papers: two-gyro, force-inertial, whole-body, accelerometer-array, external-acceleration; `all` runs the five,
+several at a time, and writes one page of coverage. --resume continues an interrupted study. If one of the five
+fails, the others are finished, the exit status is 1, and --resume repeats the failed one.
 """
 
 from __future__ import annotations
@@ -66,9 +66,9 @@ class Args:
     runs: Path = Path("runs")
     """parent of the run folder"""
     page: Path | None = None
-    """with all: file to which the page of coverage is written too, as Markdown"""
+    """with `all`: file for the page of coverage, Markdown"""
     pages: tuple[Path, ...] = ()
-    """pages whose tables of studies are replaced by those of this run, for instance `docs/*.md`"""
+    """pages in which the tables of studies are replaced by those of this run, such as docs/*.md"""
     json: bool = False
     """print one JSON document instead of tables"""
 

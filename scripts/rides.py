@@ -30,9 +30,10 @@ class Args:
     runs: Path = Path("runs")
     """parent of the run folder"""
     checks: bool = False
-    """instead of the table of rides, check the physics and compare filters of one IMU on some rides (minutes)"""
+    """check the physics and compare filters of one IMU on some rides instead (minutes)"""
     pilots: bool = False
-    """instead, how riders of all skills steer: preset riders, and ten random ones of each skill, in every scenario"""
+    """print how riders of all skills steer instead: preset riders, and ten random ones of each skill, in every
+    scenario"""
     json: bool = False
     """print one JSON document instead of tables"""
 

@@ -21,8 +21,8 @@ class Args:
         "environments",
         "vectors",
     )
-    """parts to measure; bicycle and arrays are families of filters, learned are networks, vectors are environments many
-    at a time"""
+    """parts to measure; bicycle and arrays are families of filters, learned are networks, vectors are vector
+    environments"""
     json: bool = False
     """print one JSON document instead of tables"""
 

@@ -1,4 +1,4 @@
-"""Train a learned estimator; the run folder keeps weights, card, arguments and versions."""
+"""Train a learned estimator; weights, model card, arguments and versions are written to a run folder."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Args:
     """Arguments of ``poise train``."""
 
     preset: tyro.conf.Positional[str] = "bounded-motion+network"
-    """what is trained, see `poise list presets`; gain policies are trained by `poise tune`"""
+    """preset to train (`poise list presets`); `poise tune` trains gain policies"""
     quick: bool = False
     """a small version: some minutes"""
     seed: int = 0
@@ -58,16 +58,16 @@ class Args:
     recipe: str | None = None
     """recipe to train on instead of the preset's, by name (`poise list recipes`) or as a JSON file"""
     recordings: tuple[Path, ...] = ()
-    """files or folders of recordings with known truth, to train on instead of simulated episodes; of five or more the
-    last fifth chooses the best epoch"""
+    """files or folders of recordings to train on instead of simulated episodes; of five or more the last fifth
+    chooses the best epoch"""
     teacher: Literal["truth", "smoother"] = "truth"
-    """what is right in the recordings: their truth, or the smoother of the corrected filter, which needs none"""
+    """labels of the recordings: their truth, or the smoother of the corrected filter, which needs none"""
     start: Path | None = None
     """weights to start from, such as those of a training on simulation"""
     test_episodes: int | None = None
-    """simulated episodes that the finished network is tested on; 48 by default, 8 of the small version"""
+    """simulated episodes to test the finished network on (default: 48, with --quick 8)"""
     processes: int = 2
-    """how many episodes are simulated at a time; the weights do not depend on it"""
+    """number of parallel processes that simulate episodes; the weights do not depend on it"""
     resume: Path | None = None
     """run folder of an interrupted training; the other arguments must be the same"""
     export: Path | None = None

@@ -1,4 +1,4 @@
-"""Fit the gains of a filter to simulated motions: constant ones, or a policy that sets them while the filter runs."""
+"""Tune the gains of a filter on simulated motions: constants, or a policy that sets them while the filter runs."""
 
 from __future__ import annotations
 
@@ -50,14 +50,14 @@ class Args:
     filter: tyro.conf.Positional[str] = "external-acceleration"
     """filter whose gains are tuned: any Kalman filter of ``poise list estimators`` that reads a gyroscope"""
     agent: Literal["ppo", "recurrent-ppo", "sac", "td3", "analytic", "constant", "optuna"] = "ppo"
-    """who sets the gains while the filter runs: ppo, recurrent-ppo, sac, td3, or a network trained by the exact
-    gradient (analytic); or the best constant gains, by an even search (constant) or by Optuna"""
+    """what sets the gains: a policy of ppo, recurrent-ppo, sac or td3, or one trained by the exact gradient
+    (analytic); or the best constant gains, by an even search (constant) or by Optuna"""
     preset: Literal["quick", "shipped"] = "quick"
     """quick: a minute or two, as a test; shipped: as long as the trainings of the weights in
     the package, whose cards name the commit that repeats them"""
     policy: str | None = None
-    """file or shipped name of a policy of this filter: nothing is trained; only the largest gyroscope bias that it
-    knows is found, on the motions of the preset, which must be of the kinds that it was trained on"""
+    """file or shipped name of a policy of this filter: nothing is trained, only its limit of the gyroscope bias
+    is found, on the motions of the preset, which must be of the kinds that it was trained on"""
     seed: int = 0
     """root seed of motions, sensors and training"""
     steps: int | None = None
@@ -76,7 +76,7 @@ class Args:
     recordings: tuple[Path, ...] = ()
     """files or folders of recordings with known orientation to compare on; never trained on"""
     report: tuple[Path, ...] = ()
-    """no training: tables and figures of these finished run folders, with intervals over their seeds"""
+    """no training: tables and figures of these finished run folders, with intervals over seeds"""
     resume: Path | None = None
     """run folder of an interrupted training; the other arguments must be the same"""
     export: Path | None = None

@@ -1,4 +1,4 @@
-"""Estimate sample by sample while lines of samples arrive, and write a line an estimate.
+"""Estimate sample by sample while lines of samples arrive; each estimate is a line.
 
 Lines are comma-separated values or JSON objects: time, gyroscope, accelerometer, magnetometer. They come from standard
 input, a file, a serial device or UDP. A missing sample is predicted. A line that is not a sample is counted and named
@@ -48,16 +48,17 @@ class Args:
     udp: int | None = None
     """receive lines as UDP datagrams on this port instead"""
     rate: float | None = None
-    """sampling rate, Hz; found from the first 50 stamps by default, which then come late"""
+    """sampling rate, Hz; by default estimated from the first 50 stamps, whose estimates are then late"""
     columns: tuple[str, ...] = ()
     """names of the values of a line, such as time gyr_x gyr_y gyr_z acc_x acc_y acc_z; - for one that is not read;
     by default those of a header, of a JSON object, or time, gyr, acc, mag"""
     units: tuple[str, ...] = ()
     """units where they are not SI, as kind=unit (gyr=deg/s acc=g time=ms)"""
     full_scale: tuple[str, ...] = ()
-    """ranges of sensors as kind=number in the unit of the lines (gyr=2000 acc=16): what reaches them is no sample"""
+    """ranges of sensors as kind=number in the unit of the lines (gyr=2000 acc=16); samples at a range count as
+    missing"""
     format: LineFormat = "auto"
-    """of the lines; estimates are written in the same one"""
+    """format of the lines, also of the estimates"""
     follow: bool = False
     """wait for more lines at the end of a file"""
     baud: int = 115200

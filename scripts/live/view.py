@@ -57,11 +57,11 @@ class Args:
     udp: int | None = None
     """show samples that arrive as lines in UDP datagrams on this port"""
     rate: float | None = None
-    """of lines of samples, Hz; found from the first 50 stamps by default"""
+    """rate of lines of samples, Hz; by default estimated from the first 50 stamps"""
     columns: tuple[str, ...] = ()
-    """of lines of samples, see `poise stream`"""
+    """columns of lines of samples, see `poise stream`"""
     units: tuple[str, ...] = ()
-    """of lines of samples where they are not SI, as kind=unit"""
+    """units of lines of samples where they are not SI, as kind=unit"""
     format: LineFormat = "auto"
     """of lines of samples"""
     baud: int = 115200
@@ -71,7 +71,7 @@ class Args:
     calibration: Path | None = None
     """record of `poise calibrate` for a recording of raw readings"""
     port: int = 8080
-    """of the page; the next free one if it is taken"""
+    """port of the page; the next free one if it is taken"""
     host: str = "127.0.0.1"
     """address that the page is served on; 0.0.0.0 for all of this machine"""
     browser: bool = True
@@ -81,10 +81,10 @@ class Args:
     plot: str | None = None
     """which curves are shown, such as roll or inclination"""
     beside: bool = False
-    """figures stand side by side, as they do where there is no truth"""
+    """show truth and estimates side by side, which is the default without truth"""
     screenshot: Path | None = None
-    """write a picture of the page (.png) or a film of the scene (.webp, .gif) that a Chromium without a window draws,
-    and leave"""
+    """write a picture of the page (.png) or a film of the scene (.webp, .gif) with a headless Chromium, and
+    exit"""
     until: float | None = None
     """end of the film, s; that of the motion by default"""
 

@@ -1,4 +1,4 @@
-"""Compare whatever may set the gains of one filter: constants, rules by hand, a bank of tunings, policies, bounds."""
+"""Compare what can set the gains of a filter: constants, rules, a bank of tunings, policies, bounds."""
 
 from __future__ import annotations
 
@@ -37,10 +37,10 @@ class Args:
     policies: tuple[str, ...] = ()
     """shipped names or files of policies (default: the filter's shipped one)"""
     trajectories: int = 24
-    """simulated ones, without recordings"""
+    """number of simulated trajectories to compare on, without recordings"""
     errors: float = 1.0
-    """factor on the errors of sensors and of their placement in simulated rides that are compared on: 0.01 shows what
-    of the error gains alone can move"""
+    """factor on sensor and placement errors of the simulated rides that are compared on; 0.01 leaves the errors
+    that gains can reduce"""
     training: int = 24
     """simulated trajectories on which the best constants are searched"""
     points: int = 32
@@ -48,9 +48,10 @@ class Args:
     search: int = 32
     """constant gains that the search for the best ones begins with; 24 more follow"""
     folds: int = 0
-    """of recordings: also policies trained on the recordings of all other folds, by the exact gradient; 0: none"""
+    """folds of the recordings: also compare policies trained on the recordings of all other folds, by the exact
+    gradient; 0: none"""
     ablation: bool = False
-    """also what each policy loses without a group of its observations, and with a gain that it leaves alone"""
+    """also print what each policy loses without a group of its observations, and with a gain kept constant"""
     seed: int = 0
     """root seed of simulated trajectories, searches and intervals"""
     runs: Path = Path("runs")

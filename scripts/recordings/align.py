@@ -42,7 +42,7 @@ class Args:
     record: Path = Path("calibration.json")
     """magnetometer: file of the calibration; records of other channels in it are kept"""
     plot: Path | None = None
-    """a figure that shows whether it worked"""
+    """figure to check the alignment"""
     json: bool = False
     """print one JSON document instead of tables"""
 

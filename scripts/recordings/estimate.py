@@ -24,11 +24,11 @@ class Args:
     estimator: str = "bounded-motion"
     """name of the estimator, see `poise list estimators`"""
     offline: bool = False
-    """use the whole recording for every estimate: the smoother instead of the filter"""
+    """run the smoother, which uses the whole recording for every estimate"""
     output: Path | None = None
     """file to write, .csv, .parquet, .h5, .npz, or .sto for OpenSim"""
     plot: Path | None = None
-    """picture of the angles over time, .png, .pdf or .svg"""
+    """figure of the angles over time, .png, .pdf or .svg"""
     site: str | None = None
     """in recordings of several sensors, the one to use"""
     calibration: Path | None = None

@@ -21,15 +21,14 @@ class Args:
     recordings: tyro.conf.Positional[tuple[Path, ...]]
     """files, or folders that are searched for recordings"""
     estimators: tuple[str, ...] = ("bounded-motion", "external-acceleration", "mekf", "mahony", "gru")
-    """names of estimators, or files of weights of `poise train`; `poise evaluate --estimators all .` takes all that
-    are installed"""
+    """names of estimators, files of weights of `poise train`, or `all` that are installed"""
     reference: str = "auto"
     """replacement of a missing truth (agreement, not error): an estimator, `onboard` for the
     orientation that the device computed, or `auto`: mekf-9, or bounded-motion where there is no magnetometer"""
     reference_clock: Literal["recorded", "corrected"] = "recorded"
-    """take the truth as recorded, or corrected by the measured offset between its clock and that of the gyroscope"""
+    """truth as recorded, or corrected by the measured offset of its clock from that of the gyroscope"""
     offline: bool = False
-    """run the smoother of every estimator that has one as well: estimates that use the whole recording"""
+    """also run the smoother of every estimator that has one"""
     site: str | None = None
     """in recordings of several sensors, the one to use, such as bicycle_imu or trunk_imu of a ride"""
     calibration: Path | None = None

@@ -18,9 +18,9 @@ class Args:
     recordings: tyro.conf.Positional[tuple[Path, ...]]
     """files, or folders that are searched for recordings"""
     write_map: Path | None = None
-    """draft a mapping (TOML) of the first file, of any table, to be checked, completed and saved beside the data"""
+    """file for the draft of a mapping (TOML) of the first recording, to be completed and kept beside the data"""
     plot: Path | None = None
-    """picture of rates, specific force and field over time, of the first recording"""
+    """figure of rates, specific force and field over time, of the first recording"""
     calibration: Path | None = None
     """record of `poise calibrate` that turns raw readings of the recordings into SI units"""
     json: bool = False
