@@ -19,6 +19,7 @@ import platform
 import shlex
 import subprocess
 import warnings
+from collections import Counter
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from datetime import datetime
 from pathlib import Path
@@ -33,6 +34,8 @@ from ..filters.support.version import ROOT, code_version, package_version
 if TYPE_CHECKING:
     from ..envs.data.trajectory import Trajectory
 
+SIMULATED = "simulated"
+"""Set of trajectories that no file holds."""
 PACKAGES = (
     "numpy",
     "scipy",
@@ -169,6 +172,27 @@ def known_recordings(paths: Sequence[Path]) -> list[Trajectory]:
         if passed_over:
             warnings.warn(f"passed over: {passed_over_text(passed_over)}", stacklevel=2)
     return known
+
+
+def recorded_sets(paths: Sequence[Path]) -> dict[str, list[Trajectory]]:
+    """Name of a folder or file → its recordings with a known orientation, on their uniform grids.
+
+    Recordings of the same name in several folders are told apart by their folder.
+
+    Raises:
+        ValueError: see :func:`known_recordings`, two paths have the same name, or one that of simulated trajectories.
+    """
+    names = [path.resolve().name for path in paths]
+    if len({*names, SIMULATED}) <= len(names):
+        raise ValueError(f"recordings must be paths of different names, none {SIMULATED!r}, got {names}")
+    loaded = (known_recordings((path,)) for path in paths)
+    sets = {name: [each.on_grid() for each in some] for name, some in zip(names, loaded, strict=True)}
+    met = Counter(each.name for some in sets.values() for each in some)
+
+    def told_apart(group: str, one: Trajectory) -> Trajectory:
+        return one if met[one.name] == 1 else one.replace(metadata={**one.metadata, "name": f"{group}/{one.name}"})
+
+    return {group: [told_apart(group, each) for each in some] for group, some in sets.items()}
 
 
 def command_line(command: str, args: Any, options: Sequence[str]) -> str:

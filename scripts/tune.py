@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import itertools
 import math
 import time
 from collections.abc import Mapping, Sequence
@@ -18,7 +19,7 @@ from ..baselines.gain_policy.compared.runs import CURVE, SETS
 from ..filters.support.files import write_json, write_text
 from ..filters.support.parallel import progress_bar
 from ..filters.support.seeds import child_seed
-from .experiment import Run, command_line, known_recordings, open_run, start_run, versions
+from .experiment import SIMULATED, Run, command_line, open_run, recorded_sets, start_run, versions
 from .output import Output
 from .targets import check_file
 
@@ -74,7 +75,7 @@ class Args:
     test_seed: int = 0
     """root seed of these; equal for all seeds of training, so that their runs can be compared"""
     recordings: tuple[Path, ...] = ()
-    """files or folders of recordings with known orientation to compare on; never trained on"""
+    """files or folders of recordings with known orientation to compare on, each folder a table; never trained on"""
     report: tuple[Path, ...] = ()
     """no training: tables and figures of these finished run folders, with intervals over seeds"""
     resume: Path | None = None
@@ -105,13 +106,12 @@ def run(args: Args) -> int:
     config = training_config(args)
     tuned = TunedFilter.of(tunable_filter(args.filter), config.gains)
     given = None if args.policy is None else loaded(args.policy, tuned)
-    recorded = known_recordings(args.recordings)
-    for each in recorded:
+    recorded = recorded_sets(args.recordings)
+    for each in itertools.chain.from_iterable(recorded.values()):
         check_recording(tuned, each)
     folder = open_run("tune", args, may_differ=("steps", "test_trajectories", "test_seed", "recordings", "report"))
-    sets = {"simulated": config.motions.draw_many(child_seed(args.test_seed, TEST_SEED), args.test_trajectories)}
-    if recorded:
-        sets["recorded"] = recorded
+    unseen = config.motions.draw_many(child_seed(args.test_seed, TEST_SEED), args.test_trajectories)
+    sets = {SIMULATED: unseen, **recorded}
     with Output("tune", args) as out:
         constant = searched(args, config, tuned, out)
         candidates: dict[str, Trained] = {

@@ -12,7 +12,7 @@ import numpy as np
 import tyro
 
 from ...filters.support.seeds import child_seed
-from ..experiment import known_recordings, start_run
+from ..experiment import SIMULATED, recorded_sets, start_run
 from ..output import Output
 from ..tune import TEST_SEED
 
@@ -94,9 +94,7 @@ def run(args: Args) -> int:
     tuned = TunedFilter.of(tunable_filter(args.filter), config.gains)
     scored = scored_quantities(tuned.kalman, args.quantities or None)
     quantity = replace(scored[0], name=", ".join(each.name for each in scored))
-    sets: dict[str, list[Trajectory]] = {
-        path.name: [trajectory.on_grid() for trajectory in known_recordings((path,))] for path in args.recordings
-    }
+    sets = recorded_sets(args.recordings)
     folder = start_run("adapt", args, args.seed, args.runs)
     with Output("adapt", args) as out:
         motions = config.motions.draw_many(config.seed, args.training)
@@ -168,12 +166,12 @@ def simulated(args: Args, motions: object) -> tuple[dict[str, list[Trajectory]],
 
     seed = child_seed(args.seed, TEST_SEED)
     if not isinstance(motions, RiddenMotions):
-        return {"simulated": motions.draw_many(seed, args.trajectories)}, []  # type: ignore[attr-defined]
+        return {SIMULATED: motions.draw_many(seed, args.trajectories)}, []  # type: ignore[attr-defined]
     source = replace(motions.source, draws=2, changes=smaller_errors(motions.source.changes, args.errors))
     pairs = [drawn(source, seed, index) for index in range(args.trajectories)]
     lasting = [pair for pair in pairs if pair[0].mask.any()]
     # Left and right may be exchanged between the two draws; the schedule of gains does not depend on the side.
-    return {"simulated": [pair[0] for pair in lasting]}, [pair[1] for pair in lasting]
+    return {SIMULATED: [pair[0] for pair in lasting]}, [pair[1] for pair in lasting]
 
 
 def smaller_errors(changes: Mapping[str, Any], factor: float) -> dict[str, Any]:

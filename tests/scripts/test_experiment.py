@@ -18,6 +18,7 @@ import pandas as pd
 import pytest
 from rich.console import Console
 
+from poise.envs.hand.trajectories import HandTrajectories
 from poise.filters.support import rows
 from poise.scripts import experiment, output
 
@@ -190,3 +191,19 @@ def test_the_command_that_repeats_a_run_has_a_positional_argument_only_where_the
     assert words == "poise realism --parts points --rides 20"
     words = experiment.command_line("reproduce", Reproduce("two-gyro", quick=True), ("quick",))
     assert words == "poise reproduce two-gyro --quick"
+
+
+def test_recordings_of_several_folders_are_told_apart(tmp_path: Path) -> None:
+    for folder, seed in (("first", 0), ("second", 1)):
+        (tmp_path / folder).mkdir()
+        recording = HandTrajectories(duration=1.0).draw_many(seed, 1)[0]
+        recording.replace(metadata={**recording.metadata, "name": "trial"}).save(tmp_path / folder / "trial.h5")
+    sets = experiment.recorded_sets((tmp_path / "first", tmp_path / "second"))
+    assert {group: [each.name for each in some] for group, some in sets.items()} == {
+        "first": ["first/trial"],
+        "second": ["second/trial"],
+    }
+    assert [each.name for each in experiment.recorded_sets((tmp_path / "first",))["first"]] == ["trial"]
+    for names in (("first", "first"), ("simulated",)):
+        with pytest.raises(ValueError, match="paths of different names, none 'simulated'"):
+            experiment.recorded_sets(tuple(tmp_path / name for name in names))

@@ -141,7 +141,7 @@ def test_the_command_tunes_compares_and_exports(tmp_path, capsys):
     assert {row["trajectory"] for row in rows} >= {"hand-77-0"}
     card = json.loads((tmp_path / "mine.json").read_text())
     assert card["command"].startswith("poise tune external-acceleration --agent ppo")
-    assert set(card["test_error_deg"]["policy"]) == {"simulated", "recorded"}
+    assert set(card["test_error_deg"]["policy"]) == {"simulated", "one.h5"}
     assert GainPolicy.load(tmp_path / "mine").filter == "external-acceleration"
     assert "published" in capsys.readouterr().out
 
