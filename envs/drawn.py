@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import inspect
 import math
 import time
 from collections.abc import Mapping, Sequence
@@ -101,7 +102,12 @@ class DrawnEnv(gymnasium.Env[Any, np.ndarray]):
 
     def __new__(cls, *args: Any, **kwargs: Any) -> Self:
         """Check the types of the arguments, and remember them for copies."""
-        check_parameters(cls.__init__, arguments_of(cls.__init__, args, kwargs))
+        passed_on = kwargs | arguments_of(cls.__init__, args, kwargs)
+        for kind in cls.__mro__:
+            if "__init__" in vars(kind):
+                check_parameters(kind.__init__, passed_on)
+                own = inspect.signature(kind.__init__).parameters
+                passed_on = {name: value for name, value in passed_on.items() if name not in own}
         made = super().__new__(cls)
         made._made_with = args, kwargs
         return made

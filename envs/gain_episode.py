@@ -67,12 +67,9 @@ class GainEpisode:
         Raises:
             ValueError: the trajectory lacks a channel of the filter, or the truth of a scored quantity.
         """
-        channels = tuned.kalman.channels
-        missing = [channel.name for channel in channels if channel.name not in trajectory.measurements]
-        if missing:
-            raise ValueError(f"trajectory {trajectory.name!r} lacks the channels {missing} that the filter reads")
+        check_channels(trajectory, tuned)
         kalman = filter_for(tuned.kalman, trajectory)
-        samples = check_measurements(channels, trajectory.measurements, time_axis=True)
+        samples = check_measurements(kalman.channels, trajectory.measurements, time_axis=True)
         truth = np.concatenate([true_values(trajectory, quantity, kalman) for quantity in quantities], axis=-1)
         costs, weight = np.zeros(len(trajectory)), 1.0
         if reference is not None:
@@ -123,6 +120,35 @@ class GainEpisode:
         """
         own = 0.0 if math.isnan(last_error) else np.log1p(np.degrees(last_error))
         return np.append(self.foresight[decision], own).astype(np.float32)
+
+
+def check_channels(trajectory: Trajectory, tuned: TunedFilter) -> None:
+    """Refuse a trajectory without a channel of the filter.
+
+    Raises:
+        ValueError: names trajectory and channels.
+    """
+    names = [channel.name for channel in tuned.kalman.channels]
+    if missing := [name for name in names if name not in trajectory.measurements]:
+        raise ValueError(f"trajectory {trajectory.name!r} lacks the channels {missing} that {tuned.name} reads")
+
+
+def check_scored(trajectory: Trajectory, tuned: TunedFilter, quantities: Sequence[Quantity]) -> None:
+    """Refuse a trajectory on which a filter cannot be scored.
+
+    Raises:
+        ValueError: it lacks a channel of the filter or the truth of a quantity, a channel holds no sample, or no scored
+            sample has a known truth.
+    """
+    check_channels(trajectory, tuned)
+    name, kalman = trajectory.name, filter_for(tuned.kalman, trajectory)
+    for channel in kalman.channels:
+        if not np.isfinite(trajectory.measurements[channel.name]).all(axis=-1).any():
+            raise ValueError(f"trajectory {name!r} has no sample of {channel.name!r}: all are NaN")
+    for quantity in quantities:
+        known = np.isfinite(true_values(trajectory, quantity, kalman)).all(axis=-1)
+        if not (trajectory.mask & known).any():
+            raise ValueError(f"trajectory {name!r} has no scored sample with a known {quantity.name!r}")
 
 
 def filter_for(kalman: KalmanFilter, trajectory: Trajectory) -> KalmanFilter:

@@ -15,7 +15,7 @@ from ..filters.support.seeds import child_seeds, root_seed
 from .data.formats.load import load_recording
 from .data.trajectory import Trajectory
 from .gain_env import Drawn, GainTuningEnv
-from .gain_reward import true_values
+from .gain_episode import check_scored
 from .gain_vector import GainTuningVectorEnv
 from .hand.gestures import GestureConfig
 from .hand.trajectories import HandTrajectories
@@ -191,8 +191,7 @@ class ReplayGainEnv(GainTuningEnv):
         loaded = (item if isinstance(item, Trajectory) else load_recording(item) for item in items)
         self.trajectories = tuple(item.on_grid() for item in loaded)
         for item in self.trajectories:
-            for quantity in self.quantities:
-                true_values(item, quantity, self.tuned.kalman)
+            check_scored(item, self.tuned, self.quantities)
             shortest = self.tuned.features.interval_samples(item.dt)
             length = len(item) if duration is None else math.floor(duration / item.dt + 1e-6)
             if min(length, len(item)) < shortest:

@@ -96,6 +96,7 @@ def run(args: Args) -> int:
         raise ValueError("policy cannot be given with a search of constant gains, nor with resume: nothing is trained")
     from ..baselines.gain_policy.compared.contenders import rows_of
     from ..baselines.gain_policy.policy import GainPolicy
+    from ..envs.gain_episode import check_scored
     from ..envs.gain_reward import scored_quantity
     from ..filters.adaptation.gains import tunable_filter
     from ..filters.adaptation.tuned import TunedFilter
@@ -108,7 +109,7 @@ def run(args: Args) -> int:
     given = None if args.policy is None else loaded(args.policy, tuned)
     recorded = recorded_sets(args.recordings)
     for each in itertools.chain.from_iterable(recorded.values()):
-        check_recording(tuned, each)
+        check_scored(each, tuned, (scored_quantity(tuned.kalman, None),))
     folder = open_run("tune", args, may_differ=("steps", "test_trajectories", "test_seed", "recordings", "report"))
     unseen = config.motions.draw_many(child_seed(args.test_seed, TEST_SEED), args.test_trajectories)
     sets = {SIMULATED: unseen, **recorded}
@@ -141,22 +142,6 @@ def run(args: Args) -> int:
             out.say(f"weights: {final.save(args.export, card)}")
         out.add(run=str(folder.folder), card=card)
     return 0
-
-
-def check_recording(tuned: TunedFilter, recording: Trajectory) -> None:
-    """Refuse a recording on which the filter cannot be scored.
-
-    Raises:
-        ValueError: it lacks a channel of the filter, a channel holds no sample, or nothing of it is scored.
-    """
-    for channel in tuned.kalman.channels:
-        values = recording.measurements.get(channel.name)
-        if values is None:
-            raise ValueError(f"recording {recording.name!r} lacks the channel {channel.name!r} of {tuned.name}")
-        if not np.isfinite(values).all(axis=-1).any():
-            raise ValueError(f"recording {recording.name!r} has no sample of {channel.name!r}: all are NaN")
-    if not (recording.mask & np.isfinite(recording.truth_of("up")).all(axis=-1)).any():
-        raise ValueError(f"recording {recording.name!r} has no scored sample with a known orientation")
 
 
 def compare(args: Args) -> int:

@@ -97,7 +97,7 @@ def refused(name: str, value: Any, kind: Any, default: Any = None) -> str:
         return "" if same else f"one of {choices}"
     if origin in (typing.Union, types.UnionType):
         reasons = [refused(name, value, each, default) for each in typing.get_args(kind)]
-        return "" if "" in reasons else " or ".join(reasons)
+        return "" if "" in reasons else " or ".join("0 or more" if each == "negative" else each for each in reasons)
     if kind is float:
         return number_refused(name, value)
     if kind is int:

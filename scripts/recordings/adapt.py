@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -71,6 +72,7 @@ def run(args: Args) -> int:
     from ...baselines.gain_policy.policy import GainPolicy
     from ...baselines.plots import save
     from ...baselines.weights_io import list_weights
+    from ...envs.gain_episode import check_scored
     from ...envs.gain_reward import scored_quantities
     from ...filters.adaptation.gains import tunable_filter
     from ...filters.adaptation.tuned import TunedFilter
@@ -95,6 +97,8 @@ def run(args: Args) -> int:
     scored = scored_quantities(tuned.kalman, args.quantities or None)
     quantity = replace(scored[0], name=", ".join(each.name for each in scored))
     sets = recorded_sets(args.recordings)
+    for each in itertools.chain.from_iterable(sets.values()):
+        check_scored(each, tuned, scored)
     folder = start_run("adapt", args, args.seed, args.runs)
     with Output("adapt", args) as out:
         motions = config.motions.draw_many(config.seed, args.training)

@@ -106,10 +106,11 @@ def test_unscored_and_unknown_ticks_do_not_count(trajectory):
     mask = np.ones(len(trajectory), bool)
     mask[:300] = False
     truth = {"up": trajectory.truth_of("up").copy()}
-    truth["up"][300:] = np.nan
+    truth["up"][300:-10] = np.nan
     rewards, infos = play(ReplayGainEnv(trajectory.replace(mask=mask, truth=truth)), lambda observation: np.ones(1))
-    assert rewards == [0.0] * len(rewards)
-    assert np.isnan([info["error_deg"] for info in infos]).all()
+    assert rewards[:-1] == [0.0] * (len(rewards) - 1)
+    assert rewards[-1] != 0.0
+    assert np.isfinite([info["error_deg"] for info in infos]).tolist() == [False] * (len(infos) - 1) + [True]
 
 
 def test_the_agent_sees_nothing_of_the_truth(trajectory):
@@ -180,6 +181,9 @@ def test_recordings_are_read_from_files(tmp_path, trajectory):
         ({"filter": 3}, "filter must be of type .*KalmanFilter, got 3"),
         ({"gains": ("process", "cheek")}, "gains must be distinct names from"),
         ({"gains": ()}, "gains must be distinct names from"),
+        ({"gains": "measurement"}, "gains must be a sequence or None, got 'measurement'"),
+        ({"privileged": "yes"}, "privileged must be True or False"),
+        ({"noise_scale": -1.0}, "noise_scale must be 0 or more or a sequence"),
         ({"quantity": "position"}, "quantity must be one of"),
         ({"interval": 0.0}, "interval must be positive"),
         ({"reward": "fame"}, "reward must be"),
@@ -212,6 +216,12 @@ def test_wrong_calls_are_explained(trajectory):
         ReplayGainEnv([])
     with pytest.raises(ValueError, match="knows no 'up'"):
         ReplayGainEnv(trajectory.replace(truth={}))
+    unknown = {name: np.nan * values for name, values in trajectory.measurements.items()}
+    with pytest.raises(ValueError, match="has no sample of 'imu/gyr': all are NaN"):
+        ReplayGainEnv(trajectory.replace(measurements=unknown))
+    for part in ({"truth": {"up": np.nan * trajectory.truth["up"]}}, {"mask": np.zeros(len(trajectory), bool)}):
+        with pytest.raises(ValueError, match="has no scored sample with a known 'up'"):
+            ReplayGainEnv(trajectory.replace(**part))
     with pytest.raises(ValueError, match="one interval at least"):
         ReplayGainEnv(trajectory[:5])
     with pytest.raises(ValueError, match="lacks the channels"):

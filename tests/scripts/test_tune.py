@@ -82,7 +82,7 @@ def test_wrong_input_is_one_line(
 @pytest.mark.parametrize(
     ("spoil", "said"),
     [
-        (lambda one: {"measurements": {"imu/gyr": one.measurements["imu/gyr"]}}, "lacks the channel 'imu/acc' of mekf"),
+        (lambda one: {"measurements": {"imu/gyr": one.measurements["imu/gyr"]}}, "lacks the channels ['imu/acc']"),
         (
             lambda one: {"measurements": {name: np.nan * values for name, values in one.measurements.items()}},
             "all are NaN",
