@@ -109,7 +109,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     except USER_ERRORS as error:
         if debug:
             raise
-        return fail(f"{one_line(error)} (--debug shows where)")
+        return fail(one_line(error))
 
 
 def without_backend(words: list[str]) -> tuple[list[str], str]:
@@ -198,6 +198,15 @@ def check_counts(args: object) -> None:
             raise ValueError(f"{option} must be at least {least}, got {value}")
 
 
+PARSER_WORDS = {
+    r"Error parsing (\S+): invalid literal for int\(\) with base 10:": r"\1 must be a whole number, got",
+    r"Error parsing (\S+): could not convert string to float:": r"\1 must be a number, got",
+    r"Argument helptext: .*(?=\.? For full helptext)": "",
+    r"\s*\.? For full helptext, (?:run|see):?": "; see",
+}
+"""What the parser says, as a pattern → what a user needs of it."""
+
+
 def unboxed(complaint: str) -> str:
     """A parser's message in a box of several lines, as one line."""
     frame = str.maketrans(dict.fromkeys("─╭╮╰╯│┌┐└┘", " "))
@@ -205,9 +214,10 @@ def unboxed(complaint: str) -> str:
     lines = [re.sub(r"-{3,}|^[+|]|[+|]$", " ", line.translate(frame)).strip() for line in complaint.splitlines()]
     content = [line for line in lines if line]
     # The first line is the title that its contents repeat.
-    return re.sub(
-        r"\.? For full helptext, (?:run|see):?", "; see", " ".join(content[1:] if len(content) > 1 else content)
-    )
+    said = " ".join(content[1:] if len(content) > 1 else content)
+    for pattern, plain in PARSER_WORDS.items():
+        said = re.sub(pattern, plain, said)
+    return said
 
 
 def usage() -> str:
