@@ -19,16 +19,16 @@ from ..filters.core.quantity import Estimate
 
 @dataclass
 class OnlineEstimator:
-    """An estimator with its state, fed with samples as they arrive, and how long its steps took.
+    """An estimator with its state, for samples that arrive one by one, and the durations of its steps.
 
     Attributes:
-        estimator: at the sampling interval of the stream.
-        ranges: channel → range of the sensor in its unit; what reaches it is not a sample.
-        seconds: of every step.
+        estimator: with the sampling interval of the stream.
+        ranges: channel → range of the sensor in the channel's unit; samples at the range count as missing.
+        seconds: duration of every step.
 
-    Glitches and repeats count as missing, as in :func:`poise.run`: what looks like a glitch does at once, and where
-    later samples show that it is one or is none, the estimate begins again from there; repeats do from the first one
-    that a sensor would not give.
+    Glitches and repeats count as missing, as in :func:`poise.run`. What looks like a glitch does at once; if later
+    samples show that it was none, the estimate is computed again from there. Repeats do from the first one that a
+    sensor would not give.
 
     Raises:
         ValueError: the estimator needs the whole recording.
@@ -49,7 +49,7 @@ class OnlineEstimator:
         self._samples = SamplesSoFar(self.ranges, self.estimator.dt)
 
     def warm_up(self) -> Self:
-        """Compute an estimate of a resting sensor, so that compiled code is loaded before the first sample comes."""
+        """Run the estimator on a sensor at rest, so that compiled code is loaded before the first sample."""
         rest = {each.name: np.full(each.size, 1.0) for each in self.estimator.channels}
         state = self.estimator.init(rest)
         self.estimator.step(state, rest)
