@@ -32,9 +32,9 @@ from .regulator import sampled
 
 NOISES = 7
 """random numbers a control step: six senses and the muscles"""
-ARMS_INERTIA, ARMS_DAMPING = 0.24, 3.1
-"""kg·m², N·m·s/rad: what a full rider's arms and their joints add to the steering; found in the response of riders 0, 2
-and 4 to a torque on the bar (0.23 to 0.27, 2.8 to 3.2)"""
+ARMS_INERTIA, ARMS_DAMPING = 0.21, 0.83
+"""kg·m², N·m·s/rad: what a full rider's arms and their joints add to the steering; means of riders 0, 2 and 4 in their
+response at 3 m/s to a torque of 1 N·m on the bar during 0.2 s (0.17 to 0.24, 0.70 to 1.03)"""
 BLOCK = 512
 """control steps whose noise is drawn at once"""
 

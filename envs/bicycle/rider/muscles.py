@@ -42,6 +42,8 @@ SWIVEL_STIFFNESS, SWIVEL_DAMPING = (60.0, 120.0), (2.0, 6.0)
 """N·m/rad, N·m·s/rad of arms and of legs: hold elbows and knees in their planes"""
 ABDUCTION, ROTATION = 0.6, 0.9
 """rad: beyond these the ligaments of a hip resist, so that a knee never passes behind it"""
+TURNED = 0.8
+"""rad of steering up to which the shoulders follow"""
 LIGAMENT, LIGAMENT_DAMPING = 300.0, 0.3
 """N·m/rad, s/rad: damping grows with the depth, without a blow (K. H. Hunt, F. R. E. Crossley 1975)"""
 ARMS = 2
@@ -164,7 +166,7 @@ def plan(  # type: ignore[no-untyped-def]
     target = memory[TARGET]
     target[0] = build.flexion + intended[0]
     target[1] = intended[1]
-    target[2] = intended[2] + SHOULDERS_FOLLOW * max(-0.8, min(0.8, steer))
+    target[2] = intended[2] + SHOULDERS_FOLLOW * max(-TURNED, min(TURNED, steer))
     memory[WANTED] = intended[3:7]
     pitch, roll, rise = state[first + links[0]], state[first + links[1]], state[first + links[2]]
     pitching, rolling, rising = state[rates + links[0]], state[rates + links[1]], state[rates + links[2]]
@@ -210,11 +212,11 @@ def plan(  # type: ignore[no-untyped-def]
         left, right = swung(reach, left, right, lift, tip)
     for axis in range(3):
         pushes[axis], pushes[3 + axis] = left[axis], right[axis]
-    tense(numbers, arrays, steer, crank, state, links, memory)
+    tense(numbers, arrays, steer, seen[11], crank, state, links, memory)
 
 
 @jit
-def tense(numbers, arrays, steer, crank, state, links, memory):  # type: ignore[no-untyped-def]
+def tense(numbers, arrays, steer, steer_rate, crank, state, links, memory):  # type: ignore[no-untyped-def]
     """Torques that make the forces of hands and feet in the memory and support the trunk; arguments of :func:`plan`."""
     build = build_of(numbers, arrays)
     first, joints = 13, (memory.shape[0] - MUSCLES) // 2
@@ -224,6 +226,9 @@ def tense(numbers, arrays, steer, crank, state, links, memory):  # type: ignore[
     support[0], support[1], support[2] = supported
     if joints == 3:
         return
+    if abs(steer) < TURNED:
+        # the trunk's muscles turn the shoulders after the bar; else the bar would have to, through the arms
+        support[2] += TRUNK_DAMPING * SHOULDERS_FOLLOW * steer_rate
     abductions(build.table, build.middle, steer, crank, target, memory[WANTED], memory[SWIVEL])
     pitch, roll = state[first + links[0]], state[first + links[1]]
     trunk = (state[first + links[3]], state[first + links[4]], state[first + links[5]])

@@ -264,7 +264,7 @@ class Rider:
         ridden = (s.steer, s.crank, s.crank_rate, s.wheel_rate, 0.0 if drive == RESTING else ratio)
         standing.hold(level, ridden, torque, self._legs, pelvis, self._memory)
         numbers = self._numbers + level * self._moved
-        tense(numbers, self._arrays, s.steer, s.crank, state, self._links, self._memory)
+        tense(numbers, self._arrays, s.steer, s.steer_rate, s.crank, state, self._links, self._memory)
 
     def act(self) -> None:
         """Add what muscles and saddle do in the next step to the forces on the bodies.
