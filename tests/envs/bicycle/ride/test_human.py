@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.linalg import expm
 
 from poise.envs.bicycle.course.path import Path
 from poise.envs.bicycle.frame.bicycle import BicycleState
@@ -13,10 +14,10 @@ from poise.envs.bicycle.frame.bicycles import BICYCLES
 from poise.envs.bicycle.frame.whipple import whipple_model
 from poise.envs.bicycle.ride.human import HumanNoise, HumanPilot, leaning_trunk
 from poise.envs.bicycle.ride.human_steering import human_of, steady_turn
-from poise.envs.bicycle.ride.internal_model import RIGID, delays, lean_matrices, rider_model
+from poise.envs.bicycle.ride.internal_model import RIGID, delays, lean_matrices, rider_model, steering_reaction
 from poise.envs.bicycle.ride.pilot import PILOTS, check_pilot, pilot_parameters
 from poise.envs.bicycle.ride.ride import Ride
-from poise.envs.bicycle.rider.anthropometry import SUBJECTS
+from poise.envs.bicycle.rider.anthropometry import SUBJECTS, RiderBody
 from poise.envs.bicycle.rider.posture import sit
 from poise.envs.bicycle.rider.style import STYLES, RiderMotion
 
@@ -67,6 +68,30 @@ def test_a_steady_turn_rests_in_the_model():
         state[[0, 1, 6, 10]] = roll, steer, torque, leaning
         rate = A @ state + B @ (torque, 0.0, lean)
         np.testing.assert_allclose(rate[[0, 1, 2, 3, 6, 7, 10, 11]], 0.0, atol=1e-9)
+
+
+@pytest.mark.parametrize("body", [SUBJECTS[0], RiderBody(1.60, 60.0, True)], ids=["tall", "short"])
+def test_a_bar_feels_the_arms_and_not_the_trunk(body):
+    """1 N·m in place of the pilot's torque, during 0.2 s, turns the bar as the internal model says."""
+    posture, speed, steps, ended = sit(BICYCLES["mountain-bike"], body), 3.0, 100, []
+    loaded = posture.bicycle.with_load(posture.load())
+    with Ride(posture, RiderMotion(STYLES["still"], np.random.default_rng(0)), STRAIGHT, lambda _: speed) as on:
+        for _ in range(1000):
+            on.step()
+        saved, plan = on.save(), on.rider.plan
+        for torque in (0.0, 1.0):
+            on.restore(saved)
+            on.rider.plan = lambda seen, curvature, _, *rest, torque=torque: plan(seen, curvature, torque, *rest)
+            for _ in range(steps):
+                on.step()
+            ended.append(on.bicycle.state().steer)
+    trunk = leaning_trunk(posture, True, 0.0)
+    A, _ = rider_model(loaded, replace(PILOTS["skilled"], arm_damping=0.0), trunk, 9.81, speed)
+    mass, _, _ = lean_matrices(loaded, trunk, 9.81, speed)
+    pushed = np.zeros((13, 13))
+    pushed[:12, :12] = A
+    pushed[[2, 3, 11], 12] = np.linalg.solve(mass, (0.0, 1.0, -steering_reaction(loaded, trunk)))
+    assert ended[1] - ended[0] == pytest.approx(expm(pushed * steps / 500.0)[1, 12], rel=0.1)
 
 
 def test_noise_is_a_function_of_the_step():
