@@ -380,8 +380,8 @@ def assessed(study: RideStudy, path: Path) -> dict[str, Any]:
 
 SKILL = (
     f"{{rides}} rides of {{length:.0f}} s, mean over them from {SETTLED:g} s on. *{STRAPDOWN}*: gyroscopes alone. "
-    "*Posterior bound*: {bound}. *NEES*: of the angle alone, 1 if the covariance is right; mean over rides, with the "
-    "95 % interval of that mean by the spread between rides, since errors within a ride are correlated."
+    "*Posterior bound*: {bound}. *NEES*: of the angle alone, 1 if the covariance is consistent; mean over rides with "
+    "its 95 % interval over rides."
 )
 
 

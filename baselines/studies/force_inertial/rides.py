@@ -191,8 +191,8 @@ RIDES = RideStudy(
     windows=_windows,
     prepare=_from_first_whole_sample,
     extra=_more,
-    bound="for white noises and biases of the devices, and for what each output is off by on this ride: its mean, "
-    "and a process of its size and frequency",
+    bound="for white noises and biases of the devices, and for the errors of the outputs on this ride: their means, "
+    "and processes of their standard deviations and frequencies",
 )
 
 

@@ -180,8 +180,8 @@ RIDES = RideStudy(
     cells=short,
     windows=_windows,
     extra=_residuals,
-    bound="for white noises and biases of the devices, and for what each output and constraint is off by on this ride: "
-    "its mean, and a process of its size and frequency",
+    bound="for white noises and biases of the devices, and for the errors of outputs and constraints on this ride: "
+    "their means, and processes of their standard deviations and frequencies",
 )
 
 
