@@ -244,8 +244,7 @@ def saddle_checks() -> Iterator[Check]:
         holds = max(each["pulls"] for each in pair) <= most
         holds = holds and widest[0] <= ALONG and widest[1] <= ACROSS and apart <= APART
         yield Check(
-            f"saddle, {name}: samples with a cell below -{PULL:g} N, least cell, centre of pressure (5 to 95 %) along "
-            "and across, full; lumped",
+            f"saddle, {name}, full; lumped: cells below -{PULL:g} N, least cell, CoP along, across",
             f"{most:g} %, –, ±{ALONG:g} mm, ±{ACROSS:g} mm; means {APART:g} mm apart",
             f"{text}; {apart:.0f} mm apart",
             holds,
