@@ -104,10 +104,10 @@ class Run:
 
 
 def start_run(command: str, args: Any, seed: int, root: str | Path = "runs") -> Run:
-    """Make the folder of a new run and write down its arguments and versions.
+    """Make the folder of a new run, ``root/command/<time>-<seed>``, and write down its arguments and versions.
 
     Args:
-        command: name of the command, the folder above the run's.
+        command: name of the command.
         args: its arguments, a dataclass instance or a mapping.
         seed: root seed.
         root: folder of all runs; made if missing.

@@ -75,11 +75,7 @@ def run(args: Args) -> int:
 
 
 def overview(width: int) -> str:
-    """The names of everything, without descriptions, and which lists hold results.
-
-    Args:
-        width: of a line, characters.
-    """
+    """The names of everything, without descriptions, in lines of ``width`` characters, and which lists hold results."""
     lines = [wrapped(name, [row["name"] for row in LISTS[name]()], width) for name in LISTS if name not in MEASURED]
     lines += ["", wrapped("measured", MEASURED, width), "", "poise list NAME prints a list with descriptions or values"]
     return "\n".join(lines)

@@ -84,11 +84,7 @@ COMMANDS: dict[str, Command] = {
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run ``poise`` and return its exit status.
-
-    Args:
-        argv: the words after ``poise``; those of the process if None.
-    """
+    """Run ``poise`` with the words after its name (None: those of the process) and return its exit status."""
     words = list(sys.argv[1:] if argv is None else argv)
     debug = "--debug" in words or os.environ.get("POISE_DEBUG", "0") not in ("", "0")
     try:

@@ -150,14 +150,9 @@ def skipped_text(table: pandas.DataFrame) -> str:
 def print_comparison(
     table: pandas.DataFrame, run: Run, out: Output, *, groups: Mapping[str, str] | None = None, name: str = ""
 ) -> None:
-    """Print a comparison, draw its bars, and add both to the report.
+    """Print a comparison of :func:`poise.evaluate`, draw its bars, and add both to the report.
 
-    Args:
-        table: from :func:`poise.evaluate`.
-        run: where the figures go.
-        out: where tables and rows go.
-        groups: trajectory → column of the wide tables.
-        name: of the data (simulation, recordings), in titles and file names.
+    ``groups`` tells the column of each trajectory in the wide tables; ``name`` that of the data in titles and files.
     """
     from ..baselines.plots import rms_bars, save
 

@@ -217,13 +217,8 @@ def studying(
 ) -> Iterator[tuple[Study, Output, Report]]:
     """A study in a new or resumed run folder: entries of its report are printed and written as they are found.
 
-    Args:
-        command: its name.
-        args: its arguments.
-        settings: fields of :class:`.Study`.
-        title: of the report.
-        width: columns of a table that does not go to a terminal.
-        may_differ: arguments that a resumed run need not share, see :func:`.open_run`.
+    ``settings`` are fields of :class:`.Study`, ``width`` the columns of a table that does not go to a terminal;
+    ``may_differ`` as in :func:`.open_run`.
 
     Raises:
         ValueError: a setting is out of its range, or what :func:`.open_run` refuses.

@@ -317,13 +317,7 @@ def errors_of(
 def results(
     errors: Mapping[str, Mapping[str, np.ndarray]], sets: Mapping[str, Sequence[Trajectory]], quantity: Quantity
 ) -> list[dict[str, Any]]:
-    """The same as rows of results, in degrees.
-
-    Args:
-        errors: set of trajectories → gains → error on each trajectory, rad.
-        sets: the trajectories.
-        quantity: what is scored.
-    """
+    """The same as rows of results, in degrees, from errors in rad: set of trajectories → gains → error on each."""
     metric = "inclination" if quantity.kind == "direction" else "rmse"
     common = {"quantity": quantity.name, "metric": metric, "unit": "deg"}
     return [

@@ -142,7 +142,7 @@ def page(
 
     Args:
         works: name of the work → rows of its table.
-        provenance: Markdown that says with what the numbers were computed.
+        provenance: Markdown.
         failed: name of a work that was not computed → its error.
     """
     failed = failed or {}

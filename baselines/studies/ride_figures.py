@@ -92,10 +92,7 @@ def errors_over_time(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Time (s), and mean and standard deviation of an error over all rides (deg), as far as the shortest ride goes.
 
-    Args:
-        results: of :meth:`.RideStudy.run`.
-        angle: which.
-        method: which of those that were followed; None for the study's first.
+    ``method`` is one that was followed (:meth:`.RideStudy.assess`); None for the study's first.
     """
     curves = [each["over time"][method or next(iter(each["over time"]))][angle] for each in results]
     length = min(map(len, curves))

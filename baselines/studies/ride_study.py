@@ -242,11 +242,7 @@ class RideStudy:
     def report(self, report: Report, course: str, results: list[dict[str, Any]], claims: Sequence[Claim] = ()) -> None:
         """Tables of a course (published errors, variants, ablations, windows, consistency), claims, ``results.csv``.
 
-        Args:
-            report: where they go.
-            course: in the titles, and in ``published``.
-            results: of :meth:`run`.
-            claims: further ones of this study.
+        ``results`` are those of :meth:`run`, ``claims`` further ones of this study.
         """
         rows: list[dict[str, Any]] = []
         compared = self.tabled if any(key[0] == course for key in self.published) else ()

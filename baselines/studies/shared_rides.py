@@ -11,11 +11,6 @@ from .whole_body.rides import RIDES as WHOLE_BODY
 
 
 def record_rides(study: Study, papers: Collection[str]) -> None:
-    """Record the rides of these works, several at a time; :attr:`.Study.rides` is where they find them.
-
-    Args:
-        study: of all works.
-        papers: names; those that ride nothing may be among them.
-    """
+    """Record the rides of those works that ride, several at a time; :attr:`.Study.rides` is where they find them."""
     works = (TWO_GYRO, FORCE_INERTIAL, WHOLE_BODY)
     study.record_together(job for work in works if work.name in papers for job in work.jobs(study))

@@ -36,16 +36,10 @@ class Waves:
         count: int = 4,
         equal: bool = False,
     ) -> Waves:
-        """Sines of random frequency and phase.
+        """Sines of random frequency (``low`` to ``high``, Hz) and phase around ``offset``, with deviation ``std``.
 
-        Args:
-            rng: draws frequencies, phases and shares, in this order.
-            std: standard deviation of the sum over a long time.
-            low: lowest frequency, Hz.
-            high: highest frequency, Hz.
-            offset: mean.
-            count: how many sines.
-            equal: all sines are of one size; otherwise a Dirichlet draw divides the variance among them.
+        They are of one size if ``equal``; otherwise a Dirichlet draw divides the variance among them. Drawn are
+        frequencies, phases and shares, in this order.
         """
         rates = 2.0 * math.pi * rng.uniform(low, high, count)
         phases = rng.uniform(0.0, 2.0 * math.pi, count)
@@ -90,9 +84,6 @@ def gauss_markov(normal: np.ndarray, std: float, time: float, dt: float, start: 
         time: correlation time, s.
         dt: s.
         start: standard deviation of the start; None for the stationary one.
-
-    Returns:
-        Values like ``normal``.
     """
     from scipy.signal import lfilter
 

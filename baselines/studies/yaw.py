@@ -21,9 +21,7 @@ SHARES = {"early": 1.0 / 3.0, "end": 1.0}
 def yaw_drift(ride: Trajectory, roll: np.ndarray) -> dict[str, float]:
     """Size of the error of the yaw that is integrated from the true start by (7), deg, at :data:`SHARES` of the ride.
 
-    Args:
-        ride: with the gyroscope of the bicycle.
-        roll: ``(T,)`` φ of the filter, rad; 0 where it has not started.
+    ``roll`` ``(T,)`` is φ of the filter, rad; 0 where it has not started.
     """
     rate = platform_rate(ride.measurements["bicycle_imu/gyr"], RiderGeometry.of(ride.metadata).bicycle_imu_tilt)
     turning = np.nan_to_num(rate[:, 2] / np.cos(np.nan_to_num(roll)))

@@ -21,10 +21,7 @@ Curves = dict[str, dict[str, np.ndarray]]
 def curves_of(truth: Arrays, estimates: Mapping[str, Arrays], outputs: Mapping[str, Sequence[Quantity]]) -> Curves:
     """Errors of the quantities whose truth is known, then angles of truth and estimates; deg where these are angles.
 
-    Args:
-        truth: quantity → ``(n, size)``.
-        estimates: label → quantity → ``(n, size)``.
-        outputs: label → quantities of the estimate.
+    Truth and estimates hold quantities ``(n, size)``; estimates and their ``outputs`` go by label.
     """
     errors: Curves = {}
     angles: Curves = {}

@@ -17,11 +17,7 @@ Values = Mapping[str, np.ndarray]
 
 
 def device_meshes(size: Sequence[float] = DEVICE_SIZE) -> list[Mesh]:
-    """The device of the rendered environments, and its axes.
-
-    Args:
-        size: extent along the body axes, m.
-    """
+    """The device of the rendered environments, of some size along the body axes (m), and its axes."""
     boxes = [box(centre, 2.0 * np.array(half), as_colour(colour)) for half, centre, colour in device_boxes(size)]
     ends = 1.1 * size[0] * np.eye(3)
     return [*boxes, *(rod((0.0, 0.0, 0.0), end, 0.003, colour) for end, colour in zip(ends, AXIS_COLOURS, strict=True))]
@@ -46,9 +42,7 @@ class DeviceAttitude:
     def orientation(self, estimate: Values, truth: np.ndarray | None) -> np.ndarray | None:
         """Sensor to world ``(n, 4)``, NaN where there is no estimate; None if it has no attitude.
 
-        Args:
-            estimate: quantity → ``(n, size)``.
-            truth: ``(n, 4)``, or None.
+        ``estimate`` holds quantities ``(n, size)``, ``truth`` is the orientation ``(n, 4)``.
         """
         if "orientation" in estimate:
             return np.asarray(estimate["orientation"], float)
@@ -108,10 +102,7 @@ class VirtualController:
     def position(self, estimate: Values, orientation: np.ndarray | None, dt: float) -> np.ndarray | None:
         """Displayed position ``(n, 3)``, m; None where the estimate has neither position nor acceleration.
 
-        Args:
-            estimate: quantity → ``(n, size)``.
-            orientation: of the device ``(n, 4)``.
-            dt: sampling interval, s.
+        ``orientation`` is that of the device ``(n, 4)``, ``dt`` the sampling interval in s.
         """
         if VIRTUAL_POSITION.name in estimate:
             return np.asarray(estimate[VIRTUAL_POSITION.name], float)

@@ -72,12 +72,9 @@ def opened_page(viewer: Viewer, size: tuple[int, int]) -> Iterator[Any]:
 
 
 def take_picture(viewer: Viewer, path: Path, size: tuple[int, int] = SIZE) -> Path:
-    """Write a picture of a page when two pictures one after the other are equal.
+    """Write a picture (PNG) of a page when two pictures one after the other are equal.
 
-    Args:
-        viewer: paused, and kept up to date by a thread.
-        path: PNG file.
-        size: width and height, pixels.
+    The viewer is paused, and kept up to date by a thread; ``size`` is width and height in pixels.
 
     Raises:
         ValueError: there is no browser, or the page does not come to rest.
@@ -96,13 +93,9 @@ def take_picture(viewer: Viewer, path: Path, size: tuple[int, int] = SIZE) -> Pa
 
 
 def take_film(viewer: Viewer, path: Path, until: float, size: tuple[int, int] = FILM_SIZE) -> Path:
-    """Write a moving picture of the scene from the time that a viewer shows.
+    """Write a moving picture (WebP or GIF) of the scene from the time that a viewer shows until another, s.
 
-    Args:
-        viewer: paused; nobody else updates it.
-        path: WebP or GIF file.
-        until: s of the motion.
-        size: width and height, pixels.
+    The viewer is paused, and nobody else updates it; ``size`` is width and height in pixels.
 
     Raises:
         ValueError: there is no browser, or ``until`` is not after the time that is shown.

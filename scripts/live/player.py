@@ -36,11 +36,7 @@ class Player:
         self.time = min(max(self.time, self.begin), self.end)
 
     def advance(self, clock: float) -> float:
-        """The time to show, s.
-
-        Args:
-            clock: s of a monotonic clock.
-        """
+        """The time to show, s, at a time of a monotonic clock, s."""
         passed = 0.0 if self._clock is None else max(0.0, clock - self._clock)
         self._clock = clock
         if not self.playing:

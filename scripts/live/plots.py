@@ -37,15 +37,7 @@ def curve_figure(
     colours: Mapping[str, tuple[int, int, int]],
     now: float,
 ) -> Figure:
-    """Curves over time with a line at the time that is shown.
-
-    Args:
-        time: ``(n,)`` s.
-        curves: label → ``(n,)``.
-        title: of the axis.
-        colours: of the labels.
-        now: s.
-    """
+    """Curves ``(n,)`` over time ``(n,)``, s, with a line at the time that is shown; ``title`` is that of the axis."""
     with extra("view"):
         from plotly.graph_objects import Figure, Scatter
 

@@ -142,11 +142,9 @@ def _bicycle_meshes(g: RiderGeometry) -> dict[str, list[Mesh]]:
 def rider_poses(geometry: RiderGeometry, values: Values) -> Poses:
     """Where the bodies are whose orientation is known.
 
-    Args:
-        geometry: lengths.
-        values: ``bicycle/orientation`` ``(n, 4)``, and of what else is known ``<body>/orientation``,
-            ``bicycle/position``, ``bicycle/steer``, ``bicycle/crank``, ``wheel/angle``, ``pelvis/height``,
-            ``pelvis/shift``, ``disk/position``.
+    The values hold ``bicycle/orientation`` ``(n, 4)``, and of what else is known ``<body>/orientation``,
+    ``bicycle/position``, ``bicycle/steer``, ``bicycle/crank``, ``wheel/angle``, ``pelvis/height``, ``pelvis/shift``,
+    ``disk/position``.
     """
     g, bicycle = geometry, np.asarray(values["bicycle/orientation"], float)
     n = len(bicycle)
@@ -208,12 +206,8 @@ def hinge(angle: np.ndarray) -> np.ndarray:
 def estimated_values(estimate: Values, known: Values) -> dict[str, np.ndarray]:
     """Orientations that an estimate's angles mean, and what is needed besides from ``known``.
 
-    The heading and, where it is not estimated, the pitch of the bicycle are those of ``known``. A body that is not
-    estimated is left out.
-
-    Args:
-        estimate: quantities of an estimator of rides.
-        known: the truth, or measurements of steering and crank.
+    The heading and, where it is not estimated, the pitch of the bicycle are those of ``known``: of the truth, or of
+    measurements of steering and crank. A body that is not estimated is left out.
     """
     n = len(next(iter(estimate.values())))
     truth = known.get("bicycle/orientation", np.tile([1.0, 0.0, 0.0, 0.0], (n, 1)))

@@ -200,13 +200,7 @@ class MotionScene:
             )
 
     def show(self, motion: Motion, row: int, options: Options) -> None:
-        """Put everything in its place.
-
-        Args:
-            motion: with the figures of the first one.
-            row: sample that is shown.
-            options: what is shown.
-        """
+        """Put everything in its place at a row of a motion with the figures of the first one."""
         shown = [label for label in self.labels if options.visible.get(label, True)]
         focus, heading = self._focus(motion, row)
         world = rotation.exp(np.array([0.0, 0.0, -heading])) if options.turn else np.array([1.0, 0.0, 0.0, 0.0])

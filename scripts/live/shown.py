@@ -138,11 +138,7 @@ class LiveMotion:
     _count: int = field(default=0, init=False)
 
     def add(self, samples: Sequence[Timed], truth: Mapping[str, np.ndarray] | None = None) -> None:
-        """Estimate and append samples.
-
-        Args:
-            samples: in the order of time.
-            truth: quantity → ``(n, size)``.
+        """Estimate and append samples, in the order of time, with their truth, quantity → ``(n, size)``.
 
         Raises:
             ValueError: a sample lacks a channel of an estimator.
@@ -175,9 +171,7 @@ class LiveMotion:
 def live_motion(names: Sequence[str], trajectory: Trajectory) -> LiveMotion:
     """A live motion like a trajectory, whose samples are not yet part of it.
 
-    Args:
-        names: of the estimators.
-        trajectory: of one or more samples, with the channels, truth, sampling interval and metadata to come.
+    The trajectory has one or more samples, with the channels, truth, sampling interval and metadata to come.
 
     Raises:
         ValueError: an unknown estimator, one that needs the whole recording, or a channel is lacking.

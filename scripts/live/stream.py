@@ -140,11 +140,7 @@ def reader_of(args: Any, channels: Sequence[Channel]) -> LineReader:
 
 
 def ranges_of(texts: Sequence[str], layout: Layout) -> dict[str, float]:
-    """Channel → range in SI units.
-
-    Args:
-        texts: kind=number, in the unit of the lines.
-        layout: what the columns of the lines are.
+    """Channel → range in SI units, from texts kind=number in the unit of the lines.
 
     Raises:
         ValueError: an unknown kind, or no positive number.

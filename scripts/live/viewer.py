@@ -215,11 +215,7 @@ class Viewer:
         self.tick(0.0)
 
     def tick(self, clock: float) -> None:
-        """Advance the player and update what has changed.
-
-        Args:
-            clock: s of a monotonic clock.
-        """
+        """Advance the player to a time of a monotonic clock, s, and update what has changed."""
         with self._lock:
             self._tick(clock)
 
@@ -240,11 +236,7 @@ class Viewer:
             self._plot.figure = self._figure()
 
     def run(self, newer: Callable[[], Motion | None] = lambda: None) -> None:
-        """Keep the page up to date until :attr:`stopped` is set.
-
-        Args:
-            newer: the motion that has grown since, or None.
-        """
+        """Keep the page up to date, with the motion that has grown if there is one, until :attr:`stopped` is set."""
         while not self.stopped.wait(1.0 / FRAMES):
             grown = newer()
             if grown is not None and grown is not self.motion:

@@ -71,8 +71,7 @@ def riders_best() -> Rows:
 def learned(trained: Iterable[Path] = ()) -> Rows:
     """Every network of a preset: its error on simulated episodes that it never saw, deg, from its card.
 
-    Args:
-        trained: files of weights, or folders of them; none for those that are shipped.
+    ``trained`` are files of weights, or folders of them; none for those that are shipped.
     """
     from ...baselines.weights_io import SUFFIX as WEIGHTS
     from ...baselines.weights_io import list_weights, load_weights

@@ -106,12 +106,7 @@ def site_channels(trajectory: Trajectory, site: str) -> dict[str, Any]:
 
 
 def sensors_of(trajectory: Trajectory, channels: Sequence[str] = ()) -> list[Trajectory]:
-    """The sensors of a recording, each as ``imu``; the recording itself if it has one.
-
-    Args:
-        trajectory: the recording.
-        channels: what an estimator reads: the recording itself if it has them all.
-    """
+    """The sensors of a recording, each as ``imu``; the recording itself if it has one, or has all the ``channels``."""
     from ...envs.data.plausibility.sites import sites
 
     if "imu/gyr" in trajectory.measurements or (channels and set(channels) <= set(trajectory.measurements)):

@@ -29,12 +29,7 @@ PRINTED_ROTATION = ((0.6629, 0.7487, 0.0071), (-0.0044, -0.0056, 1.0000), (-0.74
 
 
 def calibrated(seed: int, hold: float) -> dict[str, Any]:
-    """A controller with drawn scales and offsets on the rate table, calibrated; errors of what is found.
-
-    Args:
-        seed: of device, motion and noise.
-        hold: time at each rate, s.
-    """
+    """A controller with drawn scales and offsets, calibrated on the rate table, ``hold`` s at each rate: errors."""
     truth = random_calibration(CONTROLLER, seed)
     runs = accelerometer_runs(CONTROLLER, truth, seed, hold=hold)
     channel = truth.channels[accelerometer_channel(CONTROLLER)]

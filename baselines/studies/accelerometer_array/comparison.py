@@ -48,12 +48,7 @@ def carried(gesture: str, sensors: str, seed: int, duration: float) -> Trajector
 
 
 def contenders(array: str, noise: Mapping[str, Any]) -> dict[str, Any]:
-    """Label → name or estimator, those of the thesis first.
-
-    Args:
-        array: ``controller`` or ``triaxial``.
-        noise: see :func:`noise_of`; what is absent stays default.
-    """
+    """Label → name or estimator on an array, those of the thesis first; noise as :func:`noise_of` has it."""
     model = ArrayOrientation(array=array, **noise)
     published = ArrayOrientation(array=array, exact_rotation=False, orthonormalise=False, **noise)
     gyroscope: dict[str, Any] = {name: value for name, value in noise.items() if name == "gyroscope_std"}
@@ -89,14 +84,9 @@ def gesture_errors(gesture: str, sensors: str, seed: int, duration: float) -> li
 
 
 def recording_errors(path: Path, seconds: float | None) -> list[Row]:
-    """Errors of every estimator on a recording with a magnetometer and a truth.
+    """Errors of every estimator on a recording; no row if it lacks a magnetometer or a truth.
 
-    Args:
-        path: file.
-        seconds: how much of the motion is taken, with the rest before it; None: all.
-
-    Returns:
-        A row for each estimator; none if the recording lacks what is needed.
+    ``seconds`` says how much of the motion is taken, with the rest before it; None: all.
     """
     trajectory = load_recording(path)
     if seconds is not None:
@@ -172,12 +162,10 @@ def comparison(study: Study, report: Report) -> None:
 
 
 def pivoted(rows: list[Row], column: str, metric: str) -> list[Row]:
-    """One row an estimator, one column a motion (means over seeds), and the mean of all at the end, the best first.
+    """One row an estimator, the best first: one column a motion (mean over seeds), and the mean of all at the end.
 
-    Args:
-        rows: with ``estimator``, ``column`` and metrics.
-        column: key of the motions; a recording is named by what is before the first ``_``, the number of the trial.
-        metric: which.
+    ``column`` is the key of the motions; a recording is named by what is before the first ``_``, the number of the
+    trial.
     """
     rows = [row for row in rows if row.get(metric) is not None]
     means = grouped(rows, {"estimator": "estimator", column: "motion"}, {"value": (metric, np.mean)})

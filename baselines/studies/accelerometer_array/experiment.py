@@ -132,13 +132,7 @@ def attitude_nees(device: str, seed: int, duration: float, calibrated: bool) -> 
 
 
 def experiment(study: Study, report: Report, simulated: list[Row]) -> None:
-    """Table 5.1, figures 5.18 to 5.22.
-
-    Args:
-        study: which seeds.
-        report: where they go.
-        simulated: rows of :func:`.spatial.attitude_errors`.
-    """
+    """Table 5.1, figures 5.18 to 5.22; ``simulated``: rows of :func:`.spatial.attitude_errors`."""
     seeds, duration = (2, 30.0) if study.quick else (5, DURATION)
     roots = [study.seed_of("experiment", index) for index in range(seeds)]
     jobs = [(device, seed, duration) for device in FIRST for seed in roots]

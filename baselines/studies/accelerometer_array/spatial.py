@@ -138,14 +138,7 @@ def pointing_errors(estimate: np.ndarray, truth: np.ndarray) -> tuple[np.ndarray
 def attitude_errors(
     device: str, seed: int, duration: float = DURATION, dip: float = 0.0, methods: Iterable[str] = ()
 ) -> list[Row]:
-    """Errors of every method on one motion, degrees.
-
-    Args:
-        device: ``controller`` or ``octa``.
-        seed: of motion and noise.
-        duration: s.
-        dip: of the field, rad.
-        methods: their names; none for all, and for a device that always points north and level.
+    """Errors of some methods (none: all, and a device that always points north and level) on one motion, degrees.
 
     Returns:
         A row for each method: ``device``, ``method``, ``seed``, ``pitch`` and ``azimuth`` (rms), ``pitch_max`` and

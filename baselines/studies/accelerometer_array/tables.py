@@ -13,10 +13,10 @@ Row = dict[str, Any]
 def grouped(
     rows: Iterable[Row], by: Mapping[str, str], columns: Mapping[str, tuple[str, Callable[[Sequence[float]], Any]]]
 ) -> list[Row]:
-    """One line for each combination of keys, in order of first appearance.
+    """One line for each combination of keys, in order of first appearance; None where no row has a value.
 
     Args:
-        rows: results; None where there is none.
+        rows: results.
         by: key of the rows → column that shows it.
         columns: column → key of the rows, and the mean, smallest … of its values.
     """

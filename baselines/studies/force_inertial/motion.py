@@ -94,16 +94,10 @@ class Motion:
 
 
 def draw_motion(rng: np.random.Generator, course: Course, errors: Errors, pitch: float = 60.0 * DEG) -> Motion:
-    """A left circle of 2.5 m at 2 m/s with the trunk 20° inside, or wandering at 1 to 5 m/s.
-
-    Args:
-        rng: draws.
-        course: ``indoor`` or ``outdoor``.
-        errors: give the shoulders' tilt.
-        pitch: mean θ.
+    """A left circle of 2.5 m at 2 m/s with the trunk 20° inside, or wandering at 1 to 5 m/s; ``pitch``: mean θ.
 
     Raises:
-        ValueError: another course.
+        ValueError: another course than ``indoor`` and ``outdoor``.
     """
     if course not in ("indoor", "outdoor"):
         raise ValueError(f"course must be 'indoor' or 'outdoor', got {course!r}")
@@ -153,14 +147,7 @@ class Exact:
 
 
 def exact_readings(motion: Motion, t: np.ndarray, rider: ForceInertial, inertia: tuple[float, float, float]) -> Exact:
-    """Newton and Euler for a trunk on a moving seat.
-
-    Args:
-        motion: as functions of time.
-        t: ``(T,)`` s.
-        rider: lengths and masses.
-        inertia: of the trunk about its centre of mass, axes x up the trunk, y, z.
-    """
+    """Newton and Euler for a trunk on a moving seat at times ``(T,)``; its inertia about axes x up the trunk, y, z."""
     gravity = np.array([0.0, 0.0, rider.gravity])
 
     def contact(time: np.ndarray) -> np.ndarray:
@@ -202,14 +189,7 @@ def exact_readings(motion: Motion, t: np.ndarray, rider: ForceInertial, inertia:
 def simulate(
     motion: Motion, errors: Errors, rider: ForceInertial, duration: float, rng: np.random.Generator
 ) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
-    """A ride as the channels of suite ``force-inertial``, and its truth.
-
-    Args:
-        motion: as functions of time.
-        errors: of sensors and rider.
-        rider: lengths, masses, interval.
-        duration: s.
-        rng: draws the errors.
+    """A ride of ``duration`` s as the channels of suite ``force-inertial``, and its truth.
 
     Returns:
         Channel → ``(T, size)`` in our axes; ``bicycle/roll``, ``force-inertial/trunk_angles`` and

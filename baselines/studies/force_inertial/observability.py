@@ -130,14 +130,7 @@ PARTS = {"NEES of the angles": slice(0, 4), "NEES of all states": slice(0, 7)}
 def ideal_consistency(
     runs: int = 50, duration: float = 6.0, seed: int = 0, level: float = 0.95
 ) -> dict[str, Consistency]:
-    """NEES of the angles and of all seven states at the end of each run, and NIS of every sample.
-
-    Args:
-        runs: how many.
-        duration: s.
-        seed: of all draws.
-        level: probability between the bounds of a consistent filter.
-    """
+    """NEES of the angles and of all seven states at the end of each run of ``duration`` s, and NIS of every sample."""
     model = ForceInertial.published(**PRIOR)
     rng = np.random.default_rng(seed)
     inputs, truth = simulate(draw_motion(rng, "indoor", NO_ERRORS), NO_ERRORS, ForceInertial.published(), duration, rng)

@@ -19,10 +19,7 @@ def true_states(
 ) -> np.ndarray:
     """The filter's state ``(T, 27)`` at the truth: true angles and bias, and what the filter remembers of its inputs.
 
-    Args:
-        model: gives the interval and the low-passes.
-        measurements: without missing samples.
-        truth: with ``force-inertial/trunk_angles``, ``bicycle/roll``, ``trunk_imu/gyroscope_bias``.
+    The measurements have no missing samples; the truth has trunk angles, roll and bias of the trunk's gyroscope.
     """
     names = ("trunk_imu/gyr", "bicycle_imu/gyr", "wheel/speed")
     now = [measurements[name] for name in names]

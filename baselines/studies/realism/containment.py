@@ -42,13 +42,10 @@ class Summary(NamedTuple):
 
 
 def summary(trajectory: Trajectory, site: str, bandwidths: Sequence[float], orientation: str) -> Summary:
-    """Statistics of one sensor at several bandwidths, and its spectra in bands.
+    """Statistics of one sensor at several bandwidths (Hz), and its spectra in bands.
 
-    Args:
-        trajectory: simulated or recorded.
-        site: of the sensor.
-        bandwidths: Hz; the smallest one that the sampling rate allows stands for those beyond.
-        orientation: name of the sensor's true orientation.
+    The smallest bandwidth that the sampling rate allows stands for those beyond. ``orientation`` names the sensor's
+    truth.
     """
     spectra = motion_spectra(trajectory, site, orientation=orientation)
     own = SHARE_OF_RATE * spectra.rate
@@ -76,15 +73,7 @@ def banded(spectrum: Spectrum) -> np.ndarray:
 def episode_summary(
     described: Mapping[str, Any], seed: int, index: int, sites: Sequence[str], bandwidths: Sequence[float]
 ) -> list[dict[str, Any]]:
-    """Simulate one episode of a recipe and summarise it site by site, for :meth:`.Study.map`.
-
-    Args:
-        described: of the recipe.
-        seed: root seed.
-        index: of the episode.
-        sites: of the sensors.
-        bandwidths: Hz.
-    """
+    """Simulate one episode of a described recipe and summarise it site by site, for :meth:`.Study.map`."""
     episode = recipe(described).episode(seed, index)
     found = [summary(episode, site, bandwidths, orientation_of(site)) for site in sites]
     return [one._asdict() | {"statistics": [one.statistics[each] for each in bandwidths]} for one in found]
@@ -103,16 +92,10 @@ def simulated_summaries(
     bandwidths: Sequence[float],
     rate: float | None = None,
 ) -> dict[str, list[Summary]]:
-    """Site → summaries of the first episodes of a recipe, computed once a run folder.
+    """Site → summaries of the first episodes of a recipe, computed once a run folder; riders carry these sensors alone.
 
-    Args:
-        study: its seed is the root seed of the episodes.
-        made: the recipe.
-        episodes: how many.
-        sites: of the sensors; riders carry these alone.
-        bandwidths: Hz.
-        rate: Hz, of all episodes of a hand, so that the bandwidths of recordings are within theirs; None for the
-            rates of the recipe.
+    ``rate`` (Hz) of all episodes of a hand keeps the ``bandwidths`` (Hz) of recordings within theirs; None: the
+    recipe's.
     """
     if rate is not None and isinstance(made, HandRecipe):
         made = replace(made, rates=(rate, rate))
@@ -149,11 +132,7 @@ def totals(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
 def containment_rows(recorded: Sequence[Summary], simulated: Sequence[Summary]) -> list[dict[str, Any]]:
     """One row a statistic: the simulated range, the recorded values, and which recordings lie outside.
 
-    Every recording is compared at its own bandwidth; the range shown is that at the widest one.
-
-    Args:
-        recorded: each with its own bandwidth as the only one.
-        simulated: with the bandwidths of all recordings.
+    Every recording is compared at its own, only bandwidth; the range shown is that at the widest one.
     """
     by_width = {width: ranges(simulated, width) for each in recorded for width in each.statistics}
     widest = by_width[max(by_width)]

@@ -50,15 +50,7 @@ def gestures(study: Study, episodes: int) -> dict[str, dict[str, float]]:
 
 
 def ride_statistics(scenario: str, subject: int, seed: int, duration: float, fidelity: str) -> dict[str, float]:
-    """Statistics of one ride of ``poise/RiderBicycle-v0`` with ideal sensors on soft tissue, for :meth:`.Study.map`.
-
-    Args:
-        scenario: its name.
-        subject: number of the rider.
-        seed: of the ride.
-        duration: s.
-        fidelity: ``full`` or ``lumped``.
-    """
+    """Statistics of one ride of ``duration`` s with ideal sensors on soft tissue, for :meth:`.Study.map`."""
     from ....envs.bicycle.environment import RiderBicycleEnv
     from ....envs.record import record_once
 

@@ -94,12 +94,7 @@ BELIEVABLE = {
 
 
 def judged(quantity: str, values: Mapping[str, float]) -> dict[str, Any]:
-    """A row of a table: the range, how many values are inside, which are not, and the source of the range.
-
-    Args:
-        quantity: a key of :data:`BELIEVABLE`.
-        values: where → value.
-    """
+    """A row: range and source of a :data:`BELIEVABLE` quantity, how many of the values are inside, which are not."""
     within = BELIEVABLE[quantity]
     outside = [f"{where} ({value:.3g})" for where, value in values.items() if not within.holds(value)]
     return {

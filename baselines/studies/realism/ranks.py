@@ -99,13 +99,7 @@ def kendall(one: np.ndarray, other: np.ndarray) -> float:
 
 
 def agreement(simulated: np.ndarray, recorded: np.ndarray, seed: int) -> tuple[float, tuple[float, float]]:
-    """τ of the order of mean errors, and its 5 to 95 % interval over draws of episodes and recordings.
-
-    Args:
-        simulated: errors ``(episodes, estimators)``.
-        recorded: errors ``(recordings, estimators)``.
-        seed: of the bootstrap.
-    """
+    """τ of the order of mean errors ``(draws, estimators)``, and its 5 to 95 % interval over draws of both."""
     generator = np.random.default_rng(seed)
 
     def mean(errors: np.ndarray, rows: np.ndarray) -> np.ndarray:
@@ -126,13 +120,7 @@ def agreement(simulated: np.ndarray, recorded: np.ndarray, seed: int) -> tuple[f
 
 
 def ranked(study: Study, episodes: int, group: Recorded) -> Ranked | None:
-    """Order of the estimators on a group of recordings and on its recipe; None where there is no inclination to judge.
-
-    Args:
-        study: where results are kept.
-        episodes: of the recipe.
-        group: recordings of one role.
-    """
+    """Order of the estimators on a group of recordings and on its recipe; None where no inclination can be judged."""
     role, names = ROLES[group.role], installed()
     errors = (
         study.cached(f"estimators on recordings {group.group}", recorded_errors, group, names) if role.ranked else []

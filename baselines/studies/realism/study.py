@@ -141,15 +141,7 @@ PARTS: Mapping[str, Part] = {
 def realism(
     study: Study, report: Report, settings: Settings, groups: Sequence[Recorded], parts: Sequence[str] = ()
 ) -> None:
-    """Report the chosen parts; all if none is named.
-
-    Args:
-        study: where rides and results are kept.
-        report: what is found.
-        settings: how much is simulated.
-        groups: recordings with their roles.
-        parts: names of :data:`PARTS`.
-    """
+    """Report the chosen parts of :data:`PARTS`; all if none is named."""
     for name, part in PARTS.items():
         if not parts or name in parts:
             part(study, report, settings, groups)
@@ -160,12 +152,7 @@ COLOURS = (VERMILION, GREEN, PINK, AMBER, SKY)
 
 
 def spectra(simulated: Sequence[Summary], recorded: Mapping[str, Sequence[Summary]]) -> Figure:
-    """Power spectral densities: range and median of the episodes, and every recording.
-
-    Args:
-        simulated: of one recipe and site.
-        recorded: group → its recordings.
-    """
+    """Power spectral densities of one recipe and site: range and median of episodes, and every recording by group."""
     known = all("acc" in each.spectra for group in (simulated, *recorded.values()) for each in group)
     shown = ("gyr", "acc" if known else "force")
     figure, axes = new_figure(7.5, 6.5, rows=2)

@@ -86,14 +86,7 @@ def truth_of(estimator: Any, ride: Trajectory) -> dict[str, np.ndarray]:
 
 
 def errors_of(estimator: Estimator[Any], ride: Trajectory, estimate: Estimate, scored: np.ndarray) -> Errors:
-    """Errors of an estimate with its deviations, where it has a covariance of all angles.
-
-    Args:
-        estimator: that estimated.
-        ride: with truth.
-        estimate: on all its samples.
-        scored: ``(T,)`` samples that count.
-    """
+    """Errors of an estimate at the samples ``(T,)`` that count, and deviations if it has a covariance of all angles."""
     outputs = tuple(estimator.outputs)
     difference = angles_of(outputs, estimate.pose)[scored] - angles_of(outputs, truth_of(estimator, ride))[scored]
     parts = deviation_parts(estimator)
@@ -126,16 +119,11 @@ STATES: Mapping[str, States] = {
 
 
 def angle_bounds(paper: str, ride: Trajectory, scored: np.ndarray) -> np.ndarray:
-    """Root mean square ``(K,)`` of the bound of every angle over the samples that count, deg.
+    """Root mean square ``(K,)`` of the bound of every angle of a paper's filter over the samples that count, deg.
 
     It is the bound of the published filter's equations and noises, linearised along the ride. An estimator that knows
     more (a network that has seen rides) may fall below it; one without such knowledge stays above if the noises are
     those of the sensors.
-
-    Args:
-        paper: name of its filter.
-        ride: on its grid, with truth.
-        scored: ``(T,)`` samples that count.
     """
     kalman: Any = make(paper, dt=ride.dt, metadata=ride.metadata)
     samples = {channel.name: ride.measurements[channel.name] for channel in kalman.channels}

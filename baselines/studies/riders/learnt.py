@@ -52,15 +52,10 @@ class Learnt:
 
 
 def learn(paper: str, start: str, source: RideSource, seed: int, *, samples: int = 32, refinements: int = 40) -> Learnt:
-    """Learn from the training rides of ``source``.
+    """Learn from the training rides of ``source``, with ``seed`` as their root seed.
 
-    Args:
-        paper: name of the published filter.
-        start: name of the filter that the regression corrects: that of the network.
-        source: the rides.
-        seed: their root seed.
-        samples: see :func:`.best_constant_gains`.
-        refinements: likewise.
+    ``start`` names the filter that the regression corrects, that of the network; ``samples`` and ``refinements`` are
+    those of :func:`.best_constant_gains`.
     """
     published: Any = make(paper)
     outputs = tuple(quantity for quantity in published.outputs if quantity.kind == "angle")

@@ -37,15 +37,9 @@ class Ridge:
 
     @classmethod
     def fit(cls, inputs: np.ndarray, targets: np.ndarray, penalty: float) -> Self:
-        """The regression of targets ``(N, K)`` on inputs ``(N, P)``.
+        """The regression of targets ``(N, K)`` on inputs ``(N, P)`` of all updates.
 
-        Args:
-            inputs: of all updates.
-            targets: likewise.
-            penalty: in updates: so many with standardised inputs of 1 and no target.
-
-        Raises:
-            ValueError: the penalty is not positive.
+        The penalty counts in updates: so many with standardised inputs of 1 and no target.
         """
         if not penalty > 0.0:
             raise ValueError(f"penalty must be positive, got {penalty}")

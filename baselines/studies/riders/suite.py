@@ -217,11 +217,8 @@ def learn_named(paper: str, start: str, source: Any, seed: int) -> tuple[str, Le
 def compare(settings: RiderSuite, folder: Path, *, processes: int = 1, progress: bool = False) -> list[Row]:
     """All rows, of groups and rides in their order. Rides whose rows are in the folder already are not ridden again.
 
-    Args:
-        settings: of the comparison.
-        folder: of one file a ride, which appears whole or not at all.
-        processes: how many run at a time; the rows do not depend on it, nor on an interruption.
-        progress: show bars.
+    Each ride has a file in the folder, which appears whole or not at all. The rows depend neither on ``processes``, how
+    many run at a time, nor on an interruption.
     """
     rides = [(group, index) for group in UNSEEN for index in range(settings.rides)]
     files = {each: folder / f"riders_{each[0].replace(' ', '_')}_{each[1]}.json" for each in rides}

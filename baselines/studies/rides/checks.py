@@ -50,10 +50,7 @@ class Check(NamedTuple):
 def measured_eigenvalues(speed: float, duration: float = 1.6, tyre: TyreParameters = BENCHMARK_TYRE) -> np.ndarray:
     """Eigenvalues (4,) of the linear map that best carries each sampled state of four passive rides to the next, 1/s.
 
-    Args:
-        speed: of the benchmark bicycle, m/s.
-        duration: of each ride, s.
-        tyre: its tyres.
+    The benchmark bicycle rolls at ``speed`` (m/s) for ``duration`` s each.
     """
     before, after = [], []
     with Physics(gravity=GRAVITY) as physics:

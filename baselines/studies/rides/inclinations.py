@@ -28,14 +28,10 @@ def inclination_rows(
     rides: Sequence[tuple[str, str]] = RIDES,
     duration: float = 40.0,
 ) -> Iterator[dict[str, Any]]:
-    """Rows: scenario and site of the IMU, then the RMS error of inclination (deg) of each estimator.
+    """Rows: scenario and site of the IMU, then the RMS error of inclination (deg) of each estimator, in ``duration`` s.
 
-    The last column is that of the mean of the true vertical, which only hindsight knows.
-
-    Args:
-        estimators: names of estimators.
-        rides: scenario and site of the IMU of each row; rides of one scenario are the same ride.
-        duration: s.
+    The last column is that of the mean of the true vertical, which only hindsight knows. Rows of one scenario are of
+    the same ride.
     """
     ridden: dict[str, Any] = {}
     for scenario, site in rides:

@@ -98,14 +98,7 @@ def ride_statistics(
 
 
 def ride(scenario: str, subject: int, duration: float, fidelity: str, seed: int) -> dict[str, Any]:
-    """Ride once; :func:`ride_statistics` of it.
-
-    Args:
-        scenario: name of a scenario.
-        subject: 0…4.
-        duration: s.
-        fidelity: ``full`` or ``lumped``.
-        seed: of the ride.
+    """Ride once for ``duration`` s; :func:`ride_statistics` of it.
 
     Raises:
         ValueError: an unknown scenario or rider, or a number out of its range.

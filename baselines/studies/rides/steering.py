@@ -44,15 +44,7 @@ def at_speed(speed: float) -> Scenario:
 def steered(
     course: str | float, subject: int | str, pilot: str, seed: int, duration: float, fidelity: str = "lumped"
 ) -> dict[str, Any]:
-    """Steering of one ride of a mountain bicycle, for :meth:`.Study.map`.
-
-    Args:
-        course: name of a scenario, or a speed (km/h) for :func:`at_speed`.
-        subject: number of the rider, or ``random``.
-        pilot: name of the pilot.
-        seed: of the ride.
-        duration: s.
-        fidelity: ``full`` or ``lumped``.
+    """Steering of one ride of a mountain bicycle, for :meth:`.Study.map`; ``course``: a scenario, or a speed (km/h).
 
     Returns:
         ``scenario``, ``subject``, ``pilot``, ``upright``, ``seconds`` that were ridden, and after :data:`SETTLED`
@@ -115,13 +107,7 @@ def by_speed(study: Study, count: int) -> dict[float, dict[str, float]]:
 
 
 def long_rides(study: Study, scenarios: Sequence[str], fidelity: str) -> list[dict[str, Any]]:
-    """Every scenario with the preset riders, and with random riders of each skill.
-
-    Args:
-        study: its duration, root seed and riders.
-        scenarios: names.
-        fidelity: ``full`` or ``lumped``.
-    """
+    """Every scenario with the preset riders, and with random riders of each skill."""
     jobs = []
     for name in scenarios:
         riders: list[tuple[int | str, str, int]] = [

@@ -132,15 +132,7 @@ SIGNALS = (
 
 
 def example_ride(scenario: str, subject: int, seed: int, duration: float, fidelity: str) -> Trajectory:
-    """One ride with every sensor of the papers, errors included.
-
-    Args:
-        scenario: name.
-        subject: number of the rider.
-        seed: of the ride.
-        duration: s.
-        fidelity: ``full`` or ``lumped``.
-    """
+    """One ride of ``duration`` s with every sensor of the papers, errors included."""
     from ....envs.bicycle.environment import RiderBicycleEnv
     from ....envs.record import record_once
 
@@ -149,12 +141,7 @@ def example_ride(scenario: str, subject: int, seed: int, duration: float, fideli
 
 
 def ride_signals(trajectory: Trajectory, title: str = "") -> Figure:
-    """Speed, true angles, inertial sensors, load cells and the hands' forces over time.
-
-    Args:
-        trajectory: of ``poise/RiderBicycle-v0`` with the suite ``all``.
-        title: above the figure.
-    """
+    """Speed, true angles, inertial sensors, load cells and hands' forces of a ride with the suite ``all`` over time."""
     figure, axes = new_figure(8.5, 10.0, rows=len(SIGNALS) + 3)
     time, truth = trajectory.time - trajectory.time[0], trajectory.truth
     speed, angles, *inertial, hands = axes

@@ -26,11 +26,6 @@ BANDWIDTH = (19.0, 63.0)
 def vibration(surface: str | Surface, duration: float = 6.0, fidelity: Fidelity = "full") -> tuple[float, float]:
     """Vertical acceleration of the bicycle at the seat tube while subject 0 rides straight on at 12 km/h.
 
-    Args:
-        surface: of the road.
-        duration: s.
-        fidelity: of the rider.
-
     Returns:
         Root mean square (m/s²) without gravity, and the frequency (Hz) below which 95 % of its power lies.
 

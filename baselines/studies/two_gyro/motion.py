@@ -162,13 +162,13 @@ def simulate(
     rng: np.random.Generator | None = None,
     sampling: Literal["interval", "instant"] = "interval",
 ) -> Trajectory:
-    """A motion as two gyroscopes and a camera see it.
+    """A motion as two gyroscopes and a camera see it, for ``duration`` s every ``dt`` s.
 
     Args:
         motion: what happens.
         duration: s.
-        dt: s, the sampling interval.
-        errors: of the sensors; :data:`IDEAL` for none.
+        dt: s.
+        errors: of the sensors.
         rng: draws the errors; None for a fixed seed.
         sampling: what a gyroscope's sample is: the mean of the interval that it ends, or the rate at its end.
 

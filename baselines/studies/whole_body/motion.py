@@ -206,14 +206,10 @@ class ExactRide:
         errors: SensorErrors | None = None,
         sampling: Literal["instant", "interval"] = "instant",
     ) -> Trajectory:
-        """The ride with its sensors, in the environment's channels and axes.
+        """The ride of ``duration`` s with its sensors every ``dt`` s, in the environment's channels and axes.
 
-        Args:
-            duration: s.
-            dt: sampling interval, s.
-            errors: of the sensors; None for the defaults of :class:`SensorErrors`.
-            sampling: inertial sensors give the value at the sampling instant, or the mean over the interval before it
-                (Simpson's rule, as the environment's sensors do).
+        Inertial sensors give the value at the sampling instant, or the mean over the interval before it (Simpson's
+        rule, as the environment's sensors do).
         """
         errors = SensorErrors() if errors is None else errors
         rng = np.random.default_rng(np.random.SeedSequence(self.seed).spawn(2)[1])

@@ -130,15 +130,7 @@ def frames(scene: Reconstruction) -> list[Figure]:
 
 
 def reconstruction(study: RideStudy, report: Report, path: Path, course: str, seated: str) -> list[Claim]:
-    """Picture and film of one ride; how far estimated joints are from the true ones.
-
-    Args:
-        study: of the ride.
-        report: gets picture and film.
-        path: of the ride.
-        course: in titles.
-        seated: variant in which the seat carries the trunk.
-    """
+    """Picture and film of one ride; how far estimated joints are from the true ones, also by the variant ``seated``."""
     scene = Reconstruction(study, path)
     note = (
         f"Black: truth. Blue: estimate. The grid has lines every {GRID:g} m, in the frame that turns with the bicycle; "
@@ -171,10 +163,10 @@ def skeleton(
     """Lines of rider and bicycle in the frame R of the paper, which turns with the bicycle but does not roll.
 
     Args:
-        geometry: lengths and places of the rider and the bicycle.
+        geometry: lengths and places.
         pose: the paper's angles of one moment, each ``(size,)``.
-        steer: ``(1,)`` steering angle, rad.
-        crank: ``(1,)`` crank angle, rad.
+        steer: ``(1,)`` rad.
+        crank: ``(1,)`` rad.
 
     Returns:
         Name → ``(n, 3)`` points of a line, m: x forward, y left, z up.

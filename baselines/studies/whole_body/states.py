@@ -49,10 +49,7 @@ def true_states(
 ) -> np.ndarray:
     """The filter's state ``(T, n)`` at the truth, with what it remembers of its inputs.
 
-    Args:
-        model: the filter.
-        measurements: channel → samples of the filter's channels; the last valid sample stands for a missing one.
-        truth: true angles under the environment's names.
+    The last valid sample stands for a missing one; the truth has the environment's names.
     """
     held = {name: held_samples(values) for name, values in measurements.items()}
     angles = true_angles_state(truth)
