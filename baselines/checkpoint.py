@@ -27,10 +27,8 @@ ARRAY = "__array__"
 def save_checkpoint(path: Path, key: Mapping[str, Any], state: Mapping[str, Any]) -> None:
     """Write a checkpoint atomically; the previous one is kept beside it as ``<stem>.previous<suffix>``.
 
-    Args:
-        path: file to (re)place.
-        key: JSON-able description of the training: a checkpoint resumes only what has an equal one.
-        state: arrays, tensors, numbers, texts, lists and dictionaries.
+    A checkpoint resumes only a training with an equal key, of JSON's types. The state holds arrays, tensors, numbers,
+    texts, lists and dictionaries.
     """
     import torch
 

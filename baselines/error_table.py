@@ -99,11 +99,8 @@ def summary(table: pandas.DataFrame, metric: str = "inclination", groups: Mappin
 def agreement(table: pandas.DataFrame, metric: str = "inclination") -> Any:
     """Differences between estimators on recordings without truth: one row and one column per estimator, deg.
 
-    The order is that of the table: no estimator is the truth, so there is no ranking.
-
-    Args:
-        table: from :func:`poise.evaluate`.
-        metric: ``inclination``, ``heading`` or ``total``.
+    The order is that of the table: no estimator is the truth, so there is no ranking. ``metric`` is ``inclination``,
+    ``heading`` or ``total``.
     """
     table = pandas.DataFrame(table)
     to = table["metric"].str.extract(f"^{re.escape(metric)} to (.+)$", expand=False)

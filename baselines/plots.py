@@ -107,13 +107,7 @@ def rms_bars(table: pandas.DataFrame, kinds: Mapping[str, str], metric: str = "i
     """Mean error of every estimator as bars, best on top, with each trajectory as a dot.
 
     The scale is set by the better half of the estimators. Values beyond it are cut off and marked by a triangle at the
-    edge with the largest value.
-
-    Args:
-        table: from :func:`poise.evaluate`.
-        kinds: estimator → kind, for the colours.
-        metric: which metric.
-        title: above the axes.
+    edge with the largest value. ``kinds`` of estimators choose the colours.
     """
     from .error_table import summary
 
@@ -176,11 +170,7 @@ def error_curves(
 ) -> Figure:
     """Motion and inclination errors of some estimators over time.
 
-    Args:
-        trajectory: with truth; its specific force and angular rate (true ones without an IMU) are drawn above.
-        estimates: label → estimate over the whole trajectory.
-        kinds: label → kind, for the colours.
-        title: above the figure.
+    Specific force and angular rate (true ones without an IMU) are drawn above. ``kinds`` of labels choose the colours.
     """
     figure, (motion, errors) = new_figure(8.5, 4.6, rows=2)
     time = trajectory.time - trajectory.time[0]
@@ -223,12 +213,7 @@ def error_curves(
 
 
 def angle_curves(trajectories: Mapping[str, Trajectory], estimates: Mapping[str, Estimate]) -> Figure:
-    """Roll, pitch and yaw of sensors over time, with two standard deviations to either side, and the truth if known.
-
-    Args:
-        trajectories: sensor → recording.
-        estimates: sensor → estimate, from :func:`poise.run`.
-    """
+    """Roll, pitch and yaw of sensors over time, with two standard deviations to either side, and the truth if known."""
     from ..filters.core.frames import ANGLES, attitude_columns
 
     frames = {name: estimate.to_frame() for name, estimate in estimates.items()}
@@ -274,9 +259,7 @@ def unwrapped(degrees: np.ndarray) -> np.ndarray:
 def signals(trajectory: Trajectory, rest: Mapping[str, np.ndarray]) -> Figure:
     """Lengths of angular rate, specific force and magnetic field of every sensor over time; rest is shaded.
 
-    Args:
-        trajectory: a recording.
-        rest: sensor → ``(T,)`` bool, from :func:`poise.envs.data.inspection.inspect_recording`.
+    ``rest`` is that of :func:`poise.envs.data.inspection.inspect_recording`: sensor → ``(T,)`` bool.
     """
     labels = {"gyr": "|rate|, rad/s", "acc": "|force|, m/s²", "mag": "|field|"}
     kinds = [kind for kind in labels if any(f"{site}/{kind}" in trajectory.measurements for site in rest)]

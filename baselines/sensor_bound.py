@@ -31,9 +31,8 @@ WIDE = 1.0
 def inclination_bound(trajectory: Trajectory) -> float | None:
     """Root mean square of the bound over the mask, deg; None where the errors of an IMU are not known, or zero.
 
-    Args:
-        trajectory: on its grid, with the channels ``imu/gyr`` and ``imu/acc`` and the true orientation; simulated, so
-            that its metadata hold the parameters of its sensors.
+    The trajectory is on its grid, with ``imu/gyr``, ``imu/acc`` and the true orientation; simulated, so that its
+    metadata hold the parameters of its sensors.
     """
     noises = [noise_of(trajectory, kind) for kind in ("gyr", "acc")]
     known = [noise for noise in noises if noise is not None and noise["white_noise"] > 0.0]

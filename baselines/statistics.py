@@ -56,9 +56,7 @@ def mean_score(scores: np.ndarray) -> float:
 def probability_of_improvement(scores: np.ndarray, others: np.ndarray) -> float:
     """Probability that a run of the first agent has a larger score than one of the second, mean over tasks; ties half.
 
-    Args:
-        scores: ``(runs, tasks)`` of the first agent.
-        others: ``(other runs, tasks)`` of the second, on the same tasks.
+    Scores are ``(runs, tasks)``, on the same tasks.
 
     Raises:
         ValueError: they have not the same number of tasks.

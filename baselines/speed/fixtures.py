@@ -108,16 +108,10 @@ FAMILIES: tuple[tuple[frozenset[str], Callable[..., Data]], ...] = (
 
 
 def plausible_measurements(estimator: Estimator[Any], seed: int, length: int = 80, dt: float = 0.01) -> Data:
-    """Plausible samples of the channels that an estimator reads.
+    """Plausible samples ``(T, size)`` of the channels that an estimator reads.
 
-    Args:
-        estimator: its channels choose the family, and its array of accelerometers, if it has one, the readings.
-        seed: of the motion and of the noise.
-        length: T; of a ride at most a few seconds.
-        dt: s; of a ride a multiple of 0.01.
-
-    Returns:
-        Channel → ``(T, size)``.
+    Its channels choose the family, and its array of accelerometers, if it has one, the readings. Rides last a few
+    seconds, with intervals of a multiple of 0.01 s.
 
     Raises:
         ValueError: no family has all these channels.
