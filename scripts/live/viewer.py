@@ -14,10 +14,9 @@ import numpy as np
 
 from ...filters.support.names import look_up
 from ...filters.support.optional import extra
-from .curves import TRUTH
+from .curves import TRUTH, colours_of, curve_figure
 from .motion import Motion, Rider, Subject
 from .player import SPEEDS, Player
-from .plots import colours_of, curve_figure
 from .scene import DEVICE, RIDE, MotionScene, Options
 
 with extra("view"):
