@@ -55,6 +55,14 @@ def new_figure(width: float, height: float, rows: int = 1, columns: int = 1) -> 
     return figure, list(axes)
 
 
+def time_figure(width: float, height: float, rows: int = 1, columns: int = 1) -> tuple[Figure, list[Any]]:
+    """As :func:`new_figure`, of curves over time in s."""
+    figure, axes = new_figure(width, height, rows, columns)
+    for ax in axes[-columns:]:
+        ax.set_xlabel("time, s")
+    return figure, axes
+
+
 def new_spatial_figure(
     width: float, height: float, rows: int = 1, columns: int = 1, dpi: int = 140
 ) -> tuple[Figure, list[Any]]:
@@ -172,7 +180,7 @@ def error_curves(
 
     Specific force and angular rate (true ones without an IMU) are drawn above. ``kinds`` of labels choose the colours.
     """
-    figure, (motion, errors) = new_figure(8.5, 4.6, rows=2)
+    figure, (motion, errors) = time_figure(8.5, 4.6, rows=2)
     time = trajectory.time - trajectory.time[0]
     # a device with an array of accelerometers has no such channels: its true motion is drawn
     for channel, quantity, colour, read, true in (
@@ -197,7 +205,6 @@ def error_curves(
         colour = COLOURS.get(kind, COLOURS["baseline"])
         errors.plot(time, degrees, color=colour, linestyle=style, linewidth=0.9, label=label)
     errors.set_ylabel("inclination error, deg")
-    errors.set_xlabel("time, s")
     # The better half sets the scale, so that one diverging estimator does not hide the others.
     end = 1.3 * sorted(usual)[(len(usual) - 1) // 2] if usual else 1.0
     errors.set_ylim(0.0, max(end, 1e-3))
@@ -218,7 +225,7 @@ def angle_curves(trajectories: Mapping[str, Trajectory], estimates: Mapping[str,
 
     frames = {name: estimate.to_frame() for name, estimate in estimates.items()}
     shown = [angle for angle in ANGLES if any(angle in frame for frame in frames.values())]
-    figure, axes = new_figure(8.5, 1.0 + 1.7 * len(shown), rows=len(shown))
+    figure, axes = time_figure(8.5, 1.0 + 1.7 * len(shown), rows=len(shown))
     colours = list(COLOURS.values())
     spans: dict[str, list[float]] = {}
     for number, (name, frame) in enumerate(frames.items()):
@@ -244,7 +251,6 @@ def angle_curves(trajectories: Mapping[str, Trajectory], estimates: Mapping[str,
         low, high = min(spans[angle]), max(spans[angle])
         # The angles set the scale; wider bands are cut.
         ax.set_ylim(low - 0.1 * (high - low) - 1.0, high + 0.1 * (high - low) + 1.0)
-    axes[-1].set_xlabel("time, s")
     handles = dict(zip(*axes[0].get_legend_handles_labels()[::-1], strict=True))
     figure.legend(handles.values(), handles, loc="outside upper right", ncols=6, frameon=False, fontsize=8)
     return figure
@@ -263,7 +269,7 @@ def signals(trajectory: Trajectory, rest: Mapping[str, np.ndarray]) -> Figure:
     """
     labels = {"gyr": "|rate|, rad/s", "acc": "|force|, m/s²", "mag": "|field|"}
     kinds = [kind for kind in labels if any(f"{site}/{kind}" in trajectory.measurements for site in rest)]
-    figure, axes = new_figure(8.5, 0.8 + 1.5 * max(len(kinds), 1), rows=max(len(kinds), 1))
+    figure, axes = time_figure(8.5, 0.8 + 1.5 * max(len(kinds), 1), rows=max(len(kinds), 1))
     for kind, ax in zip(kinds, axes, strict=False):
         for number, site in enumerate(rest):
             values = trajectory.measurements.get(f"{site}/{kind}")
@@ -281,5 +287,4 @@ def signals(trajectory: Trajectory, rest: Mapping[str, np.ndarray]) -> Figure:
     elif kinds:
         legend_above(axes[0])
     axes[0].set_title(f"{trajectory.name}{' (shaded: rest)' if len(rest) == 1 else ''}", loc="left", fontsize=10)
-    axes[-1].set_xlabel("time, s")
     return figure

@@ -11,7 +11,7 @@ import numpy as np
 
 from ...envs.data.trajectory import Trajectory
 from ...filters.core.quantity import DEG, Estimate
-from ..plots import AMBER, BLUE, GREEN, TRUTH_COLOR, VERMILION, legend_above, new_figure
+from ..plots import AMBER, BLUE, GREEN, TRUTH_COLOR, VERMILION, legend_above, new_figure, time_figure
 from .claims import Claim
 from .report import Report
 from .ride_study import SETTLED, SPACING, RideStudy
@@ -34,12 +34,11 @@ def ride_figure(
     ride, shown = study.load(path), list(angles or study.angles)
     truth = study.truth(ride.truth)
     errors = {name: study.errors(study.estimate(ride, study.variants[name]).pose, truth) for name in study.drawn}
-    figure, axes = new_figure(7.5, 0.6 + 1.9 * len(shown), len(shown))
+    figure, axes = time_figure(7.5, 0.6 + 1.9 * len(shown), len(shown))
     for ax, angle in zip(axes, shown, strict=True):
         curves = {name: error[angle] for name, error in errors.items() if angle in error}
         draw_angle(ax, ride.time, true_angle(study, truth, angle), curves, angle)
     legend_above(axes[0])
-    axes[-1].set_xlabel("time, s")
     report.figure(title, figure, title, SCALES)
     return ride
 

@@ -140,11 +140,11 @@ def save_curves(path: Path, curves: dict[str, tuple[float, float, Any]], label: 
     """Curves over time, as a figure."""
     import numpy as np
 
-    from ...baselines.plots import legend_above, new_figure, save
+    from ...baselines.plots import legend_above, save, time_figure
 
-    figure, (ax,) = new_figure(9.0, 3.2)
+    figure, (ax,) = time_figure(9.0, 3.2)
     for name, (start, dt, values) in curves.items():
         ax.plot(start + dt * np.arange(len(values)), values, linewidth=0.8, label=name)
-    ax.set(xlabel="time, s", ylabel=label)
+    ax.set(ylabel=label)
     legend_above(ax)
     out.say(f"figure: {save(figure, path)}")

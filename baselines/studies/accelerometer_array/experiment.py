@@ -22,7 +22,7 @@ from ....filters.core import rotation
 from ....filters.core.consistency import nees
 from ....filters.core.estimator import run
 from ....filters.core.kalman import KalmanFilter
-from ...plots import TRUTH_COLOR, legend_above, new_figure
+from ...plots import TRUTH_COLOR, legend_above, new_figure, time_figure
 from ..averages import interval_of_mean
 from ..claims import Claim
 from ..kit import Study
@@ -37,6 +37,7 @@ from .spatial import (
     STANDARD_GRAVITY,
     WITH_GYROSCOPE,
     WITHOUT_GYROSCOPE,
+    attitude_covariance,
     estimated,
     pointed,
     pointing_errors,
@@ -60,7 +61,8 @@ MORE: dict[str, tuple[str, ...]] = {"controller": (), "octa": (WITH_GYROSCOPE,)}
 """Further methods of the table"""
 PUBLISHED = {"controller": (3.0, 10.0), "octa": (3.0, 5.0)}
 """Table 5.1, deg: largest error in simulation, in the experiment"""
-NUMBERS = {"controller": ("5.18 and 5.19", "5.6 and 5.7"), "octa": ("5.20 and 5.21", "5.9 and 5.10")}
+NUMBERS = {"controller": "5.18 and 5.19", "octa": "5.20 and 5.21"}
+"""Device → numbers of its figures"""
 OFFSETS = np.radians([row[1] for row in TABLE_4_2.values()])
 """rad/s: offsets of the thesis' gyroscope before its calibration"""
 UNCORRECTED = "integration with the offsets of Table 4.2"
@@ -82,53 +84,38 @@ def tracked(device: str, seed: int, duration: float) -> tuple[Trajectory, np.nda
 def curves(device: str, seed: int, duration: float) -> dict[str, Any]:
     """``time``; true ``pitch`` and ``azimuth``, deg; ``errors`` against the tracker: method → [pitch, azimuth], deg."""
     trajectory, reference = tracked(device, seed, duration)
-    found: dict[str, Any] = {"time": trajectory.time.tolist(), "errors": {}}
-    pitch, azimuth = pointing_angles(reference)
-    found["pitch"], found["azimuth"] = np.degrees(pitch).tolist(), np.degrees(azimuth).tolist()
-    for method in METHODS[device]:
-        estimate = estimated(method, device, trajectory)
-        errors = pointing_errors(estimate, reference)[:2]
-        found["errors"][method] = [np.degrees(each).tolist() for each in errors]
-    return found
+    pitch, azimuth = (np.degrees(angle).tolist() for angle in pointing_angles(reference))
+    estimates = {method: estimated(method, device, trajectory) for method in METHODS[device]}
+    errors = {
+        method: np.degrees(pointing_errors(estimate, reference)[:2]).tolist() for method, estimate in estimates.items()
+    }
+    return {"time": trajectory.time.tolist(), "pitch": pitch, "azimuth": azimuth, "errors": errors}
 
 
 def largest(device: str, seed: int, duration: float) -> list[Row]:
     """Largest error of pitch and azimuth (deg) of each method, after the start."""
     trajectory, reference = tracked(device, seed, duration)
-    late, rows = trajectory.time >= SETTLED, []
-    for method in (*METHODS[device], *MORE[device]):
-        errors = pointing_errors(estimated(method, device, trajectory), reference)[:2]
-        worst = float(np.degrees(np.abs(np.array(errors)[:, late]).max()))
-        rows.append({"device": device, "method": method, "largest": worst})
+    tried = {method: (method, trajectory) for method in (*METHODS[device], *MORE[device])}
     if device == "controller":
         rate = trajectory.measurements["imu/gyr"] + OFFSETS
         moved = trajectory.replace(measurements={**trajectory.measurements, "imu/gyr": rate})
-        errors = pointing_errors(estimated("integration", device, moved), reference)[:2]
-        rows.append(
-            {
-                "device": device,
-                "method": UNCORRECTED,
-                "largest": float(np.degrees(np.abs(np.array(errors)[:, late]).max())),
-            }
-        )
+        tried[UNCORRECTED] = ("integration", moved)
+    rows = []
+    for name, (method, samples) in tried.items():
+        errors = np.array(pointing_errors(estimated(method, device, samples), reference)[:2])
+        worst = np.abs(errors[:, trajectory.time >= SETTLED]).max()
+        rows.append({"device": device, "method": name, "largest": float(np.degrees(worst))})
     return rows
 
 
 def attitude_nees(device: str, seed: int, duration: float, calibrated: bool) -> float:
-    """NEES of the attitude of the proposed filter, a degree of freedom, after calibration or with white noise.
-
-    An attitude error e about the body's axes changes row i of Q by q_i × e; the rows' covariance gives that of e.
-    """
+    """NEES of the attitude of the proposed filter, a degree of freedom, after calibration or with white noise."""
     trajectory = tracked(device, seed, duration)[0] if calibrated else pointed(device, seed, duration)
     model, measurements = prepared(FIRST[device], device, trajectory)
     estimate = run(KalmanFilter(model), measurements)
     truth, late = trajectory.truth["orientation"], trajectory.time >= SETTLED
     error = rotation.log(rotation.multiply(rotation.conjugate(truth), estimate.pose["orientation"]))[late]
-    Q = rotation.to_matrix(truth[late])
-    # three rows of crosses below each other; their product with their transpose is twice the identity
-    J = np.concatenate([rotation.skew(Q[:, i]) for i in range(3)], axis=-2)
-    P = 0.25 * J.mT @ np.asarray(estimate.covariance)[late, :9, :9] @ J
-    return float(np.mean(nees(error, P))) / 3.0
+    return float(np.mean(nees(error, attitude_covariance(np.asarray(estimate.covariance)[late], truth[late])))) / 3.0
 
 
 def experiment(study: Study, report: Report, simulated: list[Row]) -> None:
@@ -137,7 +124,7 @@ def experiment(study: Study, report: Report, simulated: list[Row]) -> None:
     roots = [study.seed_of("experiment", index) for index in range(seeds)]
     jobs = [(device, seed, duration) for device in FIRST for seed in roots]
     measured = [row for found in study.map("experiment", largest, jobs) for row in found]
-    rows, claims = [], []
+    rows, claims, worst = [], [], {}
     for device, method in FIRST.items():
         in_simulation = [
             max(row["pitch_max"], row["azimuth_max"])
@@ -154,8 +141,9 @@ def experiment(study: Study, report: Report, simulated: list[Row]) -> None:
                 {"device": device, "quantity": f"largest error, {kind}", "published": f"±{published:g}"}
                 | {"values": values, "unit": "deg"}
             )
-        figure = NUMBERS[device][0]
+        figure = NUMBERS[device]
         own, integrated, tilted, marins = (float(np.max(found[name])) for name in (method, *METHODS[device][:3]))
+        worst[device] = own
         claims += [
             Claim.less(f"{device}, experiment: the proposed method stays within ±{large:g}° (Table 5.1)", own, large),
             Claim.less(f"{device}, experiment: integration is lost, beyond 20° (Figures {figure})", 20.0, integrated),
@@ -177,10 +165,6 @@ def experiment(study: Study, report: Report, simulated: list[Row]) -> None:
         "tracker as reference. The published ± are ranges read off figures, not standard deviations.",
         interval=OVER_MOTIONS,
     )
-    worst = {
-        device: max(row["largest"] for row in measured if (row["device"], row["method"]) == (device, method))
-        for device, method in FIRST.items()
-    }
     for kind, error in (("without", worst["octa"]), ("with", helped)):
         statement = f"OCTA {kind} a gyroscope is as accurate as the controller with one (Table 5.1)"
         claims.append(Claim.within(statement, error / worst["controller"], 0.5, 2.0, "times"))
@@ -205,7 +189,7 @@ def experiment(study: Study, report: Report, simulated: list[Row]) -> None:
 
 def experiment_figure(report: Report, device: str, one: dict[str, Any]) -> None:
     """Pitch and azimuth by the tracker and the proposed method, and errors of all four methods."""
-    figure, axes = new_figure(7.5, 7.0, 4)
+    figure, axes = time_figure(7.5, 7.0, 4)
     time = np.array(one["time"])
     for row, angle in enumerate(("pitch", "azimuth")):
         top, below = axes[2 * row], axes[2 * row + 1]
@@ -219,8 +203,7 @@ def experiment_figure(report: Report, device: str, one: dict[str, Any]) -> None:
         below.set(ylabel=f"error of {angle}, deg", ylim=(-20.0, 20.0))
     legend_above(axes[0])
     legend_above(axes[1])
-    axes[-1].set_xlabel("time, s")
-    title = f"Figures {NUMBERS[device][0]}: the {device} after calibration"
+    title = f"Figures {NUMBERS[device]}: the {device} after calibration"
     report.figure(f"experiment-{device}", figure, title, "Simulated; errors beyond 20° are cut.")
 
 

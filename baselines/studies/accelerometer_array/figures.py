@@ -11,7 +11,7 @@ from ....envs.data.trajectory import Trajectory
 from ....filters.arrays.spatial.pointing import pointing_angles
 from ....filters.core import rotation
 from ....filters.core.quantity import STANDARD_GRAVITY
-from ...plots import AMBER, BLUE, GREEN, GREY, PINK, SKY, TRUTH_COLOR, VERMILION, legend_above, new_figure
+from ...plots import AMBER, BLUE, GREEN, GREY, PINK, SKY, TRUTH_COLOR, VERMILION, legend_above, new_figure, time_figure
 from ..report import Report
 
 LINES = (BLUE, VERMILION, GREEN, AMBER, PINK, GREY, SKY)
@@ -33,7 +33,7 @@ def move_figure(trajectory: Trajectory) -> Any:
 
 def readings_figure(trajectory: Trajectory, seconds: float = 10.0) -> Any:
     """One reading of each sensor, with and without noise (5.5)."""
-    figure, axes = new_figure(7.5, 5.0, 3)
+    figure, axes = time_figure(7.5, 5.0, 3)
     part = trajectory.time <= seconds
     q, time = trajectory.truth["orientation"][part], trajectory.time[part]
     truth = {name: trajectory.truth[name][part] for name in ("external_acceleration", "angular_rate")}
@@ -51,14 +51,13 @@ def readings_figure(trajectory: Trajectory, seconds: float = 10.0) -> Any:
         ax.plot(time, clean, color=TRUTH_COLOR, linewidth=0.8, label="true")
         ax.set_ylabel(label)
     legend_above(axes[0])
-    axes[-1].set_xlabel("time, s")
     return figure
 
 
 def pointing_figures(report: Report, device: str, curves: dict[str, Any]) -> None:
     """Figures 5.6 to 5.8, or 5.9 to 5.11, from :func:`.spatial.attitude_curves`."""
     errors_name, path_name = NUMBERS[device]
-    figure, axes = new_figure(7.5, 7.0, 4)
+    figure, axes = time_figure(7.5, 7.0, 4)
     time = curves["time"]
     for row, (angle, true) in enumerate((("pitch", curves["pitch"]), ("azimuth", curves["azimuth"]))):
         top, below = axes[2 * row], axes[2 * row + 1]
@@ -74,7 +73,6 @@ def pointing_figures(report: Report, device: str, curves: dict[str, Any]) -> Non
         below.set_ylabel(f"error of {angle}, °")
     legend_above(axes[0])
     figure.legend(*axes[1].get_legend_handles_labels(), loc="outside lower center", fontsize=7.5, ncols=3)
-    axes[-1].set_xlabel("time, s")
     report.figure(
         f"pointing-{device}",
         figure,

@@ -16,7 +16,16 @@ from ..averages import mean_of
 from ..claims import Claim
 from ..kit import Study
 from ..report import Report
-from .spatial import PROPOSED, WITH_GYROSCOPE, WITHOUT_GYROSCOPE, estimated, pointed, pointing_errors, prepared
+from .spatial import (
+    PROPOSED,
+    WITH_GYROSCOPE,
+    WITHOUT_GYROSCOPE,
+    attitude_covariance,
+    estimated,
+    pointed,
+    pointing_errors,
+    prepared,
+)
 
 METHODS = (("controller", PROPOSED), ("octa", WITH_GYROSCOPE), ("octa", WITHOUT_GYROSCOPE))
 ANGLES = ("pitch", "azimuth", "total")
@@ -57,10 +66,7 @@ def bounds_of(trajectory: Trajectory, model: Any, measurements: Mapping[str, np.
 
 def angles_of(P: np.ndarray, orientation: np.ndarray) -> dict[str, np.ndarray]:
     """Variances ``(T,)`` of pitch, azimuth and the whole rotation, rad², from the covariance of the rows of Q."""
-    Q = rotation.to_matrix(orientation)
-    # an attitude error e about the body's axes changes row i by q_i × e
-    J = np.concatenate([rotation.skew(Q[:, i]) for i in range(3)], axis=-2)
-    attitude = 0.25 * J.mT @ P[:, :9, :9] @ J
+    Q, attitude = rotation.to_matrix(orientation), attitude_covariance(P, orientation)
     # (5.50): sin θ = Q₃₂, tan ψ = Q₁₂ / Q₂₂; both move with e as the rows do
     by_e = np.stack([rotation.skew(Q[:, i])[:, 1] for i in range(3)], axis=1)
     east, north, up = Q[:, 0, 1], Q[:, 1, 1], Q[:, 2, 1]

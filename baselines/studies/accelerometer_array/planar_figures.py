@@ -12,7 +12,7 @@ from ....filters.arrays.planar.orientation import PLANAR_ANGLE
 from ....filters.arrays.planar.pose import PLANAR_RATE
 from ....filters.core.estimator import run
 from ....filters.core.rotation import wrap
-from ...plots import TRUTH_COLOR, legend_above, new_figure
+from ...plots import TRUTH_COLOR, legend_above, new_figure, time_figure
 from ..kit import Study
 from ..report import Report
 from ..ride_figures import DRAWN
@@ -74,10 +74,10 @@ def planar_figures(report: Report, motion: str, curves: Mapping[str, Any], clean
     numbers, time = NUMBERS[motion], np.array(curves["time"])
     report.figure(f"path-{motion}", path_figure(curves["path"]), f"Figure {numbers['path']}: path, {motion}")
     part = (time >= 2.0) & (time <= 3.0)
-    figure, (ax,) = new_figure(7.5, 2.6)
+    figure, (ax,) = time_figure(7.5, 2.6)
     ax.plot(time[part], np.array(curves["reading"])[part], color=DRAWN[-1], linewidth=0.8, label="with noise")
     ax.plot(time[part], np.array(clean)[part], color=TRUTH_COLOR, linewidth=0.8, label="true")
-    ax.set(xlabel="time, s", ylabel="a₁, m/s²")
+    ax.set(ylabel="a₁, m/s²")
     legend_above(ax)
     report.figure(f"readings-{motion}", figure, f"Figure {numbers['readings']}: an accelerometer, {motion}")
     late = (time >= time[-1] - WINDOW) if motion == "infinity" else np.ones(len(time), bool)
@@ -87,12 +87,12 @@ def planar_figures(report: Report, motion: str, curves: Mapping[str, Any], clean
     report.figure(
         f"errors-{motion}", error_figure(time, curves["errors"], COMPARED), title, "Errors beyond 60° are cut."
     )
-    figure, (ax,) = new_figure(7.5, 2.8)
+    figure, (ax,) = time_figure(7.5, 2.8)
     begin = (time >= 5.0) & (time <= 5.0 + WINDOW)
     ax.plot(time[begin], np.array(curves["rate"])[begin], color=TRUTH_COLOR, linewidth=1.2, label="true")
     for (name, rate), color in zip(curves["rates"].items(), (DRAWN[1], DRAWN[-1]), strict=True):
         ax.plot(time[begin], np.array(rate)[begin], color=color, linewidth=0.8, label=name)
-    ax.set(xlabel="time, s", ylabel="ω, rad/s")
+    ax.set(ylabel="ω, rad/s")
     legend_above(ax)
     title = f"Figure {numbers['rate']}: angular rate by the complete pose, {motion}"
     report.figure(f"rate-{motion}", figure, title)
@@ -102,10 +102,9 @@ def more_figures(report: Report, curves: Mapping[str, Any]) -> None:
     """Figures 3.11 to 3.13, of another walk: its path, averaging and linear methods, the extended filter alone."""
     time = np.array(curves["time"])
     report.figure("path-another", path_figure(curves["path"]), "Figure 3.11: path, another walk")
-    figure, axes = new_figure(7.5, 4.6, 2)
+    figure, axes = time_figure(7.5, 4.6, 2)
     draw_angles(axes[0], time, curves, MORE, np.ones(len(time), bool))
     draw_errors(axes[1], time, curves["errors"], MORE, 200.0)
-    axes[1].set_xlabel("time, s")
     legend_above(axes[0])
     report.figure("more-methods", figure, "Figure 3.12: averaging, linear and unscented filter, another walk")
     title = "Figure 3.13: errors of the extended filter alone, another walk"
@@ -135,9 +134,8 @@ def path_figure(path: Sequence[Sequence[float]]) -> Any:
 
 def angle_figure(time: np.ndarray, curves: Mapping[str, Any], methods: Sequence[str], part: np.ndarray) -> Any:
     """True angle and estimates, nearest turn."""
-    figure, (ax,) = new_figure(7.5, 3.2)
+    figure, (ax,) = time_figure(7.5, 3.2)
     draw_angles(ax, time, curves, methods, part)
-    ax.set_xlabel("time, s")
     legend_above(ax)
     return figure
 
@@ -155,9 +153,8 @@ def draw_angles(ax: Any, time: np.ndarray, curves: Mapping[str, Any], methods: S
 
 def error_figure(time: np.ndarray, errors: Mapping[str, Any], methods: Sequence[str], limit: float = 60.0) -> Any:
     """Errors over the whole run."""
-    figure, (ax,) = new_figure(7.5, 3.0)
+    figure, (ax,) = time_figure(7.5, 3.0)
     draw_errors(ax, time, errors, methods, limit)
-    ax.set_xlabel("time, s")
     legend_above(ax)
     return figure
 

@@ -18,7 +18,7 @@ from ....filters.arrays.rate import ANGULAR_RATE, ArrayRate
 from ....filters.core import metrics
 from ....filters.core.estimator import run
 from ....filters.core.observer import Observer
-from ...plots import BLUE, TRUTH_COLOR, new_figure
+from ...plots import BLUE, TRUTH_COLOR, time_figure
 from ..claims import Claim
 from ..kit import Study
 from ..report import OVER_MOTIONS, Report
@@ -138,14 +138,11 @@ def weight_table(rows: list[Row]) -> list[Row]:
     return grouped(weighted, {"errors": "errors", "method": "method"}, {name: (name, np.mean) for name in SPEEDS})
 
 
-def rate_curves(seed: int, errors: str = CALIBRATED, start: float = 10.0, length: float = 10.0) -> dict[str, Any]:
-    """First components over some seconds, as in Figure 2.10, with weights (2.12): name → list, for a figure."""
-    trajectory = shaken(seed, errors, start + length)
-    part = slice(round(start * RATE), None)
-    curves: dict[str, Any] = {
-        "time": trajectory.time[part].tolist(),
-        "true": trajectory.truth["angular_rate"][part, 0].tolist(),
-    }
+def rate_curves(seed: int) -> dict[str, Any]:
+    """First components over ten seconds, as in Figure 2.10, with weights (2.12): name → list, for a figure."""
+    trajectory, part = shaken(seed, CALIBRATED, 20.0), slice(round(10.0 * RATE), None)
+    true = trajectory.truth["angular_rate"][part, 0]
+    curves: dict[str, Any] = {"time": trajectory.time[part].tolist(), "true": true.tolist()}
     for method, parameters in METHODS.items():
         if "variant" not in parameters:
             pose = run(estimator(method), trajectory.measurements).pose
@@ -162,11 +159,9 @@ def claims(rows: list[Row]) -> list[Claim]:
     thesis = PUBLISHED["weighted"]
     in_thesis = [one < other for one, other in zip(PUBLISHED["polynomial roots"], PUBLISHED["Parsa"], strict=True)]
     named = {row: mean[method] for method, row in ROWS_OF_TABLE_2_1.items() if row}
-    weights = next(row for row in weight_table(rows) if row["method"] == DEFAULT and row["errors"] == CALIBRATED)
+    by_method = {row["method"]: row for row in weight_table(rows) if row["errors"] == CALIBRATED}
+    weights, as_published = by_method[DEFAULT], by_method["weighted, as published"][next(iter(SPEEDS))]
     slow, *_, fast = (weights[name] for name in SPEEDS)
-    as_published = next(
-        row for row in weight_table(rows) if row["method"] == "weighted, as published" and row["errors"] == CALIBRATED
-    )[next(iter(SPEEDS))]
     least = min(weights[name] for name in SPEEDS if weights[name] is not None)
     growth = f"{slow:.3f} below 1 rad/s, {fast:.3f} above 6 rad/s"
     published = "Table 2.1: the weighted error lies within the six published runs"
@@ -229,11 +224,12 @@ def angular_rates(study: Study, report: Report) -> None:
     jobs = [(study.seed_of("shaking", index), kind, duration) for kind in kinds for index in range(seeds)]
     rows = [row for found in study.map("angular rate", rate_errors, jobs) for row in found]
     report.numbers(results_of(rows, "rms", "shaking {seed}, {errors}", ANGULAR_RATE.name, "rms", "rad/s"))
+    published = {row: f"{np.mean(runs):.2f} ({min(runs):.2f} … {max(runs):.2f})" for row, runs in PUBLISHED.items()}
     report.compare(
         "Table 2.1: angular rate of a shaken OCTA",
         [
             {"method": method, "quantity": "rms of |ω̂ − ω|", "unit": "rad/s"}
-            | {"published": mean_and_range(PUBLISHED[row]) if row else None}
+            | {"published": published.get(row or "")}
             | {"values": values_of(rows, "rms", method=method, errors=CALIBRATED)}
             for method, row in ROWS_OF_TABLE_2_1.items()
         ],
@@ -255,7 +251,7 @@ def angular_rates(study: Study, report: Report) -> None:
 
 def draw(report: Report, curves: dict[str, Any]) -> None:
     """Angular rates and weights over ten seconds."""
-    figure, (top, below) = new_figure(7.5, 4.6, 2)
+    figure, (top, below) = time_figure(7.5, 4.6, 2)
     time = curves["time"]
     top.plot(time, curves["true"], color=TRUTH_COLOR, linewidth=2.2, alpha=0.6, label="true")
     for name, values in curves.items():
@@ -268,11 +264,5 @@ def draw(report: Report, curves: dict[str, Any]) -> None:
     below.plot(time, curves["weight"], color=BLUE, linewidth=0.8)
     below.set_ylabel("weight w_x")
     below.set_ylim(0.0, 1.05)
-    below.set_xlabel("time, s")
     title = "Figures 2.9 to 2.12: angular rate and weights"
     report.figure("angular-rate", figure, title, f"Rates beyond {limit:.0f} rad/s are cut.")
-
-
-def mean_and_range(values: tuple[float, ...]) -> str:
-    """Published numbers in short."""
-    return f"{np.mean(values):.2f} ({min(values):.2f} … {max(values):.2f})"

@@ -8,7 +8,7 @@ import numpy as np
 
 from ....filters.arrays.rate import ANGULAR_RATE
 from ....filters.core.estimator import run
-from ...plots import legend_above, new_figure
+from ...plots import legend_above, new_figure, time_figure
 from ..kit import Study
 from ..report import Report
 from ..ride_figures import DRAWN
@@ -44,11 +44,11 @@ def rate_pictures(study: Study, report: Report) -> None:
 
 def rate_figures(report: Report, curves: dict[str, Any]) -> None:
     """Both figures, from :func:`error_curves`."""
-    figure, (ax,) = new_figure(7.5, 3.2)
+    figure, (ax,) = time_figure(7.5, 3.2)
     for method, color in SHOWN.items():
         ax.semilogy(curves["time"], np.maximum(curves[method], 1e-3), color=color, linewidth=0.8, label=method)
     ax.semilogy(curves["time"], np.maximum(curves["predicted"], 1e-3), "k", linewidth=0.8, label="√tr Σ, predicted")
-    ax.set(xlabel="time, s", ylabel="‖ω̂ − ω‖, rad/s")
+    ax.set(ylabel="‖ω̂ − ω‖, rad/s")
     legend_above(ax)
     report.figure("angular-rate-errors", figure, "Figure 2.11: errors of the angular rate", "Logarithmic.")
     figure, axes = new_figure(9.0, 2.8, 1, 3)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ...plots import TRUTH_COLOR, legend_above, new_figure
+from ...plots import TRUTH_COLOR, legend_above, new_figure, time_figure
 from ..report import Report
 from ..ride_figures import DRAWN
 
@@ -37,12 +37,12 @@ def accelerometer_figures(report: Report, runs: dict[str, Any], mounting: Any, f
     """Imposed rates, raw output, output against acceleration with the fit, and its residuals."""
     ways = [("outwards", "out +x"), ("inwards", "out -x")]
     for key, label, number in (("rate", "rate, °/s", "4.6"), ("raw", "output, digits", "4.7")):
-        figure, axes = new_figure(7.5, 2.8, 1, 2)
+        figure, axes = time_figure(7.5, 2.8, 1, 2)
         for ax, (title, end) in zip(axes, ways, strict=True):
             part = np.char.endswith(mounting, end)
             time = runs["time"][part] - runs["time"][part][0]
             ax.plot(time[::EVERY], runs[key][part][::EVERY], color=DRAWN[-1], linewidth=0.8)
-            ax.set(xlabel="time, s", title=f"axis {title}")
+            ax.set(title=f"axis {title}")
         axes[0].set_ylabel(label)
         name = "imposed rates" if key == "rate" else "output of an accelerometer"
         report.figure(f"table-{key}", figure, f"Figure {number}: {name}")
@@ -66,11 +66,10 @@ def gyroscope_figures(report: Report, turns: dict[str, Any]) -> None:
     """Rate of the table, output, best fit and residuals of the gyroscope."""
     time, rate, raw, kept = (np.array(turns[name]) for name in ("time", "rate", "raw", "kept"))
     scale, offset = (math.degrees(value) for value in turns["fitted"])
-    figure, axes = new_figure(7.5, 4.2, 2)
+    figure, axes = time_figure(7.5, 4.2, 2)
     for ax, values, label in zip(axes, (rate, raw), ("rate, °/s", "output, digits"), strict=True):
         ax.plot(time[::EVERY] - time[0], values[::EVERY], color=DRAWN[-1], linewidth=0.8)
         ax.set_ylabel(label)
-    axes[-1].set_xlabel("time, s")
     report.figure("gyroscope-runs", figure, "Figures 4.11 and 4.12: rate of the table and output of the gyroscope")
     figure, axes = new_figure(8.0, 3.4, 1, 2)
     axes[0].plot(raw[::EVERY], rate[::EVERY], ".", color=DRAWN[-1], markersize=2.0, label="readings")

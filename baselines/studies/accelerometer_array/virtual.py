@@ -14,7 +14,7 @@ from ....filters.core import rotation
 from ....filters.core.estimator import run
 from ....filters.core.kalman import KalmanFilter
 from ....filters.core.quantity import STANDARD_GRAVITY, Estimate
-from ...plots import TRUTH_COLOR, legend_above, new_figure, new_spatial_figure
+from ...plots import TRUTH_COLOR, legend_above, new_spatial_figure, time_figure
 from ..claims import Claim
 from ..kit import Study
 from ..report import Report
@@ -101,7 +101,7 @@ def controller_figure(seed: int) -> tuple[Any, float]:
 
 def position_figure(curves: dict[str, Any]) -> Any:
     """The three positions over time."""
-    figure, axes = new_figure(7.5, 4.6, 3)
+    figure, axes = time_figure(7.5, 4.6, 3)
     time = np.array(curves["time"])
     part = time <= 15.0
     for axis, ax in enumerate(axes):
@@ -112,7 +112,6 @@ def position_figure(curves: dict[str, Any]) -> Any:
         limit = 1.5 * max(np.abs(true).max(), np.abs(virtual).max())
         ax.set(ylabel=f"{('east', 'north', 'up')[axis]}, m", ylim=(-limit, limit))
     legend_above(axes[0])
-    axes[-1].set_xlabel("time, s")
     return figure
 
 

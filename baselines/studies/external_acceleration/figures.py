@@ -11,7 +11,7 @@ from ....filters.core import rotation
 from ....filters.core.estimator import run
 from ....filters.core.metrics import DEGREES
 from ....filters.imu.external_acceleration import ExternalAcceleration
-from ...plots import AMBER, BLUE, TRUTH_COLOR, legend_above, new_figure
+from ...plots import AMBER, BLUE, TRUTH_COLOR, legend_above, new_figure, time_figure
 from ...registry import make_estimator
 from .simulation import MODES, RATE, Trial, estimate, reference, simulate
 
@@ -69,7 +69,7 @@ def figure_2(seed: int) -> Figure:
 def figure_3(seed: int) -> Figure:
     """Test B: sizes of external acceleration and of the accelerometer's signal."""
     trial = simulate("B", [seed])
-    figure, (upper, lower) = new_figure(8.5, 4.0, 2)
+    figure, (upper, lower) = time_figure(8.5, 4.0, 2)
     upper.plot(seconds(trial), np.linalg.norm(trial.acceleration[:, 0], axis=-1), color=OURS, linewidth=0.9)
     upper.set_ylabel("‖a‖, m/s²")
     lower.plot(seconds(trial), np.linalg.norm(trial.measurements["imu/acc"][:, 0], axis=-1), color=OURS, linewidth=0.9)
@@ -77,14 +77,13 @@ def figure_3(seed: int) -> Figure:
     for side in (-1.0, 1.0):
         lower.axhline(GRAVITY + side * ExternalAcceleration().threshold, color=BAND, linewidth=0.8, linestyle="--")
     lower.set_ylabel("‖y_A‖, m/s²")
-    lower.set_xlabel("time, s")
     return figure
 
 
 def figure_4(seed: int) -> Figure:
     """Test B: roll, pitch and external acceleration of the three modes."""
     trial = simulate("B", [seed])
-    figure, axes = new_figure(11.0, 7.5, 5, 3)
+    figure, axes = time_figure(11.0, 7.5, 5, 3)
     true, time = angles(trial.up), seconds(trial)
     for column, mode in enumerate(MODES):
         pose = estimate(trial, published(mode))
@@ -95,27 +94,25 @@ def figure_4(seed: int) -> Figure:
             beside(axes[3 * (2 + axis) + column], time, ours, true_a, f"a_{'xyz'[axis]}, m/s²")
         axes[column].set_title(f"mode {mode}", fontsize=10, loc="left")
         legend_above(axes[column])
-        axes[12 + column].set_xlabel("time, s")
     return figure
 
 
 def figure_5(seed: int) -> Figure:
     """Test C: size of the external acceleration, and of its error in the three modes."""
     trial = simulate("C", [seed])
-    figure, axes = new_figure(8.5, 6.0, 4)
+    figure, axes = time_figure(8.5, 6.0, 4)
     axes[0].plot(seconds(trial), np.linalg.norm(trial.acceleration[:, 0], axis=-1), color=TRUE, linewidth=0.8)
     axes[0].set_ylabel("‖a‖, m/s²")
     for ax, mode in zip(axes[1:], MODES, strict=True):
         off = estimate(trial, published(mode))["external_acceleration"][:, 0] - reference(trial)[:, 0]
         ax.plot(seconds(trial), np.linalg.norm(off, axis=-1), color=OURS, linewidth=0.8)
         ax.set_ylabel(f"error, mode {mode}\nm/s²", fontsize=8.5)
-    axes[-1].set_xlabel("time, s")
     return figure
 
 
 def truth_figure(seed: int) -> Figure:
     """Tests B and C: size of the external acceleration, true and estimated by modes 1 and 3, and the errors."""
-    figure, axes = new_figure(10.0, 5.5, 3, 2)
+    figure, axes = time_figure(10.0, 5.5, 3, 2)
     for column, test in enumerate("BC"):
         trial = simulate(test, [seed])
         true, time = trial.acceleration[:, 0], seconds(trial)
@@ -128,7 +125,7 @@ def truth_figure(seed: int) -> Figure:
             axes[4 + column].plot(time, np.linalg.norm(found - true, axis=-1), color=color, linewidth=0.8)
         axes[column].set_title(f"test {test}", fontsize=10, loc="left")
         legend_above(axes[column])
-        axes[4 + column].set(xlabel="time, s", ylabel="‖error‖, m/s²")
+        axes[4 + column].set(ylabel="‖error‖, m/s²")
     return figure
 
 
@@ -152,7 +149,7 @@ def figure_6(seed: int) -> Figure:
 
 def figure_7(seed: int) -> Figure:
     """Roll of tests A and B: gyroscope alone or mode 2, c_a = 0.001, c_a = 1."""
-    figure, axes = new_figure(10.0, 5.5, 3, 2)
+    figure, axes = time_figure(10.0, 5.5, 3, 2)
     a, b = simulate("A", [seed]), simulate("B", [seed])
     alone = run(make_estimator("gyroscope-integration", dt=1.0 / RATE), a.measurements).pose["up"]
     columns = (
@@ -165,7 +162,6 @@ def figure_7(seed: int) -> Figure:
             beside(ax, seconds(trial), angles(up)[0], angles(trial.up)[0], f"{name}\nroll, deg")
         axes[column].set_title(f"test {'AB'[column]}", fontsize=10, loc="left")
         legend_above(axes[column])
-        axes[4 + column].set_xlabel("time, s")
     return figure
 
 

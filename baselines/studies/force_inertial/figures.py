@@ -18,7 +18,7 @@ from ....envs.bicycle.sensors.devices import (
 from ....filters.bicycle.force_inertial.filter import ForceInertial
 from ....filters.bicycle.geometry import RiderGeometry
 from ....filters.core.quantity import DEG, STANDARD_GRAVITY
-from ...plots import TRUTH_COLOR, legend_above, new_figure
+from ...plots import TRUTH_COLOR, legend_above, time_figure
 from ..claims import Claim
 from ..report import Report
 from ..ride_figures import DRAWN, offset_shares, ride_figure, spread_claims, spread_figure
@@ -56,7 +56,7 @@ def convergence_figure(study: RideStudy, path: Path, seconds: float = 8.0) -> An
     ride = study.load(path)
     samples = {channel.name: ride.measurements[channel.name] for channel in ForceInertial.channels}
     truth, kalman = dict(study.truth(ride.truth)), study.estimator(ride, Variant())
-    figure, (ax,) = new_figure(7.5, 3.0)
+    figure, (ax,) = time_figure(7.5, 3.0)
     shown = ride.time[1:] - ride.time[0] <= seconds
     time = ride.time[1:][shown]
     true = truth["force-inertial/trunk_angles"][1:, 0][shown] / DEG
@@ -66,7 +66,7 @@ def convergence_figure(study: RideStudy, path: Path, seconds: float = 8.0) -> An
         found = pose["force-inertial/trunk_angles"][:, 0][shown] / DEG
         # the wrong start itself, before the first update
         ax.plot([ride.time[0], *time], [true[0] + off, *found], color=color, linewidth=0.9, label=f"start {off:+g}°")
-    ax.set(xlabel="time, s", ylabel="φ_h, deg")
+    ax.set(ylabel="φ_h, deg")
     legend_above(ax)
     return figure
 
@@ -77,7 +77,7 @@ def torque_figure(study: RideStudy, path: Path, begin: float = 5.0, seconds: flo
     samples = {channel.name: ride.measurements[channel.name] for channel in ForceInertial.channels}
     model = study.estimator(ride, Variant()).model
     named = smoothed_torques(model, samples, dict(study.truth(ride.truth)))
-    figure, axes = new_figure(7.5, 4.6, 2)
+    figure, axes = time_figure(7.5, 4.6, 2)
     start = min(begin, 0.25 * float(ride.time[-1]))
     # averages over 0.2 s do not reach to the end
     part = (ride.time >= start) & (ride.time <= min(start + seconds, ride.time[-1] - 0.2))
@@ -88,7 +88,6 @@ def torque_figure(study: RideStudy, path: Path, begin: float = 5.0, seconds: flo
             ax.plot(ride.time[part], named[name][part, index], color=color, linewidth=width, label=name)
         ax.set_ylabel(label)
         legend_above(ax)
-    axes[-1].set_xlabel("time, s")
     return figure
 
 

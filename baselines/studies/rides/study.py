@@ -13,7 +13,7 @@ from ....envs.bicycle.rider.anthropometry import SUBJECTS
 from ....envs.data.trajectory import Trajectory
 from ....filters.support.rows import RESULT
 from ....filters.support.seeds import child_seeds
-from ...plots import TRUTH_COLOR, new_figure
+from ...plots import TRUTH_COLOR, time_figure
 from ..kit import Study
 from ..report import Report
 from .checks import all_checks
@@ -142,7 +142,7 @@ def example_ride(scenario: str, subject: int, seed: int, duration: float, fideli
 
 def ride_signals(trajectory: Trajectory, title: str = "") -> Figure:
     """Speed, true angles, inertial sensors, load cells and hands' forces of a ride with the suite ``all`` over time."""
-    figure, axes = new_figure(8.5, 10.0, rows=len(SIGNALS) + 3)
+    figure, axes = time_figure(8.5, 10.0, rows=len(SIGNALS) + 3)
     time, truth = trajectory.time - trajectory.time[0], trajectory.truth
     speed, angles, *inertial, hands = axes
     speed.plot(time, trajectory.measurements["wheel/speed"], color="#b9bec6", linewidth=0.7, label="wheel/speed")
@@ -164,7 +164,6 @@ def ride_signals(trajectory: Trajectory, title: str = "") -> Figure:
     for begin, name in ((0, "left"), (3, "right")):
         hands.plot(time, np.linalg.norm(grips[:, begin : begin + 3], axis=1), linewidth=0.7, label=name)
     hands.set_ylabel("hands, N")
-    hands.set_xlabel("time, s")
     for ax in axes:
         ax.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False, fontsize=8)
         ax.yaxis.label.set_size(8.5)

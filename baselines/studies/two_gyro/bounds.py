@@ -12,7 +12,7 @@ from ....filters.analysis.bounds import posterior_bound
 from ....filters.analysis.observability import trajectory_observability
 from ....filters.bicycle.two_gyro.truth import true_states
 from ....filters.core.quantity import DEG
-from ...plots import BLUE, GREEN, GREY, VERMILION, legend_above, new_figure
+from ...plots import BLUE, GREEN, GREY, VERMILION, legend_above, time_figure
 from ..claims import Claim
 from ..kit import Study
 from ..report import Report
@@ -138,7 +138,7 @@ def constant_rates() -> tuple[list[dict[str, Any]], list[Claim]]:
 
 def figure_4(curves: dict[str, np.ndarray]) -> Any:
     """Three panels as in the paper, logarithmic."""
-    figure, axes = new_figure(7.5, 8.0, 3)
+    figure, axes = time_figure(7.5, 8.0, 3)
     colours = (BLUE, VERMILION, GREEN, GREY)
     time = DT * np.arange(len(curves["(a) Σ2"]))
     for ax, case, title in zip(
@@ -150,7 +150,6 @@ def figure_4(curves: dict[str, np.ndarray]) -> Any:
     for rate, colour in zip(YAW_RATES, colours, strict=True):
         axes[2].plot(time, bound(turning(rate * DEG), "sigma2", 120.0)[:, 0], color=colour, label=f"{rate:g} °/s")
     axes[2].set_title("(c) Σ2 at constant yaw rates", loc="left", fontsize=10)
-    axes[2].set_xlabel("time, s")
     for ax in axes:
         ax.set(yscale="log", ylabel="σ of φ, deg")
         legend_above(ax)

@@ -12,7 +12,7 @@ from ....envs.data.trajectory import Trajectory
 from ....filters.bicycle.two_gyro.truth import true_angles
 from ....filters.core import rotation
 from ....filters.core.quantity import DEG, Estimate
-from ...plots import TRUTH_COLOR, legend_above, new_figure
+from ...plots import TRUTH_COLOR, legend_above, new_figure, time_figure
 from ..report import Report
 from ..ride_figures import DRAWN, SCALES, draw_angle, true_angle, with_band
 from ..ride_study import RideStudy
@@ -37,7 +37,7 @@ def course_figure(study: RideStudy, report: Report, path: Path, course: str, tit
     estimates = {name: study.estimate(ride, study.variants[name]) for name in study.drawn}
     errors = {name: study.errors(each.pose, truth) for name, each in estimates.items()}
     motion = platform_motion(ride)
-    figure, axes = new_figure(7.5, 0.6 + 1.6 * len(panels), len(panels))
+    figure, axes = time_figure(7.5, 0.6 + 1.6 * len(panels), len(panels))
     for ax, panel in zip(axes, panels, strict=True):
         if panel in motion:
             ax.plot(ride.time, motion[panel], color=TRUTH_COLOR, linewidth=0.9)
@@ -48,7 +48,6 @@ def course_figure(study: RideStudy, report: Report, path: Path, course: str, tit
             curves = {name: error[panel] for name, error in errors.items() if panel in error}
             draw_angle(ax, ride.time, true_angle(study, truth, panel), curves, panel)
     legend_above(axes[panels.index("φ")])  # the other panels have the same curves, or fewer
-    axes[-1].set_xlabel("time, s")
     report.figure(f"ride {course}", figure, title, f"{SCALES} Thin: three standard deviations.")
     if course == "straight":
         report.figure("path", path_figure(ride), "Figure 17 (a): path of the straight ride")
@@ -99,12 +98,11 @@ def fixture_figure(push: Trajectory, estimates: Mapping[str, Estimate], study: R
     """Figure 6 (roll), 7 (its error) and 8 (relative angles) of one push, with Σ1 and Σ2 on the same sensor."""
     truth, methods = true_angles(push.truth, "disk"), (f"Σ1, {sensor}", f"Σ2, {sensor}")
     errors = {name: study.errors(estimates[name].pose, truth) for name in methods}
-    drawn, axes = new_figure(7.5, 8.5, 5)
+    drawn, axes = time_figure(7.5, 8.5, 5)
     rolls = {name: errors[name]["φ"] for name in methods}
     draw_angle(axes[0], push.time, true_angle(study, truth, "φ"), rolls, "φ", (DRAWN[1], DRAWN[-1]))
     roll_errors(axes[1], push.time, errors, estimates, methods)
     for ax, angle in zip(axes[2:], THETA, strict=True):
         draw_angle(ax, push.time, true_angle(study, truth, angle), {methods[1]: errors[methods[1]][angle]}, angle)
     legend_above(axes[0])
-    axes[-1].set_xlabel("time, s")
     return drawn

@@ -17,7 +17,7 @@ from ....filters.core.consistency import nees
 from ....filters.core.kalman import KalmanFilter
 from ....filters.core.quantity import DEG
 from ....filters.core.rotation import wrap
-from ...plots import TRUTH_COLOR, legend_above, new_figure
+from ...plots import TRUTH_COLOR, legend_above, time_figure
 from ..averages import interval_of_mean, mean_of, rms, rounded
 from ..claims import Claim
 from ..kit import Study
@@ -128,7 +128,7 @@ def segway(study: Study, report: Report) -> None:
 
 def figure(seed: int) -> Any:
     """Pitch and its error while the platform turns."""
-    drawn, (top, below) = new_figure(7.5, 4.2, 2)
+    drawn, (top, below) = time_figure(7.5, 4.2, 2)
     for (name, model), color in zip(reversed(MODELS.items()), (DRAWN[1], DRAWN[-1]), strict=True):
         ride, error, estimate = run("turning", model, seed)
         pitch = true_angles(ride.truth)["two-gyro/pitch"][:, 0] / DEG
@@ -137,7 +137,7 @@ def figure(seed: int) -> Any:
         top.plot(ride.time, pitch + error, color=color, linewidth=0.8, label=name)
         with_band(below, ride.time, error, estimate, color, name)
     top.set(ylabel="χ, deg", ylim=(-16.0, 16.0))
-    below.set(ylabel="error of χ, deg", ylim=(-8.0, 8.0), xlabel="time, s")
+    below.set(ylabel="error of χ, deg", ylim=(-8.0, 8.0))
     legend_above(top)
     legend_above(below)
     return drawn

@@ -15,7 +15,7 @@ from ....filters.core import rotation
 from ....filters.core.consistency import consistency, nees
 from ....filters.core.kalman import KalmanFilter
 from ....filters.core.quantity import DEG, Estimate
-from ...plots import legend_above, new_figure
+from ...plots import legend_above, time_figure
 from ..averages import rounded, windowed
 from ..claims import Claim
 from ..kit import Study
@@ -310,7 +310,7 @@ def ideal_consistency(study: Study, report: Report) -> None:
 
 def roll_figure() -> Any:
     """Roll errors of single runs."""
-    figure, axes = new_figure(7.5, 8.0, 3)
+    figure, axes = time_figure(7.5, 8.0, 3)
     straight, bump = Case("straight", duration=60.0), Case("bump", duration=60.0)
     shown = (
         ("turning, about 30 °/s", {"Σ1": Case(model="sigma1"), "Σ2": Case()}, 12.0),
@@ -325,5 +325,4 @@ def roll_figure() -> Any:
         ax.set_title(title, loc="left", fontsize=10)
         ax.set(ylabel="error of φ, deg", ylim=(-limit, limit))
         legend_above(ax)
-    axes[-1].set_xlabel("time, s")
     return figure

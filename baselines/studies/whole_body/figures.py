@@ -13,7 +13,7 @@ from ....filters.bicycle.geometry import RiderGeometry
 from ....filters.bicycle.whole_body.filter import WholeBody
 from ....filters.bicycle.whole_body.linkage import true_angles
 from ....filters.core.quantity import DEG, STANDARD_GRAVITY
-from ...plots import TRUTH_COLOR, legend_above, new_figure
+from ...plots import TRUTH_COLOR, legend_above, new_figure, time_figure
 from ..report import Report
 from ..ride_figures import DRAWN, draw_angle, true_angle
 from ..ride_study import SPACING, RideStudy, Variant
@@ -109,10 +109,9 @@ def bump_figure(study: RideStudy, path: Path, unguarded: Variant) -> Figure:
         name: study.errors(study.estimate(ride, variant).pose, truth)["θ2"]
         for name, variant in (("without guard", unguarded), ("filter", first))
     }
-    figure, (top, below) = new_figure(7.5, 4.2, 2)
+    figure, (top, below) = time_figure(7.5, 4.2, 2)
     top.plot(ride.time, ride.measurements["bicycle_imu/acc"][:, 2] / STANDARD_GRAVITY, color=DRAWN[-1], linewidth=0.7)
     top.set_ylabel("accelerometer\nup, g", fontsize=8.5)
     draw_angle(below, ride.time, true_angle(study, truth, "θ2"), errors, "θ2")
-    below.set_xlabel("time, s")
     legend_above(below)
     return figure
