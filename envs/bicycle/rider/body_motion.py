@@ -30,7 +30,7 @@ WARM_UP = 4.0
 SHIFT_TIME, GLANCE_TIME = (0.5, 1.5), (0.3, 0.5)
 """s: from one posture to another, and into a glance"""
 GLANCE_HOLD = (0.3, 1.2)
-"""s: over the shoulder"""
+"""s: looking aside"""
 NODS, LOOKS_AHEAD = 0.4, 0.4
 """1: pitch relative to yaw of the head's turns, and share of looks that return ahead; assumed"""
 TURN_TIME, TURN_PACE = 0.3, 0.25
@@ -87,11 +87,11 @@ def posture_changes(rng: np.random.Generator, time: np.ndarray, deviation: float
     return found
 
 
-def glances(rng: np.random.Generator, time: np.ndarray, twist: float, interval: float) -> np.ndarray:
-    """Twist of the trunk ``(n,)`` that goes with looks over a shoulder."""
+def glances(rng: np.random.Generator, time: np.ndarray, turn: float, interval: float) -> np.ndarray:
+    """Turns ``(n,)`` to either side and back: of the trunk in looks over a shoulder, or of the head; ``turn`` rad."""
     found = np.zeros(len(time))
     for begin in events(rng, interval, float(time[-1])):
-        size = twist * float(rng.uniform(0.5, 1.5)) * (1.0 if rng.random() < 0.5 else -1.0)
+        size = turn * float(rng.uniform(0.5, 1.5)) * (1.0 if rng.random() < 0.5 else -1.0)
         there, hold, back = (float(rng.uniform(*each)) for each in (GLANCE_TIME, GLANCE_HOLD, GLANCE_TIME))
         end = begin + there + hold
         found += size * (smooth_step(time, begin, there) - smooth_step(time, end, back))

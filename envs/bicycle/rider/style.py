@@ -95,12 +95,22 @@ class RiderStyle:
     swing: float = 0.0
     """rad: amplitude by which a standing rider swings the bicycle from side to side, once a turn of the cranks; riders
     who sprint swing it by 0.2 and more"""
+    scan: float = 0.0
+    """rad: turn of the head to either side where another road may come in, on average; the neck's limit keeps it
+    smaller. Drivers before a crossing look 47° (about 67 years old) to 53° (27 years) aside with head and eyes"""
+    scan_interval: float = math.inf
+    """s between such turns, on average: the same drivers look aside 2.1 to 2.7 times a crossing, 16 times a minute of a
+    rider at 5 m/s with crossings 50 m apart
+
+    S. W. Savage, L. Zhang, G. Swan, A. R. Bowers, The effects of age on the contributions of head and eye movements to
+    scanning behavior at intersections, Transp. Res. F 73 (2020).
+    """
 
     def __post_init__(self) -> None:
-        for name in (*SIZES, "hand_load", "unsteadiness", "gaze"):
+        for name in (*SIZES, "hand_load", "unsteadiness", "gaze", "scan"):
             if not 0.0 <= getattr(self, name) < math.inf:
                 raise ValueError(f"{name} must not be negative, got {getattr(self, name)}")
-        for name in ("posture_interval", "glance_interval", "gaze_interval"):
+        for name in ("posture_interval", "glance_interval", "gaze_interval", "scan_interval"):
             if not getattr(self, name) >= 1.0:
                 raise ValueError(f"{name} must be at least 1 s, got {getattr(self, name)}")
         if not 0.0 <= self.standing <= 1.0:
@@ -121,21 +131,22 @@ STYLES = {
         RiderStyle(
             "mild", 0.042, 0.05, 0.055, 0.25, 0.3,
             pedalling=0.025, posture=0.01, posture_interval=30.0, glance=0.1, glance_interval=40.0, breath=0.004,
-            gaze=0.2, gaze_interval=5.0,
+            gaze=0.2, gaze_interval=5.0, scan=0.81, scan_interval=60.0,
         ),
         RiderStyle(
             "normal", 0.055, 0.05, 0.055, 0.6, 0.5,
             pedalling=0.036, posture=0.015, posture_interval=20.0, glance=0.15, glance_interval=25.0, breath=0.006,
-            gaze=0.3, gaze_interval=3.0,
+            gaze=0.3, gaze_interval=3.0, scan=0.87, scan_interval=15.0,
         ),
         RiderStyle(
             "aggressive", 0.06, 0.05, 0.07, 0.8, 0.6, unsteadiness=0.25,
             pedalling=0.06, posture=0.015, posture_interval=15.0, glance=0.2, glance_interval=15.0, breath=0.01,
-            gaze=0.5, gaze_interval=1.5,
+            gaze=0.5, gaze_interval=1.5, scan=0.93, scan_interval=3.7,
         ),
         RiderStyle(
             "standing", 0.04, 0.038, 0.05, 0.25, 0.3,
             posture=0.01, posture_interval=30.0, breath=0.01, gaze=0.2, gaze_interval=5.0, standing=0.85, swing=0.06,
+            scan=0.81, scan_interval=60.0,
         ),
     )
 }  # fmt: skip
@@ -217,7 +228,7 @@ class RiderMotion:
 
     def __init__(self, style: RiderStyle, rng: np.random.Generator, duration: float = 120.0) -> None:
         self.style, self.duration = style, duration
-        for_noise, for_posture, for_glances, for_breath, for_rest, for_gaze, for_standing = rng.spawn(7)
+        for_noise, for_posture, for_glances, for_breath, for_rest, for_gaze, for_standing, for_scans = rng.spawn(8)
         # one row before time 0 and two after the end, for the interpolation
         rows = math.ceil(duration * TABLE_RATE) + 4
         time = (np.arange(rows) - 1.0) / TABLE_RATE
@@ -234,7 +245,7 @@ class RiderMotion:
         phases = for_rest.uniform(0.0, 2.0 * math.pi, 3)
         self.gaze = gaze_shifts(for_gaze, time, style.gaze, style.gaze_interval)
         """yaw and pitch of the head to the trunk, a table of :mod:`.body_motion`, rad"""
-        self.gaze[:, 0] += LOOK * looks
+        self.gaze[:, 0] += LOOK * looks + glances(for_scans, time, style.scan, style.scan_interval)
         self.gaze = MOST_TURNED * np.tanh(self.gaze / MOST_TURNED)
         self.habits = np.array([style.turn_lean, style.levelling, style.pedalling, *phases])
 

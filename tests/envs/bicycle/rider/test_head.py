@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -101,6 +103,19 @@ def test_gaze_moves_as_the_style_says():
     assert not RiderMotion(STYLES["still"], np.random.default_rng(1), 60.0).gaze.any()
     with pytest.raises(ValueError, match="gaze must not be negative"):
         RiderStyle("odd", 0.0, 0.0, 0.0, 0.0, 0.0, gaze=-1.0)
+
+
+def test_scans_of_crossings_turn_the_head_alone():
+    style = STYLES["aggressive"]
+    scanning, ahead = (RiderMotion(each, np.random.default_rng(1), 600.0) for each in (style, replace(style, scan=0.0)))
+    np.testing.assert_array_equal(scanning.table, ahead.table)
+    np.testing.assert_array_equal(scanning.habits, ahead.habits)
+    # before the limit of the neck
+    added = MOST_TURNED * (np.arctanh(scanning.gaze / MOST_TURNED) - np.arctanh(ahead.gaze / MOST_TURNED))
+    np.testing.assert_allclose(added[:, 1], 0.0, atol=1e-12)
+    begun = np.count_nonzero(np.diff((np.abs(added[:, 0]) > 0.3).astype(int)) == 1)
+    # two in ten fall into another one
+    assert 0.7 < begun * style.scan_interval / 600.0 < 1.05
 
 
 def test_many_rows_are_read_as_one():
