@@ -67,7 +67,8 @@ class PilotParameters:
     """N·m·s/rad: of arms that hold the bar, without delay (round figure of this project): what unsteady hands and a
     swaying trunk do to the bar at high speed"""
     largest_torque: float = 20.0
-    """N·m, approached softly: a reserve for recoveries, above all at walking pace; ordinary riding takes less than 10"""
+    """N·m, approached softly: a reserve for recoveries, above all at walking pace; ordinary riding takes less than 10
+    """
     sway: float = 2.0
     """N·m: standard deviation of the roll moment that the internal model expects from body and wind"""
     sway_time: float = 0.5
