@@ -222,5 +222,8 @@ def of_weights(path: str) -> Entry:
     card = load_card(path)
     kind = str(card.get("estimator", "")).rpartition(".")[2]
     if kind not in NETWORKS:
-        raise ValueError(f"{path}: its card describes no estimator of `poise train`, but {card.get('kind', kind)!r}")
+        own = "; a network of your own is loaded by LearnedEstimator.load" if card.get("network") == "torch" else ""
+        raise ValueError(
+            f"{path}: its card describes no estimator of `poise train`, but {card.get('kind', kind)!r}{own}"
+        )
     return Entry(NETWORKS[kind], str(card.get("description", "")), HERE, "learned", {"weights": path})

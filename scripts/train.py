@@ -247,7 +247,7 @@ def card_of(args: Args, preset: Preset, result: FitResult, table: pandas.DataFra
         "best_epoch": result.best_epoch,
         "calibration": None if result.calibration is None else jsonable(result.calibration._asdict()),
         "limits": limits_of(preset, result.estimator, result.calibration),
-        "history": [{name: round(value, 6) for name, value in entry.items()} for entry in result.history],
+        "history": jsonable([{name: round(value, 6) for name, value in entry.items()} for entry in result.history]),
         "test": means(table),
         "versions": versions(("numpy", "numba", "torch", "scipy")),
         "date": date.today().isoformat(),

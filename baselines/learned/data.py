@@ -65,6 +65,10 @@ class SequenceData:
     def __len__(self) -> int:
         return len(self.features)
 
+    def __getitem__(self, index: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Features, target, spread and mask of one sequence: what a ``torch.utils.data.DataLoader`` batches."""
+        return self.features[index], self.target[index], self.spread[index], self.mask[index]
+
     @classmethod
     def from_trajectories(cls, trajectories: Iterable[Trajectory], front_end: FrontEnd, head: Head) -> Self:
         """Sequences of simulated or recorded trajectories with known truth.
@@ -90,10 +94,13 @@ class SequenceData:
         """Sequences of :func:`sequence_of`, padded to one length.
 
         Raises:
-            ValueError: there are none.
+            ValueError: there are none, or they are of different front ends or heads.
         """
         if not parts:
             raise ValueError("a data set must hold at least one sequence, got none")
+        widths = sorted({tuple(array.shape[1:] for array in part) for part in parts})
+        if len(widths) > 1:
+            raise ValueError(f"sequences must be of one front end and head, got shapes {widths[0]} and {widths[1]}")
         longest = max(len(part[0]) for part in parts)
         wholes: list[np.ndarray] = []
         for index in range(4):
@@ -192,7 +199,12 @@ class SequenceData:
             length: updates in a window.
             generator: order of the sequences, and how they are augmented; None: as they are.
             head: augments the sequences; None: as they are.
+
+        Raises:
+            ValueError: ``size`` or ``length`` is not positive.
         """
+        if size < 1 or length < 1:
+            raise ValueError(f"size and length must be at least 1, got {size} and {length}")
         order = np.arange(len(self)) if generator is None else generator.permutation(len(self))
         size = min(size, len(self))
         stop = len(self) if generator is None else len(self) - size + 1

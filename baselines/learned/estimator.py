@@ -181,15 +181,21 @@ class LearnedEstimator(NetworkParts):
         Args:
             path_or_name: file, or name of shipped weights.
             dt: sampling interval, s.
-            network: made already, of a kind that this package does not know; None: the one that the card describes.
+            network: one of your own (:class:`.modules.TorchNetwork`), which takes the weights of the file; None: the
+                one that the card describes.
 
         Raises:
             FileNotFoundError: there are no such weights.
-            ValueError: they are damaged, or are those of something else.
+            ValueError: they are damaged, are those of something else, or of a network of your own that is not given.
         """
         arrays, card = load_weights(path_or_name)
         try:
             front, head, kind = card["front_end"], card["head"], card["network"]
+            if network is None and kind == "torch":
+                raise ValueError(
+                    f"{path_or_name} holds a torch module of your own: "
+                    "give it as network=TorchNetwork(module, features, outputs)"
+                )
             made = read_network(look_up("kind of network", kind, NETWORKS) if network is None else network, arrays)
             front_end = look_up("kind of front end", front["kind"], FRONT_ENDS).read(front, dt)
             return cls(made, front_end, look_up("kind of head", head["kind"], HEADS).read(head))

@@ -91,15 +91,20 @@ def fit(
         say: called with a line an epoch; None for a silent training.
 
     Raises:
-        ValueError: the module gives other shapes than the head takes; there is nothing to resume, or it was started
-            with another configuration, other data or another version of the package; a data set scores nothing, or
-            scores numbers that are not finite.
-        RuntimeError: loss or gradients were not finite several times in a row.
+        ValueError: the module does not take float32 features on the CPU, gives other shapes than the head takes or
+            numbers that are not finite, or has nothing to train; there is nothing to resume, or it was started with
+            another configuration, other data or another version of the package; a data set scores nothing, scores
+            numbers that are not finite, or has other features than the front end.
+        RuntimeError: loss or gradients were not finite several times in a row, or in all of an epoch.
     """
     config = FitConfig() if config is None else config
     for name, part in (("data", data), ("validation", validation)):
         if not part.mask.any():
             raise ValueError(f"{name} scores nothing: the truth of its {len(part)} sequences is unknown everywhere")
+        if part.features.shape[-1] != front_end.size:
+            raise ValueError(
+                f"{name} must have the {front_end.size} features of the front end, got {part.features.shape[-1]}"
+            )
         check_finite(name, part, head)
     if resume and folder is None:
         raise ValueError("resume needs the folder of the interrupted training")
@@ -175,6 +180,8 @@ class Trainer:
         self.module, self.head, self.config = module, head, config
         settings = {"config": asdict(config), "head": head.describe(), "data": data.digest()}
         self.key = {**settings, "module": repr(module)}
+        if not any(parameter.requires_grad for parameter in module.parameters()):
+            raise ValueError("module has no parameter that can be trained")
         own = getattr(module, "standardised", None)
         self.network = TorchNetwork(module, data.features.shape[-1], head.size, context, own)
         self.optimizer = torch.optim.AdamW(
@@ -191,14 +198,11 @@ class Trainer:
         """Take the scales of the features if they are not known, check the shapes, score the network as it is."""
         if not self.network.standardised.known:
             self.network.standardised.fit(*standardisation(data.features, data.mask))
-        raw_output, _ = self.forward(torch.from_numpy(data.features[:1, :2]), None)
-        if tuple(raw_output.shape) != (1, 2, self.head.size):
-            raise ValueError(
-                f"module must give (B, N, {self.head.size}) for features (B, N, {data.features.shape[-1]}), "
-                f"got {tuple(raw_output.shape)} for (1, 2, …)"
-            )
+        check_module(self, torch.from_numpy(data.features[:2, :3]))
         self.best = copy.deepcopy(self.module.state_dict())
         self.best_loss, _ = validation_loss(self, validation)
+        if not math.isfinite(self.best_loss):
+            raise ValueError("module gives numbers that are not finite before it is trained")
 
     def forward(self, features: torch.Tensor, memory: Any) -> tuple[torch.Tensor, Any]:
         """The module on features as they are."""
@@ -236,6 +240,8 @@ class Trainer:
             else:
                 skipped += 1
                 memory = None if memory is None else torch.nan_to_num(memory)
+        if skipped and not count:
+            raise RuntimeError(f"loss or gradients were not finite in all {skipped} updates of epoch {self.epoch + 1}")
         held_out, parts = validation_loss(self, validation)
         degrees = math.degrees(float(parts.mean()))
         self.epoch += 1
@@ -289,6 +295,36 @@ class Trainer:
         self.best_loss, self.history, self.best = state["best_loss"], state["history"], state["best"]
 
 
+def check_module(trainer: Trainer, features: torch.Tensor) -> None:
+    """Let the module see a few updates ``(B, N, F)``, and the next ones with what it remembers.
+
+    Raises:
+        ValueError: it fails, or gives something else than a head and an estimator need.
+    """
+    size, memory = trainer.head.size, None
+    takes = f"module must take float32 features (B, N, {features.shape[-1]}) on the CPU"
+    remembered = getattr(trainer.module, "memory_size", None)
+    if remembered is not None:
+        takes += f" and memory (B, {remembered}) or None, and give (output, memory)"
+    trainer.module.eval()
+    for _ in range(2):
+        try:
+            with torch.no_grad():
+                output, memory = trainer.forward(features, memory)
+        except (RuntimeError, TypeError, ValueError, AttributeError, NotImplementedError) as reason:
+            raise ValueError(f"{takes}, but it fails: {reason}") from reason
+        found = [output] if remembered is None else [output, memory]
+        if not all(isinstance(each, torch.Tensor) for each in found):
+            raise ValueError(
+                f"{takes}; one that remembers needs an attribute memory_size and a memory that is one tensor, "
+                f"got {', '.join(type(each).__name__ for each in found)}"
+            )
+        shapes = [tuple(each.shape) for each in found]
+        wanted = [(*features.shape[:2], size), (len(features), remembered)][: len(found)]
+        if shapes != wanted:
+            raise ValueError(f"module must give {wanted} for features {tuple(features.shape)}, got {shapes}")
+
+
 def whole_sequences(
     trainer: Trainer, data: SequenceData, size: int = 64, length: int = 1000
 ) -> Iterator[tuple[slice, torch.Tensor]]:
@@ -306,10 +342,14 @@ def whole_sequences(
 
 
 def validation_loss(trainer: Trainer, data: SequenceData) -> tuple[float, np.ndarray]:
-    """Loss of whole sequences, without gradients, and the root mean square error of each part, rad."""
+    """Loss of whole sequences, without gradients, and the root mean square error of each part, rad.
+
+    The loss is infinite where an output that is scored is not finite; means leave such samples out.
+    """
     total, count, squares, scored = 0.0, 0, 0.0, 0
     for part, outputs in whole_sequences(trainer, data):
         mask = torch.from_numpy(data.mask[part])
+        total += 0.0 if bool(torch.isfinite(outputs[mask]).all()) else math.inf
         target, spread = torch.from_numpy(data.target[part]), torch.from_numpy(data.spread[part])
         counted = int(mask.any(dim=1).sum())
         if not counted:

@@ -115,7 +115,7 @@ def read_network(kind: Any, arrays: Mapping[str, np.ndarray]) -> Any:
     """The network of a weights file.
 
     Args:
-        kind: class of the network, or a network that has its weights already.
+        kind: class of the network, or a network that takes its weights from here.
         arrays: of the file.
 
     Raises:
@@ -123,5 +123,9 @@ def read_network(kind: Any, arrays: Mapping[str, np.ndarray]) -> Any:
     """
     own = {name: array for name, array in arrays.items() if name not in NAMES}
     made: Any = kind
-    network = made.from_arrays(own) if isinstance(kind, type) else kind
+    if isinstance(kind, type):
+        network = made.from_arrays(own)
+    else:
+        network = kind
+        network.load(own)
     return network if len(own) == len(arrays) else WithUnlikeness(network, *(arrays[name] for name in NAMES))

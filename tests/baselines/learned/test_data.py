@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import torch
 
 from poise.baselines.learned.data import SequenceData, sequence_of, simulation_digest, split
 from poise.baselines.learned.head import TiltHead, turned
@@ -110,6 +111,22 @@ def test_windows_hold_everything_once(dataset: SequenceData) -> None:
     assert sum(window.first for window in windows) == 3
     joined = np.concatenate([window.features for window in windows[:3]], axis=1)
     np.testing.assert_array_equal(joined, dataset.features[:2])
+
+
+def test_a_loader_of_torch_takes_whole_sequences(dataset: SequenceData) -> None:
+    loader = torch.utils.data.DataLoader(dataset, batch_size=2)  # type: ignore[arg-type]
+    features, target, spread, mask = next(iter(loader))
+    np.testing.assert_array_equal(features, dataset.features[:2])
+    assert [tuple(each.shape[:2]) for each in (target, spread, mask)] == [tuple(features.shape[:2])] * 3
+    assert len(list(loader)) == 3
+
+
+def test_sequences_of_other_front_ends_are_no_part_of_a_set(dataset: SequenceData) -> None:
+    fewer = replace(dataset, features=dataset.features[..., 1:])
+    with pytest.raises(ValueError, match="of one front end and head"):
+        SequenceData.together([dataset, fewer])
+    with pytest.raises(ValueError, match="size and length must be at least 1, got 0 and 50"):
+        next(dataset.windows(0, 50))
 
 
 def test_shuffled_windows_keep_errors(dataset: SequenceData) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -19,6 +21,7 @@ from poise.baselines.learned.fit import FitResult, Trainer, fit
 from poise.baselines.learned.head import AngleHead, TiltHead
 from poise.baselines.learned.inputs.level_frame import LevelFrame
 from poise.baselines.learned.networks.modules import GruModule, TcnModule
+from poise.baselines.registry import make_estimator
 from poise.baselines.weights_io import load_weights
 from poise.filters.core.metrics import direction_error
 from poise.filters.core.quantity import Quantity
@@ -96,16 +99,86 @@ def test_the_readers_own_module_learns(data: tuple[SequenceData, SequenceData], 
     result = trained(data, replace(SMALL, epochs=10), own())
     assert result.history[-1]["validation_deg"] < 0.6 * 4.7
     path = result.estimator.save(tmp_path / "own")
-    network = fitting.TorchNetwork(own(), END.size, 2)
-    network.load(load_weights(path)[0])
+    with torch.random.fork_rng():
+        torch.manual_seed(1)
+        other = nn.Sequential(nn.Linear(END.size, 16), nn.Tanh(), nn.Linear(16, 2))
+    network = fitting.TorchNetwork(other, END.size, 2)
     samples = {"imu/gyr": np.zeros((50, 3)), "imu/acc": np.tile([0.3, 0.0, 9.8], (50, 1))}
     again = LearnedEstimator.load(path, network=network)
     np.testing.assert_array_equal(again.run(samples).pose["up"], result.estimator.run(samples).pose["up"])
+    with pytest.raises(ValueError, match="the weights are those of another module"):
+        LearnedEstimator.load(path, network=fitting.TorchNetwork(nn.Linear(END.size, 2), END.size, 2))
+    with pytest.raises(ValueError, match="give it as network=TorchNetwork"):
+        LearnedEstimator.load(path)
+    with pytest.raises(ValueError, match=r"a network of your own is loaded by LearnedEstimator\.load"):
+        make_estimator(str(path))
 
 
 def test_a_module_of_other_shapes_is_refused(data: tuple[SequenceData, SequenceData]) -> None:
-    with pytest.raises(ValueError, match=r"module must give \(B, N, 2\)"):
+    with pytest.raises(ValueError, match=r"module must give \[\(2, 3, 2\)\] for .*, got \[\(2, 3, 3\)\]"):
         trained(data, SMALL, nn.Linear(END.size, 3))
+
+
+class Remembering(nn.Module):
+    """A recurrent module that says what memory it has."""
+
+    def __init__(self, memory_size: int, kind: type[nn.RNNBase] = nn.GRU) -> None:
+        super().__init__()
+        self.memory_size, self.inner, self.output = memory_size, kind(END.size, 4, batch_first=True), nn.Linear(4, 2)
+
+    def forward(self, features: torch.Tensor, memory: torch.Tensor | None = None) -> tuple[torch.Tensor, Any]:
+        hidden, last = self.inner(features, None if memory is None else memory[None].contiguous())
+        return self.output(hidden), last[0]
+
+
+class Unbounded(nn.Linear):
+    """Gives what is no number."""
+
+    def forward(self, features: torch.Tensor) -> torch.Tensor:
+        return super().forward(features) * math.nan
+
+
+@pytest.mark.parametrize(
+    ("module", "message"),
+    [
+        (lambda: nn.Linear(END.size + 1, 2), r"must take float32 features \(B, N, \d+\) on the CPU, but it fails"),
+        (lambda: nn.Linear(END.size, 2).double(), "on the CPU, but it fails: .*Double"),
+        (lambda: nn.Linear(END.size, 2, device="meta"), "on the CPU, but it fails: .*meta"),
+        (
+            lambda: nn.GRU(END.size, 2, batch_first=True),
+            "one that remembers needs an attribute memory_size.* got tuple",
+        ),
+        (lambda: Remembering(3), r"module must give \[\(2, 3, 2\), \(2, 3\)\] .* got \[\(2, 3, 2\), \(2, 4\)\]"),
+        (lambda: nn.Identity(), "no parameter that can be trained"),
+        (lambda: nn.Linear(END.size, 2).requires_grad_(False), "no parameter that can be trained"),
+        (lambda: Unbounded(END.size, 2), "not finite before it is trained"),
+    ],
+)
+def test_a_module_that_cannot_be_trained_is_refused(
+    data: tuple[SequenceData, SequenceData], module: Callable[[], nn.Module], message: str
+) -> None:
+    with pytest.raises(ValueError, match=message):
+        trained(data, SMALL, module())
+
+
+def test_weights_that_give_no_numbers_are_never_the_best(data: tuple[SequenceData, SequenceData]) -> None:
+    class Breaking(nn.Linear):
+        def forward(self, features: torch.Tensor) -> torch.Tensor:
+            found = super().forward(features)
+            return found if self.training or self.epochs == 0 else found * math.nan
+
+    module = Breaking(END.size, 2)
+    module.epochs = 0
+    module.register_forward_hook(lambda made, *_: setattr(made, "epochs", made.epochs + made.training))
+    result = trained(data, SMALL, module)
+    assert result.best_epoch == 0
+    assert all(math.isinf(entry["validation"]) for entry in result.history)
+
+
+def test_data_of_another_front_end_are_refused(data: tuple[SequenceData, SequenceData]) -> None:
+    fewer = replace(data[0], features=data[0].features[..., 1:])
+    with pytest.raises(ValueError, match=r"data must have the \d+ features of the front end"):
+        trained((fewer, data[1]), SMALL)
 
 
 def test_data_that_score_nothing_are_refused(data: tuple[SequenceData, SequenceData]) -> None:
