@@ -151,7 +151,10 @@ def test_the_command_tunes_compares_and_exports(tmp_path, capsys):
 def test_minutes_of_training_beat_the_best_constant_gains(name):
     config = dataclasses.replace(shipped_config(name), total_timesteps=200_000, trajectories=96, warm_start=96)
     policy = train_policy(config)
-    unseen = config.motions.draw_many(4321, 16)
+    unseen = config.motions.draw_many(4321, 32)
     tuned = TunedFilter.of(tunable_filter(name))
-    constant = constant_errors(tuned, unseen, np.array(policy.card["constant_action"])).mean()
-    assert policy_errors(tuned.kalman, policy, unseen).mean() < constant
+    constant = constant_errors(tuned, unseen, np.array(policy.card["constant_action"]))
+    learned = policy_errors(tuned.kalman, policy, unseen)
+    # Of each motion's own error, as rewards are: a mean of errors is that of the one motion that no gains can follow.
+    published = constant_errors(tuned, unseen, np.zeros(tuned.actions))
+    assert ((constant - learned) / published).mean() > 0.0
