@@ -16,7 +16,9 @@ then: a wrong dip turns their estimate for ever, and an error about the field's 
 not see, hardly decays. Their dip and their east are compared with those of both averages.
 
 Until a start has been confirmed, an average that later samples make too short to be trusted begins anew with them: it
-held samples of two directions, and a start from both is as wrong as their share.
+held samples of two directions, and a start from both is as wrong as their share. So does one of forces that a steady
+average of the last moment contradicts: in the mean of both directions a filter sees no contradiction, and takes the
+rest for a bias of its gyroscope. In strong motion a moment is not steady and decides nothing.
 
 Two rules need no patience. An average of a few samples that the next one contradicts starts anew with that sample, and
 so does the estimator, until a start has been confirmed. After these few a sample that points elsewhere decides
@@ -62,6 +64,12 @@ LARGEST_CHANGE = math.radians(30.0)
 :data:`FEW` have been averaged."""
 FEW = 0.05
 """s"""
+MOMENT = 0.15
+"""s: time constant of the average force of the last moment."""
+LARGEST_MOVE = math.radians(20.0)
+"""Angle between it and the average force beyond which the latter is of samples of two directions."""
+STEADY = 0.8
+"""Least length of the average of a moment, in root mean squares of its samples, that says so."""
 IMPACT, IMPACT_SHARE = 300.0, 10.0
 """m/s² and root mean squares of the samples before: a force that exceeds both is no sample. The first is more than all
 axes of a sensor with a range of ±16 g can show together."""
@@ -74,19 +82,19 @@ INPUTS = 20
 """Of :func:`watch`: rate (3), force (3), field (3), up (3), orientation (4), age of the rate, dt, declination, and
 whether the inclination is watched for good (1) or until it was confirmed (0). One more where equations keep the field
 of their start: its vertical component."""
-MEMORY = 15
+MEMORY = 19
 """Of :func:`watch`: average force (3), mean square, time, time of contradiction; the same of the field (3, 1, 1, 1);
 times of agreement of the heading and of the inclination; zero, or if the estimate is lost the factor on the covariance
-of its prior."""
-FORCE, SQUARE, TIME, FIELD, FIELD_TIME, LOST = slice(0, 3), 3, 4, slice(6, 9), 10, 14
+of its prior; average force of the last moment (3), its mean square."""
+FORCE, SQUARE, TIME, FIELD, FIELD_TIME, LOST, LATELY = slice(0, 3), 3, 4, slice(6, 9), 10, 14, slice(15, 18)
 """Where some of it is."""
 
 
 def watch(memory: Array, inputs: Array) -> Array:
-    """Memory ``(..., 15)`` after a sample; the estimator starts anew at the next one if it is lost.
+    """Memory ``(..., 19)`` after a sample; the estimator starts anew at the next one if it is lost.
 
     Args:
-        memory: ``(..., 15)``; zeros at the start.
+        memory: ``(..., 19)``; zeros at the start.
         inputs: ``(..., 20)`` or ``(..., 21)``; force and field NaN where there is no sample, the vertical NaN for
             that of the orientation.
     """
@@ -129,12 +137,25 @@ def watch(memory: Array, inputs: Array) -> Array:
         return xp.logical_and(xp.greater_equal(time, SETTLED), xp.greater(length, shortest**2 * square))
 
     force, force_square, force_time, force_contrary = averaged(memory[..., :6], inputs[..., 3:6], SHORTEST_FORCE)
+    lately, sample = rotate_back(turn, memory[..., LATELY]), inputs[..., 3:6]
+    share = dt / xp.where(xp.less(force_time, MOMENT), force_time + 1e-9, zero + MOMENT)
+    there = xp.logical_and(xp.all(xp.isfinite(sample), axis=-1)[..., None], xp.less(share, 1.0 + 1e-6))
+    lately = xp.where(there, lately + share * (sample - lately), lately)
+    scattered, size = memory[..., 18:19], xp.sum(sample * sample, axis=-1)[..., None]
+    scattered = xp.where(there, scattered + share * (size - scattered), scattered)
+    squared = xp.sum(lately * lately, axis=-1)[..., None]
+    lengths = xp.sqrt(squared * xp.sum(force * force, axis=-1)[..., None] + 1e-30)
+    moved = xp.less(xp.sum(lately * force, axis=-1)[..., None], math.cos(LARGEST_MOVE) * lengths)
+    moved = xp.logical_and(moved, xp.greater(squared, STEADY**2 * scattered))
+    moved = xp.logical_and(xp.logical_and(moved, unconfirmed), xp.greater(force_time, MOMENT))
+    force, force_square = xp.where(moved, lately, force), xp.where(moved, squared, force_square)
+    force_time = xp.where(moved, zero + FEW + dt, force_time)
     field, field_square, field_time, field_contrary = averaged(memory[..., 6:12], inputs[..., 6:9], SHORTEST_FIELD)
     upright = trusted(force, force_square, force_time, SHORTEST_FORCE)
     aligned = xp.sum(up * force, axis=-1)[..., None]
     length = xp.sqrt(xp.sum(force * force, axis=-1)[..., None] + 1e-30)
     standing = xp.logical_and(upright, xp.greater(aligned, math.cos(0.5 * LARGEST_LEAN_AT_START) * length))
-    stood = xp.where(standing, memory[..., 13:14] + dt, memory[..., 13:14])
+    stood = xp.where(moved, zero, xp.where(standing, memory[..., 13:14] + dt, memory[..., 13:14]))
     confirmed = xp.greater_equal(stood, CONFIRMED)
     least = xp.where(confirmed, zero + math.cos(LARGEST_LEAN), zero + math.cos(LARGEST_LEAN_AT_START))
     leaning = xp.logical_and(upright, xp.less(aligned, least * length))
@@ -175,7 +196,8 @@ def watch(memory: Array, inputs: Array) -> Array:
     early = xp.logical_or(force_contrary, field_contrary)
     leant, off, agreed = (xp.where(xp.logical_or(lost, early), zero, value) for value in (leant, off, agreed))
     parts = [force, force_square, force_time, leant, field, field_square, field_time, off, agreed, stood]
-    return xp.concat([*parts, xp.where(early, zero + 1.0, xp.where(lost, zero + INFLATION, zero))], axis=-1)
+    factor = xp.where(early, zero + 1.0, xp.where(lost, zero + INFLATION, zero))
+    return xp.concat([*parts, factor, lately, scattered], axis=-1)
 
 
 @dataclass(frozen=True)
@@ -247,7 +269,7 @@ def without_impacts(places: Places, sample: Array, memory: Array, age: Array) ->
     Args:
         places: of :func:`places_of`.
         sample: ``(..., d)``.
-        memory: ``(..., 15)`` of the sample before.
+        memory: ``(..., 19)`` of the sample before.
         age: ``(..., 1)`` s since the last valid force, at the sample before.
     """
     xp = namespace(sample, memory)

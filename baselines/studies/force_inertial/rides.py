@@ -241,8 +241,7 @@ def rides(study: Study, report: Report) -> None:
         report.table(
             f"Lower bound, {scenario}, deg",
             [rounded(bound)],
-            "Cramér–Rao, along the true states, for white noises of the sizes that the filter assumes. Exact sensors "
-            "leave what the model does not know of the rider: pedalling, and shoulders that are not level.",
+            "Cramér–Rao, along the true states, for white noises of the sizes that the filter assumes.",
         )
         report.table(
             f"Torques at the true pose, {scenario}",
