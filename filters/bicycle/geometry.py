@@ -191,7 +191,7 @@ class TapeMeasure(Checked):
         known = [field.name for field in fields(cls)]
         if not isinstance(described, Mapping) or not set(described) <= set(known):
             raise ValueError(f"{GEOMETRY_STD} must map some of {known} to standard deviations, got {described}")
-        return cls(**{name: float(value) for name, value in described.items()})
+        return cls(**described)
 
 
 class RiderEquations(Equations):

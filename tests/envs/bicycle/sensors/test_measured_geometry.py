@@ -55,7 +55,7 @@ def test_metadata_say_how_exactly_it_was_measured() -> None:
         TapeMeasure.of({GEOMETRY_STD: {"hips": 0.0}})
     with pytest.raises(ValueError, match="geometry_std must map some of"):
         TapeMeasure.of({GEOMETRY_STD: 0.0})
-    for wrong in (-1.0, np.inf, np.nan):
+    for wrong in (-1.0, np.inf, np.nan, "1 cm", None):
         with pytest.raises(ValueError, match="places must"):
             TapeMeasure.of({GEOMETRY_STD: {"places": wrong}})
 
