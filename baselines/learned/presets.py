@@ -145,7 +145,7 @@ TRAINED = {"scenarios": ["indoor_circle", "outdoor", "straight", "slalom"], "sty
 RIDES = RideSource(rides=160, draws=4, duration=40.0, changes=TRAINED)
 KEPT = 0.4
 """Rides for the best epoch and the covariance, as a share of those of the training; riders differ: 24 are too few."""
-MEASURED = {"whole-body": (replace(RIDES, exact_draws=2), ("leg_offsets[0]",))}
+MEASURED = {"whole-body": (replace(RIDES, draws=5, exact_draws=1), ("leg_offsets[0]",))}
 """Paper whose filter knows how exactly a rider was measured → rides, of which some are exact, and what tells which"""
 RIDDEN = FitConfig(epochs=14, window=125, learning_rate=3e-3)
 CORRECTED = {
