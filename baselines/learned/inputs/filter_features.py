@@ -51,8 +51,7 @@ class FilterFeatures:
         kalman: the filter; the head corrects its outputs.
         interval: s between updates of the network.
         channels_seen: names of the channels that are features; None for all of the filter.
-        parameters_seen: names of parameters that are features (:func:`.parameters_of`), relative to their defaults, and
-            1 where they are larger: nothing beyond is trained on.
+        parameters_seen: names of parameters that are features (:func:`.parameters_of`), relative to their defaults.
 
     Raises:
         ValueError: sampling slower than the network, or a channel or parameter that the filter does not have.
@@ -178,7 +177,7 @@ class FilterFeatures:
     def _told(self) -> np.ndarray:
         """What :attr:`parameters_seen` are here."""
         own = parameters_of(self.kalman.model)
-        return np.array([min(own[name] / self._usual[name], 1.0) for name in self.parameters_seen])
+        return np.array([own[name] / self._usual[name] for name in self.parameters_seen])
 
     @cached_property
     def _usual(self) -> Mapping[str, float]:

@@ -50,7 +50,7 @@ class ConsistentWholeBody(WholeBody):
     Noises and offsets were chosen on simulated rides of training riders with devices from laboratory to phone grade,
     worn with placement errors, and a rider measured with a tape: offsets as they are there, noises by the likelihood of
     the true angles. Where the metadata of a recording say how exactly the rider was measured
-    (:class:`.geometry.TapeMeasure`), the priors of what C1, C2, C5 and C6 are off by follow from that.
+    (:class:`.geometry.TapeMeasure`), the priors of what C1, C2, C5 and C6 are off by follow from that, up to a tape's.
     """
 
     usual_flexion: float = WholeBody.trunk_flexion
@@ -117,13 +117,14 @@ class ConsistentWholeBody(WholeBody):
 
     @classmethod
     def parameters_from(cls, metadata: Mapping[str, Any]) -> dict[str, Any]:
-        """As of every filter of a rider; offsets of lengths and hinges as the geometry was measured."""
+        """As of every filter of a rider; offsets of lengths and hinges as the geometry was measured, or with a tape."""
         parameters = super().parameters_from(metadata)
         if parameters and metadata.get(GEOMETRY_STD) is not None:
             tape, usual = TapeMeasure.of(metadata), TapeMeasure()
             lengths, places = (tape.lengths / usual.lengths) ** 2, (tape.places / usual.places) ** 2
-            wider = [math.sqrt(share * lengths + (1.0 - share) * places) for share in BY_LENGTHS]
-            for name, factors in (("arm_offsets", wider[:2]), ("leg_offsets", wider[2:])):
+            # wider ones than of a usual tape made the errors larger
+            parts = [min(1.0, math.sqrt(share * lengths + (1.0 - share) * places)) for share in BY_LENGTHS]
+            for name, factors in (("arm_offsets", parts[:2]), ("leg_offsets", parts[2:])):
                 length, hinge, swivel = getattr(cls, name)
                 some = (max(each * by, LEAST_OFFSET) for each, by in zip((length, hinge), factors, strict=True))
                 parameters[name] = (*some, swivel)

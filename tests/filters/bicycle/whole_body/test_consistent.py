@@ -141,7 +141,8 @@ def test_offsets_follow_from_how_exactly_the_rider_was_measured() -> None:
     ):
         # an elbow or a knee that is not quite out is the rider's, not the tape's
         np.testing.assert_allclose(exact, [0.002, 0.002, own[2]])
-        np.testing.assert_allclose(twice, [2.0 * own[0], 2.0 * own[1], own[2]])
+        np.testing.assert_array_equal(twice, own)
+    np.testing.assert_allclose(offsets(lengths=0.01, places=0.005)[0], [0.03, 0.025, 0.2])
     arm, leg = offsets(lengths=0.0)
     assert arm[0] == pytest.approx(0.06 * math.sqrt(0.87))
     assert leg[0] == pytest.approx(0.033 * math.sqrt(0.61))
