@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import re
+import reprlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from pathlib import Path
@@ -288,12 +289,25 @@ def resumed(
 
 
 def check_same(env_id: str, options: Mapping[str, Any], seed: int, path: Path) -> None:
-    """Refuse to mix episodes of different origin in one folder."""
-    trajectory = load_trajectory(path)
-    environment = trajectory.metadata.get("environment") or {}
-    expected = {"environment": env_id, "seed": seed, **plain(options)}
-    kwargs = environment.get("kwargs") or {}
-    found = {"environment": environment.get("id"), "seed": trajectory.metadata.get("seed")}
-    found |= {name: kwargs.get(name) for name in options}
-    if found != expected:
-        raise ValueError(f"{path} holds another episode ({found}) than is wanted ({expected}); choose another folder")
+    """Refuse to mix episodes of different origin in one folder.
+
+    Raises:
+        ValueError: the file holds another episode.
+    """
+    metadata = load_trajectory(path).metadata
+    environment = metadata.get("environment") or {}
+    found = {"environment": environment.get("id"), "options": environment.get("kwargs"), "seed": metadata.get("seed")}
+    refuse_others(path, found, {"environment": env_id, "options": plain(options), "seed": seed})
+
+
+def refuse_others(path: Path, found: Mapping[str, Any], wanted: Mapping[str, Any]) -> None:
+    """Refuse a file that holds something else than is wanted.
+
+    Raises:
+        ValueError: an entry differs; the message names it, and both values, shortened.
+    """
+    for name, value in wanted.items():
+        if found.get(name) != value:
+            values = f"{reprlib.repr(found.get(name))}, wanted is {reprlib.repr(value)}"
+            another = "other options" if name == "options" else f"another {name}"
+            raise ValueError(f"{path} holds an episode of {another}: {values}; choose another folder")

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from ..data.trajectory import load_trajectory
-from ..record import resumed
+from ..record import refuse_others, resumed
 from .recipe import Recipe
 from .registry import described_recipe
 
@@ -62,7 +62,6 @@ def check_same(described: Mapping[str, Any], seed: int, index: int, path: Path) 
         ValueError: the file holds another episode.
     """
     found = load_trajectory(path).metadata.get("recipe") or {}
-    for name, wanted in (("seed", seed), ("index", index), ("definition", described)):
-        if found.get(name) != wanted:
-            what = "recipe" if name == "definition" else name
-            raise ValueError(f"{path} holds an episode of another {what}; choose another folder")
+    refuse_others(
+        path, found | {"recipe": found.get("definition")}, {"seed": seed, "index": index, "recipe": described}
+    )

@@ -1,8 +1,8 @@
 """Cache of compiled code: the folder, and the compiler that writes to it.
 
 The folder is ``compiled`` below the one that the environment variable ``POISE_CACHE`` names, or below the user's cache
-folder. Machine code is stored with a checksum, so that a damaged file is compiled anew. Where no folder can be written,
-everything is compiled in memory, at every start, after one warning.
+folder. Machine code is stored with a checksum, so that a damaged file is compiled anew. What cannot be written, for
+want of a permission or of space, is compiled in memory, at every start, after one warning.
 """
 
 from __future__ import annotations
@@ -37,14 +37,28 @@ def cache_folder() -> Path | None:
         with tempfile.TemporaryFile(dir=folder):
             return folder
     except OSError as reason:
-        if folder not in _WARNED:
-            _WARNED.add(folder)
-            warnings.warn(
-                f"compiled filters cannot be kept in {folder} ({reason}): they are compiled anew at every start. "
-                "Set the environment variable POISE_CACHE to a folder that can be written",
-                stacklevel=2,
-            )
+        warn_once(folder, reason)
         return None
+
+
+def warn_once(folder: Path, reason: OSError) -> None:
+    """Warn, once a folder, that what is compiled is not kept in it."""
+    if folder not in _WARNED:
+        _WARNED.add(folder)
+        warnings.warn(
+            f"compiled filters cannot be kept in {folder} ({reason.strerror}): they are compiled anew at every start. "
+            "Set the environment variable POISE_CACHE to a folder that can be written",
+            stacklevel=3,
+        )
+
+
+@contextmanager
+def unless_full(folder: Path) -> Iterator[None]:
+    """Write a file of the folder, if there is space for it: the code is in memory and runs without it."""
+    try:
+        yield
+    except OSError as reason:
+        warn_once(folder, reason)
 
 
 @functools.cache
@@ -89,6 +103,10 @@ def _checked(files: Any) -> type:
     """Numba's index and data files with a checksum; what does not match it counts as not there."""
 
     class Checked(files):
+        def save(self, key: Any, data: Any) -> None:
+            with unless_full(user_cache("compiled")):
+                super().save(key, data)
+
         def _load_index(self) -> dict[Any, str]:
             try:
                 return dict(super()._load_index())

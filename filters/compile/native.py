@@ -16,7 +16,7 @@ from numba.core import cgutils, types
 from numba.extending import intrinsic
 
 from ..support.files import write_bytes
-from .cache import cache_folder, opened, sealed
+from .cache import cache_folder, opened, sealed, unless_full
 from .emit import module_of
 
 _ENGINES: list[Any] = []
@@ -45,7 +45,8 @@ def addresses(functions: Mapping[str, str], label: str) -> dict[str, int]:
     if code is None:
         code = translated(text, machine)
         if path is not None:
-            write_bytes(path, sealed(code))
+            with unless_full(path.parent):
+                write_bytes(path, sealed(code))
     engine = binding.create_mcjit_compiler(binding.parse_assembly(f'target triple = "{triple}"\n'), machine)
     engine.add_object_file(binding.ObjectFileRef.from_data(code))
     engine.finalize_object()

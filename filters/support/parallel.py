@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import functools
 import os
+import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
@@ -26,9 +28,18 @@ def processors() -> int:
 
 def progress_bar(total: int | None, label: str, unit: str, *, show: bool = True) -> Any:
     """Return a bar on standard error (a context manager with ``update``), invisible where that is not a terminal."""
+    return _bar()(total=total, desc=label, unit=unit, disable=None if show else True)
+
+
+@functools.cache
+def _bar() -> Any:
+    """tqdm with a lock of threads: its own is a semaphore, which the system keeps when a process is interrupted."""
     from tqdm import tqdm
 
-    return tqdm(total=total, desc=label, unit=unit, disable=None if show else True)
+    class Bar(tqdm):
+        _lock = threading.RLock()
+
+    return Bar
 
 
 @contextmanager

@@ -52,7 +52,10 @@ def test_record_in_processes_gives_the_same_episodes(episodes, tmp_path):
 
 def test_record_does_not_mix_origins(episodes, capsys):
     assert record(episodes, "--episodes", "2", "--seed", "8") == 2
-    assert "holds another episode" in capsys.readouterr().err
+    assert "holds an episode of another seed" in capsys.readouterr().err
+    # without the options of before: those that are not named have their defaults, and so have not what is there
+    assert main(["record", "hand-motion", "--folder", str(episodes), "--episodes", "3", "--seed", "7"]) == 2
+    assert "holds an episode of other options: {'" in capsys.readouterr().err
 
 
 def test_record_explains_bad_words(tmp_path, capsys):

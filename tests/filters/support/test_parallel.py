@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import threading
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from poise.envs.data.trajectory import load_trajectory
-from poise.filters.support.parallel import BACKENDS, in_parallel, on_backend
+from poise.filters.support.parallel import BACKENDS, in_parallel, on_backend, progress_bar
 from poise.scripts.main import main
 
 JOBS = [(2, power) for power in range(5)]
@@ -53,3 +54,8 @@ def test_recordings_do_not_depend_on_the_backend(backend: str, tmp_path: Path, m
             np.testing.assert_array_equal(values, spread.measurements[channel])
         for quantity, values in serial.truth.items():
             np.testing.assert_array_equal(values, spread.truth[quantity])
+
+
+def test_a_bar_leaves_no_semaphore_behind() -> None:
+    """Tqdm's own lock is one of the system, of which Python complains when a process is interrupted."""
+    assert isinstance(progress_bar(1, "jobs", "job").get_lock(), type(threading.RLock()))
