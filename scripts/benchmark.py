@@ -92,7 +92,6 @@ def run(args: Args) -> int:
         recorded, passed_over = load_all(args.recordings) if args.recordings else ([], [])
         tasks, channels = tasks_of(args, recorded)
         folder = open_run("benchmark", args, may_differ=("baseline", "save"))
-        out.say(f"an interrupted run continues with --resume {folder.folder}")
         if args.sweep:
             assert riders is not None
             rider_sweeps(riders, args, folder, out)

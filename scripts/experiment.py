@@ -18,6 +18,7 @@ import json
 import platform
 import shlex
 import subprocess
+import sys
 import warnings
 from collections import Counter
 from collections.abc import Collection, Iterable, Mapping, Sequence
@@ -125,7 +126,7 @@ def start_run(command: str, args: Any, seed: int, root: str | Path = "runs") -> 
 
 
 def open_run(command: str, args: Any, may_differ: Collection[str] = ()) -> Run:
-    """Start a run, or resume the one in the folder ``args.resume``.
+    """Start a run, and say on standard error how to resume it; or resume the one in the folder ``args.resume``.
 
     Args:
         command: name of the command.
@@ -137,7 +138,9 @@ def open_run(command: str, args: Any, may_differ: Collection[str] = ()) -> Run:
         ValueError: it is a run of another command or of other arguments.
     """
     if args.resume is None:
-        return start_run(command, args, args.seed, args.runs)
+        made = start_run(command, args, args.seed, args.runs)
+        print(f"poise: an interrupted run continues with --resume {made.folder}", file=sys.stderr, flush=True)
+        return made
     path = args.resume / "args.json"
     if not path.exists():
         raise FileNotFoundError(f"there is no run in {args.resume}")

@@ -33,7 +33,7 @@ def progress_bar(total: int | None, label: str, unit: str, *, show: bool = True)
 
 @functools.cache
 def _bar() -> Any:
-    """tqdm with a lock of threads: its own is a semaphore, which the system keeps when a process is interrupted."""
+    """Progress bars with a lock of threads: that of tqdm is a semaphore, which an interrupted process leaves behind."""
     from tqdm import tqdm
 
     class Bar(tqdm):

@@ -207,3 +207,12 @@ def test_recordings_of_several_folders_are_told_apart(tmp_path: Path) -> None:
     for names in (("first", "first"), ("simulated",)):
         with pytest.raises(ValueError, match="paths of different names, none 'simulated'"):
             experiment.recorded_sets(tuple(tmp_path / name for name in names))
+
+
+def test_a_new_run_says_how_to_resume_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    args = dataclasses.make_dataclass("Args", ["seed", "runs", "resume"])(0, tmp_path, None)
+    run = experiment.open_run("train", args)
+    assert f"continues with --resume {run.folder}\n" in capsys.readouterr().err
+    args.resume = run.folder
+    assert experiment.open_run("train", args) == run
+    assert capsys.readouterr().err == ""
