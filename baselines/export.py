@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import warnings
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -33,6 +34,9 @@ def write_estimates(estimates: Mapping[str, Estimate], path: str | Path) -> Path
     Args:
         estimates: sensor → estimate of a whole recording, with its time (from :func:`poise.run`).
         path: file to write; its ending decides the format.
+
+    Warns:
+        UserWarning: a ``.sto`` of several sensors whose headings have no common origin.
 
     Raises:
         ValueError: an unknown ending, no estimate, or for ``.sto`` one without orientation or time.
@@ -106,6 +110,13 @@ def write_sto(estimates: Mapping[str, Estimate], path: Path) -> None:
         if known.sum() < 2:
             raise ValueError(f".sto needs orientations over time; the estimate of {sensor!r} has {known.sum()}")
         found[sensor] = np.asarray(estimate.time)[known], np.asarray(estimate.pose[names[0]])[known]
+    own = [sensor for sensor, estimate in estimates.items() if ORIENTATION.name not in estimate.pose]
+    if own and len(estimates) > 1:
+        warnings.warn(
+            f"the heading of {', '.join(own)} counts from its own start, since no magnetometer was used: angles "
+            "between the sensors about the vertical mean nothing; an estimator such as mekf-9 gives a common heading",
+            stacklevel=4,
+        )
     start = max(time[0] for time, _ in found.values())
     stop = min(time[-1] for time, _ in found.values())
     if start >= stop:

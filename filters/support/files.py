@@ -53,7 +53,8 @@ def replacing(path: str | Path) -> Iterator[Path]:
         yield part
         os.replace(part, path)
     except OSError as reason:
-        if reason.filename is None or Path(reason.filename) != part:
+        # A disk that is full names no file.
+        if reason.errno is None or Path(reason.filename or part) != part:
             raise
         # The file that was asked for, not the temporary one that stands for it.
         raise type(reason)(reason.errno, reason.strerror, str(path)) from reason

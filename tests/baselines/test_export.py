@@ -85,3 +85,13 @@ def test_what_cannot_be_written_is_explained(estimates, tmp_path):
     for ending in WRITERS:
         if ending not in (".sto", ".parquet"):
             write_estimates(tilt, tmp_path / f"tilt{ending}")
+
+
+def test_sensors_without_a_common_heading_are_named(estimates, tmp_path, recwarn):
+    """Inverse kinematics would take the difference of two arbitrary headings for an angle of a joint."""
+    alone = poise.run("bounded-motion", simulate_hand("slow", seed=6, duration=5.0))
+    write_estimates({"thigh": alone}, tmp_path / "a.sto")
+    write_estimates(estimates, tmp_path / "a.sto")
+    assert not recwarn
+    with pytest.warns(UserWarning, match="heading of thigh, shank counts from its own start"):
+        write_estimates({"thigh": alone, "shank": alone}, tmp_path / "a.sto")

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import dataclass
+from types import ModuleType
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -18,9 +20,10 @@ from poise.filters.core.kalman import KalmanFilter
 from poise.filters.core.matrices import covariance_of, identity
 from poise.filters.core.model import Gain, Model
 from poise.filters.core.quantity import ACCELEROMETER, GYROSCOPE, UP, Channel, Quantity
-from poise.filters.core.rotation import exp_matrix, normalize
+from poise.filters.core.rotation import exp, exp_matrix, normalize, rotate_back
 from poise.filters.registry import FILTERS, Entry, make, name_of
 from poise.filters.support.parameters import check_positive
+from poise.filters.support.version import ROOT
 
 
 @dataclass(frozen=True)
@@ -94,3 +97,19 @@ def test_it_finds_samples_of_its_channels_and_is_scored():
     table = evaluate(["vertical", "tilt"], simulate_hand("fast", 1, duration=3.0))
     errors = table[table["metric"] == "inclination"].set_index("estimator")["value"]
     assert errors["vertical"] < errors["tilt"]
+
+
+def test_the_recipe_of_the_contributors_page_predicts_through_a_drop_out(monkeypatch):
+    """Put into the package, it meets the contracts of all filters; a turn to first order in dt would not."""
+    page = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    block = page.split("### A filter")[1].split("```python")[1].split("\ntrajectory =")[0]
+    recipe = ModuleType("recipe")
+    monkeypatch.setitem(sys.modules, "recipe", recipe)
+    exec(block, recipe.__dict__)
+    tracker = KalmanFilter(recipe.GravityTracker(), compiled=False)
+    data = plausible_measurements(tracker, 13, 40)
+    data["imu/acc"][20:] = np.nan
+    found, up = tracker.run(data).pose["up"], None
+    for t in range(19, 40):
+        up = found[t] if up is None else rotate_back(exp(tracker.dt * data["imu/gyr"][t]), up)
+        np.testing.assert_allclose(found[t], up, atol=1e-12)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import signal
@@ -37,6 +38,17 @@ def test_an_interrupted_write_leaves_the_earlier_file(tmp_path: Path) -> None:
         interrupted()
     assert path.read_text() == "before"
     assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_full_disk_names_the_file(tmp_path: Path) -> None:
+    """The system names none when it refuses what is written to an open file."""
+
+    def full() -> None:
+        with replacing(tmp_path / "x.csv"):
+            raise OSError(errno.ENOSPC, "No space left on device")
+
+    with pytest.raises(OSError, match=r"No space left on device: '.*/x\.csv'"):
+        full()
 
 
 def test_the_part_keeps_the_suffix(tmp_path: Path) -> None:
