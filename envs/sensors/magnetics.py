@@ -151,7 +151,7 @@ def magnetics_of(magnetics: str | Magnetics | None) -> Magnetics:
     """
     if magnetics is None:
         return MAGNETICS["undisturbed"]
-    return magnetics if isinstance(magnetics, Magnetics) else look_up("magnetics", magnetics, MAGNETICS)
+    return magnetics if isinstance(magnetics, Magnetics) else look_up("magnetic disturbance", magnetics, MAGNETICS)
 
 
 @dataclass

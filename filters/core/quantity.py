@@ -115,6 +115,12 @@ class Estimate(NamedTuple):
     time: Array | None = None
     layout: Layout | None = None
 
+    def __repr__(self) -> str:
+        """One line: leading shape of the arrays, quantities, and what there is besides."""
+        shape = next((tuple(values.shape[:-1]) for values in self.pose.values()), ())
+        others = [name for name in ("covariance", "nis", "time") if getattr(self, name) is not None]
+        return f"Estimate(shape {shape}, {', '.join(self.pose)}; with {', '.join(others) or 'no covariance'})"
+
     def to_frame(self) -> pandas.DataFrame:
         """A table with one row per sample, angles in degrees: see :meth:`.frames.SequenceTable.frame`."""
         kinds = {

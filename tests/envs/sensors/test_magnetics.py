@@ -157,5 +157,5 @@ def test_bad_disturbances_are_named():
         Magnetics(hard_iron=-1.0)
     with pytest.raises(ValueError, match="variation_length must be positive and finite, got 0"):
         replace(MAGNETICS["indoor"], variation_length=0.0)
-    with pytest.raises(ValueError, match="unknown magnetics 'moon'"):
+    with pytest.raises(ValueError, match="unknown magnetic disturbance 'moon'"):
         magnetics_of("moon")

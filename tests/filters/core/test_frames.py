@@ -98,3 +98,12 @@ def test_a_filter_run_by_itself_has_a_table_too(motion):
     model = equations_of(poise.make_estimator("mekf", dt=motion.dt))
     frame = KalmanFilter(model).run(motion.measurements).to_frame()
     assert {"roll", "pitch", "yaw", "up_x"} <= set(frame.columns)
+
+
+def test_an_estimate_is_one_line():
+    from poise.filters.core.quantity import Estimate
+
+    up = np.zeros((3001, 3))
+    assert repr(Estimate({"up": up})) == "Estimate(shape (3001,), up; with no covariance)"
+    whole = Estimate({"up": up[0], "bias": up[0]}, covariance=np.eye(3), nis=up[0, 0])
+    assert repr(whole) == "Estimate(shape (), up, bias; with covariance, nis)"
