@@ -68,6 +68,20 @@ class Claim:
         return cls(statement, number, known[worst] < limit)
 
     @classmethod
+    def shares(
+        cls,
+        statement: str,
+        values: Mapping[str, float],
+        of: Mapping[str, float],
+        limit: float = 1.0,
+        unit: str = "of it",
+    ) -> Claim:
+        """Holds if every value is below ``limit`` times what has its name in ``of``; others do not count."""
+        return cls.every(
+            statement, {name: value / of[name] for name, value in values.items() if name in of}, limit, unit
+        )
+
+    @classmethod
     def best(cls, statement: str, name: str, values: Mapping[str, float], unit: str = "deg") -> Claim:
         """Holds if ``values[name]`` is the smallest; the number names the smallest of the others."""
         others = {key: value for key, value in values.items() if key != name and not math.isnan(value)}

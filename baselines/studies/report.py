@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...filters.support.files import replacing, write_text
-from ...filters.support.rows import markdown_table
+from ...filters.support.rows import RESULT, markdown_table
 from ..plots import save, save_animation
 from .claims import Claim
 
@@ -160,6 +160,11 @@ class Report:
 def stem(title: str) -> str:
     """Name of the file of an entry, without its suffix."""
     return re.sub(r"[^a-z0-9]+", "-", title.lower()).strip("-")[:80]
+
+
+def result(*values: Any) -> dict[str, Any]:
+    """A row of ``results.csv``, of :data:`.RESULT`: estimator, trajectory, quantity, metric, value, unit."""
+    return dict(zip(RESULT, values, strict=True))
 
 
 OWN = ("quantity", "published", "unit", "values")

@@ -16,11 +16,10 @@ from ...filters.core.consistency import nees
 from ...filters.core.kalman import KalmanFilter
 from ...filters.core.observer import Observer
 from ...filters.core.quantity import Estimate
-from ...filters.support.rows import RESULT
 from .averages import circular_mean, interval_of_mean, largest, leading, mean_of, mean_rms, rounded, windowed
 from .claims import Claim
 from .kit import RideJob, Study, load_ride
-from .report import STD, Report
+from .report import STD, Report, result
 from .yaw import yaw_claim, yaw_drift
 
 SETTLED = 10.0
@@ -313,7 +312,7 @@ class RideStudy:
 
     def in_short(self, course: str, results: list[dict[str, Any]]) -> list[dict[str, Any]]:
         """The skill of the filter in two rows: roll of the bicycle, and mean over the other published angles."""
-        published = {angle: leading(text) for angle, text in self.published.get((course, self.first), {}).items()}
+        published = self.published_errors(course)
         tabled = {angle for (_, name), values in self.published.items() if name == self.first for angle in values}
         columns = {
             "published": published,
@@ -334,16 +333,18 @@ class RideStudy:
             for name, part in angles.items()
         ]
 
+    def published_errors(self, course: str) -> dict[str, float]:
+        """Angle → error of the filter that the paper publishes for a course, deg."""
+        return {angle: leading(text) for angle, text in self.published.get((course, self.first), {}).items()}
+
     def claims(self, course: str, results: list[dict[str, Any]]) -> list[Claim]:
         """What holds of the errors of a course: against the paper, the baselines and each other; and of consistency."""
         ours, best = mean_rms(results, self.first), mean_rms(results, MEAN)
-        published = self.published.get((course, self.first), {})
-        ratios = {angle: ours[angle] / leading(value) for angle, value in published.items()}
-        constant = {angle: error / best[angle] for angle, error in ours.items()}
+        published = self.published_errors(course)
         roll = next(angle for angle, (name, _) in self.angles.items() if name == ROLL)
-        found = [Claim.every("Every error is at or below the published one", ratios, 1.0, "of it")] if ratios else []
+        found = [Claim.shares("Every error is at or below the published one", ours, published)] if published else []
         found += [
-            Claim.every("Every angle is estimated better than by the best constant", constant, 1.0, "of its error"),
+            Claim.shares("Every angle is estimated better than by the best constant", ours, best, unit="of its error"),
             Claim.less("The roll is estimated better than by zero", ours[roll], mean_rms(results, ZERO)[roll]),
         ]
         for each in self.comparisons:
@@ -354,15 +355,15 @@ class RideStudy:
             for statistic, value in mean_of(each["consistency"][name] for each in results).items():
                 found.append(Claim.within(f"{name}: {statistic} is right within a factor of two", value, 0.5, 2.0))
         bound = mean_of(each.get("bound", {}) for each in results)
-        shares = {angle: limit / ours[angle] for angle, limit in bound.items()}
-        if shares:
-            found.append(Claim.every("No error lies below its bound by more than 5 %", shares, 1.05, "of the error"))
+        if bound:
+            statement = "No error lies below its bound by more than 5 %"
+            found.append(Claim.shares(statement, bound, ours, 1.05, "of the error"))
         return [*found, yaw_claim(results)]
 
     def results(self, results: Iterable[dict[str, Any]]) -> list[dict[str, Any]]:
         """Rows of ``results.csv``: RMS error of every method and angle on every ride."""
         return [
-            dict(zip(RESULT, (f"{self.name}: {name}", each["name"], angle, "rms", value, "deg"), strict=True))
+            result(f"{self.name}: {name}", each["name"], angle, "rms", value, "deg")
             for each in results
             for name, spans in each["rms"].items()
             for angle, value in spans["settled"].items()

@@ -108,8 +108,8 @@ def orientation_bounds(study: Study, report: Report) -> None:
             (BOUND, f"{device}, {method}: no error lies below its bound"),
             (KNOWN, f"Were the hand's acceleration known, no error would lie below: {device}, {method}"),
         ):
-            ratios = {name: mean[f"{name} {kind}"] / mean[name] for name in ANGLES}
-            claims.append(Claim.every(statement, ratios, 1.05, "of the error"))
+            bounds = {name: mean[f"{name} {kind}"] for name in ANGLES}
+            claims.append(Claim.shares(statement, bounds, mean, 1.05, "of the error"))
     report.table(
         "Bound of the orientation",
         rows,

@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from ..report import result
+
 Row = dict[str, Any]
 
 
@@ -35,11 +37,7 @@ def grouped(
 
 def results_of(rows: Iterable[Row], key: str, trajectory: str, quantity: str, metric: str, unit: str) -> list[Row]:
     """Rows of ``results.csv``: ``row[key]`` of each method; ``trajectory`` is a format of the row's entries."""
-    return [
-        {"estimator": row["method"], "trajectory": trajectory.format(**row), "quantity": quantity}
-        | {"metric": metric, "value": row[key], "unit": unit}
-        for row in rows
-    ]
+    return [result(row["method"], trajectory.format(**row), quantity, metric, row[key], unit) for row in rows]
 
 
 def values_of(rows: Iterable[Row], key: str, **chosen: Any) -> list[Any]:

@@ -21,12 +21,13 @@ from ...scoring import has_truth
 from ..claims import Claim
 from ..coverage import cover
 from ..kit import Study
-from ..report import Report
+from ..report import Report, result
 from .figures import FIGURES
 from .items import ITEMS, LEVELS, TABLE_I, TABLE_II, TABLE_III
 from .simulation import MODES, RATE, TESTS, Trial, errors, reference, simulate
 from .skill import beyond_the_trial, long_errors, skill, skill_of_test
 
+NAME = "external-acceleration"
 QUANTITIES = ("roll", "pitch", "a_x", "a_y", "a_z", "‖a‖")
 STILL = {
     "motion_share": 0.25,
@@ -48,11 +49,7 @@ BROAD_MODELS: dict[str, dict[str, Any]] = {
 
 def reproduce(study: Study, report: Report) -> None:
     """Do the study."""
-    seeds = tuple(
-        study.seed_of("external-acceleration", subject, index)
-        for subject in study.subjects
-        for index in range(study.seeds)
-    )
+    seeds = tuple(study.seed_of(NAME, subject, index) for subject in study.subjects for index in range(study.seeds))
     report.text(
         f"{len(seeds)} simulated trials of each test, as long as the paper's, at {RATE:g} Hz; one of the paper each. "
         "Motion, sensors and the misalignment of the optical reference (1.6° an axis) are drawn for each trial. The "
@@ -151,14 +148,9 @@ def table_i(report: Report, tests: dict[str, Any]) -> None:
             )
         report.numbers(
             [
-                {
-                    "estimator": f"external-acceleration mode {mode} {rotated}",
-                    "trajectory": f"test {test} trial {number}",
-                    "quantity": "up",
-                    "metric": "inclination",
-                    "value": value,
-                    "unit": "deg",
-                }
+                result(
+                    f"{NAME} mode {mode} {rotated}", f"test {test} trial {number}", "up", "inclination", value, "deg"
+                )
                 for rotated, errors_ in (("published", found), ("exact", exact))
                 for number, value in enumerate(errors_["inclination"])
             ]
@@ -354,7 +346,7 @@ def recorded_errors(path: Path) -> dict[str, Any]:
         return {}  # what has no reference, or is not a single IMU
     row: dict[str, Any] = {"trial": trial.name}
     contenders = {
-        name: make_estimator("external-acceleration", dt=trial.dt, keep_covariance=False, **parameters)
+        name: make_estimator(NAME, dt=trial.dt, keep_covariance=False, **parameters)
         for name, parameters in BROAD_MODELS.items()
     }
     contenders["bounded-motion"] = make_estimator("bounded-motion", dt=trial.dt, keep_covariance=False)

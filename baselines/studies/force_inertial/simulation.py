@@ -12,13 +12,13 @@ from ....filters.core import rotation
 from ....filters.core.kalman import KalmanFilter
 from ....filters.core.metrics import rms
 from ....filters.core.quantity import DEG
-from ..averages import leading, rounded
+from ..averages import rounded
 from ..claims import Claim
 from ..kit import Study
 from ..report import Report
 from ..ride_study import SETTLED
 from .motion import Course, Errors, draw_motion, simulate
-from .rides import ANGLES, OURS, RIDES
+from .rides import ANGLES, RIDES
 from .states import from_the_truth
 
 AS_PUBLISHED: dict[str, Any] = {
@@ -49,7 +49,6 @@ VARIANTS: dict[str, tuple[dict[str, Any], str, str]] = {
     "integration from the true start": ({}, "2.9 1.7 5.4 0.34", "4.6 4.6 6.0 0.37"),
 }
 """Name → options, and what an independent simulation of the same equations found indoors and outdoors, deg."""
-INDOOR = RIDES.published["indoor_circle", OURS]
 COURSES: tuple[Course, Course] = ("indoor", "outdoor")
 
 
@@ -199,6 +198,7 @@ def claims(means: dict[tuple[str, str], dict[str, float]], slowest: dict[str, fl
     published = means["as published, sign of (12) corrected", "indoor"]
     raw, ours = means["same, (13) as published", "indoor"], means[exact, "indoor"]
     accelerometers = means["exact (7), (8) from accelerometers", "indoor"]
+    tabled = RIDES.published_errors("indoor_circle")
     statement = "indoor: the published (7), (8) are as good as the corrected form in φ_h"
     found += [
         Claim.less(statement, published["φ_h"], ours["φ_h"], factor=1.1),
@@ -208,17 +208,12 @@ def claims(means: dict[tuple[str, str], dict[str, float]], slowest: dict[str, fl
             float(np.mean(list(ours.values()))),
             float(np.mean(list(means["same, no bias model", "indoor"].values()))),
         ),
-        Claim.every(
-            "indoor: corrected (7), (8) from accelerometers keep every angle within table II",
-            {angle: accelerometers[angle] / leading(INDOOR[angle]) for angle in ANGLES},
-            1.0,
-            "of the published error",
-        ),
-        Claim.every(
-            "indoor: the apparent vertical in (13) keeps every angle within table II",
-            {angle: ours[angle] / leading(INDOOR[angle]) for angle in ANGLES},
-            1.0,
-            "of the published error",
+        *(
+            Claim.shares(f"indoor: {what} every angle within table II", errors, tabled, unit="of the published error")
+            for what, errors in (
+                ("corrected (7), (8) from accelerometers keep", accelerometers),
+                ("the apparent vertical in (13) keeps", ours),
+            )
         ),
     ]
     found += [
@@ -268,9 +263,10 @@ def offsets(study: Study, report: Report) -> None:
     claims = []
     for course in COURSES:
         none, measured, kept = (means[case, course] for case in CASES)
-        ratios = {angle: measured[angle] / none[angle] for angle in ANGLES}
         claims += [
-            Claim.every(f"(14), {course}: measured offsets cost at most a fifth", ratios, 1.2, "of the error without"),
+            Claim.shares(
+                f"(14), {course}: measured offsets cost at most a fifth", measured, none, 1.2, "of the error without"
+            ),
             Claim.less(
                 f"(14), {course}: offsets that stay double the error of φ_b", none["φ_b"], kept["φ_b"], factor=0.5
             ),

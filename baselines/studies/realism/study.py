@@ -10,10 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ....envs.recipes.registry import recipe
-from ....filters.support.rows import RESULT
 from ...plots import AMBER, BLUE, GREEN, PINK, SKY, VERMILION, legend_above, new_figure
 from ..kit import Study
-from ..report import Report
+from ..report import Report, result
 from .containment import DRAWN, HIGH, LOW, Summary, containment_rows, simulated_summaries, summary, totals
 from .motion import SHARE_OF_RATE, UNITS
 from .points import points
@@ -95,7 +94,7 @@ def recorded_summaries(groups: Sequence[Recorded]) -> dict[str, list[Summary]]:
 def results(label: str, summaries: Sequence[Summary]) -> list[dict[str, Any]]:
     """Rows of ``results.csv``, at the widest bandwidth of each."""
     return [
-        dict(zip(RESULT, ("truth", f"{label}/{each.name}", "motion", name, value, UNITS[name] or "1"), strict=True))
+        result("truth", f"{label}/{each.name}", "motion", name, value, UNITS[name] or "1")
         for each in summaries
         for name, value in each.statistics[max(each.statistics)].items()
         if np.isfinite(value)

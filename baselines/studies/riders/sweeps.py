@@ -18,6 +18,7 @@ from ....filters.support.ranges import Range
 from ...learned.presets import RIDES, seeds_of
 from ...plots import new_figure, save
 from ...registry import make_estimator
+from ..report import result
 from .errors import errors_of, score
 from .suite import RiderSuite, estimators_of, names_of, scored_samples
 
@@ -168,15 +169,8 @@ def sweep_points(settings: RiderSuite, *, processes: int = 1, progress: bool = F
 def results(points: list[Point]) -> list[dict[str, Any]]:
     """One number a row, as run folders keep them."""
     return [
-        {
-            "estimator": point.estimator,
-            "trajectory": f"{point.sweep} {point.value:g}:{point.ride}",
-            "quantity": point.paper,
-            "metric": "angle",
-            "value": point.error,
-            "unit": "deg",
-        }
-        for point in points
+        result(each.estimator, f"{each.sweep} {each.value:g}:{each.ride}", each.paper, "angle", each.error, "deg")
+        for each in points
     ]
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from ...learned.rides import UNSEEN
 from ...statistics import bootstrap_interval
+from ..report import result
 from .suite import CONSTANT, ROLL_ONLY, Row, names_of
 
 
@@ -25,11 +26,10 @@ def results(rows: Iterable[Row]) -> list[dict[str, Any]]:
     """One number a row, as run folders keep them: each angle, and the mean over angles with its measures."""
     found = []
     for row in rows:
-        named = {"estimator": row.method, "trajectory": f"{row.group}:{row.ride}-{row.draw}"}
+        ride = f"{row.group}:{row.ride}-{row.draw}"
         for name, angle in zip(names_of(row.paper), row.angles, strict=True):
-            found.append({**named, "quantity": f"{row.paper}/{name}", "metric": "angle", "value": angle, "unit": "deg"})
-        for metric, value, unit in measures(row):
-            found.append({**named, "quantity": row.paper, "metric": metric, "value": value, "unit": unit})
+            found.append(result(row.method, ride, f"{row.paper}/{name}", "angle", angle, "deg"))
+        found += [result(row.method, ride, row.paper, *measure) for measure in measures(row)]
     return found
 
 

@@ -11,11 +11,10 @@ import numpy as np
 from ....envs.bicycle.course.scenarios import list_scenarios
 from ....envs.bicycle.rider.anthropometry import SUBJECTS
 from ....envs.data.trajectory import Trajectory
-from ....filters.support.rows import RESULT
 from ....filters.support.seeds import child_seeds
 from ...plots import TRUTH_COLOR, time_figure
 from ..kit import Study
-from ..report import Report
+from ..report import Report, result
 from .checks import all_checks
 from .inclinations import inclination_rows
 from .saddle import ACROSS, ALONG, PULL, SITTING, saddle_rows
@@ -118,7 +117,7 @@ def results(found: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
             for kind in KINDS
             if f"{quantity}_{kind}" in each
         ]
-        rows += [dict(zip(RESULT, ("truth", name, *number), strict=True)) for number in numbers]
+        rows += [result("truth", name, *number) for number in numbers]
     return rows
 
 

@@ -12,7 +12,7 @@ from ....filters.bicycle.platform_gyro import PlatformGyro, TwoGyroIntegration
 from ....filters.bicycle.two_gyro.filter import TwoGyro
 from ....filters.bicycle.two_gyro.truth import true_angles
 from ....filters.core.quantity import DEG, Estimate
-from ..averages import leading, mean_of, mean_rms
+from ..averages import mean_of, mean_rms
 from ..claims import Claim
 from ..kit import Study
 from ..report import Report
@@ -169,19 +169,15 @@ def claims(results: list[dict[str, Any]]) -> list[Claim]:
     settled = mean_rms(results, "Σ2")["φ"] if long else float("nan")
     late, peak = mean_rms(results, "Σ2", "last 20 s")["φ"], mean_of(each["peak"]["Σ2"] for each in results)["φ"]
     ours, white = (mean_rms(results, name) for name in ("Σ2", WHITE_CAMERA))
-    published = {angle: leading(text) for angle, text in TABLE_I.items()}
+    published = RIDES.published_errors("indoor_circle")
     own_ratio = max(published[angle] / value for angle, value in EARLIER.items())
-
-    def shares(errors: dict[str, float], of: dict[str, float]) -> dict[str, float]:
-        return {angle: error / of[angle] for angle, error in errors.items()}
-
     earlier = "as accurate as the published method with force sensors ([19]), within the paper's own ratio"
     alone = "A camera with white noise only"
     bound = mean_of(each["bound"] for each in results)["φ"]
     return [
-        Claim.every(f"Σ2 is {earlier}", shares(ours, EARLIER), own_ratio, "of it"),
-        Claim.every(f"{alone}: {earlier}", shares(white, EARLIER), own_ratio, "of it"),
-        Claim.every(f"{alone}: every error is at or below table I", shares(white, published), 1.0, "of it"),
+        Claim.shares(f"Σ2 is {earlier}", ours, EARLIER, own_ratio),
+        Claim.shares(f"{alone}: {earlier}", white, EARLIER, own_ratio),
+        Claim.shares(f"{alone}: every error is at or below table I", white, published),
         Claim.less("The roll is smaller than the posterior bound of its error", mean_rms(results, ZERO)["φ"], bound),
         Claim.less(f"Σ2 does not drift: φ in the last 20 s and from {SETTLED:g} s on", late, settled, factor=1.2),
         Claim.less("The largest error of φ is below 5°", peak, 5.0),

@@ -175,7 +175,7 @@ class ExactRide:
         return dict(zip(names, rates, strict=True))
 
     def forces(self, t: np.ndarray) -> dict[str, np.ndarray]:
-        """Specific force in bicycle axes (the paper's) at the bicycle's IMU, the pivot and the trunk's IMU."""
+        """Specific force, paper's axes: at the bicycle's IMU and the pivot, and in trunk axes at the trunk's IMU."""
         f, g, link = self.functions, self.geometry, self.linkage
         fixed = [paper_axes(np.array(place)) for place in (g.bicycle_imu, g.trunk_pivot)]
 
@@ -191,13 +191,9 @@ class ExactRide:
         left = np.stack([-np.sin(yaw), 0.0 * yaw, -np.cos(yaw)], axis=-1)
         contact = derivative(f["speed"], t)[..., None] * ahead + (f["speed"](t) * f["yaw"](t))[..., None] * left
         acceleration = contact + np.array([0.0, STANDARD_GRAVITY, 0.0]) + second_derivative(places, t)
-        forces = (self.frame(t).mT @ acceleration[..., None])[..., 0]
-        return dict(zip(("bicycle_imu", "pivot", "trunk_imu"), forces, strict=True))
-
-    def _on_trunk(self, t: np.ndarray, forces: dict[str, np.ndarray]) -> np.ndarray:
-        """Specific force at the trunk's IMU in trunk axes ``(..., 3)``."""
+        bicycle, pivot, trunk = (self.frame(t).mT @ acceleration[..., None])[..., 0]
         R = rotation.euler_matrix("zxy", self.trunk(t))
-        return (R.mT @ forces["trunk_imu"][..., None])[..., 0]
+        return {"bicycle_imu": bicycle, "pivot": pivot, "trunk_imu": (R.mT @ trunk[..., None])[..., 0]}
 
     def record(
         self,
@@ -215,18 +211,12 @@ class ExactRide:
         rng = np.random.default_rng(np.random.SeedSequence(self.seed).spawn(2)[1])
         t = dt * np.arange(round(duration / dt) + 1)
         pose, rates, forces = self.pose(t), self.rates(t), self.forces(t)
-        own = self._on_trunk(t, forces)
         pivot = forces["pivot"]
         if sampling == "interval":
-            parts = [(rates, forces, own)]
-            for at in (t - 0.5 * dt, t - dt):
-                there = self.forces(at)
-                parts.append((self.rates(at), there, self._on_trunk(at, there)))
-            first, middle, last = parts
-            rates = {name: _simpson(*(part[0][name] for part in parts)) for name in rates}
-            forces = {name: _simpson(*(part[1][name] for part in parts)) for name in forces}
-            own = _simpson(first[2], middle[2], last[2])
-        R = rotation.euler_matrix("zxy", pose["trunk/angles"])
+            earlier = [(self.rates(at), self.forces(at)) for at in (t - 0.5 * dt, t - dt)]
+            rates = {name: _simpson(one, *(part[0][name] for part in earlier)) for name, one in rates.items()}
+            forces = {name: _simpson(one, *(part[1][name] for part in earlier)) for name, one in forces.items()}
+        own, R = forces["trunk_imu"], rotation.euler_matrix("zxy", pose["trunk/angles"])
         if self.bumps is not None:
             shock = 40.0 * rng.uniform(-1.0, 1.0, (t.size, 3)) * ((t >= self.bumps[0]) & (t < self.bumps[1]))[:, None]
             shock *= (rng.random(t.size) < 0.3)[:, None]

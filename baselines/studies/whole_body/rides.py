@@ -18,7 +18,7 @@ from ....filters.bicycle.whole_body.integration import WholeBodyIntegration
 from ....filters.bicycle.whole_body.linkage import SHOULDER, SIDES, TRUNK, true_angles
 from ....filters.core import rotation
 from ....filters.core.quantity import Estimate
-from ..averages import largest, leading, mean_of, mean_rms, windowed
+from ..averages import largest, mean_of, mean_rms, windowed
 from ..claims import Claim
 from ..kit import Study
 from ..report import Report
@@ -234,29 +234,22 @@ def rides(study: Study, report: Report) -> None:
 def follows(every: list[dict[str, Any]]) -> Claim:
     """Whether integration is worse than the filter after 20 s; knees, which C8 gives to both, are the same."""
     ours, other = (mean_rms(every, name, LATER) for name in ("filter", STRAPDOWN))
-    ratios = {angle: ours[angle] / other[angle] for angle in SHOWN if angle[0] != "β"}
-    return Claim.every("Figure 6: after 20 s every angle is better than integrated", ratios, 1.0, "of its error")
+    shown = {angle: ours[angle] for angle in SHOWN if angle[0] != "β"}
+    return Claim.shares("Figure 6: after 20 s every angle is better than integrated", shown, other, unit="of its error")
 
 
 def no_worse_than_published(
     course: str, every: list[dict[str, Any]], method: str, statement: str, angles: Sequence[str] = tuple(ANGLES)
 ) -> Claim:
     """Whether a method's error of every angle is at or below that of table III."""
-    found = mean_rms(every, method)
-    ratios = {angle: found[angle] / published_error(course, angle) for angle in angles}
-    return Claim.every(f"{statement} at or below table III", ratios, 1.0, "of it")
+    found = {angle: error for angle, error in mean_rms(every, method).items() if angle in angles}
+    return Claim.shares(f"{statement} at or below table III", found, RIDES.published_errors(course))
 
 
 def beats_the_constant(every: list[dict[str, Any]], method: str, statement: str) -> Claim:
     """Whether a method's error of every angle is below that of the best constant."""
     found, best = (mean_rms(every, name) for name in (method, MEAN))
-    ratios = {angle: error / best[angle] for angle, error in found.items()}
-    return Claim.every(f"{statement} estimated better than by the best constant", ratios, 1.0, "of its error")
-
-
-def published_error(course: str, angle: str) -> float:
-    """Mean RMS error of table III, deg."""
-    return leading(TABLE_III[course][angle])
+    return Claim.shares(f"{statement} estimated better than by the best constant", found, best, unit="of its error")
 
 
 def bump_errors(path: Path) -> dict[str, dict[str, float]]:
@@ -292,7 +285,7 @@ def bumps(study: Study, report: Report) -> None:
                 Claim.less(
                     f"θ2, {name}: its largest error is below twice the RMS of table III, outdoors",
                     means[name]["θ2"],
-                    published_error("outdoor", "θ2"),
+                    RIDES.published_errors("outdoor")["θ2"],
                     factor=2.0,
                 )
                 for name in means
