@@ -7,7 +7,7 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from poise.baselines.plots import PALETTE, TRUTH_COLOR
+from poise.baselines.plots import PALETTE, TRUTH_COLOR, time_figure
 
 SEEN_BY = {
     "everybody": np.eye(3),
@@ -35,3 +35,8 @@ def test_colours_are_told_apart(who: str) -> None:
     seen = {colour: lab(colour, np.asarray(SEEN_BY[who])) for colour in (*PALETTE, "#000000")}
     for one, other in combinations(seen, 2):
         assert np.linalg.norm(seen[one] - seen[other]) > 15.0, (one, other)
+
+
+def test_the_lowest_axes_of_a_figure_over_time_say_so() -> None:
+    labels = [ax.get_xlabel() for ax in time_figure(4.0, 3.0, 2, 2)[1]]
+    assert labels == ["", "", "time, s", "time, s"]

@@ -30,6 +30,14 @@ def test_ranges_maxima_and_minima():
     assert Claim.best("pitch is best", "pitch", errors).holds is False
 
 
+def test_errors_are_compared_with_a_reference_by_name():
+    errors, published = {"roll": 1.0, "pitch": 3.0, "yaw": 9.0}, {"roll": 2.0, "pitch": 2.0}
+    found = Claim.shares("at or below the published ones", errors, published)
+    assert found.holds is False
+    assert found.number == "largest: 1.5 of it (pitch), limit 1"
+    assert Claim.shares("within twice", errors, published, 2.0).holds is True
+
+
 def test_a_ranking_is_that_of_the_numbers():
     errors = {"a": 1.0, "b": 2.0, "c": 3.0}
     assert Claim.ranked("a before b before c", ("a", "b", "c"), errors).holds is True

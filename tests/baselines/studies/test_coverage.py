@@ -73,6 +73,15 @@ def test_what_is_right_once_it_is_corrected_is_told_from_a_difference(report):
     )
 
 
+def test_claims_of_several_tables_are_named_together():
+    both = coverage.claims_in("What holds, indoor", "What holds, outdoor")
+    item = Item("Table I", "drift", "Table I", both("It does not", "It beats"))
+    assert item.shown == ("Table I",)
+    assert item.decided == tuple(
+        (f"What holds, {course}", start) for start in ("It does not", "It beats") for course in ("indoor", "outdoor")
+    )
+
+
 def test_an_item_that_nothing_answers_needs_a_reason():
     with pytest.raises(ValueError, match="Figure 3: an item that nothing shows or decides needs a reason"):
         Item("Figure 3", "curves")
