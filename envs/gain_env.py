@@ -31,8 +31,7 @@ class GainTuningEnv(DrawnEnv):
 
     Args:
         filter: name of a Kalman filter with gains (:func:`poise.list_estimators`), or such a filter; it must read a
-            gyroscope. It is configured with the rider and bicycle, or the device,
-            in the metadata of the trajectory.
+            gyroscope. It is configured with the rider and bicycle, or the device, in the metadata of the trajectory.
         gains: names of the gains to be tuned, in the order of the action; None for those that suit exploration
             (:func:`poise.filters.adaptation.gains.acted_gains`).
         quantity: output of the filter whose error counts, or several, whose root mean square does; None for ``up``,
@@ -43,8 +42,8 @@ class GainTuningEnv(DrawnEnv):
         reference: action of the constant gains that ``improvement`` and ``relative`` compare with; None for the
             published tuning.
         error_scale: deg; errors far above it count by their logarithm in relative rewards.
-        smoothing: s; the gains follow the actions with this time constant, so that the noise of an agent's exploration
-            changes them by a sensible factor; 0: at once.
+        smoothing: s; the gains follow the actions with this time constant, which averages the noise of an agent's
+            exploration; 0: at once.
         privileged: whether observations end with privileged information from the truth, for the critic of a training.
         render_mode: ``human`` (a window), ``rgb_array`` or None.
 

@@ -40,10 +40,10 @@ class HandMotionGainEnv(GainTuningEnv):
     | ``external-acceleration`` | ``measurement`` (σ_A ≤ 0.3 m/s²); where named, ``process`` (σ_G), ``c_a`` (≤ 0.5) |
     | ``bounded-motion`` | ``process`` (σ_g), ``bias`` (σ_b), ``velocity`` (σ_V) |
 
-    c_a is never so large that a gyroscope error of 1 °/s could lock the filter out
-    (:mod:`poise.filters.adaptation.gains`). It is acted on only where ``gains`` names it, since almost every change of
-    it does harm; so is σ_G, since its ratio to σ_A is what counts. The gains follow the actions with the time constant
-    ``smoothing``, so that noise of unit variance in single decisions changes them by a few tenths of a decade only.
+    c_a stays below the values at which a gyroscope error of 1 °/s could lock the filter out
+    (:mod:`poise.filters.adaptation.gains`). It is set only where ``gains`` names it, because almost every change of it
+    increases the error; so is σ_G, because only its ratio to σ_A matters. The gains follow the actions with the time
+    constant ``smoothing``, so that noise of unit variance in single decisions changes them by a few tenths of a decade.
 
     ## Observation space
 
@@ -55,13 +55,15 @@ class HandMotionGainEnv(GainTuningEnv):
 
     ## Reward
 
-    ``relative`` (the default) and ``improvement`` are zero with the ``reference`` gains, which run beside the agent's.
-    ``error``: minus the mean error of ``quantity`` over the interval, rad (:func:`poise.filters.core.metrics.error`).
-    ``improvement``: that of the ``reference`` gains, run beside it, minus the agent's: the same optimal policy with far
-    less variance. ``relative``: the same of s ln(1 + e / s) with s = ``error_scale``, divided by its mean over the
-    episode plus 0.2°, so that easy and hard motions count alike and a few bad seconds do not dominate. Samples without
-    truth or outside the evaluation mask do not count. With ``consistency`` w, minus w·|ln(mean NIS / m)| of the m
-    innovations of the interval.
+    * ``error``: minus the mean error of ``quantity`` over the interval, rad (:func:`poise.filters.core.metrics.error`).
+    * ``improvement``: the error of the ``reference`` gains, which run in parallel, minus the agent's. The optimal
+      policy is the same, the variance far smaller.
+    * ``relative`` (the default): likewise of s ln(1 + e / s) with s = ``error_scale``, divided by the mean of the
+      reference over the episode plus 0.2°: easy and hard motions count alike, and a few bad seconds do not dominate.
+
+    ``improvement`` and ``relative`` are zero with the ``reference`` gains. Samples without truth or outside the
+    evaluation mask do not count. With ``consistency`` w, minus w·|ln(mean NIS / m)| of the m innovations of the
+    interval.
 
     ## Start and end
 
@@ -93,9 +95,7 @@ class HandMotionGainEnv(GainTuningEnv):
 
     ## Version history
 
-    * v0: first release. Before it, the default motions were ``mixed``, the reward was ``error``, all gains were acted
-      on and they followed the actions at once: agents with the exploration that libraries have by default then did
-      worse than the published gains.
+    * v0: first release.
     """
 
     def __init__(
@@ -171,8 +171,7 @@ class ReplayGainEnv(GainTuningEnv):
 
     ## Version history
 
-    * v0: first release. Before it, the reward was ``error``, all gains were acted on and they followed the actions at
-      once by default.
+    * v0: first release.
     """
 
     def __init__(

@@ -49,13 +49,13 @@ class RecordedSensors(Sensing):
 
 
 class ReplayEnv(PoseEnv):
-    """The recorded measurements are replayed; the agent estimates the pose and is scored by the recorded truth.
+    """Recorded measurements are replayed; the agent estimates the pose and is scored by the recorded truth.
 
     ## Description
 
     Any :class:`poise.Trajectory` as an environment with the interface of ``poise/HandMotion-v0``. It keeps the
-    recording's time: on its uniform grid (:meth:`.Trajectory.on_grid`) a gap is a stretch without samples, of its
-    true length, that is not scored. Nothing is random but where an episode starts.
+    recording's time: on its uniform grid (:meth:`.Trajectory.on_grid`) a gap consists of samples without
+    values, of its true length, that are not scored. Only the start of an episode is random.
 
     ## Action Space
 

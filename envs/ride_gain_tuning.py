@@ -33,7 +33,7 @@ class RiderBicycleGainEnv(GainTuningEnv):
     Every episode is a ride of ``poise/RiderBicycle-v0`` with its sensor errors, one of ``rides`` different ones: a step
     runs the filter over ``interval`` seconds (several samples) with the gains of the action. A bicycle is difficult for
     filters with an accelerometer: it leans into its turns, so that the mean specific force points along the bicycle's
-    upward axis and not along the world's. Observations do not contain the truth, and actions do not change the ride.
+    upward axis, not along the vertical. Observations do not contain the truth, and actions do not change the ride.
 
     ## Action Space
 
@@ -108,8 +108,7 @@ class RiderBicycleGainEnv(GainTuningEnv):
 
     ## Version History
 
-    * v0: first release. Before it, the reward was ``error``, all gains were acted on and they followed the actions at
-      once by default.
+    * v0: first release.
     """
 
     _episode_fields = (*GainTuningEnv._episode_fields, "_ridden", "_present")

@@ -66,9 +66,9 @@ class HandMotionEnv(PoseEnv):
     The sample of a time step describes the interval that ends with it: with ``sampling="interval"`` the rotation vector
     and the velocity increment over the interval, divided by its length; with ``sampling="instant"`` the values at its
     end. In an interval gravity acts in the attitude half way through it, while ``pose/up`` belongs to its end: an ideal
-    accelerometer reads ``external_acceleration`` + g · ``up`` turned by half the rotation vector of the interval
-    (``angular_rate`` times its length), exactly. Without this turn the sum is wrong by up to 0.5 m/s² at 100 Hz where a
-    hand shakes.
+    accelerometer reads ``external_acceleration`` + g · ``up`` rotated by half the rotation vector of the interval
+    (``angular_rate`` times its length), exactly. Without this rotation the sum is wrong by up to 0.5 m/s² at 100 Hz
+    where a hand shakes.
 
     ## Rewards
 

@@ -106,8 +106,9 @@ def explanation(path: Path) -> str:
     mapping = mapping_of(table)
     suggested = ", ".join(f"{channel} = {list(columns)}" for channel, columns in mapping.columns.items())
     return (
-        f"it holds a table ({table.seen()}) of an unknown format, whose names and units do not identify gyroscope and "
-        f"accelerometer{f' (they suggest {suggested})' if suggested else ''}. Say what the columns mean: "
+        f"it holds a table ({table.seen()}) whose names and units do not identify gyroscope and accelerometer"
+        f"{f' (they suggest {suggested})' if suggested else ''}. Describe the columns: `poise inspect {path.name} "
+        f"--write-map {path.stem}.toml` drafts a mapping to complete and to use in place of the file; in Python "
         'poise.load_recording(path, columns={"gyr": […], "acc": […]}, units={"gyr": "deg/s", "acc": "g"}, '
-        'time="…" or rate=…), or write the same to a TOML file, which `poise inspect FILE --write-map` drafts'
+        'time="…" or rate=…)'
     )

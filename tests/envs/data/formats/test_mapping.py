@@ -316,7 +316,8 @@ def test_wrong_arguments_are_named(tmp_path, arrays, changes, message):
 def test_unknown_files_are_answered_with_what_was_seen_and_how_to_map_it(tmp_path, arrays):
     path = write(tmp_path / "a.csv", arrays)
     with pytest.raises(
-        ValueError, match=r"delimited by comma; 200 rows; columns time, p, q, r.*load_recording\(path, col"
+        ValueError,
+        match=r"delimited by comma; 200 rows; columns time, p, q, r.*inspect a\.csv --write-map a\.toml.*\(path, col",
     ):
         poise.load_recording(path)
     path.write_text("hello\n")
