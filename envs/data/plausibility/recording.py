@@ -12,7 +12,7 @@ from ..repeats import moves
 from ..trajectory import Trajectory
 from .clocks import check_clock
 from .readings import Finding, check_alive, check_copies
-from .reference import check_frozen, check_reference
+from .reference import check_frozen, check_reference, check_steps, reference_on_sensor
 from .sites import seen, sites, vectors
 from .turning import check_rates, compared
 from .units import check_field, check_force, check_noise, check_rest, check_sign
@@ -38,11 +38,14 @@ def check_recording(trajectory: Trajectory) -> list[Finding]:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             trajectory = trajectory.on_grid()
+    findings += check_reference(trajectory)
+    if not wrong_clock:
+        trajectory, moved = reference_on_sensor(trajectory)
+        findings += moved
     for site in sites(trajectory):
         findings += check_site(trajectory, site, wrong_clock)
-    findings += check_reference(trajectory)
     if not any(finding.channel == "imu/gyr" and finding.severity == "warning" for finding in findings):
-        findings += check_frozen(trajectory)
+        findings += [*check_frozen(trajectory), *check_steps(trajectory)]
     return sorted(findings, key=lambda finding: finding.severity != "warning")
 
 

@@ -1,4 +1,4 @@
-"""Plausibility of the reference of a recording: its clock, and stretches in which it stands still."""
+"""Plausibility of the reference of a recording: its clock and axes, jumps, and samples that stand for others."""
 
 from __future__ import annotations
 
@@ -6,8 +6,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..repeats import HELD
-from ..trajectory import Trajectory
+from ....filters.core import rotation
+from ..reference_clock import aligned, rate_error
+from ..repeats import HELD, runs_of, usual_run
+from ..trajectory import REFERENCE_CLOCK, Trajectory
 from .readings import Finding, Severity
 from .sites import seen
 
@@ -15,16 +17,85 @@ LARGE_OFFSET = 0.01
 """s by which a reference may be late before it decides about errors."""
 FROZEN = 0.2
 """rad that a gyroscope turns while a reference stands still."""
+MISALIGNED = 4.0
+"""deg between the axes of reference and sensor, or their verticals, that decide about errors."""
+SIDEWAYS = 45.0
+"""deg from which on they are another order of axes."""
+ALIGN = "Errors contain this angle; align it (poise.envs.data.reference_clock.aligned)."
+EXPLAINED = 0.5
+"""Share of the difference of their rates that is left if an offset or a rotation explains it."""
+JUMP = 0.35
+"""rad that a reference turns between two samples beyond what the gyroscope shows."""
+STALE = 0.01
+"""rad that a gyroscope turns, on average, while a slower reference repeats one value."""
+FEWEST = 500
+"""Samples that determine how a reference lies."""
 
 
 def check_reference(trajectory: Trajectory) -> Iterator[Finding]:
     """Offset of the clock of the reference, if known."""
-    offset = trajectory.metadata.get("reference_clock_offset")
+    offset = trajectory.metadata.get(REFERENCE_CLOCK)
     if isinstance(offset, int | float) and abs(offset) > 1e-3:
         what = f"the reference is {1e3 * abs(offset):.1f} ms {'ahead of' if offset > 0.0 else 'behind'} the gyroscope"
         remedy = "Evaluate with the reference clock corrected as well."
         severity: Severity = "warning" if abs(offset) > LARGE_OFFSET else "note"
         yield Finding(severity, "orientation", what, "two clocks that were not synchronised", remedy)
+
+
+def reference_on_sensor(trajectory: Trajectory) -> tuple[Trajectory, list[Finding]]:
+    """The trajectory with its reference on the gyroscope's clock, and findings about that clock and about its axes.
+
+    A reference that its loader has aligned, or that the motion does not determine, is left alone.
+    """
+    truth = trajectory.truth.get("orientation")
+    channels = [seen(trajectory, channel) for channel in ("imu/gyr", "imu/acc")]
+    if truth is None or "reference_alignment" in trajectory.metadata or any(values is None for values in channels):
+        return trajectory, []
+    there = np.isfinite(np.concatenate([truth, *channels], axis=1)).all(axis=1) & trajectory.mask  # type: ignore[arg-type]
+    if there.sum() < FEWEST:
+        return trajectory, []
+    found, findings = aligned(trajectory), []
+    angles = found.metadata["reference_alignment"]
+    axes, vertical, offset = angles["sensor_deg"], angles["vertical_deg"], found.metadata.get(REFERENCE_CLOCK, 0.0)
+    explained = rate_error(found) < EXPLAINED * rate_error(trajectory)
+    if explained and abs(offset) > LARGE_OFFSET and REFERENCE_CLOCK not in trajectory.metadata:
+        trajectory = trajectory.replace(metadata=trajectory.metadata | {REFERENCE_CLOCK: offset})
+        findings += check_reference(trajectory)
+        trajectory = trajectory.reference_clock_corrected()
+    if explained and MISALIGNED < axes < SIDEWAYS:
+        what, cause = f"its axes are turned by {axes:.0f}° against the sensor's", "markers and sensor on one body"
+        findings.append(Finding("warning", "orientation", what, f"{cause}, whose axes were not aligned", ALIGN))
+    if axes < SIDEWAYS and MISALIGNED < vertical < SIDEWAYS:
+        what = f"its vertical leans by {vertical:.0f}° against that of the accelerometer, on average"
+        cause = "a laboratory whose z axis is not upright, or a bias of the accelerometer"
+        findings.append(Finding("warning", "orientation", what, cause, ALIGN))
+    return trajectory, findings
+
+
+def check_steps(trajectory: Trajectory) -> Iterator[Finding]:
+    """A reference that is slower than the recording, and jumps that the gyroscope does not show."""
+    q, gyr = trajectory.truth.get("orientation"), seen(trajectory, "imu/gyr")
+    if q is None or gyr is None or len(q) < 3:
+        return
+    step = np.gradient(trajectory.time)
+    turned = np.linalg.norm(np.nan_to_num(gyr), axis=1) * step
+    begins, lengths = runs_of(q)
+    usual = usual_run(lengths)
+    if usual > 1 and float((lengths == usual).mean()) > EXPLAINED:
+        missed = float(turned.sum() / len(begins)) * (usual - 1) / usual
+        what = f"every orientation stands {usual} times: the reference runs at {1.0 / (usual * np.median(step)):.4g} Hz"
+        severity: Severity = "warning" if missed > STALE else "note"
+        cause, remedy = "a reference that is slower than the recording", "Replace the repeated rows by NaN."
+        yield Finding(severity, "orientation", what, cause, remedy)
+        return
+    angle = rotation.angle(rotation.multiply(rotation.conjugate(q[:-1]), q[1:]))
+    jumps = angle > JUMP + 3.0 * (turned[:-1] + turned[1:])
+    if jumps.any():
+        rows = np.flatnonzero(jumps) + 1
+        what = f"{len(rows)} jump{'s' if len(rows) > 1 else ''} of up to {np.degrees(angle[jumps].max()):.0f}° (first at sample {rows[0]})"
+        cause = "a tracking system that lost the body, or mistook its markers"
+        remedy = "The gyroscope does not show them: replace the wrong rows by NaN."
+        yield Finding("warning", "orientation", what, cause, remedy)
 
 
 def check_frozen(trajectory: Trajectory) -> Iterator[Finding]:

@@ -1,0 +1,98 @@
+"""A reference on another clock, in other axes, slower than the recording, or that jumps: each kind is named."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+import poise
+from poise.envs.data.plausibility.recording import check_recording
+from poise.envs.data.trajectory import Trajectory
+from poise.envs.hand.sensing import simulate_hand
+from poise.filters.core import rotation
+
+MOTIONS = {gesture: simulate_hand(gesture, seed, duration=30.0) for gesture, seed in (("mixed", 5), ("slow", 8))}
+
+
+def about(axis: tuple[float, float, float], degrees: float) -> np.ndarray:
+    return np.asarray(rotation.exp(np.radians(degrees) * np.array(axis)))
+
+
+def in_body(axis: tuple[float, float, float], degrees: float) -> Callable[[np.ndarray], np.ndarray]:
+    return lambda q: np.asarray(rotation.multiply(q, about(axis, degrees)))
+
+
+def late(samples: int) -> Callable[[np.ndarray], np.ndarray]:
+    return lambda q: np.roll(q, samples, axis=0)
+
+
+def wrong(rows: slice, value: tuple[float, ...]) -> Callable[[np.ndarray], np.ndarray]:
+    def changed(q: np.ndarray) -> np.ndarray:
+        q[rows] = value
+        return q
+
+    return changed
+
+
+def told(gesture: str, change: Callable[[np.ndarray], np.ndarray]) -> list[str]:
+    known = MOTIONS[gesture]
+    q = change(np.array(known.truth["orientation"]))
+    trajectory: Trajectory = known.replace(truth={"orientation": q})[100:-100]
+    return [f"{each.severity}: {each.what}" for each in check_recording(trajectory) if each.channel == "orientation"]
+
+
+@pytest.mark.parametrize("gesture", list(MOTIONS))
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (late(5), "behind the gyroscope"),
+        (late(15), "behind the gyroscope"),
+        (late(-30), "ahead of the gyroscope"),
+        (late(45), "behind the gyroscope"),
+        (in_body((1.0, 0.0, 0.0), 8.0), "its axes are turned by 8° against the sensor's"),
+        (in_body((0.6, 0.8, 0.0), -5.0), "its axes are turned by 5°"),
+        (in_body((0.0, 0.0, 1.0), 30.0), "its axes are turned by 30°"),
+        (lambda q: rotation.multiply(about((1.0, 0.0, 0.0), 8.0), q), "its vertical leans by 8°"),
+        (lambda q: q[np.arange(len(q)) // 10 * 10], "every orientation stands 10 times: the reference runs at 10 Hz"),
+        (lambda q: q[np.arange(len(q)) // 5 * 5], "every orientation stands 5 times: the reference runs at 20 Hz"),
+        (wrong(slice(1200, 1230), (1.0, 0.0, 0.0, 0.0)), "jumps of up to"),
+        (wrong(slice(1200, 1201), (0.6, 0.0, 0.8, 0.0)), "2 jumps of up to"),
+    ],
+)
+def test_each_kind_is_named(gesture: str, change: Callable[[np.ndarray], np.ndarray], words: str) -> None:
+    if gesture == "slow" and words.startswith("jumps"):
+        words = "1 jump of up to 34°"
+    found = told(gesture, change)
+    assert len(found) == 1, found
+    assert found[0].startswith("warning") and words in found[0]
+
+
+def test_two_kinds_are_told_apart() -> None:
+    clock, axes = told("mixed", lambda q: np.roll(rotation.multiply(q, about((0.6, 0.0, 0.8), 20.0)), 10, axis=0))
+    assert "100.0 ms behind" in clock
+    assert "turned by 20°" in axes
+
+
+@pytest.mark.parametrize("gesture", list(MOTIONS))
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda q: q,
+        lambda q: -q,
+        lambda q: q * np.where(np.arange(len(q)) % 3, 1.0, -1.0)[:, None],
+        lambda q: rotation.multiply(about((0.0, 0.0, 1.0), 40.0), q),
+        lambda q: np.where((np.arange(len(q)) % 10 == 0)[:, None], q, np.nan),
+        lambda q: np.where((np.arange(len(q)) > 1500)[:, None], q, np.nan),
+    ],
+)
+def test_sound_references_are_silent(gesture: str, change: Callable[[np.ndarray], np.ndarray]) -> None:
+    assert told(gesture, change) == []
+
+
+def test_a_table_of_errors_warns_of_them() -> None:
+    known = MOTIONS["mixed"]
+    truth = {"orientation": in_body((1.0, 0.0, 0.0), 8.0)(np.array(known.truth["orientation"]))}
+    with pytest.warns(UserWarning, match="its axes are turned by 8°"):
+        poise.evaluate("tilt", known.replace(truth=truth))
