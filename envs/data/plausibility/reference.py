@@ -92,7 +92,8 @@ def check_steps(trajectory: Trajectory) -> Iterator[Finding]:
     jumps = angle > JUMP + 3.0 * (turned[:-1] + turned[1:])
     if jumps.any():
         rows = np.flatnonzero(jumps) + 1
-        what = f"{len(rows)} jump{'s' if len(rows) > 1 else ''} of up to {np.degrees(angle[jumps].max()):.0f}° (first at sample {rows[0]})"
+        count = f"{len(rows)} jump{'s' if len(rows) > 1 else ''}"
+        what = f"{count} of up to {np.degrees(angle[jumps].max()):.0f}° (first at sample {rows[0]})"
         cause = "a tracking system that lost the body, or mistook its markers"
         remedy = "The gyroscope does not show them: replace the wrong rows by NaN."
         yield Finding("warning", "orientation", what, cause, remedy)

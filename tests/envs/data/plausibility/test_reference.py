@@ -66,7 +66,8 @@ def test_each_kind_is_named(gesture: str, change: Callable[[np.ndarray], np.ndar
         words = "1 jump of up to 34°"
     found = told(gesture, change)
     assert len(found) == 1, found
-    assert found[0].startswith("warning") and words in found[0]
+    assert found[0].startswith("warning")
+    assert words in found[0]
 
 
 def test_two_kinds_are_told_apart() -> None:
