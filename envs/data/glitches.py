@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from .repeats import CHANNELS, RunsSoFar, moves, repeated
+from .repeats import CHANNELS, RunsSoFar, moves, repeated, runs_of
 from .trajectory import Trajectory
 
 LEAST = {"gyr": 3.0, "acc": 30.0}
@@ -30,6 +30,8 @@ RETURN = 0.3
 AWAY = (-4, -3, -2, 2, 3, 4)
 REACH = 5
 """Samples before and after that decide on one."""
+WRITTEN = 3
+"""Times that a glitch may be written."""
 FEWEST = 9
 """Samples from which on there is a decision."""
 FULL = 0.999
@@ -39,11 +41,20 @@ FULL = 0.999
 def glitches(values: np.ndarray, least: float) -> np.ndarray:
     """Samples ``(T,)`` bool of ``(T, 3)`` that stand alone, far from neighbours that agree.
 
-    At the start and after a gap the neighbours are the next two samples.
+    At the start and after a gap the neighbours are the next two samples. One sample that was written twice or three
+    times is one.
     """
-    found = np.zeros(len(values), bool)
     if len(values) < FEWEST:
-        return found
+        return np.zeros(len(values), bool)
+    begins, lengths = runs_of(values)
+    if len(begins) < len(values):
+        return np.repeat(alone(values[begins], least) & (lengths <= WRITTEN), lengths)
+    return alone(values, least)
+
+
+def alone(values: np.ndarray, least: float) -> np.ndarray:
+    """The same of samples of which none is as the one before."""
+    found = np.zeros(len(values), bool)
     none = np.full((2, values.shape[1]), np.nan)
     before, after = np.concatenate([none[:1], values[:-1]]), np.concatenate([values[1:], none[:1]])
     with np.errstate(invalid="ignore", over="ignore"):
@@ -65,7 +76,7 @@ def glitches(values: np.ndarray, least: float) -> np.ndarray:
 def sudden(values: np.ndarray, least: float) -> bool:
     """Whether the last of samples ``(T, 3)`` looks like a glitch as long as the next one has not come."""
     with np.errstate(invalid="ignore", over="ignore"):
-        steps = np.linalg.norm(np.diff(values[-REACH:], axis=0), axis=1)
+        steps = np.linalg.norm(np.diff(values[runs_of(values)[0]][-REACH:], axis=0), axis=1)
     if len(steps) < REACH - 1 or not steps[-1] > least:
         return False
     return bool(steps[-1] > ISOLATION * np.sort(np.nan_to_num(steps[:-1]))[-2])

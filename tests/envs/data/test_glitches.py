@@ -39,6 +39,18 @@ def test_a_sample_that_stands_alone_counts_as_missing(kind: str, size: float) ->
         assert inclination(glitched) < inclination(KNOWN) + 0.3
 
 
+@pytest.mark.parametrize("times", [2, 3])
+@pytest.mark.parametrize(("kind", "value"), [("gyr", 35.0), ("gyr", -34.9), ("acc", 156.9), ("acc", -39.2)])
+def test_a_glitch_that_was_written_several_times_is_one(kind: str, value: float, times: int) -> None:
+    rows = (np.arange(150, 1150, 97)[:, None] + np.arange(times)).ravel()
+    glitched = with_samples(kind, rows, np.full(3, value))
+    with pytest.warns(UserWarning, match=f"imu/{kind}: {len(rows)} glitches"):
+        found = without_glitches(glitched)[f"imu/{kind}"]
+    np.testing.assert_array_equal(np.flatnonzero(np.isnan(found).any(axis=1)), rows)
+    arriving, _ = so_far({f"imu/{name}": glitched.measurements[f"imu/{name}"] for name in ("gyr", "acc")}, {})
+    np.testing.assert_array_equal(np.isnan(arriving[f"imu/{kind}"]), np.isnan(found))
+
+
 @pytest.mark.parametrize(("kind", "value"), [("gyr", 99.99), ("acc", -999.0)])
 def test_the_first_sample_and_the_first_after_a_gap_may_be_glitches(kind: str, value: float) -> None:
     rows = np.array([0, *range(600, 641)])
@@ -59,7 +71,7 @@ def test_motion_and_impacts_are_left_alone(gesture: str) -> None:
 
 
 def test_what_lasts_two_samples_or_rings_on_is_a_motion() -> None:
-    two = with_samples("acc", np.array([500, 501]), np.array([60.0, 0.0, 60.0]))
+    two = with_samples("acc", np.array([500, 501]), np.array([[60.0, 0.0, 60.0], [58.0, 1.0, 63.0]]))
     ringing = np.array(KNOWN.measurements["imu/acc"])
     ringing[500:530, 2] += 90.0 * np.exp(-np.arange(30) / 6.0) * (-1.0) ** np.arange(30)
     for trajectory in (two, KNOWN.replace(measurements=KNOWN.measurements | {"imu/acc": ringing})):
