@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import os
 import threading
+import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
@@ -119,8 +120,28 @@ def in_parallel(
         # joblib's backend for Ray hands over all results at the end
         at_once = not get_active_backend()[0].supports_return_generator
         pool = Parallel(n_jobs=min(processes, len(jobs)), return_as="list" if at_once else "generator_unordered")
-        results = pool(delayed(function)(*job) for job in jobs)
+        results = pool(delayed(_in_worker)(os.getpid(), function, *job) for job in jobs)
     with progress_bar(len(jobs), label, unit, show=bool(label and jobs)) as bar:
         for result in results:
             bar.update()
             yield result
+
+
+def _in_worker(employer: int, function: Callable[..., Any], *job: Any) -> Any:
+    """Do a job of another process; a worker that this process started ends with it."""
+    _end_with(employer)
+    return function(*job)
+
+
+@functools.cache
+def _end_with(employer: int) -> None:
+    """End this process when its parent is killed: it would wait for ever for somebody to read its results."""
+    if os.getppid() != employer:  # of a cluster
+        return
+
+    def watch() -> None:
+        while os.getppid() == employer:
+            time.sleep(1.0)
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()

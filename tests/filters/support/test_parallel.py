@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 import threading
+import time
 from pathlib import Path
 
 import numpy as np
@@ -59,3 +63,21 @@ def test_recordings_do_not_depend_on_the_backend(backend: str, tmp_path: Path, m
 def test_a_bar_leaves_no_semaphore_behind() -> None:
     """Tqdm's own lock is one of the system, of which Python complains when a process is interrupted."""
     assert isinstance(progress_bar(1, "jobs", "job").get_lock(), type(threading.RLock()))
+
+
+@pytest.mark.skipif(os.name != "posix", reason="SIGKILL")
+def test_workers_end_with_the_process_that_was_killed() -> None:
+    """They hold its output, so that a reader would wait as long as they live."""
+    script = """
+import time
+from poise.filters.support.parallel import in_parallel
+assert len(list(in_parallel(abs, [(1,), (2,)], 2))) == 2
+print("ready", flush=True)
+list(in_parallel(time.sleep, [(60.0,), (60.0,)], 2))
+"""
+    with subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "ready\n"
+        time.sleep(2.0)
+        process.kill()
+        assert process.communicate(timeout=40.0)[0] == ""
