@@ -17,10 +17,7 @@ ENVIRONMENT = "poise/RiderBicycle-v0"
 def record_suites(options: Sequence[Mapping[str, Any]], seed: int) -> list[Trajectory]:
     """Episodes of ``poise/RiderBicycle-v0`` that differ in their sensors only, bit for bit as if recorded one by one.
 
-    Args:
-        options: arguments of each environment; they may differ in ``suite``, ``sensors``, ``rate`` and what else
-            concerns the sensors alone.
-        seed: of the episode.
+    Their options may differ in ``suite``, ``sensors``, ``rate`` and what else concerns the sensors alone.
 
     Raises:
         ValueError: the ride is not the same in all of them.

@@ -96,13 +96,7 @@ def accelerometer_runs(
 ) -> RateTableData:
     """Runs for every axis: 80 to 800 °/s where it points outwards, back where it points inwards, and upright.
 
-    The reference point of the array is 0.1 m from the axis of the table.
-
-    Args:
-        array: the device, as it is built.
-        truth: its calibration.
-        seed: of motion and noise.
-        hold: time at each rate, s.
+    The reference point of the array is 0.1 m from the axis of the table, which holds each rate for ``hold`` s.
     """
     device = HandDevice(array.name, _spatial(array), "array-data-sheet", gyroscope=False, magnetometer=False)
     channel = truth.channels[accelerometer_channel(array)]
@@ -149,11 +143,7 @@ def _runs(
 ) -> RateTableData:
     """Runs of a device mounted (up, out) on a table, one below the other, a minute apart, without the changes of rate.
 
-    Args:
-        device: what is mounted.
-        tables: mounting → rates of the run.
-        seed: of motion and noise.
-        raw: channel → readings ``(n, size)`` to raw ones.
+    ``raw`` turns readings of channels ``(n, size)`` into raw ones.
     """
     data: RateTableData | None = None
     for child, ((up, out), table) in zip(np.random.SeedSequence(seed).spawn(len(tables)), tables.items(), strict=True):

@@ -298,12 +298,7 @@ def gesture_config(gesture: str | GestureConfig) -> GestureConfig:
 def make_gesture(
     gesture: str | GestureConfig, generator: np.random.Generator, duration: float | None = None
 ) -> Gesture:
-    """Draw a gesture.
-
-    Args:
-        gesture: name (see :data:`GESTURES`) or configuration.
-        generator: source of randomness.
-        duration: length, s; None: that of the configuration.
+    """Draw a gesture by name (:data:`GESTURES`) or configuration, ``duration`` s long; None: that of the configuration.
 
     Raises:
         ValueError: unknown name or a duration that is not positive.

@@ -51,13 +51,9 @@ class Over(Checked):
     tissue_share: float = 0.15
 
     def lay(self, generator: np.random.Generator, base: Gesture, held: Intervals, start: float) -> Gesture:
-        """Draw the parts over a motion.
+        """Draw the parts over a motion without them, whose first rest ends at ``start`` (s).
 
-        Args:
-            generator: source of randomness.
-            base: motion without them.
-            held: when the device is in the hand; it is put down at the end of each interval.
-            start: end of the first rest, s.
+        The device is put down at the end of each interval in which it is ``held``.
         """
         shares = (self.tremor_share, self.drift_share, self.taps_share, self.vibration_share, self.set_down_share)
         # every part has a generator of its own, so that shares change which ones act and nothing else

@@ -26,12 +26,9 @@ UPRIGHT = np.array([math.sqrt(0.5), math.sqrt(0.5), 0.0, 0.0])
 
 
 def planar_state(times: np.ndarray, place: Jet, angle: Jet) -> BodyState:
-    """The state of a body that moves in the vertical plane.
+    """The state of a body that moves in the vertical plane at times ``(T,)``, s.
 
-    Args:
-        times: ``(T,)`` s.
-        place: jet ``(T, 2)``, east and up, m.
-        angle: jet ``(T,)`` of φ, rad.
+    Its jets are the place east and up ``(T, 2)``, m, and the angle φ ``(T,)``, rad.
     """
     position, velocity, acceleration = (
         np.stack([part[:, 0], np.zeros(len(times)), part[:, 1]], axis=-1) for part in place

@@ -116,13 +116,9 @@ def hand_suite(
 
 
 def sense(suite: SensorSuite, states: States, mounting: Mounting, array: AccelerometerArray | None = None) -> Block:
-    """Measurements and truth of consecutive time steps.
+    """Measurements and truth of consecutive time steps by a suite at a site of the device that is mounted so.
 
-    Args:
-        suite: sensors at the mounted site.
-        states: motion of the device.
-        mounting: site and axes on the device.
-        array: the array of accelerometers as it is built, for a device with one.
+    A device with accelerometers in an array has it as it is built.
     """
     now, earlier = (mounted(part, mounting) for part in states)
     first = suite.sensors[0]

@@ -9,9 +9,7 @@ from ...filters.compile.cache import jit
 def spin_momentum(frame, moments):  # type: ignore[no-untyped-def]
     """Angular momentum of a link about its own centre of mass: three numbers, N·m·s, world axes.
 
-    Args:
-        frame: ``(18,)`` of :mod:`.kinematics`.
-        moments: ``(3,)`` principal moments of inertia, kg·m².
+    The frame ``(18,)`` is that of :mod:`.kinematics`, the moments ``(3,)`` principal ones, kg·m².
     """
     x = y = z = 0.0
     for axis in range(3):

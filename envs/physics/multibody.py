@@ -139,14 +139,7 @@ class Multibody:
 def connect_points(
     physics: Physics, parent: tuple[int, int], parent_point: Vector, child: tuple[int, int], child_point: Vector
 ) -> int:
-    """Hold two points of two links together.
-
-    Args:
-        physics: the world.
-        parent: (body, link).
-        parent_point: ``(3,)`` m in that link's body frame.
-        child: (body, link).
-        child_point: ``(3,)`` m in that link's body frame.
+    """Hold two points of two links together, each given by (body, link) and place ``(3,)`` m in the link's body frame.
 
     Returns:
         The constraint's number, for :func:`constraint_forces`.

@@ -101,10 +101,6 @@ class Tree:
         )
 
     def text(self, *, shapes: bool = True) -> str:
-        """The URDF, in short lines: PyBullet reads no more than 8 KiB of a line.
-
-        Args:
-            shapes: whether to have something to draw, which takes most of the time of loading.
-        """
+        """The URDF, in short lines: PyBullet reads no more than 8 KiB of a line. Loading shapes to draw takes most of the time."""
         links = [line for head, drawn in self._links for line in (head, *(drawn if shapes else ()), "</link>")]
         return "\n".join([f'<robot name="{self.name}">', *links, *self._joints, "</robot>"])

@@ -67,12 +67,7 @@ class HandRecipe(Recipe):
             raise ValueError(f"duration must be two samples at least, got {self.duration} s")
 
     def draw(self, seed: int | np.random.SeedSequence, name: str = "randomised") -> Trajectory:
-        """Simulate one episode; separate children of the seed are used for motion, setting and errors.
-
-        Args:
-            seed: of this episode.
-            name: for the metadata.
-        """
+        """Simulate one episode; separate children of its seed are used for motion, setting and errors."""
         sequence = unspawned(seed)
         motion, setting, noise = (np.random.default_rng(child) for child in sequence.spawn(3))
         rate = log_uniform(setting, self.rates)

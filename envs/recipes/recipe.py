@@ -33,21 +33,11 @@ class Recipe(Checked):
     """of the recipe; the shipped ones are in :data:`poise.envs.recipes.registry.RECIPES`"""
 
     def draw(self, seed: int | np.random.SeedSequence, name: str = "randomised") -> Trajectory:
-        """Simulate one episode from a seed.
-
-        Args:
-            seed: of this episode.
-            name: for the metadata.
-        """
+        """Simulate one episode from its seed; ``name`` goes into the metadata."""
         raise NotImplementedError
 
     def episode(self, seed: int, index: int, name: str | None = None) -> Trajectory:
-        """Episode ``index`` of the data set of root ``seed``.
-
-        Args:
-            seed: root seed of the data set, 0 or more.
-            index: of the episode, 0 or more.
-            name: for the metadata; None for ``<recipe>-<seed>-<index>``.
+        """Episode ``index`` of the data set of root ``seed``, by default named ``<recipe>-<seed>-<index>``.
 
         Raises:
             ValueError: a negative number.
@@ -98,12 +88,7 @@ def tuples(value: Any) -> Any:
 
 
 def built(cls: type[T], described: Any, where: str) -> T:
-    """A frozen dataclass, and those in its fields, from mappings.
-
-    Args:
-        cls: the dataclass.
-        described: field → value.
-        where: words before a field in messages.
+    """A frozen dataclass, and those in its fields, from mappings; ``where`` are words before a field in messages.
 
     Raises:
         ValueError: not a mapping, an unknown field, or a value that the class rejects.

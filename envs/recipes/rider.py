@@ -133,12 +133,7 @@ class RiderRecipe(Recipe):
         }
 
     def ride(self, seed: int | np.random.SeedSequence, name: str = "ride") -> Trajectory:
-        """The ride of an episode with ideal sensors, before any errors.
-
-        Args:
-            seed: of the episode.
-            name: for the metadata.
-        """
+        """The ride of an episode with ideal sensors, before any errors."""
         from ..bicycle.environment import RiderBicycleEnv
         from ..record import record_once
 
@@ -149,21 +144,11 @@ class RiderRecipe(Recipe):
         return trajectory.replace(metadata=trajectory.metadata | options | {"name": name})
 
     def draw(self, seed: int | np.random.SeedSequence, name: str = "randomised") -> Trajectory:
-        """Ride, and add the errors of one draw of sensors.
-
-        Args:
-            seed: of the episode: separate children are used for the setting, the ride and the sensors.
-            name: for the metadata.
-        """
+        """Ride, and add the errors of one draw of sensors; setting, ride and sensors have separate children of the seed."""
         return self.sensed(self.ride(seed, name), unspawned(seed).spawn(3)[2])
 
     def sensed(self, ride: Trajectory, seed: int | np.random.SeedSequence) -> Trajectory:
-        """A draw of devices, their errors and the measured geometry on a ride; any number of them a ride.
-
-        Args:
-            ride: of :meth:`ride`.
-            seed: of this draw.
-        """
+        """A draw of devices, their errors and the measured geometry on a :meth:`ride`; any number of them a ride."""
         setting, errors = unspawned(seed).spawn(2)
         generator, sensors = np.random.default_rng(setting), self.sensors
         return redrawn(

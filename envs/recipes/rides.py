@@ -67,12 +67,9 @@ class RideSource:
 
 
 def ride(source: RideSource, seed: int, index: int) -> Trajectory:
-    """A ride with ideal sensors; kept in the user's cache folder for all networks that train on it.
+    """Ride ``index`` with ideal sensors; kept in the user's cache folder for all networks that train on it.
 
-    Args:
-        source: which rides.
-        seed: root seed; rides of different seeds share neither riders nor courses.
-        index: of the ride.
+    Rides of different root seeds share neither riders nor courses.
     """
     made: Any = source.recipe()
     store = EpisodeStore("training-rides", made.describe(), in_memory=1, on_disk=ON_DISK)

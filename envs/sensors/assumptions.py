@@ -119,14 +119,6 @@ FILLED = (
 
 
 def completed(stated: NoiseModel, assumed: NoiseModel) -> tuple[NoiseModel, tuple[str, ...]]:
-    """A stated model with its zeros replaced by assumptions.
-
-    Args:
-        stated: what the data sheet states; 0 for what it does not.
-        assumed: the sensor of a grade.
-
-    Returns:
-        The model, and the names of the fields that are assumed.
-    """
+    """A model that a data sheet states with its zeros replaced by those of a grade, and the names of these fields."""
     names = tuple(name for name in FILLED if not getattr(stated, name) and getattr(assumed, name))
     return replace(stated, **{name: getattr(assumed, name) for name in names}), names

@@ -93,15 +93,9 @@ def vector(name: str, value: Sequence[float] | np.ndarray, size: int) -> tuple[f
 
 
 def mounted(body: BodyState, mounting: Mounting) -> BodyState:
-    """Motion of a sensor that is fixed to a moving body.
+    """Motion of a sensor with a lever arm and rotation on a moving body.
 
-    Args:
-        body: motion of the body frame.
-        mounting: lever arm and rotation of the sensor on the body.
-
-    Returns:
-        The state of the sensor frame: r + Rl, v + ω × Rl and, where both accelerations are known,
-        a + α × Rl + ω × (ω × Rl).
+    It is r + Rl, v + ω × Rl and, where both accelerations are known, a + α × Rl + ω × (ω × Rl).
     """
     orientation = body.orientation
     if mounting.rotation != (1.0, 0.0, 0.0, 0.0):

@@ -105,8 +105,7 @@ class SensorSuite(Sensing):
     def reset(self, rng: np.random.Generator) -> None:
         """Begin an episode: draw what is constant in it and forget the last one.
 
-        Args:
-            rng: each sensor draws from a separate child, so sensors added at the end do not change the others.
+        Each sensor draws from a separate child, so sensors added at the end do not change the others.
         """
         super().reset(rng)
         children = rng.spawn(len(self.sensors))

@@ -192,12 +192,9 @@ class Clock:
 
 
 def make_clocks(keys: Iterable[ClockKey | None], rate: float, generator: np.random.Generator) -> dict[ClockKey, Clock]:
-    """Clocks of an episode: one for every timing at every site.
+    """Clocks of an episode at ``rate`` (Hz): one for every timing at every site; None for a punctual sensor.
 
-    Args:
-        keys: site and timing of each sensor; None for a punctual one.
-        rate: time steps per second, Hz.
-        generator: from whose seed they descend; it is not used up.
+    They descend from the generator's seed; it is not used up.
     """
     return {
         key: Clock(key[1], rate, named_generator(generator, "clock", key[0]))

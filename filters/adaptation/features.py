@@ -70,13 +70,7 @@ class InnovationFeatures(Features):
         return self.empty(batch, len(STREAMS) * (width + 3) + 2, (len(STREAMS), width))
 
     def observe(self, memory: FeatureMemory, kalman: KalmanFilter, action: np.ndarray) -> np.ndarray:
-        """Features and the action of the last interval: float32 ``(*batch, size)`` in [−1, 1].
-
-        Args:
-            memory: at the end of an interval.
-            kalman: the filter.
-            action: ``(*batch, k)`` in [−1, 1].
-        """
+        """Features at the end of an interval and its action ``(*batch, k)``: float32 ``(*batch, size)`` in [−1, 1]."""
         batch, scales = memory.averages.shape[:-2], len(self.scales)
         block = memory.averages[..., :-2].reshape(*batch, scales, len(STREAMS), -1)
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -138,9 +132,7 @@ def stream_channels(kalman: KalmanFilter) -> tuple[str, str | None]:
 def before(values: np.ndarray, held: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The last valid vector before every sample ``(T, *batch, d)``, and that after the last one ``(*batch, d)``.
 
-    Args:
-        values: ``(T, *batch, d)``; a vector with any NaN is unknown.
-        held: ``(*batch, d)`` last valid vector before the first sample.
+    A vector with any NaN is unknown; ``held`` is the last valid one before the first sample.
     """
     row = np.concatenate([held[None], values])
     known = np.isfinite(row).all(axis=-1)

@@ -105,9 +105,7 @@ class NamedFeatures(Features):
 def features_of(kalman: KalmanFilter, interval: float = 0.1) -> Features:
     """The features for a filter: invariant ones for one inertial sensor in any mounting, else every number by name.
 
-    Args:
-        kalman: the filter.
-        interval: between decisions, s.
+    ``interval`` (s) is that between decisions.
     """
     if all(channel.name.startswith("imu/") for channel in kalman.channels):
         return InnovationFeatures(interval)

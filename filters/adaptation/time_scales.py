@@ -81,13 +81,7 @@ class Features:
         return FeatureMemory(averages, sums, np.full((*batch, *previous), np.nan), np.array(0), np.zeros(batch, int))
 
     def observe(self, memory: FeatureMemory, kalman: KalmanFilter, action: np.ndarray) -> np.ndarray:
-        """Features and the action of the last interval: float32 ``(*batch, size)`` in [−1, 1].
-
-        Args:
-            memory: at the end of an interval.
-            kalman: the filter.
-            action: ``(*batch, k)`` in [−1, 1].
-        """
+        """Features at the end of an interval and its action ``(*batch, k)``: float32 ``(*batch, size)`` in [−1, 1]."""
         raise NotImplementedError
 
     def moments(

@@ -123,10 +123,7 @@ def posterior_bound(model: Model, states: np.ndarray, measurements: Mapping[str,
 def riccati(system: Linearisation, P: np.ndarray, first: int = 0) -> np.ndarray:
     """Covariances ``(T, e, e)`` of the optimal filter of a linear system; NaN before the start.
 
-    Args:
-        system: matrices of all steps and measurements.
-        P: ``(e, e)`` covariance at the first sample, including its measurement.
-        first: number of that sample.
+    ``P`` ``(e, e)`` is that at the sample ``first``, its measurement included.
     """
     F, Q = system.F, system.Q
     bounds = [np.full_like(P, np.nan)] * first + [P]

@@ -205,12 +205,7 @@ class RiderEquations(Equations):
 
     @classmethod
     def for_rider(cls, geometry: RiderGeometry, **parameters: Any) -> Self:
-        """The equations for one rider and bicycle.
-
-        Args:
-            geometry: of rider and bicycle.
-            parameters: other fields; they take precedence over those of the geometry.
-        """
+        """The equations for one rider and bicycle; parameters are other fields and take precedence over the geometry."""
         return cls(**(cls.rider_parameters(geometry) | parameters))
 
     @classmethod

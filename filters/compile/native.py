@@ -24,11 +24,9 @@ _ENGINES: list[Any] = []
 
 
 def addresses(functions: Mapping[str, str], label: str) -> dict[str, int]:
-    """Addresses of printed functions in the memory of this process.
+    """Addresses of printed functions (:func:`.emit.print_function`) in the memory of this process.
 
-    Args:
-        functions: name → text of :func:`.emit.print_function`.
-        label: begins the name of the file that keeps the machine code.
+    ``label`` begins the name of the file that keeps the machine code.
     """
     binding.initialize_native_target()
     binding.initialize_native_asmprinter()

@@ -43,16 +43,10 @@ SECTION = 5.0
 
 
 def relative_delay(before: np.ndarray, now: np.ndarray, after: np.ndarray, dt: float) -> float:
-    """The delay in seconds, from innovations squared at delays of −``STEP``, 0 and ``STEP``.
+    """The delay in seconds, from innovations squared ``(T, *batch)`` at delays of −``STEP``, 0 and ``STEP``.
 
-    Args:
-        before: ``(T, *batch)``, NaN where there is none; all sequences of a batch are of one device.
-        now: likewise.
-        after: likewise.
-        dt: sampling interval, s.
-
-    Returns:
-        Zero if the recording is shorter than three sections or tells nothing.
+    All sequences of a batch are of one device. It is zero if the recording is shorter than three sections or tells
+    nothing.
     """
     length = round(SECTION / dt)
     count = len(now) // length

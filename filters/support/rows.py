@@ -14,11 +14,7 @@ RESULT = ("estimator", "trajectory", "quantity", "metric", "value", "unit")
 
 
 def records(rows: Iterable[Any]) -> list[dict[str, Any]]:
-    """Return rows as dictionaries.
-
-    Args:
-        rows: mappings, named tuples, dataclass instances, or one pandas data frame.
-    """
+    """Return mappings, named tuples, dataclass instances, or one pandas data frame as dictionaries."""
     if hasattr(rows, "to_dict") and not isinstance(rows, Mapping):
         rows = rows.to_dict("records")
     return [_record(row) for row in rows]
@@ -35,11 +31,9 @@ def _record(row: Any) -> dict[str, Any]:
 
 
 def jsonable(value: Any, infinite: Callable[[float], Any] = str) -> Any:
-    """Return ``value`` in JSON's types: dataclasses by field, paths as text, arrays as lists.
+    """Return anything in JSON's types: dataclasses by field, paths as text, arrays as lists.
 
-    Args:
-        value: anything.
-        infinite: what stands for a number that is not finite; its text by default.
+    ``infinite`` gives what stands for a number that is not finite.
     """
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         return {field.name: jsonable(getattr(value, field.name), infinite) for field in dataclasses.fields(value)}

@@ -114,12 +114,9 @@ class Path:
 
 
 def smooth_curvature(curvature: Callable[[np.ndarray], np.ndarray], length: float, blend: float = 1.0) -> np.ndarray:
-    """Curvature at the points of a path of some length, blended over ``blend`` metres so that it has no jumps.
+    """Curvature (1/m) at the points of a path of some length, averaged over ``blend`` (m) so that it has no jumps.
 
-    Args:
-        curvature: arc length ``(n,)`` m → curvature ``(n,)`` 1/m.
-        length: m.
-        blend: m; the width of the averaging window.
+    ``curvature`` is a function of arc length ``(n,)``, m.
 
     Raises:
         ValueError: a length that is not positive.

@@ -83,12 +83,7 @@ class Scenario:
     """whether the rider coasts now and then"""
 
     def draw(self, rng: np.random.Generator, duration: float, surface: str | Surface | None = None) -> Course:
-        """Draw a course for a ride of ``duration`` seconds.
-
-        Args:
-            rng: source of randomness.
-            duration: s.
-            surface: in place of the scenario's own; ``"random"`` draws one.
+        """Draw a course for a ride of ``duration`` s; a surface replaces the scenario's own, ``"random"`` draws one.
 
         Raises:
             ValueError: an unknown surface.

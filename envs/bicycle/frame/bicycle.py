@@ -303,10 +303,8 @@ class Bicycle:
     def own_wrench(self, before: np.ndarray, after: np.ndarray, point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Wrench of all external forces on the bicycle's own links in the last step, see :func:`newton_euler`.
 
-        Args:
-            before: frames ``(n + 1, 18)`` of the body before it.
-            after: after it.
-            point: ``(3,)`` m, world.
+        ``before`` and ``after`` it the body has the frames ``(n + 1, 18)``; moments are about a point ``(3,)``, m,
+        world.
         """
         rows, physics = np.array(self.own_links) + 1, self.physics
         force, moment = newton_euler(

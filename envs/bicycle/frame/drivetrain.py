@@ -80,12 +80,7 @@ class Drivetrain:
         return min(self.parameters.gears, key=lambda ratio: abs(math.log(max(1e-3, wheel_rate) / ratio / middle)))
 
     def next_gear(self, time: float, wheel_rate: float) -> float | None:
-        """Ratio of the next gear if the cadence is too slow or fast; None to stay in the present one.
-
-        Args:
-            time: s.
-            wheel_rate: rad/s.
-        """
+        """Ratio of the next gear if the cadence at ``wheel_rate`` (rad/s) is too slow or fast; None to stay."""
         ratio, _, shifted = self.chain[:3].tolist()
         cadence = wheel_rate / ratio
         higher = cadence > self._fast

@@ -34,13 +34,7 @@ class Foot:
         self.engaged = 1.0 if speed < STOPPING else 0.0
 
     def update(self, speed: float, wanted: float, period: float) -> None:
-        """Set the foot down or lift it, during one control period (s).
-
-        Args:
-            speed: of the bicycle, m/s.
-            wanted: speed, m/s.
-            period: s.
-        """
+        """Set the foot down or lift it, during one control period (s); speeds of the bicycle in m/s."""
         stopping, held = wanted < STOPPING, self.engaged > 0.0
         down = speed < ROLLING and (stopping or held)
         change = period / SET_IN if down else -period / SET_IN

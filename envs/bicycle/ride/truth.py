@@ -53,10 +53,9 @@ Quaternions = dict[str, np.ndarray]
 
 
 def isb_zxy(q: np.ndarray) -> np.ndarray:
-    """Flexion, lateral bending (to the right positive) and axial rotation ``(..., 3)``: Z-X-Y angles in ISB axes.
+    """Flexion, bending (to the right positive) and axial rotation ``(..., 3)``: Z-X-Y angles in ISB axes.
 
-    Args:
-        q: ``(..., 4)`` child to parent, our axes.
+    ``q`` ``(..., 4)`` turns the child into the parent, our axes.
     """
     R = ISB @ rotation.to_matrix(q) @ ISB.T
     return np.stack(
@@ -72,8 +71,7 @@ def isb_zxy(q: np.ndarray) -> np.ndarray:
 def isb_yxy(q: np.ndarray) -> np.ndarray:
     """Plane of elevation, elevation (negative, in (−π, 0)) and axial rotation ``(..., 3)``: Y-X-Y angles in ISB axes.
 
-    Args:
-        q: ``(..., 4)`` humerus to trunk, our axes.
+    ``q`` ``(..., 4)`` turns the humerus into the trunk, our axes.
     """
     R = ISB @ rotation.to_matrix(q) @ ISB.T
     return np.stack(

@@ -132,12 +132,7 @@ CAMERA_DISTANCES = Device(
 
 
 def wheel_encoder(radius: float, rate: float) -> Device:
-    """Speed from counts of the rear wheel's encoder in each interval.
-
-    Args:
-        radius: of the wheel, m.
-        rate: samples per second, Hz.
-    """
+    """Speed from counts of the rear wheel's encoder in each interval; radius in m, rate in Hz."""
     return Device(
         "Grayhill 63R",
         "whole-body section II-A: 256 lines; data sheet: quadrature; counts of each interval are not smoothed, and "

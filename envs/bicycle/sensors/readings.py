@@ -73,12 +73,8 @@ def seat_load_cells(ride: RideQuantities) -> np.ndarray:
 def centre_of_pressure(cells: np.ndarray, sites: SensorSites) -> np.ndarray:
     """Centre of pressure on the saddle ``(..., 2)``: m ahead and to the left of the saddle point.
 
-    Args:
-        cells: ``(..., 3)`` compression front, rear left, rear right, N.
-        sites: of the cells.
-
-    Returns:
-        x_C and y_C below (10) of the force-inertial paper, here with y to the left.
+    It is x_C, y_C below (10) of the force-inertial paper, here with y to the left, of cells ``(..., 3)`` that are
+    compressed in front, rear left and rear right, N.
     """
     return cells @ np.array([sites.load_cells.x, sites.load_cells.y]).T / np.sum(cells, axis=-1, keepdims=True)
 

@@ -72,13 +72,9 @@ def sensor_at(trajectory: Trajectory, channel: str) -> Mapping[str, Any]:
 def sensor_truth(
     truth: Mapping[str, np.ndarray], sensor: Mapping[str, Any], site: str, name: str
 ) -> dict[str, np.ndarray]:
-    """Truth of the body that carries a sensor → truth of the sensor.
+    """Truth ``(T, size)`` of the body that carries a sensor of :func:`sensor_at` → truth of the sensor.
 
-    Args:
-        truth: of the ride, name → ``(T, size)``.
-        sensor: from :func:`sensor_at`.
-        site: of the sensor.
-        name: of the ride, for messages.
+    ``name`` is that of the ride, for messages.
 
     Raises:
         ValueError: the orientation of the body is not known.

@@ -133,10 +133,7 @@ class SoftTissueMotion:
         return np.ascontiguousarray(block[:3, :3]), np.ascontiguousarray(block[:3, 3])
 
     def carry(self, bodies: Mapping[str, BodyState]) -> tuple[dict[str, BodyState], dict[str, np.ndarray]]:
-        """Motion of the skin at the next n samples.
-
-        Args:
-            bodies: motion of the bones ``(n, …)`` by name.
+        """Motion of the skin at the next n samples, from the motion of the bones ``(n, …)`` by name.
 
         Returns:
             The bodies with the motion of their skin, a frame to which sensors are fixed, and displacement and rotation

@@ -62,13 +62,7 @@ class ArmDriver:
         self._late = np.zeros((max(1, round(self.arm.delay / self.time_step)), 12))
 
     def start(self, gesture: Gesture, mass_factor: float = 1.0, generator: np.random.Generator | None = None) -> None:
-        """Begin a gesture.
-
-        Args:
-            gesture: what is meant.
-            mass_factor: of the device's mass and moments, which the arm does not know.
-            generator: of the noise; None for none.
-        """
+        """Begin a gesture; the arm does not know ``mass_factor``, of the device's mass and moments. Without generator no noise."""
         self._gesture, self._mass_factor, self._step = gesture, mass_factor, 0
         self._late = np.zeros_like(self._late)
         self._noise = None

@@ -101,15 +101,7 @@ class Path:
     def draw(
         cls, generator: np.random.Generator, duration: float, speed: float, turning: float, intervals: Intervals
     ) -> Path:
-        """Draw a path.
-
-        Args:
-            generator: source of randomness.
-            duration: s.
-            speed: mean while walking, m/s.
-            turning: root mean square of the rate of turning while walking, rad/s.
-            intervals: when one walks.
-        """
+        """Draw a path of ``duration`` s with means while walking: speed (m/s), and root mean square of the turning (rad/s)."""
         times = cls.INTERVAL * np.arange(-2, int(np.ceil((duration + MARGIN) / cls.INTERVAL)) + 5)
         # standing, one neither goes nor turns; the spline moves three knots before its coefficients do
         margin = 3.0 * cls.INTERVAL

@@ -19,10 +19,7 @@ from ...core.rotation import rotate
 def pointing_angles(q: Array) -> tuple[Array, Array]:
     """Pitch θ = arcsin e_z and azimuth ψ = atan2(e_x, e_y) ``(...)``, rad, of the body's y axis e in the world.
 
-    The azimuth is measured from north (+y) towards east (+x).
-
-    Args:
-        q: unit quaternion, body to world, ``(..., 4)``.
+    The azimuth is measured from north (+y) towards east (+x); ``q`` ``(..., 4)`` rotates from body to world.
     """
     xp = namespace(q)
     e = rotate(q, 0.0 * q[..., 1:] + xp.asarray([0.0, 1.0, 0.0], dtype=q.dtype))

@@ -102,12 +102,7 @@ def in_bicycle(force: Triple, phi_b: Scalar) -> Triple:
 
 
 def pedal_moment(force: Scalar, rider: ForceInertialParameters) -> Scalar:
-    """Moment about the bicycle's y of the pedals on the rider, about the pivot, N·m.
-
-    Args:
-        force: of the rider down on the pedals, bicycle axes, N.
-        rider: points of action.
-    """
+    """Moment about the bicycle's y of the pedals on the rider, about the pivot, N·m, for a force down on them, N."""
     resting = rider.axle_forward * rider.pedal_down - rider.axle_up * rider.pedal_back
     return resting + rider.drive_forward * (force - rider.pedal_down)
 

@@ -250,13 +250,7 @@ def resting_legs(geometry: RiderGeometry, gravity: float = GRAVITY) -> RestingLe
 
 
 def resting_leg(geometry: RiderGeometry, crank: np.ndarray, gravity: float = GRAVITY) -> Leg:
-    """Statics of one leg.
-
-    Args:
-        geometry: of the person.
-        crank: ``(n,)`` angle of this leg's crank, 0 in front, forward positive, rad.
-        gravity: m/s².
-    """
+    """Statics of one leg whose crank has the angles ``(n,)``, 0 in front, forward positive, rad."""
     hip, axle = np.array(geometry.hip)[[0, 2]], np.array(geometry.crank_axle)[[0, 2]]
     pedal = axle + geometry.crank_length * np.stack([np.cos(crank), -np.sin(crank)], axis=-1)
     reach = pedal - hip

@@ -64,12 +64,9 @@ def readings(
 
 
 def steering(parameters: ForceInertialParameters, speed: Array, yaw: Scalar) -> Scalar:
-    """Angle of the handlebar to the right, rad, for which the wheels roll along the path of this yaw rate.
+    """Angle of the handlebar to the right, rad, for which the wheels roll along a path.
 
-    Args:
-        parameters: wheelbase and caster angle.
-        speed: m/s, at least 0.3 m/s.
-        yaw: rate to the right, rad/s.
+    Its yaw rate to the right is in rad/s, the speed in m/s, at least 0.3 m/s.
     """
     xp = namespace(speed)
     slow = xp.less(speed, 0.3)
@@ -82,10 +79,7 @@ def static_angles(
 ) -> tuple[Array, Array, Array, Array]:
     """Angles φ_h, θ, φ, φ_b for which a trunk at rest in a steady turn requires the measured forces.
 
-    Args:
-        parameters: of the rider.
-        read: measured forces.
-        lateral: v_b ψ̇, m/s²; zero for rest.
+    ``lateral`` is v_b ψ̇, m/s²; zero for rest.
     """
     xp = namespace(lateral)
     gravity, scale = parameters.gravity, parameters.trunk_mass * parameters.trunk_height
