@@ -101,6 +101,9 @@ class Tree:
         )
 
     def text(self, *, shapes: bool = True) -> str:
-        """The URDF, in short lines: PyBullet reads no more than 8 KiB of a line. Loading shapes to draw takes most of the time."""
+        """The URDF, in short lines: PyBullet reads no more than 8 KiB of a line.
+
+        Shapes are there to be drawn; they take most of the time of loading.
+        """
         links = [line for head, drawn in self._links for line in (head, *(drawn if shapes else ()), "</link>")]
         return "\n".join([f'<robot name="{self.name}">', *links, *self._joints, "</robot>"])

@@ -144,7 +144,7 @@ class RiderRecipe(Recipe):
         return trajectory.replace(metadata=trajectory.metadata | options | {"name": name})
 
     def draw(self, seed: int | np.random.SeedSequence, name: str = "randomised") -> Trajectory:
-        """Ride, and add the errors of one draw of sensors; setting, ride and sensors have separate children of the seed."""
+        """Ride, and add the errors of one draw of sensors; setting, ride and sensors have seeds of their own."""
         return self.sensed(self.ride(seed, name), unspawned(seed).spawn(3)[2])
 
     def sensed(self, ride: Trajectory, seed: int | np.random.SeedSequence) -> Trajectory:

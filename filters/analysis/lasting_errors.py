@@ -197,7 +197,7 @@ FREQUENCIES, DAMPINGS = np.geomspace(0.3, 30.0, 41), np.geomspace(0.1, 4.0, 25)
 
 
 def fitted_process(values: np.ndarray, dt: float) -> tuple[float, float, bool]:
-    """Second-order process that is correlated as the values ``(T,)`` of mean zero every ``dt`` s, or that whose rate is.
+    """Second-order process that is correlated as values ``(T,)`` of mean zero every ``dt`` s, or whose rate is.
 
     Returns:
         Frequency ω (rad/s), damping ζ, and whether it is the rate.

@@ -205,7 +205,7 @@ class RiderEquations(Equations):
 
     @classmethod
     def for_rider(cls, geometry: RiderGeometry, **parameters: Any) -> Self:
-        """The equations for one rider and bicycle; parameters are other fields and take precedence over the geometry."""
+        """The equations for one rider and bicycle; ``parameters`` are other fields, and take precedence."""
         return cls(**(cls.rider_parameters(geometry) | parameters))
 
     @classmethod

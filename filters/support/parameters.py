@@ -62,7 +62,7 @@ def check_positive(of: object, *names: str, or_zero: Sequence[str] = ()) -> None
 
 
 def arguments_of(maker: Callable[..., Any], args: Sequence[Any], kwargs: Mapping[str, Any]) -> dict[str, Any]:
-    """Name → value of the arguments of a call but ``self``; empty if they do not fit, which Python itself then reports."""
+    """Name → value of a call's arguments without ``self``; empty if they do not fit, which Python then reports."""
     signature = inspect.signature(maker)
     try:
         given = signature.bind(None, *args, **kwargs).arguments

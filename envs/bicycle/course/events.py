@@ -57,7 +57,7 @@ class Events:
 
 
 def gusts(rng: np.random.Generator, speed: float, duration: float) -> SideForce:
-    """Cross wind of a breezy day, and pushes as by passing lorries, for a ride at ``speed`` (mean, m/s) of ``duration`` s.
+    """Cross wind of a breezy day, and pushes as by passing lorries, for a ride at a mean speed (m/s).
 
     The wind across is a mean of up to 4 m/s with turbulence of 1.5 m/s (standard deviation, first-order spectrum of 2
     s). A push of 15 to 40 N lasts 0.4 to 1 s and comes every 8 to 16 s. All are round figures of this project.

@@ -17,7 +17,7 @@ BODY_PLACES = ("trunk_pivot", "shoulder", "hip", "trunk_imu")
 
 
 def rider_geometry(posture: Posture, sites: SensorSites | None = None) -> RiderGeometry:
-    """The geometry of a person fitted to a bicycle; sensor sites, None for those of the papers, give the rolling radius."""
+    """The geometry of a person fitted to a bicycle; sites (None: the papers') give the wheel's rolling radius."""
     sites = sensor_sites(posture) if sites is None else sites
     bicycle, body, trunk = posture.bicycle, posture.body, posture.trunk()
     drive = bicycle.drive

@@ -46,7 +46,7 @@ class PlacementErrors:
         return not any(vars(self).values())
 
     def draw(self, sites: Mapping[str, Mounting], rng: np.random.Generator) -> dict[str, Mounting]:
-        """Where the sensors of a ride really are, by name of :data:`PLACED`; the errors of one do not depend on the others."""
+        """Where the sensors of :data:`PLACED` really are; the errors of one site do not depend on the others."""
         drawn = dict(zip(PLACED, rng.standard_normal((len(PLACED), 6)), strict=True))
         found = {}
         for name, site in sites.items():

@@ -70,7 +70,7 @@ class WornSensors:
     def simulate(
         self, bodies: Mapping[str, BodyState], ride: RideQuantities
     ) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
-        """Measurements at the next n time steps from the motion of the bones by name, and the truth about the sensors."""
+        """Measurements at the next n time steps from the motion of the bones, and the truth about the sensors."""
         skins, moved = self._tissue.carry(bodies)
         measurements, truth, _ = self.suite.simulate(skins, ride)
         for name, site in self._nominal.items():

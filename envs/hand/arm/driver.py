@@ -62,7 +62,7 @@ class ArmDriver:
         self._late = np.zeros((max(1, round(self.arm.delay / self.time_step)), 12))
 
     def start(self, gesture: Gesture, mass_factor: float = 1.0, generator: np.random.Generator | None = None) -> None:
-        """Begin a gesture; the arm does not know ``mass_factor``, of the device's mass and moments. Without generator no noise."""
+        """Begin a gesture, without noise if there is no generator; the arm does not know the factor of the mass."""
         self._gesture, self._mass_factor, self._step = gesture, mass_factor, 0
         self._late = np.zeros_like(self._late)
         self._noise = None
