@@ -101,7 +101,7 @@ class Path:
     def draw(
         cls, generator: np.random.Generator, duration: float, speed: float, turning: float, intervals: Intervals
     ) -> Path:
-        """Draw a path of ``duration`` s with means while walking: speed (m/s), and root mean square of the turning (rad/s)."""
+        """Draw a path of ``duration`` s: mean speed (m/s) and root mean square of the turning (rad/s) while walking."""
         times = cls.INTERVAL * np.arange(-2, int(np.ceil((duration + MARGIN) / cls.INTERVAL)) + 5)
         # standing, one neither goes nor turns; the spline moves three knots before its coefficients do
         margin = 3.0 * cls.INTERVAL
