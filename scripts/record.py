@@ -138,8 +138,7 @@ def recorder(args: Args) -> tuple[Callable[..., list[Path]], str]:
         ValueError: an unknown recipe, environment or option, or options beside a recipe, which has its own fields.
     """
     if args.recipe is not None:
-        from ..envs.recipes.recording import record_recipe
-        from ..envs.recipes.registry import recipe
+        from ..envs.recipes.registry import recipe, record_recipe
 
         if args.options:
             raise ValueError(f"options belong to an environment, but --recipe is {args.recipe}: edit its JSON instead")

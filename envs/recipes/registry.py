@@ -5,13 +5,14 @@ from __future__ import annotations
 import importlib
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from ...filters.support.files import write_text
 from ...filters.support.names import look_up
-from ..data.trajectory import Trajectory
+from ..data.trajectory import Trajectory, load_trajectory
+from ..record import refuse_others, resumed
 from ..sensors.assumptions import CONSUMER, INDUSTRIAL
 from .hand import HandRecipe
 from .recipe import Recipe
@@ -173,3 +174,58 @@ def rebuilt(trajectory: Trajectory) -> Trajectory:
     if not isinstance(origin, Mapping) or not {"definition", "seed", "index"} <= set(origin):
         raise ValueError(f"{trajectory.name} carries no recipe: its metadata hold {sorted(trajectory.metadata)}")
     return recipe(origin["definition"]).episode(origin["seed"], origin["index"], trajectory.name)
+
+
+def record_recipe(
+    made: Recipe,
+    folder: str | Path,
+    *,
+    episodes: int,
+    seed: int = 0,
+    processes: int = 1,
+    report: Callable[[Path], None] | None = None,
+) -> list[Path]:
+    """Record the first episodes of a recipe; what is finished stays, and a second call continues there.
+
+    Args:
+        made: the recipe, which every file carries.
+        folder: where the files ``<recipe>_<index>.h5`` go.
+        episodes: how many there shall be; a larger number keeps the first ones.
+        seed: root seed.
+        processes: how many are simulated at a time; the numbers do not depend on it.
+        report: called with the path of every finished episode, also with those that were there.
+
+    Returns:
+        The paths, in order.
+
+    Raises:
+        ValueError: a number is out of its range, or a file in the folder is an episode of another recipe or seed
+            (nothing is overwritten).
+    """
+    for name, value, least in (("episodes", episodes, 1), ("processes", processes, 1), ("seed", seed, 0)):
+        if value < least:
+            raise ValueError(f"{name} must be at least {least}, got {value}")
+    folder = Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    paths = [folder / f"{made.name}_{index:04d}.h5" for index in range(episodes)]
+    described = made.describe()
+    return resumed(
+        record_one, check_same, [(described, seed, index, path) for index, path in enumerate(paths)], processes, report
+    )
+
+
+def record_one(described: Mapping[str, Any], seed: int, index: int, path: Path) -> Path:
+    """Simulate one episode and write it; the file appears whole or not at all."""
+    return described_recipe(described).episode(seed, index, path.stem).save(path)
+
+
+def check_same(described: Mapping[str, Any], seed: int, index: int, path: Path) -> None:
+    """Refuse to mix episodes of different origin in one folder.
+
+    Raises:
+        ValueError: the file holds another episode.
+    """
+    found = load_trajectory(path).metadata.get("recipe") or {}
+    refuse_others(
+        path, found | {"recipe": found.get("definition")}, {"seed": seed, "index": index, "recipe": described}
+    )

@@ -2,11 +2,13 @@
 
 Riding costs time; drawing sensors anew on a ride does not. What a learner corrects is mostly constant in a ride and
 differs from ride to ride: alignment, zeros, lengths of limbs. So every ride is used several times, each with another
-draw of errors and half of them with left and right exchanged.
+draw of errors and half of them with left and right exchanged. A lasting fault of a sensor is what a filter with
+constant noises does not expect.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
@@ -16,7 +18,6 @@ from ...filters.bicycle.geometry import GEOMETRY_STD, TapeMeasure
 from ...filters.support.names import look_up
 from ..data.trajectory import Trajectory
 from ..episodes import EpisodeStore
-from .faults import FAULTS
 from .recipe import Recipe
 from .redraw import TRUE_GEOMETRY
 from .registry import described_recipe, recipe
@@ -49,7 +50,7 @@ class RideSource:
     exact_draws: int = 0
     """further draws on each ride, whose rider is measured exactly, not with a tape"""
     fault: str | None = None
-    """one of :data:`.faults.FAULTS` in every draw, at the same time in all of a ride"""
+    """one of :data:`.rides.FAULTS` in every draw, at the same time in all of a ride"""
 
     def __post_init__(self) -> None:
         for name, least in (("rides", 1), ("draws", 1), ("exact_draws", 0)):
@@ -101,3 +102,42 @@ def held_out(source: RideSource, **changes: Any) -> RideSource:
     """The same distribution but for some fields of the recipe, such as ``styles=("aggressive",)``; tapes alone."""
     changed = {**source.changes, **{name: list(value) for name, value in changes.items()}}
     return replace(source, changes=changed, exact_draws=0)
+
+
+EARLIEST = 5.0
+"""s after the start of the ride"""
+LEAST = 15.0
+"""s that a fault lasts at least, where the ride is long enough"""
+
+
+@dataclass(frozen=True)
+class Fault:
+    """A number of a channel that is off for a while."""
+
+    channel: str
+    column: int
+    size: float
+    """in the channel's unit"""
+    longest: float = math.inf
+    """s after which it is over"""
+
+    def applied(self, ride: Trajectory, generator: np.random.Generator) -> Trajectory:
+        """The ride with this fault from a random time on.
+
+        Raises:
+            ValueError: the ride lacks the channel.
+        """
+        if self.channel not in ride.measurements:
+            raise ValueError(f"ride {ride.name!r} lacks the channel {self.channel!r} of the fault")
+        time = ride.time - ride.time[0]
+        start = generator.uniform(EARLIEST, max(EARLIEST, time[-1] - min(self.longest, LEAST)))
+        values = ride.measurements[self.channel].copy()
+        values[(time >= start) & (time < start + self.longest), self.column] += self.size
+        return ride.replace(measurements={**ride.measurements, self.channel: values})
+
+
+FAULTS = {
+    "bias step": Fault("bicycle_imu/gyr", 0, math.radians(1.0)),
+    "seat offset": Fault("seat/wrench", 1, 40.0, 20.0),
+}
+"""Name → fault: 1 °/s more of the bicycle's roll rate until the end; 40 N of side force below the saddle for 20 s."""

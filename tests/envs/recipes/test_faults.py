@@ -10,8 +10,7 @@ import pytest
 
 from poise.envs.data.trajectory import Trajectory
 from poise.envs.recipes import rides
-from poise.envs.recipes.faults import EARLIEST, FAULTS
-from poise.envs.recipes.rides import RideSource, drawn
+from poise.envs.recipes.rides import EARLIEST, FAULTS, RideSource, drawn
 
 LENGTH = 4000
 RIDE = Trajectory(

@@ -11,8 +11,7 @@ import pytest
 from poise.envs.data.trajectory import load_trajectory
 from poise.envs.hand.hand_held import HandHeld
 from poise.envs.recipes.hand import HandRecipe
-from poise.envs.recipes.recording import record_recipe
-from poise.envs.recipes.registry import rebuilt, save_recipe
+from poise.envs.recipes.registry import rebuilt, record_recipe, save_recipe
 from poise.scripts.main import main
 
 SHORT = HandRecipe("short", duration=3.0, carried_share=0.0, held=HandHeld(first_rest=(0.3, 1.0)))
