@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...envs.bicycle.frame.shapes import PAINT, RUBBER, Outline, bicycle_shapes
 from ...filters.bicycle.force_inertial.kinematics import DOWN, UP_THE_TRUNK
 from ...filters.bicycle.geometry import RiderGeometry
 from ...filters.bicycle.relative_sensor import relative_orientation
@@ -19,9 +20,6 @@ from ...filters.bicycle.whole_body.linkage import paper_axes
 from ...filters.core import rotation
 from .meshes import Colour, Mesh, ball, box, rod, tyre
 
-PAINT: Colour = (0.72, 0.13, 0.14)
-STEEL: Colour = (0.58, 0.60, 0.63)
-RUBBER: Colour = (0.13, 0.13, 0.14)
 SHIRT: Colour = (0.16, 0.40, 0.66)
 TROUSERS: Colour = (0.21, 0.23, 0.29)
 SKIN: Colour = (0.87, 0.68, 0.54)
@@ -97,46 +95,14 @@ def rider_meshes(geometry: RiderGeometry) -> dict[str, list[Mesh]]:
 
 def _bicycle_meshes(g: RiderGeometry) -> dict[str, list[Mesh]]:
     """Frame, front assembly, wheels and crank, and the disk of the two-gyroscope paper's fixture."""
-    saddle, axle, axis, origin = (np.array(v) for v in (g.saddle, g.crank_axle, g.steer_axis, g.steer_origin))
-    hub, fork = np.array([0.0, 0.0, g.wheel_radius]), np.array([g.wheelbase, 0.0, g.wheel_radius])
-    head = origin + axis * (saddle[2] - 0.05 - origin[2]) / axis[2]
-    crown = origin + axis * (2.0 * g.wheel_radius + 0.06 - origin[2]) / axis[2]
-    clamp = axle + 0.88 * (saddle - axle)
-    side = np.array([0.0, 0.05, 0.0])
-    frame = [
-        rod(axle, clamp, 0.017, PAINT),
-        rod(clamp, saddle, 0.013, STEEL),
-        rod(axle, crown, 0.021, PAINT),
-        rod(clamp, head, 0.017, PAINT),
-        rod(crown, head, 0.022, PAINT),
-        box(saddle + np.array([0.02, 0.0, 0.015]), (0.27, 0.06, 0.035), RUBBER),
-        box(saddle + np.array([-0.06, 0.0, 0.02]), (0.11, 0.14, 0.035), RUBBER),
-        box(g.bicycle_imu, (0.05, 0.035, 0.03), SENSOR),
-    ]
-    for sign in (1.0, -1.0):
-        frame.append(rod(axle + sign * side, hub + sign * side, 0.010, PAINT))
-        frame.append(rod(clamp, hub + sign * side, 0.009, PAINT))
-    left = np.array(g.grip)
-    middle = head + axis * (left[2] - head[2]) / axis[2]
-    front = [rod(crown - origin, middle - origin, 0.017, STEEL)]
-    for sign in (1.0, -1.0):
-        hand = left * (1.0, sign, 1.0)
-        end = hand + np.array([0.0, sign * 0.05, 0.0])
-        front.append(rod(crown + sign * side - origin, fork + sign * side - origin, 0.013, STEEL))
-        front.append(rod(middle - origin, end - origin, 0.012, STEEL))
-        front.append(rod(hand - np.array([0.0, sign * 0.05, 0.0]) - origin, end - origin, 0.018, RUBBER))
-    wheel = [tyre(g.wheel_radius, 0.024, RUBBER), rod((0.0, -0.05, 0.0), (0.0, 0.05, 0.0), 0.02, STEEL)]
-    for angle in np.arange(8) * math.pi / 8.0:
-        end = (g.wheel_radius - 0.03) * np.array([math.cos(angle), 0.0, math.sin(angle)])
-        wheel.append(rod(-end, end, 0.003, STEEL))
-    crank = [rod((0.0, -0.06, 0.0), (0.0, 0.06, 0.0), 0.02, STEEL)]
-    crank.append(rod((0.0, -0.052, 0.0), (0.0, -0.046, 0.0), 0.09, STEEL))
-    for sign in (1.0, -1.0):
-        crank.append(rod((0.0, sign * 0.06, 0.0), (sign * g.crank_length, sign * 0.06, 0.0), 0.011, STEEL))
-        crank.append(box((sign * g.crank_length, sign * g.pedal_offset, 0.0), (0.09, 0.09, 0.02), RUBBER))
+    places = (g.saddle, g.crank_axle, g.steer_axis, g.steer_origin, g.grip)
+    seen = Outline(*places, g.wheelbase, (g.wheel_radius, g.wheel_radius), g.crank_length, g.pedal_offset)
+    meshes = bicycle_shapes(seen, rod, box, tyre)
+    frame, front = meshes.pop("rear_frame"), meshes.pop("front_assembly")
+    frame.append(box(g.bicycle_imu, (0.05, 0.035, 0.03), SENSOR))
     flat = np.array([0.0, 0.0, 0.006])
     disk = [rod(-flat, flat, 0.2, DISK), rod((0.12, 0.0, 0.0), (0.12, 0.0, 0.014), 0.035, PAINT)]
-    return {"bicycle": frame, "front": front, "rear_wheel": wheel, "front_wheel": wheel, "crank": crank, "disk": disk}
+    return {"bicycle": frame, "front": front, **meshes, "disk": disk}
 
 
 def rider_poses(geometry: RiderGeometry, values: Values) -> Poses:

@@ -16,14 +16,14 @@ import numpy as np
 from ....filters.core import rotation
 from ...physics.momentum import newton_euler
 from ...physics.multibody import Multibody
-from ...physics.urdf import Tree
+from ...physics.urdf import Tree, box_shape, rod_shape
 from ...physics.world import BASE, Physics
 from ...sensors.ideal import BodyState
 from ..course.terrain import FlatGround, Ground
 from .drivetrain import Drivetrain
 from .forces import bicycle_forces, bicycle_state
 from .parameters import AIR_DENSITY, BicycleParameters, RigidPart
-from .shapes import bicycle_shapes
+from .shapes import Outline, bicycle_shapes
 from .tyre import Tyre, TyreForce, TyreParameters, tyre_force_of
 
 WHEELS = ("rear_wheel", "front_wheel")
@@ -80,7 +80,7 @@ class BicycleMemory:
 
 def bicycle_tree(bicycle: BicycleParameters) -> Tree:
     """Links and joints of a bicycle; the joints are called steer = ``front_assembly``, and as the wheels and crank."""
-    tree, shapes = Tree(bicycle.name), bicycle_shapes(bicycle)
+    tree, shapes = Tree(bicycle.name), bicycle_shapes(outline(bicycle), rod_shape, box_shape)
     frame, front = bicycle.rear_frame, bicycle.front_assembly
     steer = bicycle.steer_origin
     tree.link("rear_frame", frame.mass, frame.tensor, frame.centre, shapes["rear_frame"])
@@ -98,6 +98,15 @@ def bicycle_tree(bicycle: BicycleParameters) -> Tree:
         tree.link("crank", drive.mass, drive.inertia, (0.0, 0.0, 0.0), shapes["crank"])
         tree.joint("rear_frame", "crank", drive.axle, (0.0, 1.0, 0.0))
     return tree
+
+
+def outline(bicycle: BicycleParameters) -> Outline:
+    """What is seen of a bicycle; without a drive, cranks that nobody sees."""
+    drive, radii = bicycle.drive, (bicycle.rear_wheel.radius, bicycle.front_wheel.radius)
+    axle = (0.42 * bicycle.wheelbase, 0.0, 0.28) if drive is None else drive.axle
+    cranks = (0.17, 0.12) if drive is None else (drive.crank_length, drive.pedal_offset)
+    steer = (bicycle.steer_axis.tolist(), bicycle.steer_origin.tolist())
+    return Outline(bicycle.saddle, axle, *steer, bicycle.grip, bicycle.wheelbase, radii, *cranks)
 
 
 class Bicycle:

@@ -1,81 +1,81 @@
-"""Shapes of a bicycle for rendering, by link."""
+"""Shapes of a bicycle by link, for whoever draws them: a URDF for PyBullet, or the meshes of the viewer."""
 
 from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...physics.urdf import ball_shape, box_shape, rod_shape
-from .parameters import BicycleParameters, WheelParameters
-
-PAINT = (0.75, 0.12, 0.12)
-STEEL = (0.55, 0.57, 0.6)
-RUBBER = (0.1, 0.1, 0.1)
-LEATHER = (0.25, 0.18, 0.12)
-SEGMENTS = 28
-SPOKES = 6
-
-
-def wheel_shapes(wheel: WheelParameters) -> list[str]:
-    """Tyre as a ring of short rods, and spokes, about the link's y axis."""
-    thickness = max(0.014, wheel.crown_radius)
-    rim = wheel.radius - thickness
-    angles = np.linspace(0.0, 2.0 * math.pi, SEGMENTS + 1)
-    points = [(rim * math.cos(angle), 0.0, rim * math.sin(angle)) for angle in angles]
-    shapes = [rod_shape(a, b, thickness, RUBBER) for a, b in itertools.pairwise(points)]
-    for angle in np.arange(SPOKES) * math.pi / SPOKES:
-        end = np.array([rim * math.cos(angle), 0.0, rim * math.sin(angle)])
-        shapes.append(rod_shape(-end, end, 0.004, STEEL))
-    return [*shapes, rod_shape((0.0, -0.05, 0.0), (0.0, 0.05, 0.0), 0.02, STEEL)]
+PAINT = (0.72, 0.13, 0.14)
+STEEL = (0.58, 0.60, 0.63)
+RUBBER = (0.13, 0.13, 0.14)
+SPOKES, TUBE = 8, 0.022
+"""of a wheel, and radius of its tyre's cross-section, m"""
+Draw = Callable[..., Any]
+"""Makes a shape: a rod of (start, end, radius, colour), a box of (centre, sides, colour), a tyre of (radius, tube,
+colour) about the y axis; m."""
 
 
-def bicycle_shapes(bicycle: BicycleParameters) -> dict[str, list[str]]:
-    """Link name → shapes in the link's frame."""
-    saddle = np.array(bicycle.saddle)
-    axle = np.array(bicycle.drive.axle if bicycle.drive is not None else (0.42 * bicycle.wheelbase, 0.0, 0.28))
-    hub = np.array([0.0, 0.0, bicycle.rear_wheel.radius])
-    axis, origin = bicycle.steer_axis, bicycle.steer_origin
-    fork = np.array([bicycle.wheelbase, 0.0, bicycle.front_wheel.radius])
-    # where the steering axis passes the saddle's height, and a hand above the front tyre
-    head = origin + axis * (saddle[2] - 0.05 - origin[2]) / axis[2]
-    crown = origin + axis * (2.0 * bicycle.front_wheel.radius + 0.06 - origin[2]) / axis[2]
+class Outline(NamedTuple):
+    """What is seen of a bicycle: the left grip stands for both, radii are of rear and front wheel; m."""
+
+    saddle: Sequence[float]
+    crank_axle: Sequence[float]
+    steer_axis: Sequence[float]
+    steer_origin: Sequence[float]
+    grip: Sequence[float]
+    wheelbase: float
+    radii: tuple[float, float]
+    crank_length: float
+    pedal_offset: float
+
+
+def bicycle_shapes(seen: Outline, rod: Draw, box: Draw, tyre: Draw | None = None) -> dict[str, list[Any]]:
+    """Link → shapes in the link's frame; tyres are rings of rods if there is no function for them."""
+    saddle, axle, axis, origin, grip = (np.array(part) for part in seen[:5])
+    hub, fork = np.array([0.0, 0.0, seen.radii[0]]), np.array([seen.wheelbase, 0.0, seen.radii[1]])
+    # where the steering axis passes the saddle's height, a hand above the front tyre, and the height of the hands
+    head, crown, middle = (
+        origin + axis * (height - origin[2]) / axis[2]
+        for height in (saddle[2] - 0.05, 2.0 * seen.radii[1] + 0.06, grip[2])
+    )
     clamp = axle + 0.88 * (saddle - axle)
-    side = np.array([0.0, 0.05, 0.0])
     frame = [
-        rod_shape(axle, clamp, 0.016, PAINT),
-        rod_shape(clamp, saddle, 0.013, STEEL),
-        rod_shape(axle, crown, 0.02, PAINT),
-        rod_shape(clamp, head, 0.016, PAINT),
-        rod_shape(crown, head, 0.02, PAINT),
-        box_shape(saddle - (0.02, 0.0, 0.02), (0.26, 0.13, 0.04), LEATHER),
+        rod(axle, clamp, 0.017, PAINT),
+        rod(clamp, saddle, 0.013, STEEL),
+        rod(axle, crown, 0.021, PAINT),
+        rod(clamp, head, 0.017, PAINT),
+        rod(crown, head, 0.022, PAINT),
+        box(np.add(saddle, (0.02, 0.0, 0.015)), (0.27, 0.06, 0.035), RUBBER),
+        box(np.add(saddle, (-0.06, 0.0, 0.02)), (0.11, 0.14, 0.035), RUBBER),
     ]
+    front = [rod(crown - origin, middle - origin, 0.017, STEEL)]
+    crank = [rod((0.0, -0.06, 0.0), (0.0, 0.06, 0.0), 0.02, STEEL)]
+    crank.append(rod((0.0, -0.052, 0.0), (0.0, -0.046, 0.0), 0.09, STEEL))
     for sign in (1.0, -1.0):
-        frame += [rod_shape(axle + sign * side, hub + sign * side, 0.01, PAINT)]
-        frame += [rod_shape(clamp, hub + sign * side, 0.008, PAINT)]
-    left = np.array(bicycle.grip)
-    right = left * (1.0, -1.0, 1.0)
-    middle = head + axis * (left[2] - head[2]) / axis[2]
-    front = [rod_shape(crown - origin, middle - origin, 0.017, STEEL)]
-    for sign in (1.0, -1.0):
-        front.append(rod_shape(crown + sign * side - origin, fork + sign * side - origin, 0.012, STEEL))
-    for grip in (left, right):
-        # a straight bar at the height of the hands, reaching a little beyond them
-        end = grip + np.array([0.0, math.copysign(0.05, grip[1]), 0.0])
-        front += [rod_shape(middle - origin, end - origin, 0.012, STEEL), ball_shape(grip - origin, 0.02, RUBBER)]
-    shapes = {
-        "rear_frame": frame,
-        "front_assembly": front,
-        "rear_wheel": wheel_shapes(bicycle.rear_wheel),
-        "front_wheel": wheel_shapes(bicycle.front_wheel),
-    }
-    if bicycle.drive is not None:
-        length, offset = bicycle.drive.crank_length, bicycle.drive.pedal_offset
-        crank = [rod_shape((0.0, -0.06, 0.0), (0.0, 0.06, 0.0), 0.02, STEEL)]
-        for sign in (1.0, -1.0):
-            arm = (sign * length, sign * 0.06, 0.0)
-            crank.append(rod_shape((0.0, sign * 0.06, 0.0), arm, 0.011, STEEL))
-            crank.append(box_shape((sign * length, sign * offset, 0.0), (0.09, 0.09, 0.02), RUBBER))
-        shapes["crank"] = crank
-    return shapes
+        side, hand = np.array([0.0, sign * 0.05, 0.0]), grip * (1.0, sign, 1.0) - origin
+        frame.append(rod(axle + side, hub + side, 0.010, PAINT))
+        frame.append(rod(clamp, hub + side, 0.009, PAINT))
+        front.append(rod(crown + side - origin, fork + side - origin, 0.013, STEEL))
+        front.append(rod(middle - origin, hand + side, 0.012, STEEL))
+        front.append(rod(hand - side, hand + side, 0.018, RUBBER))
+        pedal = sign * seen.crank_length
+        crank.append(rod((0.0, sign * 0.06, 0.0), (pedal, sign * 0.06, 0.0), 0.011, STEEL))
+        crank.append(box((pedal, sign * seen.pedal_offset, 0.0), (0.09, 0.09, 0.02), RUBBER))
+    rear, before = (wheel_shapes(radius, rod, tyre) for radius in seen.radii)
+    return {"rear_frame": frame, "front_assembly": front, "rear_wheel": rear, "front_wheel": before, "crank": crank}
+
+
+def wheel_shapes(radius: float, rod: Draw, tyre: Draw | None) -> list[Any]:
+    """Tyre, hub and spokes about the y axis."""
+    angles = np.linspace(0.0, 2.0 * math.pi, 4 * SPOKES + 1)
+    rim = (radius - TUBE) * np.stack([np.cos(angles), 0.0 * angles, np.sin(angles)], axis=1)
+    if tyre is None:
+        shapes = [rod(one, other, TUBE, RUBBER) for one, other in itertools.pairwise(rim)]
+    else:
+        shapes = [tyre(radius, TUBE, RUBBER)]
+    spokes = [rod(-end, end, 0.003, STEEL) for end in rim[: 2 * SPOKES : 2]]
+    return [*shapes, *spokes, rod((0.0, -0.05, 0.0), (0.0, 0.05, 0.0), 0.02, STEEL)]
