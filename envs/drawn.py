@@ -27,11 +27,7 @@ Box = tuple[Sequence[float], Sequence[float], Sequence[float]]
 
 
 def device_boxes(size: Sequence[float] = DEVICE_SIZE) -> list[Box]:
-    """A device with two grips and a stick, whose orientation is visible from any side.
-
-    Args:
-        size: extent along the body axes, m.
-    """
+    """A device with two grips and a stick, whose orientation is visible from any side; ``size`` along its axes, m."""
     x, y, z = (0.5 * side for side in size)
     return [
         ((x, 0.6 * y, z), (0.0, 0.2 * y, 0.0), BODY_COLOUR),

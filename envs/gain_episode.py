@@ -112,12 +112,7 @@ class GainEpisode:
         return np.concatenate([table, table[-1:]])
 
     def privileged(self, decision: int, last_error: float) -> np.ndarray:
-        """The privileged part ``(PRIVILEGED,)`` of an observation.
-
-        Args:
-            decision: its number.
-            last_error: of the last sample, rad; NaN where it is not known.
-        """
+        """The privileged part ``(PRIVILEGED,)`` of an observation; ``last_error`` in rad, NaN where it is not known."""
         own = 0.0 if math.isnan(last_error) else np.log1p(np.degrees(last_error))
         return np.append(self.foresight[decision], own).astype(np.float32)
 

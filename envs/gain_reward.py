@@ -110,10 +110,7 @@ def mean_over_time(values: np.ndarray, counted: np.ndarray) -> np.ndarray:
 def errors_of(quantities: Sequence[Quantity], pose: Mapping[str, np.ndarray], truth: np.ndarray) -> np.ndarray:
     """Errors ``(...)``: of one quantity, or the root mean square over several.
 
-    Args:
-        quantities: what counts.
-        pose: estimates ``(..., size)`` by name.
-        truth: ``(..., sizes)``, the quantities one after the other.
+    ``pose`` has estimates ``(..., size)`` by name, ``truth`` ``(..., sizes)`` the quantities one after the other.
     """
     squares, start = [], 0
     for quantity in quantities:

@@ -201,10 +201,7 @@ def gathered(
 ) -> dict[str, np.ndarray]:
     """Named columns of each row as arrays ``(count, size)`` with Gymnasium's masks; rows may have different names.
 
-    Args:
-        layouts: of each row, names and sizes of the columns.
-        values: of each row ``(columns,)``.
-        count: number of rows.
+    ``layouts`` are names and sizes of the columns of each row, ``values`` its numbers ``(columns,)``.
     """
     members: dict[tuple[tuple[str, int], ...], list[int]] = {}
     for row, layout in enumerate(layouts):

@@ -47,12 +47,8 @@ def mean_rates(orientation: np.ndarray, gyr: np.ndarray, dt: float) -> Rates:
 def clock_offset(orientation: np.ndarray, gyr: np.ndarray, dt: float) -> float | None:
     """Seconds by which the reference is ahead of the gyroscope; None if the motion does not determine it.
 
-    The regression is repeated on the reference as corrected so far, until nothing is left.
-
-    Args:
-        orientation: ``(T, 4)`` of the sensor, NaN where unknown, on a uniform grid.
-        gyr: ``(T, 3)`` rad/s.
-        dt: s.
+    The regression is repeated on the reference as corrected so far, until nothing is left. The orientation ``(T, 4)``
+    of the sensor, NaN where unknown, and the gyroscope ``(T, 3)`` are on a uniform grid.
     """
     if len(gyr) < 4 * round(WINDOW / dt) + 8:
         return None

@@ -180,21 +180,9 @@ def simulate_hand(
 ) -> Trajectory:
     """Record an episode of ``HandMotionEnv(drive="kinematic")`` at once, without stepping an environment.
 
-    Motion and sensor errors are those that the environment has after ``reset(seed=seed)``.
-
-    Args:
-        gesture: name or configuration.
-        seed: of motion and errors; None draws one, which the metadata name.
-        sensors: preset or suite; a suite is reset here; None as for the environment.
-        rate: Hz; None for 100, or for the rate of the suite.
-        duration: s; None for that of the gesture.
-        sampling: ``interval`` or ``instant``; None as for the environment.
-        device: as for the environment.
-        magnetometer: as for the environment.
-        lever_arm: ``(3,)`` m.
-        mounting: ``(4,)`` quaternion.
-        timing: as for the environment.
-        magnetics: as for the environment.
+    Motion and sensor errors are those that the environment has after ``reset(seed=seed)``; None draws a seed, which the
+    metadata name. The other arguments are those of :class:`.HandMotionEnv`, and so are the errors; a suite is reset
+    here.
 
     Returns:
         Measurements and truth as :func:`poise.record` would give them.

@@ -76,14 +76,11 @@ class HandTrajectories:
                 raise ValueError(f"{name} must be one of {list(known)}, got {getattr(self, name)!r}")
 
     def draw(self, generator: np.random.Generator, name: str | None = None) -> Trajectory:
-        """Draw one trajectory.
-
-        Args:
-            generator: one child is used for the setting, another for motion and errors.
-            name: for the metadata; None names gesture and seed.
+        """Draw one trajectory; one child of the generator is used for the setting, another for motion and errors.
 
         Returns:
-            Measurements and truth as of :class:`.HandMotionEnv`; metadata with what was drawn.
+            Measurements and truth as of :class:`.HandMotionEnv`; metadata with what was drawn, and the ``name`` (None: gesture
+            and seed).
         """
         choice, episode = generator.spawn(2)
         gesture = self.gestures[choice.integers(len(self.gestures))]

@@ -86,9 +86,7 @@ def calibrate_magnetometer(trajectory: Trajectory, site: str = "imu") -> Calibra
 def rotation_by_dip(field: np.ndarray, up: np.ndarray) -> tuple[np.ndarray, float]:
     """Quaternion that turns the field into the axes of ``up`` so that their angle varies least; the variation in rad.
 
-    Args:
-        field: ``(T, 3)`` unit vectors in the axes of the magnetometer.
-        up: ``(T, 3)`` unit vectors in the axes of the accelerometer.
+    Both are unit vectors ``(T, 3)``, in the axes of magnetometer and accelerometer.
     """
     from scipy.optimize import least_squares
 
