@@ -79,8 +79,8 @@ class HandTrajectories:
         """Draw one trajectory; one child of the generator is used for the setting, another for motion and errors.
 
         Returns:
-            Measurements and truth as of :class:`.HandMotionEnv`; metadata with what was drawn, and the ``name`` (None: gesture
-            and seed).
+            Measurements and truth as of :class:`.HandMotionEnv`; metadata with what was drawn, and the ``name``, which
+            is that of gesture and seed if None.
         """
         choice, episode = generator.spawn(2)
         gesture = self.gestures[choice.integers(len(self.gestures))]
