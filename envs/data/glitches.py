@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from .repeats import CHANNELS, RunsSoFar, moves, repeated, runs_of
+from .repeats import CHANNELS, RunsSoFar, moves, repeated, runs_of, zeros_in_motion
 from .trajectory import Trajectory
 
 LEAST = {"gyr": 3.0, "acc": 30.0}
@@ -93,9 +93,9 @@ def no_samples(
 ) -> dict[str, dict[str, np.ndarray]]:
     """Channel → kind of what is no sample → where ``(T,)`` bool.
 
-    That is a glitch of a gyroscope or an accelerometer; a gyroscope's 0, 0, 0 beside an accelerometer's, which is how a
-    logger writes that nothing came; what reaches the range of a sensor; and samples that were written again where none
-    came (:mod:`.repeats`).
+    That is a glitch of a gyroscope or an accelerometer; a gyroscope's 0, 0, 0 beside an accelerometer's, or for a while
+    beside one that moves, which is how a logger writes that nothing came; what reaches the range of a sensor; and
+    samples that were written again where none came (:mod:`.repeats`).
 
     Args:
         measurements: channel → ``(T, size)``, on a grid.
@@ -116,7 +116,8 @@ def no_samples(
         found.setdefault(name, {})["glitches"] = glitches(values, LEAST[kind])
         force = measurements.get(f"{site}/acc")
         if kind == "gyr" and force is not None:
-            found[name]["rows of zeros"] = np.logical_not(values.any(axis=1) | force.any(axis=1))
+            zeros = np.logical_not(values.any(axis=1) | force.any(axis=1))
+            found[name]["rows of zeros"] = zeros if dt is None else zeros | zeros_in_motion(values, force, dt)
         if name in ranges:
             found[name]["saturated"] = np.any(np.abs(values) >= FULL * ranges[name], axis=1)
     return found

@@ -23,6 +23,10 @@ HARMLESS = 0.03
 """s for which a sample may stand in for others whatever it is."""
 FEWEST_CHANGES = 20
 """Of a channel that shows noise, or how slow it is."""
+RESTLESS = 0.5
+"""m/s² of scatter that no accelerometer shows at rest."""
+AT_ONCE = 0.1
+"""rad/s beside zeros: a motion, or a simulation without errors, comes to rest in smaller steps."""
 STANDSTILL = 1e-6
 """rad/s below which no gyroscope reads but a simulated one without errors, or one that writes zeros at rest."""
 
@@ -71,6 +75,19 @@ def repeated(values: np.ndarray, dt: float, moving: np.ndarray | None = None) ->
     found = np.zeros(len(values), bool)
     for begin, length in zip(*foreign_runs(values, dt, moving), strict=True):
         found[begin + 1 : begin + length] = values[begin].any()
+    return found
+
+
+def zeros_in_motion(gyroscope: np.ndarray, force: np.ndarray, dt: float) -> np.ndarray:
+    """Samples ``(T,)`` bool in which a gyroscope ``(T, 3)`` reads 0, 0, 0 at once, while the force ``(T, 3)`` moves."""
+    found = np.zeros(len(gyroscope), bool)
+    for begin, length in zip(*foreign_runs(gyroscope, dt), strict=True):
+        rows = slice(begin, begin + length)
+        known = force[rows][np.isfinite(force[rows]).all(axis=1)]
+        beside = gyroscope[max(begin - 1, 0) : begin + length + 1]
+        at_once = float(np.abs(beside).max()) > AT_ONCE
+        if not gyroscope[begin].any() and at_once and len(known) > 1 and float(known.std(axis=0).max()) > RESTLESS:
+            found[rows] = True
     return found
 
 

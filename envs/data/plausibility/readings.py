@@ -174,11 +174,13 @@ def check_repeats(
     zero = ~(moves(values[begins]) if own else values[begins].any(axis=1))
     if own and zero.any() and lengths[zero].max() * dt >= HELD:
         start, length = begins[zero][lengths[zero].argmax()], lengths[zero].max()
-        what, remedy = f"0, 0, 0 for {length * dt:.1f} s from sample {start}", "Replace the zeros by NaN, unless"
-        yield Finding("warning", channel, what, "drop-outs written as zeros", f"{remedy} the sensor rested there.")
+        what = f"0, 0, 0 for {length * dt:.1f} s from sample {start}"
+        remedy = "They are treated as missing samples where the accelerometer moves; else it may have rested."
+        yield Finding("warning", channel, what, "drop-outs written as zeros", remedy)
     if not zero.all():
         start, length = begins[~zero][lengths[~zero].argmax()], lengths[~zero].max()
-        what = f"one sample again and again, for {length * dt:.1f} s from sample {start}"
+        often = "" if np.sum(~zero) == 1 else f" at {np.sum(~zero)} places,"
+        what = f"one sample again and again,{often} for {length * dt:.1f} s from sample {start}"
         severity: Severity = "warning" if length * dt >= HELD else "note"
         cause = "a recorder that repeats the last sample where none came"
         yield Finding(severity, channel, what, cause, "They are treated as missing samples.")

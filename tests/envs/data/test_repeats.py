@@ -10,7 +10,7 @@ import pytest
 import poise
 from poise.baselines.online import OnlineEstimator
 from poise.envs.data.plausibility.recording import check_recording
-from poise.envs.data.repeats import RunsSoFar, moves, repeated, runs_of
+from poise.envs.data.repeats import RunsSoFar, moves, repeated, runs_of, zeros_in_motion
 from poise.envs.data.trajectory import Trajectory
 from poise.envs.hand.sensing import simulate_hand
 from poise.filters.core import metrics
@@ -64,6 +64,24 @@ def test_what_it_repeats_misleads_nobody(name: str) -> None:
         error = largest(name, trajectory)
     absent = {key: np.where(repeated(v, 0.01)[:, None], np.nan, v) for key, v in trajectory.measurements.items()}
     assert error == largest(name, KNOWN.replace(measurements=absent))
+
+
+@pytest.mark.parametrize(("begin", "end"), [(0, 200), (900, 1000), (2500, 2600)])
+def test_a_gyroscope_s_zeros_in_motion_are_no_rates(begin: int, end: int) -> None:
+    changed = {name: np.array(values) for name, values in KNOWN.measurements.items()}
+    changed["imu/gyr"][begin:end] = 0.0
+    with pytest.warns(UserWarning, match=f"imu/gyr: {end - begin} rows of zeros"):
+        found = poise.run("mekf", KNOWN.replace(measurements=changed)).pose["up"]
+    changed["imu/gyr"][begin:end] = np.nan
+    np.testing.assert_array_equal(found, poise.run("mekf", KNOWN.replace(measurements=changed)).pose["up"])
+
+
+def test_a_gyroscope_that_writes_zeros_at_rest_is_believed() -> None:
+    rng = np.random.default_rng(1)
+    force = np.array([0.0, 0.0, 9.81]) + 0.05 * rng.standard_normal((len(KNOWN), 3))
+    rates = np.array(KNOWN.measurements["imu/gyr"])
+    rates[1000:2000] = 0.0
+    assert not zeros_in_motion(rates, force, 0.01).any()
 
 
 def test_a_sensor_s_own_repeats_are_left_alone() -> None:
