@@ -100,9 +100,9 @@ class DrawnEnv(gymnasium.Env[Any, np.ndarray]):
         """Check the types of the arguments, and remember them for copies."""
         passed_on = kwargs | arguments_of(cls.__init__, args, kwargs)
         for kind in cls.__mro__:
-            if "__init__" in vars(kind):
-                check_parameters(kind.__init__, passed_on)
-                own = inspect.signature(kind.__init__).parameters
+            if (made_by := vars(kind).get("__init__")) is not None:
+                check_parameters(made_by, passed_on)
+                own = inspect.signature(made_by).parameters
                 passed_on = {name: value for name, value in passed_on.items() if name not in own}
         made = super().__new__(cls)
         made._made_with = args, kwargs
