@@ -18,7 +18,8 @@ not see, hardly decays. Their dip and their east are compared with those of both
 Until a start has been confirmed, an average that later samples make too short to be trusted begins anew with them: it
 held samples of two directions, and a start from both is as wrong as their share. So does one of forces that a steady
 average of the last moment contradicts: in the mean of both directions a filter sees no contradiction, and takes the
-rest for a bias of its gyroscope. In strong motion a moment is not steady and decides nothing.
+rest for a bias of its gyroscope; what was contradicted so needs hardly any patience. In strong motion a moment is not
+steady and decides nothing.
 
 Two rules need no patience. An average of a few samples that the next one contradicts starts anew with that sample, and
 so does the estimator, until a start has been confirmed. After these few a sample that points elsewhere decides
@@ -50,6 +51,8 @@ LARGEST_ERROR = math.radians(10.0)
 """The same for dip and east of equations that keep the field of their start."""
 PATIENCE = 1.5
 """s for which they must do so."""
+REST_OF_PATIENCE = 0.2
+"""What is left of it where the average force began anew, as the last moment had contradicted it."""
 CONFIRMED = 2.0
 """s of agreement after which the inclination of a start counts as good."""
 CONFIRMED_HEADING = 8.0
@@ -160,6 +163,8 @@ def watch(memory: Array, inputs: Array) -> Array:
     least = xp.where(confirmed, zero + math.cos(LARGEST_LEAN), zero + math.cos(LARGEST_LEAN_AT_START))
     leaning = xp.logical_and(upright, xp.less(aligned, least * length))
     leant = xp.where(leaning, memory[..., 5:6] + dt, xp.where(upright, zero, memory[..., 5:6]))
+    # Samples of two directions are a contradiction already: the filter must not take it for a bias meanwhile.
+    leant = xp.where(moved, zero + (PATIENCE - REST_OF_PATIENCE), leant)
 
     world = rotate(q, field)
     east, north = world[..., :1], world[..., 1:2]
