@@ -39,6 +39,11 @@ def save_checkpoint(path: Path, key: Mapping[str, Any], state: Mapping[str, Any]
     write_bytes(path, sealed(data.getvalue()))
 
 
+def has_checkpoint(path: Path) -> bool:
+    """Whether a training had come to its first checkpoint when it was interrupted."""
+    return path.is_file() or previous(path).is_file()
+
+
 def load_checkpoint(path: Path, key: Mapping[str, Any]) -> dict[str, Any]:
     """The state that :func:`save_checkpoint` wrote; of the checkpoint before, with a warning, if the last is damaged.
 

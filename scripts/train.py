@@ -80,7 +80,9 @@ class Args:
 
 def run(args: Args) -> int:
     """Train, test, and write weights with their card."""
+    from ..baselines.checkpoint import has_checkpoint
     from ..baselines.learned.estimator import LearnedEstimator
+    from ..baselines.learned.fit import CHECKPOINT
     from ..baselines.learned.training import train_preset
 
     start = process_times()
@@ -97,7 +99,7 @@ def run(args: Args) -> int:
             teacher=args.teacher == "smoother",
             replicate=args.replicate,
             start=args.start,
-            resume=args.resume is not None,
+            resume=args.resume is not None and has_checkpoint(folder.folder / CHECKPOINT),
             processes=args.processes,
             say=out.say,
         )

@@ -201,8 +201,9 @@ def searched(args: Args, config: TrainingConfig, tuned: TunedFilter, out: Output
 
 def train(args: Args, folder: Run, start: np.ndarray) -> Trained:
     """Train a policy from a constant action; the best look at validation trajectories is kept."""
+    from ..baselines.checkpoint import has_checkpoint
     from ..baselines.gain_policy.agents.learners import policy_errors_of
-    from ..baselines.gain_policy.training import train_policy
+    from ..baselines.gain_policy.training import CHECKPOINT, train_policy
     from ..filters.adaptation.gains import tunable_filter
 
     config, kalman = training_config(args), tunable_filter(args.filter)
@@ -221,7 +222,7 @@ def train(args: Args, folder: Run, start: np.ndarray) -> Trained:
             config,
             start=start,
             folder=folder.folder,
-            resume=args.resume is not None,
+            resume=args.resume is not None and has_checkpoint(folder.folder / CHECKPOINT),
             report=report,
             validate=lambda policy: float(np.mean(policy_errors_of(kalman, policy, unseen))),
         )
