@@ -81,15 +81,14 @@ class Args:
 def run(args: Args) -> int:
     """Train, test, and write weights with their card."""
     from ..baselines.checkpoint import has_checkpoint
-    from ..baselines.learned.estimator import LearnedEstimator
     from ..baselines.learned.fit import CHECKPOINT
-    from ..baselines.learned.training import train_preset
+    from ..baselines.learned.training import started, train_preset
 
     start = process_times()
     check_file("export", args.export, args.recordings)
-    if args.start is not None:
-        LearnedEstimator.load(args.start)  # raises, before anything is simulated
     preset = chosen(args)
+    if args.start is not None:
+        started(args.start, preset.front_end(), preset.head())  # raises, before there is a run
     own = known_recordings(args.recordings) if args.recordings else None
     folder = open_run("train", args, may_differ=("test_episodes", "processes"))
     with Output("train", args) as out:
@@ -140,6 +139,9 @@ def chosen(args: Args) -> Preset:
     preset: Preset = look_up("preset", args.preset, all_presets())
     preset = preset.quick() if args.quick else preset
     if args.recipe is not None:
+        if preset.rides is not None:
+            raise ValueError(f"{args.preset} is trained on rides: it takes no recipe, got {args.recipe}")
+        preset.recipe(args.recipe)  # raises where it is none of hand motions
         preset = replace(preset, sources={args.recipe: sum(preset.sources.values())})
     if args.episodes is not None:
         whole = sum(preset.sources.values())

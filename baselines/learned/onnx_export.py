@@ -20,7 +20,6 @@ from typing import Any
 import numpy as np
 
 from ...filters.support.files import write_bytes
-from ...filters.support.names import look_up
 from ...filters.support.optional import extra
 from ...filters.support.version import poise_version
 from ..weights_io import load_weights
@@ -152,7 +151,12 @@ def export_onnx(path_or_name: str | Path, path: str | Path) -> Path:
     arrays, card = load_weights(path_or_name)
     if "network" not in card:
         raise ValueError(f"{path_or_name} are not the weights of a learned estimator: its card names no network")
-    cls, write = look_up("kind of network", card["network"], WRITERS)
+    if card["network"] not in WRITERS:
+        raise ValueError(
+            f"{path_or_name} holds a network of the kind {card['network']!r}; exported are {', '.join(WRITERS)}, "
+            "and a module of your own by torch.onnx.export"
+        )
+    cls, write = WRITERS[card["network"]]
     path = Path(path)
     path = path if path.suffix == ".onnx" else path.with_name(path.name + ".onnx")
     return write_bytes(path, onnx_model(read_network(cls, arrays), write, card).SerializeToString())

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ...envs.recipes.recipe import Recipe
-from ...envs.recipes.registry import recipe
+from ...envs.recipes.registry import hand_recipe
 from ...envs.recipes.rides import RideSource
 from ...filters.core.quantity import MAGNETOMETER
 from ...filters.registry import make
@@ -90,8 +90,8 @@ class Preset:
         return self.bank and MAGNETOMETER in make(str(self.filter)).channels
 
     def recipe(self, name: str) -> Recipe:
-        """The recipe of a source."""
-        return recipe(name)
+        """The recipe of a source, one of hand motions."""
+        return hand_recipe(name)
 
     def front_end(self) -> FrontEnd:
         """What the network sees."""

@@ -17,7 +17,8 @@ from .estimator import LearnedEstimator
 from .fit import FitResult, fit
 from .gains.gain_filter import GainFilter
 from .gains.gain_head import GainHead
-from .head import AngleHead
+from .head import AngleHead, Head
+from .inputs.front_end import FrontEnd
 from .networks.gru import GruNetwork
 from .networks.modules import GruModule
 from .presets import Preset, seeds_of
@@ -64,6 +65,8 @@ def train_preset(
     front_end: Any = preset.front_end()
     head: Any = preset.head()
     train_seed, validation_seed, _, _ = seeds_of(seed)
+    if start is not None:
+        started(start, front_end, head)  # raises, before anything is simulated
 
     def simulated(root: int, share: float, words: str) -> SequenceData:
         if preset.rides is not None:
@@ -122,11 +125,7 @@ def fit_preset(
     if start is None:
         module, config = preset.module(front_end.size, head.size, number), preset.fit
     else:
-        network = LearnedEstimator.load(start).network
-        network = getattr(network, "network", network)
-        if not isinstance(network, GruNetwork):
-            raise ValueError(f"start must be weights of a recurrent network, got a {network.kind} in {start}")
-        module, config = GruModule.of(network, preset.scale), preset.refined
+        module, config = GruModule.of(started(start, front_end, head), preset.scale), preset.refined
     config = replace(config, seed=number)
     if isinstance(head, GainHead) and start is None and not resume:
         constants = head.begin(module, data, number)
@@ -141,3 +140,22 @@ def fit_preset(
         made: Any = GainFilter(result.estimator.network, front_end, head)
         result = result._replace(estimator=made)
     return result
+
+
+def started(start: str | Path, front_end: FrontEnd, head: Head) -> GruNetwork:
+    """The network of the weights that a training starts from.
+
+    Raises:
+        FileNotFoundError: there are no such weights.
+        ValueError: they are damaged, not of a recurrent network, or of another front end or head.
+    """
+    network = LearnedEstimator.load(start).network
+    network = getattr(network, "network", network)
+    if not isinstance(network, GruNetwork):
+        raise ValueError(f"start must be weights of a recurrent network, got a {network.kind} in {start}")
+    if (network.features, network.outputs) != (front_end.size, head.size):
+        raise ValueError(
+            f"start must have {front_end.size} features and {head.size} outputs, "
+            f"got {network.features} and {network.outputs} in {start}"
+        )
+    return network

@@ -22,7 +22,7 @@ from poise.baselines.learned.head import AngleHead, TiltHead
 from poise.baselines.learned.inputs.level_frame import LevelFrame
 from poise.baselines.learned.networks.modules import GruModule, TcnModule
 from poise.baselines.registry import make_estimator
-from poise.baselines.weights_io import load_weights
+from poise.baselines.weights_io import WEIGHTS, load_weights
 from poise.filters.core.metrics import direction_error
 from poise.filters.core.quantity import Quantity
 from poise.scripts.main import main
@@ -324,3 +324,18 @@ def test_the_command_leaves_weights_that_load(tmp_path: Path, capsys: pytest.Cap
     np.testing.assert_array_equal(again["output.weight"], arrays["output.weight"])
     assert main(["train", "bounded-motion+networks"]) != 0
     assert "bounded-motion+network" in capsys.readouterr().err
+
+
+def test_a_start_of_another_network_and_recipes_of_rides_are_refused_at_once(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["train", "bounded-motion+network", "--quick", "--runs", str(tmp_path)]
+    for more, message in (
+        (["--start", str(WEIGHTS / "gru.safetensors")], "start must have 54 features and 10 outputs, got 22 and 2"),
+        (["--recipe", "rider"], "recipe must be one of hand motions"),
+    ):
+        assert main([*words, *more]) != 0
+        assert message in " ".join(capsys.readouterr().err.split())
+    assert main(["train", "two-gyro+network", "--recipe", "hand-held", "--runs", str(tmp_path)]) != 0
+    assert "is trained on rides" in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
