@@ -56,6 +56,8 @@ class Args:
     preset: Literal["quick", "shipped"] = "quick"
     """quick: a minute or two, as a test; shipped: as long as the trainings of the weights in
     the package, whose cards name the commit that repeats them"""
+    quick: bool = False
+    """the preset quick, by the name that it has in other commands"""
     policy: str | None = None
     """file or shipped name of a policy of this filter: nothing is trained, only its limit of the gyroscope bias
     is found, on the motions of the preset, which must be of the kinds that it was trained on"""
@@ -92,6 +94,8 @@ def run(args: Args) -> int:
     """Tune, compare with the published tuning and the best constant gains, and write what was found."""
     if args.report:
         return compare(args)
+    if args.quick and args.preset == "shipped":
+        raise ValueError("quick cannot be given with the preset shipped")
     if args.policy is not None and (args.agent in SEARCHES or args.resume is not None):
         raise ValueError("policy cannot be given with a search of constant gains, nor with resume: nothing is trained")
     from ..baselines.gain_policy.compared.contenders import rows_of
@@ -110,7 +114,9 @@ def run(args: Args) -> int:
     recorded = recorded_sets(args.recordings)
     for each in itertools.chain.from_iterable(recorded.values()):
         check_scored(each, tuned, (scored_quantity(tuned.kalman, None),))
-    folder = open_run("tune", args, may_differ=("steps", "test_trajectories", "test_seed", "recordings", "report"))
+    folder = open_run(
+        "tune", args, may_differ=("quick", "steps", "test_trajectories", "test_seed", "recordings", "report")
+    )
     unseen = config.motions.draw_many(child_seed(args.test_seed, TEST_SEED), args.test_trajectories)
     sets = {SIMULATED: unseen, **recorded}
     with Output("tune", args) as out:
