@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ....filters.core import rotation
-from ..reference_clock import aligned, rate_error
+from ..reference_clock import WINDOW, aligned, rate_error
 from ..repeats import HELD, runs_of, usual_run
 from ..trajectory import REFERENCE_CLOCK, Trajectory
 from .readings import Finding, Severity
@@ -54,10 +54,11 @@ def reference_on_sensor(trajectory: Trajectory) -> tuple[Trajectory, list[Findin
     there = np.isfinite(np.concatenate([truth, *channels], axis=1)).all(axis=1) & trajectory.mask  # type: ignore[arg-type]
     if there.sum() < FEWEST:
         return trajectory, []
-    found, findings = aligned(trajectory), []
+    calm = trajectory.replace(truth=trajectory.truth | {"orientation": without_jumps(trajectory)})
+    found, findings = aligned(calm), []
     angles = found.metadata["reference_alignment"]
     axes, vertical, offset = angles["sensor_deg"], angles["vertical_deg"], found.metadata.get(REFERENCE_CLOCK, 0.0)
-    explained = rate_error(found) < EXPLAINED * rate_error(trajectory)
+    explained = rate_error(found) < EXPLAINED * rate_error(calm)
     if explained and abs(offset) > LARGE_OFFSET and REFERENCE_CLOCK not in trajectory.metadata:
         trajectory = trajectory.replace(metadata=trajectory.metadata | {REFERENCE_CLOCK: offset})
         findings += check_reference(trajectory)
@@ -70,6 +71,27 @@ def reference_on_sensor(trajectory: Trajectory) -> tuple[Trajectory, list[Findin
         cause = "a laboratory whose z axis is not upright, or a bias of the accelerometer"
         findings.append(Finding("warning", "orientation", what, cause, ALIGN))
     return trajectory, findings
+
+
+def jumps_of(orientation: np.ndarray, turned: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """First rows after jumps of orientations ``(T, 4)``, and the angles ``(T - 1,)`` in rad between neighbours.
+
+    Args:
+        orientation: NaN where unknown.
+        turned: ``(T,)`` rad that a gyroscope turns in the interval of each sample.
+    """
+    angle = np.asarray(rotation.angle(rotation.multiply(rotation.conjugate(orientation[:-1]), orientation[1:])))
+    return np.flatnonzero(angle > JUMP + 3.0 * (turned[:-1] + turned[1:])) + 1, angle
+
+
+def without_jumps(trajectory: Trajectory) -> np.ndarray:
+    """The orientation of the truth, NaN beside its jumps: they would decide how its rates compare with others."""
+    orientation = np.array(trajectory.truth["orientation"])
+    turned = trajectory.dt * np.linalg.norm(np.nan_to_num(trajectory.measurements["imu/gyr"]), axis=1)
+    reach = max(1, round(WINDOW / trajectory.dt))
+    for row in jumps_of(orientation, turned)[0]:
+        orientation[max(row - reach, 0) : row + reach] = np.nan
+    return orientation
 
 
 def check_steps(trajectory: Trajectory) -> Iterator[Finding]:
@@ -88,12 +110,10 @@ def check_steps(trajectory: Trajectory) -> Iterator[Finding]:
         cause, remedy = "a reference that is slower than the recording", "Replace the repeated rows by NaN."
         yield Finding(severity, "orientation", what, cause, remedy)
         return
-    angle = rotation.angle(rotation.multiply(rotation.conjugate(q[:-1]), q[1:]))
-    jumps = angle > JUMP + 3.0 * (turned[:-1] + turned[1:])
-    if jumps.any():
-        rows = np.flatnonzero(jumps) + 1
+    rows, angle = jumps_of(q, turned)
+    if len(rows):
         count = f"{len(rows)} jump{'s' if len(rows) > 1 else ''}"
-        what = f"{count} of up to {np.degrees(angle[jumps].max()):.0f}° (first at sample {rows[0]})"
+        what = f"{count} of up to {np.degrees(angle[rows - 1].max()):.0f}° (first at sample {rows[0]})"
         cause = "a tracking system that lost the body, or mistook its markers"
         remedy = "The gyroscope does not show them: replace the wrong rows by NaN."
         yield Finding("warning", "orientation", what, cause, remedy)

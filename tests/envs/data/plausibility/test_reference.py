@@ -76,6 +76,16 @@ def test_two_kinds_are_told_apart() -> None:
     assert "turned by 20°" in axes
 
 
+def test_jumps_do_not_hide_the_axes() -> None:
+    def change(q: np.ndarray) -> np.ndarray:
+        return wrong(slice(1200, 1230), (1.0, 0.0, 0.0, 0.0))(in_body((1.0, 0.0, 0.0), 9.0)(q))
+
+    assert [text.split(": ")[1][:20] for text in told("mixed", change)] == [
+        "its axes are turned ",
+        "2 jumps of up to 179",
+    ]
+
+
 @pytest.mark.parametrize("gesture", list(MOTIONS))
 @pytest.mark.parametrize(
     "change",
