@@ -51,11 +51,12 @@ def reference_on_sensor(trajectory: Trajectory) -> tuple[Trajectory, list[Findin
     channels = [seen(trajectory, channel) for channel in ("imu/gyr", "imu/acc")]
     if truth is None or "reference_alignment" in trajectory.metadata or any(values is None for values in channels):
         return trajectory, []
-    there = np.isfinite(np.concatenate([truth, *channels], axis=1)).all(axis=1) & trajectory.mask  # type: ignore[arg-type]
+    there = np.isfinite(np.concatenate([truth, *channels], axis=1)).all(axis=1) & trajectory.mask
     if there.sum() < FEWEST:
         return trajectory, []
     calm = trajectory.replace(truth=trajectory.truth | {"orientation": without_jumps(trajectory)})
-    found, findings = aligned(calm), []
+    found = aligned(calm)
+    findings: list[Finding] = []
     angles = found.metadata["reference_alignment"]
     axes, vertical, offset = angles["sensor_deg"], angles["vertical_deg"], found.metadata.get(REFERENCE_CLOCK, 0.0)
     explained = rate_error(found) < EXPLAINED * rate_error(calm)
