@@ -57,7 +57,9 @@ def reference_on_sensor(trajectory: Trajectory) -> tuple[Trajectory, list[Findin
     calm = trajectory.replace(truth=trajectory.truth | {"orientation": without_jumps(trajectory)})
     found = aligned(calm)
     findings: list[Finding] = []
-    angles = found.metadata["reference_alignment"]
+    angles = found.metadata.get("reference_alignment")
+    if angles is None:  # too few pairs of known orientations
+        return trajectory, []
     axes, vertical, offset = angles["sensor_deg"], angles["vertical_deg"], found.metadata.get(REFERENCE_CLOCK, 0.0)
     explained = rate_error(found) < EXPLAINED * rate_error(calm)
     if explained and abs(offset) > LARGE_OFFSET and REFERENCE_CLOCK not in trajectory.metadata:

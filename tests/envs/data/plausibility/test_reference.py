@@ -70,6 +70,15 @@ def test_each_kind_is_named(gesture: str, change: Callable[[np.ndarray], np.ndar
     assert words in found[0]
 
 
+def test_a_reference_whose_samples_are_never_near_each_other_is_left_alone() -> None:
+    known = simulate_hand("slow", 9, duration=60.0)
+    truth = np.where((np.arange(len(known)) % 10 == 0)[:, None], known.truth["orientation"], np.nan)
+    assert np.isfinite(truth).all(axis=1).sum() > 500
+    assert [
+        each for each in check_recording(known.replace(truth={"orientation": truth})) if each.channel != "time"
+    ] == []
+
+
 def test_two_kinds_are_told_apart() -> None:
     clock, axes = told("mixed", lambda q: np.roll(rotation.multiply(q, about((0.6, 0.0, 0.8), 20.0)), 10, axis=0))
     assert "100.0 ms behind" in clock
