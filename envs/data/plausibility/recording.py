@@ -9,8 +9,10 @@ from __future__ import annotations
 import warnings
 
 from ..repeats import moves
+from ..resampling import shifted
 from ..trajectory import Trajectory
 from .clocks import check_clock
+from .lateness import agreements, check_gyroscope_scale, check_lag
 from .readings import Finding, check_alive, check_copies
 from .reference import check_frozen, check_reference, check_steps, reference_on_sensor
 from .sites import seen, sites, vectors
@@ -62,12 +64,18 @@ def check_site(trajectory: Trajectory, site: str, wrong_clock: bool) -> list[Fin
     gyr, acc, mag = (
         None if f"{site}/{kind}" in dead else seen(trajectory, f"{site}/{kind}") for kind in ("gyr", "acc", "mag")
     )
+    fits = {} if gyr is None or wrong_clock else agreements(gyr, {"acc": acc, "mag": mag}, trajectory.dt)
+    late = list(check_lag(site, fits))
+    if gyr is not None and any(finding.channel == f"{site}/gyr" for finding in late):
+        # What follows is told of rates in their place.
+        gyr = shifted({"gyr": gyr}, trajectory.time, -fits["acc"].lag)["gyr"]
     turning = {} if gyr is None or wrong_clock else compared(trajectory, site, gyr, acc, mag)
     if acc is not None:
-        findings += check_force(f"{site}/acc", acc, turning.get("accelerometer"))
+        findings += check_force(f"{site}/acc", acc, gyr, turning.get("accelerometer"))
     if gyr is not None:
         if not wrong_clock:
-            findings += check_rates(trajectory, site, gyr, turning)
+            rates = list(check_rates(trajectory, site, gyr, turning, fits["acc"].scale if "acc" in fits else None))
+            findings += rates or check_gyroscope_scale(site, fits)
         known = any(finding.channel == f"{site}/gyr" for finding in findings)
         findings += check_rest(f"{site}/gyr", gyr, known or any(one.explains for one in turning.values()))
         findings += [] if known or acc is None else check_noise(f"{site}/gyr", gyr, acc)
@@ -76,4 +84,4 @@ def check_site(trajectory: Trajectory, site: str, wrong_clock: bool) -> list[Fin
     removed = any(f.channel == f"{site}/acc" and f.severity == "warning" for f in findings)
     if acc is not None and not removed:
         findings += check_sign(trajectory, f"{site}/acc", acc, mag)
-    return findings
+    return findings + late

@@ -8,11 +8,13 @@ import numpy as np
 
 from ....filters.core import rotation
 from ..trajectory import Trajectory
-from .rate_consistency import FASTEST_TURN, RateConsistency, rate_consistency
+from .rate_consistency import FASTEST_TURN, SCALES, RateConsistency, rate_consistency
 from .readings import Finding
 
 LEANING, STILL = 0.2, 0.05
 """rad by which a specific force must lean for a gyroscope to show it; below which share of that it shows none."""
+NEAR_SCALE = 0.15
+"""Of the logarithm, by which a unit may differ from a known scale."""
 MOVING = 1.0
 """rad/s that a gyroscope reports only if it moves, or in another unit."""
 
@@ -32,9 +34,17 @@ def compared(
 
 
 def check_rates(
-    trajectory: Trajectory, site: str, gyr: np.ndarray, turning: dict[str, RateConsistency]
+    trajectory: Trajectory, site: str, gyr: np.ndarray, turning: dict[str, RateConsistency], scale: float | None = None
 ) -> Iterator[Finding]:
-    """Unit, signs and axes of the gyroscope, against the motion of gravity, of the field and of the truth."""
+    """Unit, signs and axes of the gyroscope, against the motion of gravity, of the field and of the truth.
+
+    Args:
+        trajectory: with the truth.
+        site: of the sensor.
+        gyr: ``(T, 3)``.
+        turning: see :func:`compared`.
+        scale: by which the rates must be multiplied, where that is known for certain; then no other unit is.
+    """
     channel, found = f"{site}/gyr", dict(turning)
     fastest = float(np.nanquantile(np.linalg.norm(gyr, axis=1), 0.99))
     yield from check_reading(trajectory, gyr, found)
@@ -46,6 +56,8 @@ def check_rates(
         return
     decided = {name: one for name, one in found.items() if one.explains} or found
     units = {name: one.other_unit for name, one in decided.items() if one.other_unit is not None}
+    if scale is not None:
+        units = {name: unit for name, unit in units.items() if abs(np.log(SCALES[unit] / scale)) < NEAR_SCALE}
     if units and not any(one.confirmed for one in decided.values()):
         unit = max(units.values(), key=list(units.values()).count)
         what = f"the reported turns are not those of the {' and '.join(units)}"

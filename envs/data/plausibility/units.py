@@ -37,6 +37,8 @@ NORMALISED = 1e-4
 QUIET_FORCE, LARGEST_SCALE = 0.3, 0.06
 """m/s² of scatter up to which an accelerometer is quiet, and by which share of gravity it may be wrong then: twice what
 uncalibrated consumer accelerometers show."""
+STEADY_TURN = 0.5
+"""rad/s from which on a sensor that is quiet does not rest."""
 LEAST_NOISE, USUAL_NOISE = 7e-5, 8e-3
 """rad/s of noise at rest below which only gyroscopes of navigation grade are, and m/s² that these are not beside."""
 STEADY_FIELD = 0.25
@@ -45,7 +47,9 @@ REST_WINDOW = 100
 """Samples; the quietest such window is taken for rest."""
 
 
-def check_force(channel: str, acc: np.ndarray, turning: RateConsistency | None = None) -> Iterator[Finding]:
+def check_force(
+    channel: str, acc: np.ndarray, gyr: np.ndarray | None = None, turning: RateConsistency | None = None
+) -> Iterator[Finding]:
     """Unit of the accelerometer, and whether gravity is in it: by the median, and by means that the gyroscope turns."""
     samples = acc[np.isfinite(acc).all(axis=1) & acc.any(axis=1)]
     length = np.linalg.norm(samples, axis=1)
@@ -58,7 +62,9 @@ def check_force(channel: str, acc: np.ndarray, turning: RateConsistency | None =
     scattered = turning is not None and not turning.steady and mean < 0.5 * usual
     lively = turning is not None and turning.steady and PLAUSIBLE_FORCE[0] <= turning.length <= PLAUSIBLE_FORCE[1]
     if (PLAUSIBLE_FORCE[0] <= usual <= PLAUSIBLE_FORCE[1] and not scattered) or lively:
-        yield from check_scale(channel, rest)
+        # A steady turn is as quiet as rest, and has an acceleration.
+        turns = False if gyr is None else np.linalg.norm(gyr, axis=1, keepdims=True) > STEADY_TURN
+        yield from check_scale(channel, quietest(np.where(turns, np.nan, acc)))
         return
     what = f"median length {usual:.4g} m/s²"
     # Where the sensor is quiet it reads gravity, in whatever unit; without gravity it reads next to nothing.
@@ -136,21 +142,21 @@ def check_sign(trajectory: Trajectory, channel: str, acc: np.ndarray, mag: np.nd
     """Whether the accelerometer points up at rest (+g on an axis that points up), as a specific force does."""
     apple = "the accelerometer has Apple's sign (it reports −g on an axis that points up)"
     remedy = "Change the sign of all three axes."
+    if "up" in trajectory.quantities and channel == "imu/acc":
+        # Accelerations average out, as velocity stays bounded.
+        upwards = (acc * trajectory.truth_of("up")).sum(axis=1)
+        if np.isfinite(upwards).any():
+            cosine = float(np.nanmean(upwards) / STANDARD_GRAVITY)
+            if cosine < -0.5:
+                what = f"it points down by the reference (cosine {cosine:.2f})"
+                yield Finding("warning", channel, what, f"{apple}, or the z axis of the reference points down", remedy)
+            elif cosine < 0.5:
+                what = f"it does not point up by the reference (cosine {cosine:.2f})"
+                cause = "a reference in another frame, or conjugate quaternions"
+                yield Finding("warning", "orientation", what, cause, "Check frame and order of the reference.")
+            return
     length = np.linalg.norm(acc, axis=1)
     direction = acc / np.where(length > 0.0, length, np.nan)[:, None]
-    cosines = np.array([])
-    if "up" in trajectory.quantities and channel == "imu/acc":
-        cosines = (direction * trajectory.truth_of("up")).sum(axis=1)
-    if np.isfinite(cosines).any():
-        cosine = float(np.nanmedian(cosines))
-        if cosine < -0.5:
-            what = f"it points down by the reference (cosine {cosine:.2f})"
-            yield Finding("warning", channel, what, f"{apple}, or the z axis of the reference points down", remedy)
-        elif cosine < 0.5:
-            what = f"it does not point up by the reference (cosine {cosine:.2f})"
-            cause = "a reference in another frame, or conjugate quaternions"
-            yield Finding("warning", "orientation", what, cause, "Check frame and order of the reference.")
-        return
     usual = np.nanmedian(direction, axis=0)
     size = float(np.nanmedian(length))
     if usual[2] < -0.9:
