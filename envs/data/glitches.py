@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 
+from .ranges import FULL, reached_range
 from .repeats import CHANNELS, RunsSoFar, moves, repeated, runs_of, zeros_in_motion
 from .trajectory import Trajectory
 
@@ -34,8 +35,6 @@ WRITTEN = 3
 """Times that a glitch may be written."""
 FEWEST = 9
 """Samples from which on there is a decision."""
-FULL = 0.999
-"""Share of the range from which a sample is saturated."""
 
 
 def glitches(values: np.ndarray, least: float) -> np.ndarray:
@@ -88,6 +87,13 @@ def full_scales(metadata: Mapping[str, Any]) -> dict[str, float]:
     return {str(name): float(limit) for name, limit in given.items()} if isinstance(given, Mapping) else {}
 
 
+def reached_ranges(measurements: Mapping[str, np.ndarray]) -> dict[str, float]:
+    """Channel → range in its unit, of gyroscopes and accelerometers whose readings show it."""
+    kinds = {name: name.rpartition("/")[2] for name, values in measurements.items() if values.shape[1] == 3}
+    found = {name: reached_range(kind, measurements[name]) for name, kind in kinds.items() if kind in LEAST}
+    return {name: limit for name, limit in found.items() if limit is not None}
+
+
 def no_samples(
     measurements: Mapping[str, np.ndarray], ranges: Mapping[str, float], dt: float | None = None
 ) -> dict[str, dict[str, np.ndarray]]:
@@ -126,14 +132,15 @@ def no_samples(
 def without_glitches(trajectory: Trajectory) -> dict[str, np.ndarray]:
     """The measurements of a trajectory on its grid, NaN where :func:`no_samples` are.
 
-    ``metadata["full_scale"]`` names the ranges of sensors (channel → range).
+    ``metadata["full_scale"]`` names the ranges of sensors (channel → range); others are seen where readings stop.
 
     Warns:
         UserWarning: how many samples there are.
     """
     measurements, reports = dict(trajectory.measurements), []
     dt = trajectory.dt if len(trajectory) > 1 else None
-    for name, parts in no_samples(measurements, full_scales(trajectory.metadata), dt).items():
+    ranges = reached_ranges(measurements) | full_scales(trajectory.metadata)
+    for name, parts in no_samples(measurements, ranges, dt).items():
         wrong = np.logical_or.reduce(list(parts.values()))
         if wrong.any():
             measurements[name] = np.where(wrong[:, None], np.nan, measurements[name])

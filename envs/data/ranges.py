@@ -1,4 +1,4 @@
-"""Ranges of sensors that the header of a table states, such as ``# Gyroscope range: ±2000 deg/s``."""
+"""Ranges of sensors: as the header of a table states (``# Gyroscope range: ±2000 deg/s``), or as readings stop at."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from .formats.table import UNITS, Table, factor, plain
+from .formats.tables.table import UNITS, Table, factor, plain
 
 STATED = re.compile(
     r"\b(?P<kind>gyr(?:o\w*?)?|angular[\s_]*(?:rate|velocity)|acc(?:el\w*?)?)[\W_]*(?:sensor[\W_]*)?"
@@ -21,6 +21,12 @@ USUAL = {
     "acc": ("g", (2, 3, 4, 6, 8, 10, 12, 16, 18, 24, 30, 32, 40, 64, 100, 200, 400)),
 }
 """Kind → unit of a range without one, and the ranges that sensors have in it; other numbers are codes of settings."""
+OF_CODES = (1.0, 1.14688)
+"""Largest reading as a share of the range: sensors whose last code lies beyond it (70 mdps a code at ±2000 °/s)."""
+EXACTLY, FULL = 0.002, 0.999
+"""Tolerance of a usual range, and share of the range from which a sample is saturated."""
+ALONE = 3.0
+"""Times the largest reading elsewhere, from which on a value that is held is no motion, whatever the range."""
 BEYOND = 1.05
 """Share of a range that readings reach at most, if it is theirs."""
 
@@ -65,3 +71,22 @@ def full_scale(table: Table, measurements: Mapping[str, np.ndarray], name: str) 
         else:
             found[channel] = limit
     return found
+
+
+def reached_range(kind: str, values: np.ndarray) -> float | None:
+    """The range of a sensor, where its readings show it: the largest is held, and is a usual range or stands alone.
+
+    Args:
+        kind: ``gyr`` or ``acc``.
+        values: ``(T, 3)`` rad/s or m/s², NaN where missing.
+    """
+    size = np.nan_to_num(np.abs(values))
+    largest = float(size.max(initial=0.0))
+    full = size >= FULL * largest
+    held = full[1:] & full[:-1] & (values[1:] == values[:-1])
+    if largest == 0.0 or not held.any():
+        return None
+    unit, ranges = USUAL[kind]
+    usual = np.outer(OF_CODES, ranges).ravel() * factor(kind, unit)
+    alone = largest > ALONE * float(size[~full.any(axis=1)].max(initial=0.0)) and not full.all(axis=0).any()
+    return largest if alone or np.min(np.abs(usual / largest - 1.0)) < EXACTLY else None

@@ -21,13 +21,13 @@ from ....filters.core import rotation
 from ....filters.core.estimator import real_numbers
 from .. import reference_clock
 from ..trajectory import Trajectory
-from .arrays import ZIP, load_mat, load_npz, read_table, time_first
 from .folders import load_streams
 from .mapping import RecordingMap, Reference, apply_map
-from .names import groups, time_column
-from .stamps import as_seconds
-from .streams import Stream, interpolated
-from .text import Head
+from .tables.arrays import ZIP, load_mat, load_npz, read_table, time_first
+from .tables.names import groups, time_column
+from .tables.stamps import as_seconds
+from .tables.streams import Stream, interpolated
+from .tables.text import Head
 
 SI_UNITS = {"gyr": "rad/s", "acc": "m/s^2"}
 EUROC_TRUTH = ("state_groundtruth_estimate0", "vicon0", "mocap0")

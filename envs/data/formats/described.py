@@ -15,8 +15,8 @@ from ....filters.core import rotation
 from ..plausibility.rate_consistency import rate_consistency
 from ..trajectory import Trajectory
 from .mapping import RecordingMap, Reference, apply_map, as_columns, finite
-from .names import Group, counter_column, groups, is_ros, time_column, time_unit
-from .table import UNITS, Table, factor, plain
+from .tables.names import Group, counter_column, groups, is_ros, time_column, time_unit
+from .tables.table import Table, factor
 
 RATES = (
     *("Update Rate", "Sample Rate", "Sampling Rate", "OutputRate", "Rate", "Frequency", "Sampling Frequency"),
@@ -110,8 +110,17 @@ def complete(table: Table, mapping: RecordingMap) -> bool:
         return False
     for channel in mapping.columns:
         kind = channel.rpartition("/")[2]
-        if kind in ("gyr", "acc") and any(plain(unit) not in UNITS[kind] for unit in units_of(table, mapping, channel)):
+        if kind in ("gyr", "acc") and not all(is_unit(kind, unit) for unit in units_of(table, mapping, channel)):
             return False
+    return True
+
+
+def is_unit(kind: str, unit: str) -> bool:
+    """Whether a unit is one of a kind, or a number of such."""
+    try:
+        factor(kind, unit)
+    except ValueError:
+        return False
     return True
 
 

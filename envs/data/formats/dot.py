@@ -16,13 +16,14 @@ import numpy as np
 
 from ....filters.core import rotation
 from ..trajectory import Trajectory
-from .arrays import read_table
 from .described import with_checked_orientation
 from .mapping import Columns, RecordingMap, Reference, apply_map, trajectory_of
-from .names import groups
-from .stamps import as_seconds
-from .table import Table
-from .text import Head, table_of
+from .tables.arrays import read_table
+from .tables.names import groups
+from .tables.packed import plain_stem
+from .tables.stamps import as_seconds
+from .tables.table import Table
+from .tables.text import Head, table_of
 
 DEVICE_KEYS = ("DeviceTag", "DeviceId", "OutputRate", "FilterProfile", "Measurement Mode", "SyncStatus", "Measurement")
 UNITS = {"gyr": "rad/s", "acc": "m/s²", "mag": "calibration field", "onboard_orientation": "1"}
@@ -97,7 +98,7 @@ def load_dot(path: Path) -> list[Trajectory]:
             f"{table.arrays['SampleTimeFine'][row]} in row {row} after {table.arrays['SampleTimeFine'][row - 1]}"
         )
     details = {
-        "name": path.stem,
+        "name": plain_stem(path),
         "clock_start": int(stamps.first),
         "device": header,
         "format": "Movella DOT",

@@ -5,11 +5,11 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from .arrays import read_table
 from .described import mapping_of, plausible_units
 from .mapping import RecordingMap
-from .stamps import as_seconds
-from .table import Table
+from .tables.arrays import read_table
+from .tables.stamps import as_seconds
+from .tables.table import Table
 
 
 def draft_map(path: str | Path) -> str:

@@ -18,14 +18,14 @@ import numpy as np
 from ....filters.core import rotation
 from ....filters.core.quantity import STANDARD_GRAVITY
 from ..trajectory import Trajectory
-from .arrays import read_table
 from .described import with_checked_orientation
 from .mapping import unit_quaternions
-from .names import AXES, groups, time_column, time_unit, words
-from .stamps import Stamps, as_seconds
-from .streams import Stream, joined
-from .table import Table, factor
-from .text import Head
+from .tables.arrays import read_table
+from .tables.names import AXES, groups, time_column, time_unit, words
+from .tables.stamps import Stamps, as_seconds
+from .tables.streams import Stream, joined
+from .tables.table import Table, factor
+from .tables.text import Head
 
 SUFFIXES = (".csv", ".txt", ".tsv")
 PREFERRED = {

@@ -14,7 +14,6 @@ from ..calibration.records import CalibrationRecord, apply_calibration, as_recor
 from ..reference_clock import measured
 from ..storage import FORMAT, HDF5_SIGNATURE, is_trajectory_file
 from ..trajectory import Trajectory, load_trajectory
-from .arrays import MATLAB, PARQUET, read_table
 from .benchmarks import is_archive, is_euroc, is_repoimu, load_archive, load_euroc, load_phone, load_repoimu
 from .broad import is_broad, load_broad
 from .described import complete, load_described, mapping_of, with_checked_orientation
@@ -22,7 +21,10 @@ from .dot import is_dot, is_xsens, load_dot, load_xsens
 from .draft import explanation
 from .folders import is_folder_of_streams, is_member, load_member
 from .mapping import RecordingMap, apply_map, make_map, read_map
-from .text import Head, table_of
+from .tables.arrays import MATLAB, PARQUET, read_table
+from .tables.cells import SENSOR
+from .tables.rows import widened
+from .tables.text import Head, table_of
 
 
 @dataclass(frozen=True)
@@ -69,7 +71,10 @@ def is_described(head: Head) -> bool:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            table = read_table(head.path) if arrays else table_of(head.text, head.path.name)
+            table = read_table(head.path) if arrays else widened(table_of(head.text, head.path.name))
+            if any(SENSOR.search(name) and name not in table.labels for name in table.texts):
+                # The first rows may be of one sensor only.
+                table = read_table(head.path)
             return complete(table, mapping_of(table))
     except (ValueError, ImportError):
         return False
@@ -231,7 +236,8 @@ def chosen_map(path: Path, given: Mapping[str, Any]) -> RecordingMap:
     arguments = dict(given)
     if "columns" not in arguments:
         drafted = mapping_of(read_table(path))
-        if not drafted.columns:
+        known = {name.rpartition("/")[2] for name in drafted.columns}
+        if not drafted.columns or not {"gyr", "acc"} & set(arguments.get("units", ())) <= known:
             raise ValueError(explanation(path))
         arguments["columns"] = {name.removeprefix("imu/"): list(names) for name, names in drafted.columns.items()}
         arguments.setdefault("time", drafted.time)

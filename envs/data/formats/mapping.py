@@ -10,7 +10,7 @@ import re
 import tomllib
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -21,8 +21,10 @@ from ....filters.support.names import unknown
 from ....filters.support.parameters import check_parameters
 from ..ranges import full_scale
 from ..trajectory import Trajectory
-from .row_times import row_times, with_times
-from .table import UNITS, Table, factor
+from .tables.packed import plain_stem
+from .tables.row_times import row_times, with_times
+from .tables.rows import by_device
+from .tables.table import UNITS, Table, factor
 
 Columns = str | Sequence[str | int]
 SIZES = {"gyr": 3, "acc": 3, "mag": 3}
@@ -229,7 +231,11 @@ def apply_map(table: Table, mapping: RecordingMap, path: Path) -> list[Trajector
     Raises:
         ValueError: a column is missing or unreadable, or the time is.
     """
-    table = with_times(table, None if mapping.time is None else str(mapping.time))
+    time = None if mapping.time is None else str(mapping.time)
+    table = with_times(table, time)
+    parts = by_device(table, time)
+    if parts:
+        return [one for device, part in parts.items() for one in apply_map(part, of_device(mapping, device), path)]
     seconds, clock = mapping.times(table)
     sensors = mapping.sensors()
     for reference in mapping.reference:
@@ -251,7 +257,7 @@ def apply_map(table: Table, mapping: RecordingMap, path: Path) -> list[Trajector
                 truth["orientation"] = reference.orientation(table)
                 if reference.position is not None:
                     truth["position"] = table.matrix(as_columns(reference.position))
-        name = path.stem if len(sensors) == 1 else f"{path.stem}-{sensor}"
+        name = plain_stem(path) if len(sensors) == 1 and sensor == "imu" else f"{plain_stem(path)}-{sensor}"
         details = {"name": name, "units": units, **clock, **mapping.details}
         if len(sensors) > 1 or sensor != "imu":
             details["sensor"] = sensor
@@ -260,6 +266,18 @@ def apply_map(table: Table, mapping: RecordingMap, path: Path) -> list[Trajector
             details.setdefault("full_scale", ranges)
         trajectories.append(trajectory_of(seconds, measurements, truth, details))
     return trajectories
+
+
+def of_device(mapping: RecordingMap, device: str) -> RecordingMap:
+    """The mapping of the rows of one device of several, which becomes a sensor of that name."""
+    columns = {f"{device}/{name.removeprefix('imu/')}": one for name, one in mapping.columns.items()}
+    units = {name.removeprefix("imu/"): unit for name, unit in mapping.units.items()}
+    references = tuple(
+        replace(one, sensor=None)
+        for one in mapping.reference
+        if one.sensor is None or one.sensor.lower() in ("imu", device.lower())
+    )
+    return replace(mapping, columns=columns, units=units, reference=references)
 
 
 def trajectory_of(

@@ -11,6 +11,7 @@ import numpy as np
 
 from ....filters.core.quantity import ACCELEROMETER, GYROSCOPE, MAGNETOMETER, SHORTEST
 from ..glitches import LEAST, glitches
+from ..ranges import FULL, reached_range
 from ..repeats import HELD, foreign_runs, moves, runs_of, usual_run
 
 CHANNELS = {"gyr": GYROSCOPE, "acc": ACCELEROMETER, "mag": MAGNETOMETER}
@@ -212,6 +213,13 @@ def check_range(channel: str, samples: np.ndarray) -> Iterator[Finding]:
         severity: Severity = "warning" if lost else "note"
         remedy = "Choose a larger range of the sensor; metadata['full_scale'] tells estimators of it."
         yield Finding(severity, channel, what, "saturation of the sensor", remedy)
+    elif (
+        reached := reached_range(kind, samples) if (kind := channel.rpartition("/")[2]) in LEAST else None
+    ) is not None:
+        count = int((np.abs(samples) >= FULL * reached).any(axis=1).sum())
+        what = f"{count} samples stand at {reached:.4g}, the end of the range"
+        remedy = "They are treated as missing samples."
+        yield Finding("note", channel, what, "saturation of the sensor, or errors of the transmission", remedy)
     limit = OVERFLOW * np.abs(samples).max(axis=0)
     before, after = samples[:-1], samples[1:]
     jumps = int((((before > limit) & (after < -limit)) | ((before < -limit) & (after > limit))).sum())

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 import poise
-from poise.envs.data.glitches import FEWEST, FULL, SamplesSoFar, without_glitches
+from poise.envs.data.glitches import FEWEST, SamplesSoFar, without_glitches
+from poise.envs.data.ranges import FULL
 from poise.envs.data.trajectory import Trajectory
 from poise.envs.hand.sensing import simulate_hand
 from poise.filters.core import metrics
@@ -158,3 +159,32 @@ def test_a_glitch_that_arrives_is_withheld_at_once() -> None:
     last = [watch.add({name: values[row] for name, values in glitched.items()})[-1] for row in range(201)]
     assert np.isnan(last[200]["imu/gyr"]).all()
     assert np.isfinite(last[200]["imu/acc"]).all()
+
+
+@pytest.mark.parametrize("count", [2, 3, 5])
+@pytest.mark.parametrize(
+    ("kind", "value"),
+    [
+        ("gyr", np.radians([2000.0, 2000.0, 2000.0])),
+        ("gyr", np.radians([np.nan, -1999.94, np.nan])),
+        ("acc", 9.80665 * np.array([-16.0, 16.0, 16.0])),
+        ("acc", np.array([np.nan, np.nan, 300.0])),
+    ],
+)
+def test_a_few_samples_in_a_row_at_the_end_of_the_range_count_as_missing(kind, value, count) -> None:
+    rows = np.array([*range(400, 400 + count), *range(900, 900 + count)])
+    before = KNOWN.measurements[f"imu/{kind}"][rows]
+    glitched = with_samples(kind, rows, np.where(np.isnan(value), before, value))
+    with pytest.warns(UserWarning, match=f"imu/{kind}: {len(rows)} saturated"):
+        found = without_glitches(glitched)[f"imu/{kind}"]
+    assert np.array_equal(np.flatnonzero(np.isnan(found).any(axis=1)), rows)
+    told = [finding for finding in poise.check_recording(glitched) if finding.channel == f"imu/{kind}"]
+    assert any("saturation" in finding.cause for finding in told)
+
+
+@pytest.mark.parametrize("share", [0.5, 0.9])
+def test_a_peak_within_the_range_that_is_held_is_motion(share) -> None:
+    gyr = KNOWN.measurements["imu/gyr"]
+    row = int(np.argmax(np.abs(gyr).max(axis=1)))
+    held = with_samples("gyr", np.array([row, row + 1]), share * gyr[row])
+    assert not np.isnan(without_glitches(held)["imu/gyr"]).any()

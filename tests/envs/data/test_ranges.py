@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import poise
-from poise.envs.data.formats.table import Table
+from poise.envs.data.formats.tables.table import Table
 from poise.envs.data.ranges import stated_ranges
 
 DPS, G = np.pi / 180.0, 9.80665

@@ -121,15 +121,14 @@ def test_decimal_commas_between_commas_are_refused(tmp_path):
         loaded(tmp_path, [names, *(row.replace(".", ",") for row in rows)])
 
 
-def test_rows_of_two_devices_in_parquet_are_refused(tmp_path):
+def test_rows_of_two_devices_in_parquet_are_two_recordings(tmp_path):
     pandas = pytest.importorskip("pandas")
     pytest.importorskip("pyarrow")
     frames = [pandas.DataFrame({"device": name} | TABLE) for name in ("left", "right")]
     pandas.concat(frames).sort_values("time (s)").to_parquet(tmp_path / "a.parquet")
-    with pytest.raises(
-        ValueError, match=r"rows of several sensors stand under one another \(column device: left, right"
-    ):
-        load_recordings(tmp_path / "a.parquet")
+    found = load_recordings(tmp_path / "a.parquet")
+    assert [one.metadata["sensor"] for one in found] == ["left", "right"]
+    assert len(found[0]) == len(TABLE["time (s)"])
 
 
 @pytest.mark.parametrize("index", ["dates", "durations", "texts"])

@@ -7,7 +7,7 @@ import pytest
 
 import poise
 from poise.envs.data.formats.load import find_recordings
-from poise.envs.data.formats.streams import Stream, joined
+from poise.envs.data.formats.tables.streams import Stream, joined
 from poise.filters.core import rotation
 
 from .motion import G, angles, axes, readings, same, write_table

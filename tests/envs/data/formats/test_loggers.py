@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from poise.envs.data.formats.load import load_recording
-from poise.envs.data.formats.table import factor
+from poise.envs.data.formats.tables.table import factor
 
 from .motion import G, angles, axes, readings, same, write_table
 
@@ -204,11 +204,11 @@ def test_folders_of_apps(tmp_path: Path, app: str) -> None:
 @pytest.mark.parametrize(
     ("content", "told"),
     [
-        (b"\x1f\x8b" + bytes(64), "gzip"),
+        (b"\x1f\x8b" + bytes(64), "packed"),
         (b"SQLite format 3\0" + bytes(64), "SQLite"),
         (b"#ROSBAG V2.0\n" + bytes(64), "rostopic"),
         (bytes((14, 16, 67, 8, 0, 0, 0, 0)) + b".FIT" + bytes(64), "FitCSVTool"),
-        (b'[{"t": 0.0, "gx": 1.0}]' * 9000, "JSON"),
+        (b'{"t": {"gx": [1.0]}}' * 9000, "JSON"),
         (b"<samples><s t='0'/></samples>", "XML"),
     ],
 )
@@ -218,8 +218,11 @@ def test_files_of_other_kinds_are_told_what_to_do(tmp_path: Path, content: bytes
         load_recording(tmp_path / "a.dat")
 
 
-def test_samples_of_two_sensors_under_one_another_are_refused_by_their_type(tmp_path: Path) -> None:
+def test_samples_of_two_sensors_under_one_another_are_told_by_their_type(tmp_path: Path) -> None:
     twice = np.repeat(np.arange(COUNT), 2)
     columns = {"time": TIME[twice], "type": np.tile([4, 1], COUNT)} | axes("{}", GYR[twice], "xyz")
-    with pytest.raises(ValueError, match="several sensors"):
-        load_recording(write_table(tmp_path / "a.csv", columns), columns={"gyr": ["x", "y", "z"]}, time="time")
+    path = write_table(tmp_path / "a.csv", columns)
+    found = load_recording(path, units={"gyr": "rad/s", "acc": "m/s^2"})
+    same(found.measurements["imu/gyr"], GYR)
+    with pytest.raises(ValueError, match=r"unknown column 'x' .*gyr_x"):
+        load_recording(path, columns={"gyr": ["x", "y", "z"]}, time="time")

@@ -66,10 +66,11 @@ def test_what_is_no_path_is_named(path):
     ("column", "labels"),
     [("segment", ["thigh", "shank"]), ("sensor", [1, 2]), ("device id", [7, 3]), ("which", ["a", "b", "c"])],
 )
-def test_rows_of_several_sensors_under_one_another_are_refused(tmp_path, column, labels):
+def test_rows_of_several_sensors_under_one_another_are_sensors(tmp_path, column, labels):
     path = write(tmp_path / "a.csv", {column: labels * len(TIME)}, repeat=len(labels))
-    with pytest.raises(ValueError, match=rf"rows of several sensors stand under one another \(column {column}: "):
-        poise.load_recording(path, columns=COLUMNS, time="time")
+    found = poise.load_recordings(path, columns=COLUMNS, time="time")
+    assert [one.metadata["sensor"] for one in found] == list(map(str, labels))
+    assert {len(one) for one in found} == {len(TIME)}
 
 
 def test_labels_that_change_now_and_then_are_no_sensors(tmp_path, recwarn):

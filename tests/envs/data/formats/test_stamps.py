@@ -10,9 +10,9 @@ from zoneinfo import ZoneInfo
 import numpy as np
 import pytest
 
-from poise.envs.data.formats.arrays import read_table
 from poise.envs.data.formats.load import load_recording
-from poise.envs.data.formats.stamps import as_seconds
+from poise.envs.data.formats.tables.arrays import read_table
+from poise.envs.data.formats.tables.stamps import as_seconds
 
 
 def written(folder: Path, content: str) -> Path:

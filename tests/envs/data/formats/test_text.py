@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from poise.envs.data.formats.arrays import read_table
 from poise.envs.data.formats.load import load_recording
-from poise.envs.data.formats.names import classify, groups, time_column
-from poise.envs.data.formats.table import factor, split_unit
+from poise.envs.data.formats.tables.arrays import read_table
+from poise.envs.data.formats.tables.names import classify, groups, time_column
+from poise.envs.data.formats.tables.table import factor, split_unit
 
 VALUES = np.round(np.random.default_rng(5).standard_normal((50, 4)), 4)
 NAMES = ["t", "Gyr_X", "Gyr_Y", "Gyr_Z"]

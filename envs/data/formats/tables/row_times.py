@@ -54,7 +54,6 @@ def row_times(
         if rest is not None:
             values, unit = values.astype(np.int64) * 10**9 + table.column(rest[0]).astype(np.int64) * rest[1], "ns"
         stamps = as_seconds(values, unit, name)
-        check_labels(table, stamps.elapsed)
         return stamps.elapsed, details | {"clock_start": stamps.first}
     if rate is None:
         raise ValueError("name the column of the time (time=…) or the sampling rate in Hz (rate=…)")
@@ -62,15 +61,6 @@ def row_times(
         stamps = as_seconds(table.column(counter), "s", counter)
         return stamps.elapsed / rate, details | {"clock_start": stamps.first}
     return np.arange(length) / rate, details
-
-
-def check_labels(table: Table, elapsed: np.ndarray) -> None:
-    """Refuse rows of several sensors at the same times; warn where rows only seem to be those of several."""
-    for name, labels in table.labels.items():
-        what = f"rows of several sensors stand under one another (column {name}: {', '.join(labels[:5])})"
-        if len(elapsed) > 1 and float((np.diff(elapsed) == 0.0).mean()) > 0.3:
-            raise ValueError(f"{what}: give each sensor a file of its own")
-        warnings.warn(f"{what}? Then give each a file of its own", stacklevel=7)
 
 
 def fraction_column(name: str, table: Table) -> tuple[str, int] | None:

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..resampling import between, neighbours
+from ...resampling import between, neighbours
 
 FAST = 0.7
 LONGEST_STEP = 3.5

@@ -5,16 +5,21 @@ from __future__ import annotations
 import zipfile
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..storage import HDF5_SIGNATURE, LARGEST, LARGEST_RATIO, objects, read_hdf5
+from ...storage import HDF5_SIGNATURE, LARGEST, LARGEST_RATIO, objects, read_hdf5
 from .cells import labels_of, numeric
+from .packed import OPENERS, ZIP, content_of, is_archive_of_arrays
+from .rows import widened
 from .table import Table, split_unit
-from .text import is_text, read_text
+from .text import decode, is_text, read_text
 
-NPY, ZIP, PARQUET, MATLAB = b"\x93NUMPY", b"PK\x03\x04", b"PAR1", b"MATLAB"
+if TYPE_CHECKING:
+    import pandas
+
+NPY, PARQUET, MATLAB = b"\x93NUMPY", b"PAR1", b"MATLAB"
 
 
 OTHERS: dict[bytes, str] = {
@@ -22,9 +27,6 @@ OTHERS: dict[bytes, str] = {
     b"\x80\x04": "is a pickle, which can run any program; save its arrays as .npz or its table as CSV or Parquet",
     b"\x80\x05": "is a pickle, which can run any program; save its arrays as .npz or its table as CSV or Parquet",
     b"ARROW1": "is an Arrow (Feather) file; save it as Parquet",
-    b"\x1f\x8b": "is compressed (gzip); unpack it first",
-    b"BZh": "is compressed (bzip2); unpack it first",
-    b"\xfd7zXZ": "is compressed (xz); unpack it first",
     b"\x28\xb5\x2f\xfd": "is compressed (zstd); unpack it first",
     b"7z\xbc\xaf": "is a 7z archive; unpack it first",
     b"Rar!": "is a RAR archive; unpack it first",
@@ -61,8 +63,12 @@ def read_table(path: Path) -> Table:
         head = file.read(4096)
     if head.startswith(NPY):
         return as_table({"array": load_npy(path)}, "NumPy array")
-    if head.startswith(ZIP):
+    if head.startswith(ZIP) and is_archive_of_arrays(path):
         return as_table(load_npz(path), "NumPy archive")
+    if head.startswith((ZIP, *OPENERS)):
+        head = content_of(path, len(head))
+        if not is_text(head):
+            raise ValueError("it is packed, and no text is in it; unpack it first")
     if head.startswith(PARQUET):
         return read_parquet(path)
     if head.startswith(HDF5_SIGNATURE) or b"MATLAB 7.3" in head[:128]:
@@ -73,10 +79,11 @@ def read_table(path: Path) -> Table:
     if other is not None:
         raise ValueError(f"it {other}")
     if is_text(head):
-        if head.lstrip()[:1] in (b"{", b"[", b"<"):
-            kind = "XML" if head.lstrip()[:1] == b"<" else "JSON"
-            raise ValueError(f"it is {kind}; save its samples as a table, such as CSV, one row a sample")
-        return read_text(path)
+        if head.lstrip()[:1] == b"<":
+            raise ValueError("it is XML; save its samples as a table, such as CSV, one row a sample")
+        if head.lstrip()[:1] in (b"{", b"["):
+            return widened(read_json(path))
+        return widened(read_text(path))
     raise ValueError("it is empty" if not head else "it is neither a text nor a NumPy, MATLAB, HDF5 or Parquet file")
 
 
@@ -123,8 +130,6 @@ def load_npz(path: Path) -> dict[str, np.ndarray]:
             total = sum(entry.file_size for entry in archive.infolist())
             if any(entry.filename.startswith("xl/") for entry in archive.infolist()):
                 raise ValueError("it is a spreadsheet; save its table as CSV")
-            if not any(entry.filename.endswith(".npy") for entry in archive.infolist()):
-                raise ValueError("it is a ZIP archive without NumPy arrays; unpack it first")
             if total > min(LARGEST, LARGEST_RATIO * path.stat().st_size + 2**20):
                 raise ValueError(f"it declares {total / 2**20:.0f} MiB, more than a file of its size can hold")
             for entry in archive.infolist():
@@ -202,8 +207,15 @@ def read_parquet(path: Path) -> Table:
         raise ValueError(f"it is not a readable Parquet file: {reason}") from None
     if frame.index.name or frame.index.dtype.kind in "mM":
         frame = frame.rename_axis(index=frame.index.name or "time").reset_index()
+    return widened(table_of_frame(frame, "Parquet table"))
+
+
+def table_of_frame(frame: pandas.DataFrame, kind: str) -> Table:
+    """A table of a frame; texts are left out, dates become ns."""
+    import pandas
+
     arrays: dict[str, np.ndarray] = {}
-    labels: dict[str, tuple[str, ...]] = {}
+    labels: dict[str, np.ndarray] = {}
     for name, column in frame.items():
         if column.dtype.kind == "m":
             values: np.ndarray | None = column.to_numpy("timedelta64[ns]").astype(np.int64)
@@ -214,13 +226,51 @@ def read_parquet(path: Path) -> Table:
         else:
             values, _ = numeric(column)
         found = labels_of(str(name), column, values)
-        labels |= {str(name): found} if found else {}
+        labels |= {str(name): found} if found is not None else {}
         if values is not None:
             arrays[f"{name} (ns)" if column.dtype.kind in "mM" else str(name)] = values
-    return replace(as_named(arrays, "Parquet table"), labels=labels)
+    return replace(as_named(arrays, kind), labels=labels)
 
 
 def as_named(arrays: dict[str, np.ndarray], kind: str) -> Table:
     """A table of arrays whose names may end with a unit."""
     units = {split_unit(name)[0]: split_unit(name)[1] for name in arrays if split_unit(name)[1]}
     return Table({split_unit(name)[0]: values for name, values in arrays.items()}, units=units, kind=kind)
+
+
+def columns_or_records(text: str) -> Any:
+    """The records of a JSON object that has one list of them, or lists of equal length for columns; else None."""
+    import json
+
+    try:
+        whole = json.loads(text)
+    except (ValueError, RecursionError):
+        return None
+    lists = {name: one for name, one in whole.items() if isinstance(one, list)} if isinstance(whole, dict) else {}
+    if len(lists) == 1:
+        return next(iter(lists.values()))
+    flat = lists and all(isinstance(one, int | float | str | None) for each in lists.values() for one in each)
+    if not flat or len({len(each) for each in lists.values()}) != 1:
+        return None
+    return [dict(zip(lists, row, strict=True)) for row in zip(*lists.values(), strict=True)]
+
+
+def read_json(path: Path) -> Table:
+    """A list of records, or a record a line, of numbers and of records of numbers."""
+    import json
+
+    import pandas
+
+    text = decode(content_of(path)).strip()
+    try:
+        records = json.loads(text) if text.startswith("[") else [json.loads(line) for line in text.splitlines()]
+    except (ValueError, RecursionError):
+        records = None
+    if text.startswith("{") and (records is None or len(records) == 1):
+        records = columns_or_records(text)
+    alike = isinstance(records, list) and len(records) > 1 and all(isinstance(one, dict) for one in records)
+    if not alike:
+        raise ValueError(
+            "it is JSON, but no list of records; save its samples as a table, such as CSV, one row a sample"
+        )
+    return table_of_frame(pandas.json_normalize(records, max_level=3), "JSON records")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ..clock import USUAL_RATES
+from ...clock import USUAL_RATES
 from .table import UNITS, factor
 
 if TYPE_CHECKING:
@@ -18,7 +18,7 @@ ZONES = {"WET": 0, "BST": 1, "WEST": 1, "CET": 1, "CEST": 2, "EET": 2, "EEST": 3
 ZONES |= {"CST": -6, "CDT": -5, "MST": -7, "MDT": -6, "PST": -8, "PDT": -7}
 """Name of a time zone → hours east of Greenwich."""
 CLOCK = r"\d\d?:\d\d(:\d\d([.,:]\d+)?|[.,]\d+)?(\s*[ap]\.?m\.?)?"
-CALENDAR = r"(\d{4}([-/.]\d\d[-/.]\d\d|\d{4})|\d\d?[-/. ](\d\d?|[a-z]{3,9})[-/. ](\d{4}|\d\d))"
+CALENDAR = r"(\d{4}([-/.]\d\d?[-/.]\d\d?|\d{4})|\d\d?[-/. ](\d\d?|[a-z]{3,9})[-/. ](\d{4}|\d\d))"
 OTHER_CLOCK = r"(?P<h>\d\d)(?P<mark>[-.]?)(?P<m>\d\d)(?P=mark)(?P<s>\d\d)([-_.,](?P<f>\d+))?"
 """A time of the day without colons, after a date."""
 DATE = re.compile(
@@ -109,7 +109,8 @@ def as_seconds(stamps: np.ndarray, unit: str, name: str = "time") -> Stamps:
     # The samples of a packet are much nearer to each other than usual.
     usual = max(float(np.median(np.abs(steps))), float(np.ptp(elapsed)) / len(steps)) if len(steps) else 0.0
     # A few rows that changed places are sorted later; a clock that was set back, or a second recording, is not.
-    if len(steps) and ((steps < 0.0).mean() > 0.05 or steps.min() < -FURTHEST_BACK * usual):
+    newest_first = len(steps) > 1 and bool((steps <= 0.0).all()) and float((steps < 0.0).mean()) > 0.5
+    if len(steps) and not newest_first and ((steps < 0.0).mean() > 0.05 or steps.min() < -FURTHEST_BACK * usual):
         row = int(np.argmin(steps)) + 1
         raise ValueError(
             f"column {name} must increase, got {stamps[row]} in row {row} after {stamps[row - 1]}: a clock that was "

@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .cells import MISSING, is_number, is_value, labels_of, numeric
+from .packed import OPENERS, ZIP, content_of, is_archive_of_arrays
 from .table import DAMAGED, Table, split_unit, units_row
 
 if TYPE_CHECKING:
@@ -110,8 +111,8 @@ def guess_delimiter(lines: list[str]) -> str | None:
 
 
 def read_text(path: Path) -> Table:
-    """Read a text table, see :func:`table_of`."""
-    return table_of(decode(path.read_bytes()), path.name)
+    """Read a text table, packed or not, see :func:`table_of`."""
+    return table_of(decode(content_of(path)), path.name)
 
 
 def table_of(text: str, name: str) -> Table:
@@ -153,6 +154,7 @@ def table_of(text: str, name: str) -> Table:
             stacklevel=4,
         )
         data = [line for line in data if line.strip() not in heads_above]
+    data = without_empty_fields(data, lines[:begin], delimiter)
     widths = [len(fields_of(line, delimiter)) for line in data[:SAMPLE]]
     width = max(set(widths), key=widths.count)
     data = whole_rows(data, delimiter, width, name)
@@ -190,9 +192,9 @@ def table_of(text: str, name: str) -> Table:
         read = [numeric(frame[column]) for column in range(width)]
     for column, name in enumerate(names):
         values, wrong = read[column]
-        texts_found = labels_of(name, frame[column], values)
-        if texts_found:
-            labels[name] = texts_found
+        found = labels_of(name, frame[column], values)
+        if found is not None:
+            labels[name] = found
         if values is None and frame[column].notna().any():
             texts[name] = str(frame[column].dropna().iloc[0])[:40]
         if values is None or (column >= len(names) - 2 and not name and np.isnan(values.astype(float)).all()):
@@ -208,6 +210,7 @@ def table_of(text: str, name: str) -> Table:
     )
     if blank.any():
         arrays = {name: values[~blank] for name, values in arrays.items()}
+        labels = {name: values[~blank] for name, values in labels.items()}
     return Table(
         arrays=arrays,
         units=units,
@@ -218,6 +221,16 @@ def table_of(text: str, name: str) -> Table:
         labels=labels,
         texts=texts,
     )
+
+
+def without_empty_fields(data: list[str], above: list[str], delimiter: str) -> list[str]:
+    """Rows without the empty fields at their ends that no name stands over."""
+    head = next((line for line in reversed(above) if line.strip()), "")
+    if delimiter == " " or not head or not data[0].endswith(2 * delimiter):
+        return data
+    empty = min(len(line) - len(line.rstrip(delimiter)) for line in data)
+    named = len(fields_of(data[0], delimiter)) - len(fields_of(head, delimiter))
+    return [line[:-empty] for line in data] if empty == named > 1 else data
 
 
 def cut_off(rows: list[list[str]], width: int, ended: bool) -> bool:
@@ -309,6 +322,9 @@ def header_lines(above: list[str], delimiter: str, width: int) -> list[tuple[int
         fields = fields_of(re.sub(r"^\s*(#|//|%)\s*", "", line), delimiter)
         content = [field for field in fields if field]
         same = len(fields) in (width - 1, width, width + 1) and len(content) > 0.25 * width
+        # pandas writes the name of its index below those of several levels.
+        higher = fields_of(above[number - 1], delimiter) if number else []
+        same |= not found and len(fields) == width == len(higher) and content == fields[:1] and not higher[0]
         if not same or len(found) == 3 or (any(is_number(field) for field in content) and len(found)):
             break
         if content and content[0].endswith(":"):
@@ -355,11 +371,18 @@ class Head:
 
     @cached_property
     def content(self) -> bytes:
-        """First bytes of a file; none of a folder."""
+        """First bytes of a file, of a packed text those of the text; none of a folder."""
         if self.folder:
             return b""
         with self.path.open("rb") as file:
-            return file.read(HEAD_LENGTH)
+            head = file.read(HEAD_LENGTH)
+        if not head.startswith((ZIP, *OPENERS)) or (head.startswith(ZIP) and is_archive_of_arrays(self.path)):
+            return head
+        try:
+            unpacked = content_of(self.path, HEAD_LENGTH)
+        except ValueError:
+            return head
+        return unpacked if is_text(unpacked) else head
 
     @cached_property
     def text(self) -> str:

@@ -9,8 +9,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ....filters.core.quantity import STANDARD_GRAVITY
-from ....filters.support.names import unknown
+from .....filters.core.quantity import STANDARD_GRAVITY
+from .....filters.support.names import unknown
 
 UNIT = re.compile(r"^(?P<name>.*?)[\s_]*(\((?P<a>(?:[^()]|\([^()]*\))*)\)|\[(?P<b>[^\[\]]*)\])$")
 SPELLED = {"deg_s": "deg/s", "degs": "deg/s", "dps": "deg/s", "mdps": "mdps", "rad_s": "rad/s", "rads": "rad/s"}
@@ -28,6 +28,8 @@ SPELLED |= {
 """Units within names of columns, ``gyr_x_dps`` or ``acc_mps2_x``."""
 ONLY_OF = {"g": "acc", "t": "^m", "s": "^time", "rad": "^gyr"}
 """Short ones that are units only within names that match."""
+MULTIPLE = re.compile(r"(?P<times>\d+\.?\d*|\.\d+)(?:/(?P<parts>[1-9]\d*))?(?P<unit>\D.*)")
+"""A number of units, or parts of one as raw readings have, ``1/16 deg/s``."""
 QUOTIENT = re.compile(r"^(?P<name>.*?(?:[xyz]|time|\bt))\s*(?:/|:| - )\s*(?P<unit>\S+)$", re.IGNORECASE)
 """Quantity over unit as ISO 80000 writes it, ``acc_x/(m/s²)`` or ``t/s``, and the same with a colon or a dash."""
 SUFFIX = re.compile(rf"^(?P<name>\w*?[a-z])_(?P<unit>{'|'.join(SPELLED)})(?P<axis>_[xyz]|\[\d\])?$", re.IGNORECASE)
@@ -130,9 +132,11 @@ def factor(kind: str, unit: str) -> float:
     if known is None:
         return 1.0
     if isinstance(unit, str):
-        times, short = re.fullmatch(r"(\d*\.?\d*)(.*)", plain(unit)).groups()  # type: ignore[union-attr]
-        if plain(unit) in known or (times.strip(".") and short in known and float(times) > 0.0):
-            return known[plain(unit)] if plain(unit) in known else float(times) * known[short]
+        if plain(unit) in known:
+            return known[plain(unit)]
+        parts = MULTIPLE.fullmatch(plain(unit))
+        if parts is not None and parts["unit"] in known and float(parts["times"]) > 0.0:
+            return float(parts["times"]) / float(parts["parts"] or 1.0) * known[parts["unit"]]
     raise ValueError(f"units[{kind!r}]: {unknown('unit', unit, known)}")
 
 
@@ -158,9 +162,10 @@ def split_unit(name: str) -> tuple[str, str]:
         stem, said, unit = name.strip().rpartition(", ")
         return (stem, unit) if said and plain(unit) in KNOWN_UNITS and not unit.isdigit() else (name.strip(), "")
     unit = (match["a"] if match["a"] is not None else match["b"]).strip()
-    times, short = re.fullmatch(r"(\d*\.?\d*)(.*)", plain(unit)).groups()  # type: ignore[union-attr]
+    multiple = MULTIPLE.fullmatch(plain(unit))
     known = (plain(unit) in KNOWN_UNITS or plain(unit) in OTHER_UNITS) and not unit.isdigit()
-    known = known or (bool(times) and short in UNITS["time"])
+    # A number before another unit may be a range, (16 g).
+    known = known or bool(multiple and multiple["unit"] in (KNOWN_UNITS if multiple["parts"] else UNITS["time"]))
     return (match["name"].strip(), unit) if unit == "" or known else (name.strip(), "")
 
 
@@ -186,7 +191,7 @@ class Table:
         kind: of the file, for messages.
         named: whether the columns have names of their own.
         unreadable: name → row and content of the first cell that is not a number, and their count.
-        labels: name → texts of a column that change from row to row, such as names of sensors.
+        labels: name → texts ``(N,)`` of a column that tells rows apart, such as names of sensors.
         texts: name → first content of a column that holds no numbers.
     """
 
@@ -196,7 +201,7 @@ class Table:
     kind: str = "table"
     named: bool = True
     unreadable: dict[str, tuple[int, str, int]] = field(default_factory=dict)
-    labels: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    labels: dict[str, np.ndarray] = field(default_factory=dict)
     texts: dict[str, str] = field(default_factory=dict)
 
     def __len__(self) -> int:
@@ -228,7 +233,8 @@ class Table:
         """Some rows of all columns of full length."""
         length = len(self)
         arrays = {name: values[kept] if len(values) == length else values for name, values in self.arrays.items()}
-        return replace(self, arrays=arrays, unreadable={})
+        labels = {name: texts[kept] for name, texts in self.labels.items()}
+        return replace(self, arrays=arrays, labels=labels, unreadable={})
 
     def matrix(self, names: str | Sequence[str]) -> np.ndarray:
         """Columns side by side, ``(N, k)`` float64; a single name may be an array of several columns."""

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .stamps import DATE, nanoseconds
+from .table import factor
 
 if TYPE_CHECKING:
     import pandas
@@ -22,8 +23,12 @@ MISSING = (
 NUMBER = re.compile(r"[-+]?(\d+[.,]?\d*|[.,]\d+)([eEdD][-+]?\d+)?|[-+]?(inf|infinity)", re.IGNORECASE)
 GROUPED = re.compile(r"[-+]?\d{1,3}('\d{3})+([.,]\d*)?|[-+]?\d{1,3}(,\d{3})*\.\d*|[-+]?\d{1,3}(\.\d{3})*,\d*")
 """Digits in groups of thousands, where the decimal mark is another one."""
+DURATION = re.compile(r"([-+]?\d+(?:[.,]\d+)?)\s*(s|secs?|seconds?|ms|msec|us|µs|min|minutes?|hr?|hours?)")
+"""A duration with its unit, as MATLAB writes it."""
+FEW = 16
+"""Different whole numbers up to which a column may number sensors, whatever its name."""
 SENSOR = re.compile(
-    r"(^|[\W_])(id|sensor|device|node|imu|mac|address|type|kind|channel|topic|stream)s?([\W_]*(id|no|number|name))?$",
+    r"(^|[\W_])(id|sensor|device|node|imu|mac|address|type|kind|channel|topic|stream|inst|instance)s?([\W_]*(id|no|number|name))?$",
     re.IGNORECASE,
 )
 OFTEN, MOST_SENSORS = 0.3, 64
@@ -37,17 +42,19 @@ def is_number(field: str) -> bool:
 
 def is_value(field: str) -> bool:
     """Whether a field may stand in a table of numbers."""
-    return is_number(field) or field.lower() in MISSING or DATE.fullmatch(field) is not None
+    return is_number(field) or field.lower() in MISSING or bool(DATE.fullmatch(field) or DURATION.fullmatch(field))
 
 
-def labels_of(name: str, column: pandas.Series, values: np.ndarray | None) -> tuple[str, ...]:
-    """Texts (or numbers of sensors) that change from row to row; empty of all other columns."""
-    if values is not None and not SENSOR.search(name):
-        return ()
-    texts = column.dropna().astype("string").str.strip()
-    changes = float((texts.to_numpy()[1:] != texts.to_numpy()[:-1]).mean()) if len(texts) > 1 else 0.0
-    texts_found = tuple(texts.unique()) if changes > OFTEN else ()
-    return texts_found if 2 <= len(texts_found) <= MOST_SENSORS else ()
+def labels_of(name: str, column: pandas.Series, values: np.ndarray | None) -> np.ndarray | None:
+    """Texts ``(N,)`` of a column that names the sensor of a row (or its number, by the column's name), or None."""
+    named = SENSOR.search(name) is not None or name.lower() in ("unit", "units")
+    few = values is not None and values.dtype.kind in "iu" and len(np.unique(values)) <= FEW
+    if values is not None and not named and not few:
+        return None
+    texts = column.astype("string").str.strip().fillna("").to_numpy(dtype=object)
+    changes = float((texts[1:] != texts[:-1]).mean()) if len(texts) > 1 else 0.0
+    different = len(set(texts.tolist()) - {""})
+    return texts if (named or changes > OFTEN) and 2 <= different <= MOST_SENSORS else None
 
 
 def numeric(column: pandas.Series) -> tuple[np.ndarray | None, np.ndarray]:
@@ -66,11 +73,22 @@ def numeric(column: pandas.Series) -> tuple[np.ndarray | None, np.ndarray]:
     wrong = filled & values.isna()
     if not filled.any() or wrong.sum() > 0.5 * filled.sum():
         first = str(texts[filled].iloc[0]) if filled.any() else ""
+        if DURATION.fullmatch(first):
+            return durations(texts), np.array([], int)
         found, none = (nanoseconds(texts) if DATE.fullmatch(first) else None), np.array([], int)
         if found is None and DATE.fullmatch(first):
             none = np.flatnonzero(~texts.str.fullmatch(DATE.pattern, flags=re.IGNORECASE).fillna(False).to_numpy(bool))
         return found, none
     return values.to_numpy(dtype=float), np.flatnonzero(wrong)
+
+
+def durations(texts: pandas.Series) -> np.ndarray | None:
+    """Durations as whole ns; None if one of them is none."""
+    parts = texts.str.extract(DURATION.pattern)
+    if parts.isna().any(axis=None):
+        return None
+    scale = parts[1].map({unit: factor("time", unit) for unit in parts[1].unique()}).to_numpy(dtype=float)
+    return np.rint(parts[0].str.replace(",", ".", regex=False).astype(float).to_numpy() * scale * 1e9).astype(np.int64)
 
 
 def spelled_out(texts: pandas.Series, filled: pandas.Series) -> pandas.Series:

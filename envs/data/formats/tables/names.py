@@ -3,12 +3,23 @@
 from __future__ import annotations
 
 import re
+import unicodedata
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 from .table import UNITS, Table, plain
 
+TRANSLATIONS = {
+    "time": "zeit temps tiempo tempo czas 时间 時間 시간 время",
+    "acceleration": "beschleunigung aceleracion accelerazione aceleracao versnelling 加速度 가속도 ускорение",
+    "gyro": "drehrate winkelgeschwindigkeit vitesse_angulaire velocidad_angular velocita_angolare velocidade_angular "
+    "giroscopio 角速度 ジャイロ 자이로 각속도",
+    "mag": "magnetfeld champ_magnetique campo_magnetico magnetometro magnetometre 磁场 磁場 地磁 자기장",
+}
+"""Word → what it is in other languages, without accents."""
+OTHER_LANGUAGES = {word.replace("_", " "): known for known, others in TRANSLATIONS.items() for word in others.split()}
+FOREIGN = re.compile("|".join(sorted(OTHER_LANGUAGES, key=len, reverse=True)), re.IGNORECASE)
 WORDS = re.compile(r"[A-Z]+(?=[A-Z][a-z])|[A-Z]?[a-z]+|[A-Z]+|\d+|[µ°]")
 FILLERS = {"cal", "calibrated", "raw", "data", "s", "rs", "sensor", "field", "values", "value", "axis", "imu"}
 FILLERS |= {"element", "measured", "rate", "velocity", "vel", "signal", "body", "b", "wideband", "float", "motion"}
@@ -29,7 +40,17 @@ KINDS = {
         "w",
         "g",
     },
-    "acc": {"acc", "accel", "accelerometer", "accelerometers", "acceleration", "accelerations", "a", "specific"},
+    "acc": {
+        "acc",
+        "accel",
+        "accelerometer",
+        "accelerometers",
+        "acceleration",
+        "accelerations",
+        "accl",
+        "a",
+        "specific",
+    },
     "mag": {"mag", "magn", "magneto", "magnetometer", "magnetometers", "magnetic", "m", "mf", "h"},
     "quaternion": {"q", "quat", "quats", "quaternion", "orientation", "attitude", "rotation", "ori"},
     "matrix": {"mat", "matrix", "dcm", "rotmat"},
@@ -49,6 +70,7 @@ TIME = {
     "ts",
     "cts",
     "stamp",
+    "stmp",
 }
 COUNTER = {"packetcounter", "counter", "sample", "samplenumber", "index", "frame", "packet", "samples", "n"}
 AXES = {"x": 0, "y": 1, "z": 2}
@@ -67,7 +89,11 @@ class Group:
 
 
 def words(name: str) -> list[str]:
-    """Words of a column's name in lower case: ``Shimmer_Accel_LN_X`` → shimmer, accel, ln, x."""
+    """Words of a column's name in lower case, in English: ``Shimmer_Accel_LN_X`` → shimmer, accel, ln, x."""
+    if not name.isascii() or FOREIGN.search(name):
+        plain_letters = "".join(c for c in unicodedata.normalize("NFKD", name) if not unicodedata.combining(c))
+        composed = unicodedata.normalize("NFC", plain_letters)
+        name = FOREIGN.sub(lambda match: f"{OTHER_LANGUAGES[match[0].lower()]} ", composed)
     return [word.lower() for word in WORDS.findall(name)]
 
 
@@ -101,6 +127,7 @@ def classify(name: str) -> tuple[str, str, str, str] | None:
         at = next((i for i, word in enumerate(rest) if word in known and (len(word) > 1 or len(rest) <= 3)), None)
         if at is not None:
             others = [word for word in rest[at + 1 :] if word not in FILLERS and word not in known]
+            others = [word for word in others if kind != "gyr" or word != "rotation"]
             if kind != "quaternion" and axis not in AXES and not axis.isdigit():
                 return None
             return " ".join(word for word in rest[:at] if word not in FILLERS), kind, " ".join(others), axis
@@ -118,7 +145,7 @@ def groups(table: Table) -> list[Group]:
                 found[whole[:3]] = {"all": name}
             continue
         # ROS calls linear acceleration what others call specific force; elsewhere gravity is taken from it.
-        one = classify(name.replace("linear_acceleration", "acceleration") if ros else name)
+        one = classify(name.replace("linear_acceleration", "acceleration").lstrip("/") if ros else name)
         if one is not None:
             found.setdefault(one[:3], {}).setdefault(one[3], name)
     add_unnamed_quaternions(table, found)
@@ -138,7 +165,8 @@ def groups(table: Table) -> list[Group]:
 
 def is_ros(table: Table) -> bool:
     """Whether the columns are the fields of ROS's message ``sensor_msgs/Imu``."""
-    return all(any(part in name for name in table.arrays) for part in ("angular_velocity.", "linear_acceleration."))
+    fields = (r"angular_velocity[./]x$", r"linear_acceleration[./]x$")
+    return all(any(re.search(field, name) for name in table.arrays) for field in fields)
 
 
 def add_unnamed_quaternions(table: Table, found: dict[tuple[str, str, str], dict[str, str]]) -> None:
