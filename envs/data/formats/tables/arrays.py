@@ -222,6 +222,9 @@ def table_of_frame(frame: pandas.DataFrame, kind: str) -> Table:
         elif column.dtype.kind == "M":
             values = pandas.to_datetime(column, utc=True).to_numpy("datetime64[ns]").astype(np.int64)
         elif column.map(np.ndim).any():
+            rows = [list(each) if isinstance(each, list | tuple | np.ndarray) else [] for each in column]
+            if {len(row) for row in rows} == {3} and all(isinstance(one, int | float) for row in rows for one in row):
+                arrays |= {f"{name}_{axis}": np.array(rows, dtype=float)[:, i] for i, axis in enumerate("xyz")}
             continue
         else:
             values, _ = numeric(column)

@@ -11,10 +11,10 @@ from typing import Any
 from .table import UNITS, Table, plain
 
 TRANSLATIONS = {
-    "time": "zeit temps tiempo tempo czas 时间 時間 시간 время",
+    "time": "zeit tijd temps tiempo tempo czas 时间 時間 시간 время",
     "acceleration": "beschleunigung aceleracion accelerazione aceleracao versnelling 加速度 가속도 ускорение",
     "gyro": "drehrate winkelgeschwindigkeit vitesse_angulaire velocidad_angular velocita_angolare velocidade_angular "
-    "giroscopio 角速度 ジャイロ 자이로 각속도",
+    "giroscopio gyroscoop 角速度 ジャイロ 자이로 각속도",
     "mag": "magnetfeld champ_magnetique campo_magnetico magnetometro magnetometre 磁场 磁場 地磁 자기장",
 }
 """Word → what it is in other languages, without accents."""
@@ -91,8 +91,8 @@ class Group:
 def words(name: str) -> list[str]:
     """Words of a column's name in lower case, in English: ``Shimmer_Accel_LN_X`` → shimmer, accel, ln, x."""
     if not name.isascii() or FOREIGN.search(name):
-        plain_letters = "".join(c for c in unicodedata.normalize("NFKD", name) if not unicodedata.combining(c))
-        composed = unicodedata.normalize("NFC", plain_letters)
+        # Accents of Latin letters only: those of kana make other syllables.
+        composed = unicodedata.normalize("NFC", re.sub(r"[\u0300-\u036f]", "", unicodedata.normalize("NFKD", name)))
         name = FOREIGN.sub(lambda match: f"{OTHER_LANGUAGES[match[0].lower()]} ", composed)
     return [word.lower() for word in WORDS.findall(name)]
 

@@ -92,7 +92,7 @@ def hidden(name: str) -> bool:
 
 
 def is_archive_of_arrays(path: Path) -> bool:
-    """Whether a ZIP archive is one of NumPy or a spreadsheet, which are no packed texts."""
+    """Whether a ZIP archive holds NumPy arrays or a spreadsheet rather than a packed text."""
     try:
         with zipfile.ZipFile(path) as archive:
             return any(name.endswith(".npy") or name.startswith("xl/") for name in archive.namelist())

@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from .cells import OFTEN, SENSOR
-from .names import AXES, GRAVITY_FREE, KINDS, classify, time_column, time_unit, words
+from .names import AXES, FILLERS, GRAVITY_FREE, KINDS, classify, time_column, time_unit, words
 from .stamps import as_seconds
 from .streams import Stream, joined
 from .table import Table
@@ -110,6 +110,8 @@ def widened(table: Table) -> Table:
     if time is None or not values:
         return table
     device = next((label for label in devices_of(table, time) if label != name), None)
+    if device is None:
+        table, device = with_devices(table, name)
     parts = (
         {"": table} if device is None else {text: table.rows(rows) for text, rows in texts_of(table, device).items()}
     )
@@ -124,6 +126,22 @@ def widened(table: Table) -> Table:
     units = {time: "s"} | units_of_kinds(table, name, names)
     kind = f"{table.kind}, a row a reading"
     return Table(arrays, units, table.preamble, kind, labels=labels, texts=table.texts)
+
+
+def with_devices(table: Table, name: str) -> tuple[Table, str | None]:
+    """The table with a column of the devices that the kinds of readings name, and its name, if there are several."""
+    kinds: dict[str, set[str]] = {}
+    devices = {}
+    for text in texts_of(table, name):
+        kind, known = kind_of(text)[0], {word for each in KINDS.values() for word in each} | FILLERS | set(AXES)
+        devices[text] = " ".join(word for word in words(text) if word not in known) if kind else ""
+        kinds.setdefault(devices[text], set()).add(kind)
+    complete = {device for device, found in kinds.items() if {"gyr", "acc"} <= found}
+    if len(complete) < 2:
+        return table, None
+    own = [devices.get(text, "") if devices.get(text, "") in complete else "" for text in table.labels[name].tolist()]
+    column = f"device of {name}"
+    return replace(table, labels=table.labels | {column: np.array(own, dtype=object)}), column
 
 
 def columns_of(table: Table) -> tuple[str | None, list[str]]:

@@ -28,7 +28,7 @@ SPELLED |= {
 """Units within names of columns, ``gyr_x_dps`` or ``acc_mps2_x``."""
 ONLY_OF = {"g": "acc", "t": "^m", "s": "^time", "rad": "^gyr"}
 """Short ones that are units only within names that match."""
-MULTIPLE = re.compile(r"(?P<times>\d+\.?\d*|\.\d+)(?:/(?P<parts>[1-9]\d*))?(?P<unit>\D.*)")
+MULTIPLE = re.compile(r"(?P<times>\d+\.?\d*|\.\d+)(?:/(?P<parts>[1-9]\d*\.?\d*))?(?P<unit>\D.*)")
 """A number of units, or parts of one as raw readings have, ``1/16 deg/s``."""
 QUOTIENT = re.compile(r"^(?P<name>.*?(?:[xyz]|time|\bt))\s*(?:/|:| - )\s*(?P<unit>\S+)$", re.IGNORECASE)
 """Quantity over unit as ISO 80000 writes it, ``acc_x/(m/s²)`` or ``t/s``, and the same with a colon or a dash."""

@@ -324,6 +324,7 @@ def header_lines(above: list[str], delimiter: str, width: int) -> list[tuple[int
         same = len(fields) in (width - 1, width, width + 1) and len(content) > 0.25 * width
         # pandas writes the name of its index below those of several levels.
         higher = fields_of(above[number - 1], delimiter) if number else []
+        same |= len(fields) == width and bool(found) and not fields[0] and len(content) >= 2
         same |= not found and len(fields) == width == len(higher) and content == fields[:1] and not higher[0]
         if not same or len(found) == 3 or (any(is_number(field) for field in content) and len(found)):
             break

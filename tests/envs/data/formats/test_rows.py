@@ -115,6 +115,20 @@ def test_several_devices_with_a_row_a_reading(tmp_path):
     same(right.measurements["imu/gyr"], 1.1 * readings()[1][1:])
 
 
+@pytest.mark.parametrize(
+    "names", [("imu1_gyro", "imu1_acc", "imu2_gyro", "imu2_acc"), ("left gyr", "left acc", "right gyr", "right acc")]
+)
+def test_kinds_that_name_their_device(tmp_path, names):
+    time, gyr, acc, *_ = readings()
+    blocks = (gyr, acc, 1.1 * gyr, acc)
+    rows = [f"{t},{names[k]},{','.join(map(str, blocks[k][i]))}" for i, t in enumerate(time) for k in range(4)]
+    (tmp_path / "a.csv").write_text("\n".join(["t,sensor,x,y,z", *rows]) + "\n")
+    one, other = poise.load_recordings(tmp_path / "a.csv", units=UNITS)
+    assert one.metadata["sensor"] == names[0].replace("imu", "").replace("_", " ").split()[0]
+    same(one.measurements["imu/gyr"], gyr)
+    same(other.measurements["imu/gyr"], 1.1 * gyr)
+
+
 @pytest.mark.parametrize("column", ["type", "activity_id", "channel"])
 @pytest.mark.parametrize("labels", [("walk", "stand"), (1, 2)])
 def test_labels_of_what_was_done_are_no_devices(tmp_path, column, labels):
