@@ -10,9 +10,9 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
+from ...envs.data.formats.tables.cells import is_number
 from ...envs.data.formats.tables.names import groups, time_column
 from ...envs.data.formats.tables.table import Table, factor, split_unit, units_row
-from ...envs.data.formats.tables.text import is_number
 from ...filters.core.quantity import Channel
 from ...filters.support.names import unknown
 

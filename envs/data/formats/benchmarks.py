@@ -24,10 +24,10 @@ from ..trajectory import Trajectory
 from .folders import load_streams
 from .mapping import RecordingMap, Reference, apply_map
 from .tables.arrays import ZIP, load_mat, load_npz, read_table, time_first
+from .tables.head import Head
 from .tables.names import groups, time_column
 from .tables.stamps import as_seconds
 from .tables.streams import Stream, interpolated
-from .tables.text import Head
 
 SI_UNITS = {"gyr": "rad/s", "acc": "m/s^2"}
 EUROC_TRUTH = ("state_groundtruth_estimate0", "vicon0", "mocap0")

@@ -18,7 +18,7 @@ from ....filters.core import rotation
 from .. import reference_clock
 from ..storage import HDF5_SIGNATURE, read_hdf5
 from ..trajectory import Trajectory
-from .tables.text import Head
+from .tables.head import Head
 
 if TYPE_CHECKING:
     import h5py

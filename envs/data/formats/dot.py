@@ -19,11 +19,12 @@ from ..trajectory import Trajectory
 from .described import with_checked_orientation
 from .mapping import Columns, RecordingMap, Reference, apply_map, trajectory_of
 from .tables.arrays import read_table
+from .tables.head import Head
 from .tables.names import groups
 from .tables.packed import plain_stem
 from .tables.stamps import as_seconds
 from .tables.table import Table
-from .tables.text import Head, table_of
+from .tables.text import table_of
 
 DEVICE_KEYS = ("DeviceTag", "DeviceId", "OutputRate", "FilterProfile", "Measurement Mode", "SyncStatus", "Measurement")
 UNITS = {"gyr": "rad/s", "acc": "m/s²", "mag": "calibration field", "onboard_orientation": "1"}

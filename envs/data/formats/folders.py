@@ -21,11 +21,11 @@ from ..trajectory import Trajectory
 from .described import with_checked_orientation
 from .mapping import unit_quaternions
 from .tables.arrays import read_table
+from .tables.head import Head
 from .tables.names import AXES, groups, time_column, time_unit, words
 from .tables.stamps import Stamps, as_seconds
 from .tables.streams import Stream, joined
 from .tables.table import Table, factor
-from .tables.text import Head
 
 SUFFIXES = (".csv", ".txt", ".tsv")
 PREFERRED = {

@@ -23,8 +23,9 @@ from .folders import is_folder_of_streams, is_member, load_member
 from .mapping import RecordingMap, apply_map, make_map, read_map
 from .tables.arrays import MATLAB, PARQUET, read_table
 from .tables.cells import SENSOR
+from .tables.head import Head
 from .tables.rows import widened
-from .tables.text import Head, table_of
+from .tables.text import table_of
 
 
 @dataclass(frozen=True)

@@ -11,10 +11,11 @@ import numpy as np
 
 from ...storage import HDF5_SIGNATURE, LARGEST, LARGEST_RATIO, objects, read_hdf5
 from .cells import labels_of, numeric
+from .head import decode, is_text
 from .packed import OPENERS, ZIP, content_of, is_archive_of_arrays
 from .rows import widened
 from .table import Table, split_unit
-from .text import decode, is_text, read_text
+from .text import read_text
 
 if TYPE_CHECKING:
     import pandas

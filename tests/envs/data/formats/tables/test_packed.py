@@ -9,7 +9,7 @@ import pytest
 
 import poise
 
-from .motion import axes, readings, same, write_table
+from ..motion import axes, readings, same, write_table
 
 
 @pytest.fixture

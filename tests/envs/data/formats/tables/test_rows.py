@@ -8,7 +8,7 @@ import pytest
 import poise
 from poise.envs.data.formats.draft import draft_map
 
-from .motion import readings, same
+from ..motion import readings, same
 
 KINDS = (("gyr", "rad/s"), ("acc", "m/s^2"), ("mag", "uT"))
 UNITS = {"gyr": "rad/s", "acc": "m/s^2"}

@@ -7,7 +7,7 @@ import pytest
 
 import poise
 
-from .motion import G, readings, same
+from ..motion import G, readings, same
 
 HEADER = ["t (s)", *(f"gyr_{axis} (rad/s)" for axis in "xyz"), *(f"acc_{axis} (m/s^2)" for axis in "xyz")]
 SI = {"gyr": "rad/s", "acc": "m/s^2"}
