@@ -20,6 +20,8 @@ CERTAIN = 3.0
 QUIET, LITTLE, MUCH = 0.09, {"acc": 0.05, "mag": 0.2}, 0.5
 """Acceleration, as a share of gravity, up to which a lag is believed that explains little of what is left without it;
 if there is more, a lag must explain much, as an acceleration in step with the rotation may look like one."""
+SCALES = (0.45, 2.2)
+"""Scales that a fit can tell; others are those of units."""
 LEAST_SCALE = 0.08
 """Error of the scale of gyroscopes without calibration, and of the fit."""
 UNDISTURBED = 0.99
@@ -31,7 +33,8 @@ ONE_LAG = 0.02
 def agreements(gyr: np.ndarray, vectors: dict[str, np.ndarray | None], interval: float) -> dict[str, Agreement]:
     """Fits of the rates ``(T, 3)`` to other channels ``(T, 3)``, by name, where there is one to be believed."""
     fits = {name: agreement(gyr, vector, interval) for name, vector in vectors.items() if vector is not None}
-    return {name: one for name, one in fits.items() if one is not None and one.explained > EXPLAINED}
+    known = {name: one for name, one in fits.items() if one is not None and SCALES[0] < one.scale < SCALES[1]}
+    return {name: one for name, one in known.items() if one.explained > EXPLAINED}
 
 
 def is_late(kind: str, one: Agreement) -> bool:
