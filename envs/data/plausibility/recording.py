@@ -75,13 +75,14 @@ def check_site(trajectory: Trajectory, site: str, wrong_clock: bool) -> list[Fin
     if gyr is not None:
         if not wrong_clock:
             rates = list(check_rates(trajectory, site, gyr, turning, fits["acc"].scale if "acc" in fits else None))
-            findings += rates or check_gyroscope_scale(site, fits)
-        known = any(finding.channel == f"{site}/gyr" for finding in findings)
+            # Of rates in another unit a fit of the lag tells nothing.
+            findings += rates or [*check_gyroscope_scale(site, fits), *late]
+        known = any(finding.channel == f"{site}/gyr" and finding not in late for finding in findings)
         findings += check_rest(f"{site}/gyr", gyr, known or any(one.explains for one in turning.values()))
         findings += [] if known or acc is None else check_noise(f"{site}/gyr", gyr, acc)
     if mag is not None:
         findings += check_field(f"{site}/mag", mag)
-    removed = any(f.channel == f"{site}/acc" and f.severity == "warning" for f in findings)
+    removed = any(f.channel == f"{site}/acc" and f.severity == "warning" and f not in late for f in findings)
     if acc is not None and not removed:
         findings += check_sign(trajectory, f"{site}/acc", acc, mag)
-    return findings + late
+    return findings
