@@ -17,6 +17,8 @@ LARGE_OFFSET = 0.01
 """s by which a reference may be late before it decides about errors."""
 FROZEN = 0.2
 """rad that a gyroscope turns while a reference stands still."""
+SLOW = 0.2
+"""rad/s that may be the bias of a gyroscope at rest."""
 MISALIGNED = 4.0
 """deg between the axes of reference and sensor, or their verticals, that decide about errors."""
 SIDEWAYS = 45.0
@@ -129,8 +131,8 @@ def check_frozen(trajectory: Trajectory) -> Iterator[Finding]:
         return
     begins = np.flatnonzero(np.append(True, ~(q[1:] == q[:-1]).all(axis=1)))
     ends = np.append(begins[1:], len(q))
-    seconds = np.linalg.norm(np.nan_to_num(gyr), axis=1) * np.gradient(trajectory.time)
-    turned = np.add.reduceat(seconds, begins)
+    speed = np.linalg.norm(np.nan_to_num(gyr), axis=1)
+    turned = np.add.reduceat(np.where(speed > SLOW, speed, 0.0) * np.gradient(trajectory.time), begins)
     frozen = (trajectory.time[ends - 1] - trajectory.time[begins] > HELD) & (turned > FROZEN)
     if frozen.any():
         share = 100.0 * float((ends - begins)[frozen].sum()) / len(q)

@@ -115,3 +115,9 @@ def test_a_table_of_errors_warns_of_them() -> None:
     truth = {"orientation": in_body((1.0, 0.0, 0.0), 8.0)(np.array(known.truth["orientation"]))}
     with pytest.warns(UserWarning, match="its axes are turned by 8°"):
         poise.evaluate("tilt", known.replace(truth=truth))
+
+
+@pytest.mark.parametrize("gesture", ["mixed", "severe"])
+def test_a_reference_that_rests_beside_a_biased_gyroscope_is_not_frozen(gesture: str) -> None:
+    motion = simulate_hand(gesture, 1, sensors="bosch-bmi160", duration=30.0)
+    assert not [each for each in check_recording(motion) if each.channel == "orientation"]
