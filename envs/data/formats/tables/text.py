@@ -154,9 +154,9 @@ def table_of(text: str, name: str) -> Table:
         read = [numeric(frame[column]) for column in range(width)]
     for column, name in enumerate(names):
         values, wrong = read[column]
-        found = labels_of(name, frame[column], values)
-        if found is not None:
-            labels[name] = found
+        row_labels = labels_of(name, frame[column], values)
+        if row_labels is not None:
+            labels[name] = row_labels
         if values is None and frame[column].notna().any():
             texts[name] = str(frame[column].dropna().iloc[0])[:40]
         if values is None or (column >= len(names) - 2 and not name and np.isnan(values.astype(float)).all()):
