@@ -28,6 +28,7 @@ from ..claims import Claim
 from ..kit import Study
 from ..report import OVER_MOTIONS, Report
 from ..ride_figures import DRAWN
+from .orientation_bounds import attitude_covariance
 from .rate_table import TABLE_4_2
 from .spatial import (
     DURATION,
@@ -37,7 +38,6 @@ from .spatial import (
     STANDARD_GRAVITY,
     WITH_GYROSCOPE,
     WITHOUT_GYROSCOPE,
-    attitude_covariance,
     estimated,
     pointed,
     pointing_errors,

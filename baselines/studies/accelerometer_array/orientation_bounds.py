@@ -20,7 +20,6 @@ from .spatial import (
     PROPOSED,
     WITH_GYROSCOPE,
     WITHOUT_GYROSCOPE,
-    attitude_covariance,
     estimated,
     pointed,
     pointing_errors,
@@ -34,6 +33,16 @@ NONE = 1e-6
 """m/s²: deviation of the white acceleration that the filter assumes, in whose place the true one is modelled"""
 SETTLED = 2.0
 """s after which errors count"""
+
+
+def attitude_covariance(P: np.ndarray, orientation: np.ndarray) -> np.ndarray:
+    """Covariance ``(T, 3, 3)`` of the attitude's error about the body's axes, rad², from that of the rows of Q.
+
+    An error e changes row i by q_i × e. The product of these crosses with their transpose is twice the identity.
+    """
+    Q = rotation.to_matrix(orientation)
+    J = np.concatenate([rotation.skew(Q[:, i]) for i in range(3)], axis=-2)
+    return 0.25 * J.mT @ P[:, :9, :9] @ J
 
 
 def true_states(trajectory: Trajectory, size: int, field: np.ndarray) -> np.ndarray:

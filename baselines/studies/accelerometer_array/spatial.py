@@ -128,16 +128,6 @@ def prepared(
     return model, measurements
 
 
-def attitude_covariance(P: np.ndarray, orientation: np.ndarray) -> np.ndarray:
-    """Covariance ``(T, 3, 3)`` of the attitude's error about the body's axes, rad², from that of the rows of Q.
-
-    An error e changes row i by q_i × e. The product of these crosses with their transpose is twice the identity.
-    """
-    Q = rotation.to_matrix(orientation)
-    J = np.concatenate([rotation.skew(Q[:, i]) for i in range(3)], axis=-2)
-    return 0.25 * J.mT @ P[:, :9, :9] @ J
-
-
 def pointing_errors(estimate: np.ndarray, truth: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Errors ``(T,)`` of pitch and azimuth (wrapped, signed) and of the whole rotation, rad."""
     found, true = pointing_angles(estimate), pointing_angles(truth)

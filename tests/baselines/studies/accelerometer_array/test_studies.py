@@ -44,8 +44,8 @@ def test_rows_and_tables_of_angular_rates(few_methods: None) -> None:
 
 
 def test_curves_of_angular_rates(few_methods: None) -> None:
-    curves = angular_rate_study.rate_curves(1, start=2.0, length=1.0)
-    assert {len(values) for values in curves.values()} == {101}
+    curves = angular_rate_study.rate_curves(1)
+    assert {len(values) for values in curves.values()} == {1001}
     assert "true" in curves
     assert "weight" in curves
 
