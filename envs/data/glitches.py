@@ -33,6 +33,8 @@ REACH = 5
 """Samples before and after that decide on one."""
 WRITTEN = 3
 """Times that a glitch may be written."""
+SATURATED, BELOW = 5, 0.5
+"""Samples in a row at the end of a range that are none where the readings beside them lie below this share of it."""
 FEWEST = 9
 """Samples from which on there is a decision."""
 
@@ -81,6 +83,23 @@ def sudden(values: np.ndarray, least: float) -> bool:
     return bool(steps[-1] > ISOLATION * np.sort(np.nan_to_num(steps[:-1]))[-2])
 
 
+def jumps_to_range(values: np.ndarray, limit: float) -> np.ndarray:
+    """Samples ``(T,)`` bool of ``(T, 3)`` that reach a range at once, for a few samples.
+
+    A motion that is too strong for a sensor fills its range first. Its readings stay: they are nearer to it than what
+    would be held in their place.
+    """
+    size = np.abs(values).max(axis=1, initial=0.0)
+    with np.errstate(invalid="ignore"):
+        full = size >= FULL * limit
+        beside = np.concatenate([[0.0], np.where(size < BELOW * limit, 0.0, size), [0.0]])
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], full, [False]]).astype(int)))
+    found = np.zeros(len(values), bool)
+    for begin, end in zip(edges[::2], edges[1::2], strict=True):
+        found[begin:end] = end - begin <= SATURATED and not (beside[begin] > 0.0 or beside[end + 1] > 0.0)
+    return found
+
+
 def full_scales(metadata: Mapping[str, Any]) -> dict[str, float]:
     """Channel → range in its unit, of ``metadata["full_scale"]``."""
     given = metadata.get("full_scale", {})
@@ -100,8 +119,9 @@ def no_samples(
     """Channel → kind of what is no sample → where ``(T,)`` bool.
 
     That is a glitch of a gyroscope or an accelerometer; a gyroscope's 0, 0, 0 beside an accelerometer's, or for a while
-    beside one that moves, which is how a logger writes that nothing came; what reaches the range of a sensor; and
-    samples that were written again where none came (:mod:`.repeats`).
+    beside one that moves, which is how a logger writes that nothing came; what jumps to the end of the range of a
+    sensor; and samples that were written again where none came (:mod:`.repeats`), which those of a saturated sensor are
+    not.
 
     Args:
         measurements: channel → ``(T, size)``, on a grid.
@@ -116,7 +136,10 @@ def no_samples(
         if dt is not None:
             rates = measurements.get(f"{site}/gyr")
             moving = None if rates is None else moves(rates)
-            found[name] = {"repeats of an earlier sample": repeated(values, dt, moving)}
+            repeats = repeated(values, dt, moving)
+            if name in ranges:
+                repeats &= np.abs(values).max(axis=1) < FULL * ranges[name]
+            found[name] = {"repeats of an earlier sample": repeats}
         if kind not in LEAST:
             continue
         found.setdefault(name, {})["glitches"] = glitches(values, LEAST[kind])
@@ -125,7 +148,7 @@ def no_samples(
             zeros = np.logical_not(values.any(axis=1) | force.any(axis=1))
             found[name]["rows of zeros"] = zeros if dt is None else zeros | zeros_in_motion(values, force, dt)
         if name in ranges:
-            found[name]["saturated"] = np.any(np.abs(values) >= FULL * ranges[name], axis=1)
+            found[name]["jumps to the end of the range"] = jumps_to_range(values, ranges[name])
     return found
 
 

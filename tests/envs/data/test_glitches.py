@@ -12,6 +12,7 @@ from poise.envs.data.glitches import FEWEST, SamplesSoFar, without_glitches
 from poise.envs.data.ranges import FULL
 from poise.envs.data.trajectory import Trajectory
 from poise.envs.hand.sensing import simulate_hand
+from poise.envs.recipes.registry import recipe
 from poise.filters.core import metrics
 
 KNOWN = simulate_hand("mixed", seed=11, duration=12.0)
@@ -90,16 +91,15 @@ def test_rows_of_zeros_of_both_sensors_are_no_rest() -> None:
         assert np.isnan(without_glitches(zeros)["imu/gyr"][rows]).all()
 
 
-def test_a_range_that_is_known_tells_saturated_samples() -> None:
+def test_a_motion_beyond_a_known_range_keeps_its_saturated_readings() -> None:
     limit = float(np.quantile(np.abs(KNOWN.measurements["imu/gyr"]), 0.98))
     clipped = np.clip(KNOWN.measurements["imu/gyr"], -limit, limit)
     told = KNOWN.replace(
         measurements=KNOWN.measurements | {"imu/gyr": clipped},
         metadata=KNOWN.metadata | {"full_scale": {"imu/gyr": limit}},
     )
-    with pytest.warns(UserWarning, match="saturated"):
-        found = without_glitches(told)["imu/gyr"]
-    assert np.array_equal(np.isnan(found).any(axis=1), (np.abs(clipped) >= FULL * limit).any(axis=1))
+    assert (np.abs(clipped) >= FULL * limit).any()
+    np.testing.assert_array_equal(without_glitches(told)["imu/gyr"], clipped)
 
 
 def so_far(measurements: dict[str, np.ndarray], ranges: dict[str, float]) -> tuple[dict[str, np.ndarray], np.ndarray]:
@@ -175,7 +175,7 @@ def test_a_few_samples_in_a_row_at_the_end_of_the_range_count_as_missing(kind, v
     rows = np.array([*range(400, 400 + count), *range(900, 900 + count)])
     before = KNOWN.measurements[f"imu/{kind}"][rows]
     glitched = with_samples(kind, rows, np.where(np.isnan(value), before, value))
-    with pytest.warns(UserWarning, match=f"imu/{kind}: {len(rows)} saturated"):
+    with pytest.warns(UserWarning, match=f"imu/{kind}: {len(rows)} jumps to the end of the range"):
         found = without_glitches(glitched)[f"imu/{kind}"]
     assert np.array_equal(np.flatnonzero(np.isnan(found).any(axis=1)), rows)
     told = [finding for finding in poise.check_recording(glitched) if finding.channel == f"imu/{kind}"]
@@ -188,3 +188,10 @@ def test_a_peak_within_the_range_that_is_held_is_motion(share) -> None:
     row = int(np.argmax(np.abs(gyr).max(axis=1)))
     held = with_samples("gyr", np.array([row, row + 1]), share * gyr[row])
     assert not np.isnan(without_glitches(held)["imu/gyr"]).any()
+
+
+def test_readings_that_saturate_in_a_strong_motion_are_nearer_to_it_than_held_ones() -> None:
+    motion = recipe("hand-held").episode(0, 24)
+    gyr = motion.measurements["imu/gyr"]
+    assert np.count_nonzero(np.abs(gyr).max(axis=1) >= FULL * np.radians(2000.0)) > 3
+    np.testing.assert_array_equal(without_glitches(motion)["imu/gyr"], gyr)
