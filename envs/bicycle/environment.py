@@ -102,7 +102,7 @@ class RiderBicycleEnv(PoseEnv):
     |---|---|---|
     | ``pose/<body>/orientation`` | 4 | bicycle, trunk, head, upper_arm, … with ``_left`` and ``_right`` |
     | ``pose/bicycle/roll``, ``pitch``, ``yaw`` | 1 | rad, Z-Y-X angles, roll to the right, nose down positive |
-    | ``pose/bicycle/steer``, ``crank``, ``speed`` | 1 | rad, rad, m/s |
+    | ``pose/bicycle/steer``, ``crank``, ``speed`` | 1 | rad (left positive), rad, m/s |
     | ``pose/trunk/angles``, ``hip_…/angles`` | 3 | rad, ISB Z-X-Y to the bicycle |
     | ``pose/shoulder_…/angles`` | 3 | rad, ISB Y-X-Y to the trunk |
     | ``pose/elbow_…/flexion``, ``knee_…/flexion`` | 1 | rad |

@@ -66,6 +66,10 @@ def clock_rows(trajectory: Trajectory) -> dict[str, str]:
         rows["missing rows"] = f"{clock.missing} of {grid} ({100.0 * clock.missing / grid:.2g} %)"
         if clock.packets:
             rows["packets"] = f"{clock.packets} stamps are shared by several samples"
+    unused = trajectory.metadata.get("columns_not_used")
+    if isinstance(unused, list) and unused:
+        more = f" and {len(unused) - 8} more" if len(unused) > 8 else ""
+        rows["columns not used"] = ", ".join(map(str, unused[:8])) + more
     step = np.diff(time)
     if len(step):
         rows["longest interval"] = f"{step.max():.4g} s, at {time[int(np.argmax(step))] - time[0]:.1f} s"

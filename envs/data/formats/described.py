@@ -7,6 +7,7 @@ the same names give a draft of a mapping.
 from __future__ import annotations
 
 import warnings
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -44,7 +45,7 @@ FITS = 12.0
 """deg; an onboard orientation whose vertical is typically this near to gravity is one of the sensor."""
 
 
-def mapping_of(table: Table, details: dict[str, object] | None = None) -> RecordingMap:
+def mapping_of(table: Table) -> RecordingMap:
     """The mapping that the names and the units of a table tell, as far as they do."""
     found = groups(table)
     ros = is_ros(table)
@@ -86,7 +87,6 @@ def mapping_of(table: Table, details: dict[str, object] | None = None) -> Record
         rate=rate,
         reference=tuple(references),
         counter=None if time else counter_column(table),
-        details=details or {},
     )
 
 
@@ -138,8 +138,19 @@ def load_described(path: Path, table: Table, name: str) -> list[Trajectory]:
     Raises:
         ValueError: a column that is needed holds no numbers, or the time runs backwards.
     """
-    mapping = mapping_of(table, {"format": name})
-    return [with_checked_orientation(one) for one in apply_map(table, mapping, path)]
+    mapping = mapping_of(table)
+    unused = columns_not_used(table, mapping)
+    details = {"format": name} | ({"columns_not_used": unused} if unused else {})
+    return [with_checked_orientation(one) for one in apply_map(table, replace(mapping, details=details), path)]
+
+
+def columns_not_used(table: Table, mapping: RecordingMap) -> list[str]:
+    """Columns of numbers that a mapping leaves out, such as forces and other sensors."""
+    used = {mapping.time, mapping.counter}
+    for part in (*mapping.columns.values(), *(reference.columns for reference in mapping.reference)):
+        names = as_columns(part)
+        used |= {names} if isinstance(names, str) else set(names)
+    return [name for name in table.arrays if name not in used]
 
 
 def with_checked_orientation(trajectory: Trajectory) -> Trajectory:

@@ -10,6 +10,7 @@ import pytest
 
 from poise.envs.data.formats.load import load_recording
 from poise.envs.data.formats.tables.table import factor
+from poise.envs.data.inspection import inspect_recording
 
 from .motion import G, angles, axes, readings, same, write_table
 
@@ -226,3 +227,11 @@ def test_samples_of_two_sensors_under_one_another_are_told_by_their_type(tmp_pat
     same(found.measurements["imu/gyr"], GYR)
     with pytest.raises(ValueError, match=r"unknown column 'x' .*gyr_x"):
         load_recording(path, columns={"gyr": ["x", "y", "z"]}, time="time")
+
+
+def test_columns_that_are_not_used_are_named(tmp_path: Path) -> None:
+    path = write_table(tmp_path / "walk.csv", table() | {"FP1_Fz (N)": 700.0 + 0.0 * TIME, "button": 0.0 * TIME})
+    found = load_recording(path)
+    assert found.metadata["columns_not_used"] == ["FP1_Fz", "button"]
+    assert inspect_recording(found).clock["columns not used"] == "FP1_Fz, button"
+    assert "columns_not_used" not in load_recording(write_table(tmp_path / "plain.csv", table())).metadata
