@@ -16,7 +16,7 @@ from ....filters.core import rotation
 from ....filters.support.parallel import in_parallel
 from ....filters.support.ranges import Range
 from ...learned.presets import RIDES, seeds_of
-from ...plots import new_figure, save
+from ...plots import legend_above, new_figure, save
 from ...registry import make_estimator
 from ..report import result
 from .errors import errors_of, score
@@ -188,7 +188,11 @@ def draw_sweeps(points: list[Point], path: Path) -> Path:
             ax.set_ylim(bottom=0.0)
             ax.set_xlabel(sweep.label if row == len(papers) - 1 else "")
         axes[row * len(SWEEPS)].set_ylabel("error, deg")
-        axes[row * len(SWEEPS)].legend(frameon=False, fontsize=6)
+        last = axes[(row + 1) * len(SWEEPS) - 1]
+        legend_above(last)
+        # as wide as the row: an empty title keeps its place
+        last.get_legend().set_in_layout(False)
+        last.set_title(" ", fontsize=9)
     return save(figure, path)
 
 
