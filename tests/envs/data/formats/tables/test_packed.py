@@ -47,7 +47,7 @@ def test_packed_texts_are_read(plain, tmp_path, way):
 @pytest.mark.parametrize("way", WAYS)
 def test_bombs_and_damaged_files_are_refused(tmp_path, plain, way):
     bomb = tmp_path / f"bomb{way}"
-    WAYS[way](bomb, b"time,gx,gy,gz,ax,ay,az\n" + b"0,0,0,0,0,0,0\n" * 10_000_000)
+    WAYS[way](bomb, b"time,gx,gy,gz,ax,ay,az\n" + b"0,0,0,0,0,0,0\n" * 500_000)
     if way in (".bz2", ".xz"):  # gzip cannot pack more than a text may be
         with pytest.raises(ValueError, match="unpacks to more than"):
             poise.load_recording(bomb)
