@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from .ranges import FULL, reached_range
+from .ranges import at_range, reached_range
 from .repeats import CHANNELS, RunsSoFar, moves, repeated, runs_of, zeros_in_motion
 from .trajectory import Trajectory
 
@@ -90,8 +90,8 @@ def jumps_to_range(values: np.ndarray, limit: float) -> np.ndarray:
     would be held in their place.
     """
     size = np.abs(values).max(axis=1, initial=0.0)
+    full = at_range(values, limit)
     with np.errstate(invalid="ignore"):
-        full = size >= FULL * limit
         beside = np.concatenate([[0.0], np.where(size < BELOW * limit, 0.0, size), [0.0]])
     edges = np.flatnonzero(np.diff(np.concatenate([[False], full, [False]]).astype(int)))
     found = np.zeros(len(values), bool)
@@ -138,7 +138,7 @@ def no_samples(
             moving = None if rates is None else moves(rates)
             repeats = repeated(values, dt, moving)
             if name in ranges:
-                repeats &= np.abs(values).max(axis=1) < FULL * ranges[name]
+                repeats &= ~at_range(values, ranges[name])
             found[name] = {"repeats of an earlier sample": repeats}
         if kind not in LEAST:
             continue
@@ -227,12 +227,9 @@ class SamplesSoFar:
             least, now, before = 0.5 * LEAST[kind], values.tolist(), last[name].tolist()
             if any(abs(one - other) > least for one, other in zip(now, before, strict=True)) or not any(now):
                 return True
-            if name in self.ranges and self._full(name, values):
+            if name in self.ranges and at_range(values, self.ranges[name]):
                 return True
         return False
-
-    def _full(self, name: str, values: np.ndarray) -> bool:
-        return bool(np.abs(values).max() >= FULL * self.ranges[name])
 
 
 def alike(one: Mapping[str, np.ndarray], other: Mapping[str, np.ndarray]) -> bool:

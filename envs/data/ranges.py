@@ -73,6 +73,11 @@ def full_scale(table: Table, measurements: Mapping[str, np.ndarray], name: str) 
     return found
 
 
+def at_range(values: np.ndarray, limit: float) -> np.ndarray:
+    """Samples ``(...)`` bool of ``(..., size)`` of which an axis is at the end of a range."""
+    return np.asarray((np.abs(values) >= FULL * limit).any(axis=-1))
+
+
 def reached_range(kind: str, values: np.ndarray) -> float | None:
     """The range of a sensor, where its readings show it: the largest is held, and is a usual range or stands alone.
 

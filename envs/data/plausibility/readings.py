@@ -11,7 +11,7 @@ import numpy as np
 
 from ....filters.core.quantity import ACCELEROMETER, GYROSCOPE, MAGNETOMETER, SHORTEST
 from ..glitches import LEAST, glitches
-from ..ranges import FULL, reached_range
+from ..ranges import at_range, reached_range
 from ..repeats import HELD, foreign_runs, moves, runs_of, usual_run
 
 CHANNELS = {"gyr": GYROSCOPE, "acc": ACCELEROMETER, "mag": MAGNETOMETER}
@@ -211,14 +211,14 @@ def check_range(channel: str, samples: np.ndarray) -> Iterator[Finding]:
         what = f"{100 * clipped:.1f} % of the samples stand at the extreme value {np.abs(samples).max():.4g}"
         lost = channel.endswith("gyr") and clipped > OFTEN_CLIPPED
         severity: Severity = "warning" if lost else "note"
-        remedy = "Choose a larger range of the sensor; metadata['full_scale'] tells estimators of it."
+        remedy = "Choose a larger range of the sensor."
         yield Finding(severity, channel, what, "saturation of the sensor", remedy)
     elif (
         reached := reached_range(kind, samples) if (kind := channel.rpartition("/")[2]) in LEAST else None
     ) is not None:
-        count = int((np.abs(samples) >= FULL * reached).any(axis=1).sum())
+        count = int(at_range(samples, reached).sum())
         what = f"{count} samples stand at {reached:.4g}, the end of the range"
-        remedy = "They are treated as missing samples."
+        remedy = "What jumps there counts as missing; readings that saturate in a motion stay."
         yield Finding("note", channel, what, "saturation of the sensor, or errors of the transmission", remedy)
     limit = OVERFLOW * np.abs(samples).max(axis=0)
     before, after = samples[:-1], samples[1:]
