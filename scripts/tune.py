@@ -67,6 +67,9 @@ class Args:
     """decisions to train on, instead of the preset's"""
     trajectories: int | None = None
     """simulated trajectories of a minute to train on, instead of the preset's"""
+    networks: int = 1
+    """networks whose mean is the policy, each trained on motions and with weights of its own seed; not for
+    recurrent-ppo nor the searches"""
     trials: int = 100
     """gains that Optuna tries"""
     recipe: str | None = None
@@ -106,6 +109,7 @@ def run(args: Args) -> int:
     from ..filters.adaptation.tuned import TunedFilter
 
     check_file("export", args.export, args.recordings)
+    check_networks(args)
     if args.agent == "optuna" and args.trials < 1:
         raise ValueError(f"trials must be at least 1, got {args.trials}")
     config = training_config(args)
@@ -171,6 +175,19 @@ def compare(args: Args) -> int:
     return 0
 
 
+def check_networks(args: Args) -> None:
+    """Refuse a number of networks that no training can have.
+
+    Raises:
+        ValueError: it is not positive, or more than one of what cannot be averaged.
+    """
+    if args.networks < 1:
+        raise ValueError(f"networks must be at least 1, got {args.networks}")
+    if args.networks > 1 and (args.policy is not None or args.agent in (*SEARCHES, "recurrent-ppo")):
+        of = "a finished policy" if args.policy is not None else f"the agent {args.agent}"
+        raise ValueError(f"networks must be 1 for {of}, got {args.networks}")
+
+
 def training_config(args: Args) -> TrainingConfig:
     """The configuration that the arguments ask for."""
     from ..baselines.gain_policy.config import config_of, shipped_config
@@ -209,6 +226,7 @@ def train(args: Args, folder: Run, start: np.ndarray) -> Trained:
     """Train a policy from a constant action; the best look at validation trajectories is kept."""
     from ..baselines.checkpoint import has_checkpoint
     from ..baselines.gain_policy.agents.learners import policy_errors_of
+    from ..baselines.gain_policy.networks import train_networks
     from ..baselines.gain_policy.training import CHECKPOINT, train_policy
     from ..filters.adaptation.gains import tunable_filter
 
@@ -217,21 +235,25 @@ def train(args: Args, folder: Run, start: np.ndarray) -> Trained:
     count = 0 if config.agent == "analytic" else min(24, config.trajectories)
     unseen = config.motions.draw_many(child_seed(args.seed, VALIDATION_SEED), count)
     curve = Curve(folder.folder / CURVE, resumed=args.resume is not None)
-    with progress_bar(config.total_timesteps, f"tune {args.filter}", "step") as bar:
+    with progress_bar(args.networks * config.total_timesteps, f"tune {args.filter}", "step") as bar:
 
         def report(progress: Mapping[str, float]) -> None:
             bar.update(int(progress["steps"]) - bar.n)
             bar.set_postfix(gain=f"{progress['gain']:.3f}")
             curve.add(progress["steps"], progress["gain"])
 
-        policy = train_policy(
-            config,
-            start=start,
-            folder=folder.folder,
-            resume=args.resume is not None and has_checkpoint(folder.folder / CHECKPOINT),
-            report=report,
-            validate=lambda policy: float(np.mean(policy_errors_of(kalman, policy, unseen))),
-        )
+        common: dict[str, Any] = {
+            "start": start,
+            "folder": folder.folder,
+            "report": report,
+            "validate": lambda policy: float(np.mean(policy_errors_of(kalman, policy, unseen))),
+        }
+        again = args.resume is not None
+        if args.networks > 1:
+            policy: Trained = train_networks(config, args.networks, resume=again, **common)
+        else:
+            again = again and has_checkpoint(folder.folder / CHECKPOINT)
+            policy = train_policy(config, resume=again, **common)
     curve.write()
     return policy
 
@@ -343,7 +365,9 @@ def card_of(
         "name": f"{args.filter.replace('-', '_')}_policy",
         "description": f"sets the gains of the {args.filter} filter while it runs",
         "agent": args.agent,
-        "command": command_line("tune", args, ("agent", "preset", "policy", "seed", "steps", "trajectories", "recipe")),
+        "command": command_line(
+            "tune", args, ("agent", "preset", "policy", "networks", "seed", "steps", "trajectories", "recipe")
+        ),
         "data": "simulated" if args.recipe is None else f"recipe {args.recipe}",
         **policy.card,
         "best_constant": [round(float(value), 4) for value in constant.action],

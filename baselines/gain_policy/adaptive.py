@@ -69,7 +69,7 @@ class AdaptiveEstimator(Enclosing):
         unknown = [part.gain for part in self.policy.ranges if part.gain not in self.filter.gains]
         if unknown:
             raise ValueError(f"the policy sets the gains {unknown}; the filter has {sorted(self.filter.gains)}")
-        inputs = self.policy.layers[0][0].shape[1]
+        inputs = self.policy.layers[0][0].shape[-1]
         if inputs != self.tuned.observation_size:
             raise ValueError(f"the policy takes {inputs} features, there are {self.tuned.observation_size}")
 

@@ -1,10 +1,10 @@
-"""A gain policy: a small network from statistics of a filter to its gains, evaluated with NumPy."""
+"""A gain policy: a small network, or several, from statistics of a filter to its gains, evaluated with NumPy."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -21,12 +21,15 @@ KIND = "gain policy"
 """Field ``kind`` of the card."""
 
 Layer = tuple[np.ndarray, np.ndarray]
-"""Weight ``(outputs, inputs)`` and bias ``(outputs,)``."""
+"""Weight ``(outputs, inputs)`` and bias ``(outputs,)``; of M networks ``(M, outputs, inputs)`` and ``(M, outputs)``."""
 
 
 @dataclass(frozen=True, eq=False)
 class GainPolicy:
     """Observation ``(*batch, n)`` → action ``(*batch, k)`` in [−1, 1]: layers with tanh between them, then a clip.
+
+    Of several networks the action is the mean of theirs: the logarithms of the gains are averaged, each within its
+    range, so a network that is wrong somewhere moves them by its share only.
 
     Attributes:
         filter: name of the filter that it tunes.
@@ -57,11 +60,15 @@ class GainPolicy:
         object.__setattr__(self, "layers", layers)
         width = self.features.size(len(self.ranges))
         for index, (weight, bias) in enumerate(layers):
-            if weight.ndim != 2 or weight.shape[1] != width or bias.shape != weight.shape[:1]:
+            if weight.ndim not in (2, 3) or weight.shape[-1] != width or bias.shape != weight.shape[:-1]:
                 raise ValueError(
                     f"layer {index} must take {width} inputs, got weight {weight.shape} and bias {bias.shape}"
                 )
-            width = weight.shape[0]
+            width = weight.shape[-2]
+        if len({weight.shape[:-2] for weight, _ in layers}) > 1:
+            raise ValueError(
+                f"all layers must be of as many networks, got weights {[weight.shape for weight, _ in layers]}"
+            )
         if not layers or width != len(self.ranges):
             raise ValueError(
                 f"the last layer must give {len(self.ranges)} actions, got {width if layers else 'no layer'}"
@@ -91,6 +98,25 @@ class GainPolicy:
         return cls(tuned.name, tuned.ranges, tuned.features, tuple(layers), smoothing=tuned.smoothing)
 
     @classmethod
+    def mean_of(cls, policies: Sequence[GainPolicy]) -> GainPolicy:
+        """The mean of policies that differ in their weights only; the rest is as of the first.
+
+        Raises:
+            ValueError: there is none, or they differ in filter, gains, observation or sizes of layers.
+        """
+        kinds = {
+            (one.filter, one.ranges, one.features, one.smoothing, tuple(weight.shape for weight, _ in one.layers))
+            for one in policies
+        }
+        if len(kinds) != 1:
+            raise ValueError(
+                f"policies must be of one filter and agree in gains, observation and layers, got {len(kinds)} kinds"
+            )
+        parts = zip(*(one.layers for one in policies), strict=True)
+        layers = tuple((np.stack([w for w, _ in part]), np.stack([b for _, b in part])) for part in parts)
+        return replace(policies[0], layers=layers)
+
+    @classmethod
     def neutral(cls, tuned: TunedFilter) -> GainPolicy:
         """The published tuning."""
         return cls.constant(tuned, np.zeros(tuned.actions))
@@ -98,10 +124,14 @@ class GainPolicy:
     def __call__(self, observation: np.ndarray) -> np.ndarray:
         """The action of an observation."""
         x = np.asarray(observation, dtype=float)
+        batch, x = x.shape[:-1], x.reshape(-1, x.shape[-1])
         for weight, bias in self.layers[:-1]:
-            x = np.tanh(x @ weight.T + bias)
+            x = np.tanh(x @ weight.swapaxes(-1, -2) + bias[..., None, :])
         weight, bias = self.layers[-1]
-        return np.clip(x @ weight.T + bias, -1.0, 1.0)
+        actions = np.clip(x @ weight.swapaxes(-1, -2) + bias[..., None, :], -1.0, 1.0)
+        if actions.ndim == 3:
+            actions = actions.mean(axis=0)
+        return actions.reshape(*batch, -1)
 
     def save(self, path: str | Path, card: Mapping[str, Any] | None = None) -> Path:
         """Write weights and card; see :func:`poise.baselines.weights_io.save_weights`."""

@@ -62,6 +62,8 @@ def test_agents_and_searches_leave_runs_that_a_report_compares(
         (["mekf", "--test-trajectories", "0"], "test_trajectories must be at least 1"),
         (["mekf", "--quick", "--preset", "shipped"], "quick cannot be given with the preset shipped"),
         (["mekf", "--quick", "--steps", "0"], "poise: error: steps must be at least 1, got 0"),
+        (["mekf", "--networks", "0"], "networks must be at least 1, got 0"),
+        (["mekf", "--agent", "optuna", "--networks", "2"], "networks must be 1 for the agent optuna, got 2"),
         (["mekf", "--recipe", "nothing"], "recipe"),
         (["mekf", "--recordings", "missing"], "missing"),
         (["mekf", "--resume", "missing"], "there is no run in missing"),

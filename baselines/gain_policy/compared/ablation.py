@@ -64,15 +64,15 @@ def blinded(policy: GainPolicy, places: np.ndarray, values: np.ndarray) -> GainP
     """The policy for which the observations at ``places`` are always those of ``values`` ``(n,)``."""
     (weight, bias), *rest = policy.layers
     kept = weight.copy()
-    kept[:, places] = 0.0
-    return replace(policy, layers=((kept, bias + weight[:, places] @ values[places]), *rest))
+    kept[..., places] = 0.0
+    return replace(policy, layers=((kept, bias + weight[..., places] @ values[places]), *rest))
 
 
 def holding(policy: GainPolicy, gain: int, action: float) -> GainPolicy:
     """The policy with one of its gains held at an action."""
     *rest, (weight, bias) = policy.layers
     weight, bias = weight.copy(), bias.copy()
-    weight[gain], bias[gain] = 0.0, action
+    weight[..., gain, :], bias[..., gain] = 0.0, action
     return replace(policy, layers=(*rest, (weight, bias)))
 
 
