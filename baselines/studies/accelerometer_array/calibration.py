@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
 from ....envs.data.calibration.channels import accelerometer_channel
+from ....envs.data.calibration.data import AXES, RateTableData
 from ....envs.hand.calibration_runs import (
     ACCELEROMETER_MOUNTINGS,
     accelerometer_runs,
@@ -16,14 +18,12 @@ from ....envs.hand.calibration_runs import (
 )
 from ....filters.arrays.array import CONTROLLER
 from ....filters.arrays.calibration.magnetometer import align_magnetometer, fit_ellipsoid
-from ....filters.arrays.calibration.rate_table import calibrate_accelerometer, calibrate_gyroscope
-from ....filters.core.quantity import STANDARD_GRAVITY
+from ....filters.arrays.calibration.rate_table import AxisCalibration, calibrate_accelerometer, calibrate_gyroscope
 from ..claims import Claim
 from ..kit import Study
 from ..report import Report
 
 OVER_DEVICES = "mean, smallest … largest over the devices"
-AXES = {"x": 0, "y": 1, "z": 2}
 PRINTED_ROTATION = ((0.6629, 0.7487, 0.0071), (-0.0044, -0.0056, 1.0000), (-0.7487, 0.6629, 0.0004))
 """(B.4)"""
 
@@ -36,10 +36,7 @@ def calibrated(seed: int, hold: float) -> dict[str, Any]:
     scale, offset = np.diag(np.array(channel.matrix)), np.array(channel.offset)
     found: dict[str, Any] = {"scale": [], "offset": [], "residual": [], "largest": []}
     for index, axis in enumerate(CONTROLLER.e):
-        upward = {}
-        for up, out in ACCELEROMETER_MOUNTINGS:
-            upward[f"{up} up, out {out}"] = float(axis[AXES[up[1]]] * float(up[0] + "1"))
-        one = calibrate_accelerometer(runs.raw[:, index], runs.rate, runs.mounting, upward, gravity=STANDARD_GRAVITY)
+        one = calibrate_accelerometer(runs.raw[:, index], runs.rate, runs.mounting, upward(axis))
         found["scale"].append(one.scale / scale[index] - 1.0)
         found["offset"].append(one.offset - offset[index])
         found["residual"].append(one.residual)
@@ -47,13 +44,24 @@ def calibrated(seed: int, hold: float) -> dict[str, Any]:
     turns = gyroscope_runs(truth, seed, hold=hold)
     gyroscope = truth.channels["imu/gyr"]
     found |= {"gyroscope scale": [], "gyroscope offset": [], "gyroscope largest": []}
-    for index, name in enumerate("xyz"):
-        along = np.char.startswith(turns.mounting, f"+{name} up")
-        one = calibrate_gyroscope(turns.raw[along, index], turns.rate[along])
+    for index, (_, _, one) in enumerate(gyroscope_fits(turns)):
         found["gyroscope scale"].append(one.scale / gyroscope.matrix[index][index] - 1.0)
         found["gyroscope offset"].append(float(np.degrees(one.offset - gyroscope.offset[index])))
         found["gyroscope largest"].append(float(np.degrees(one.largest)))
     return found | _magnetometer(seed, truth)
+
+
+def upward(axis: np.ndarray) -> dict[str, float]:
+    """Mounting on the rate table → vertical component of a sensitive axis ``(3,)`` of the device."""
+    return {f"{up} up, out {out}": float(AXES[up] @ axis) for up, out in ACCELEROMETER_MOUNTINGS}
+
+
+def gyroscope_fits(turns: RateTableData) -> Iterator[tuple[np.ndarray, np.ndarray, AxisCalibration]]:
+    """Raw readings, rate (rad/s) and fit of each axis of a gyroscope, from the runs in which it was upright."""
+    for index, name in enumerate("xyz"):
+        along = np.char.startswith(turns.mounting, f"+{name} up")
+        raw, rate = turns.raw[along, index], turns.rate[along]
+        yield raw, rate, calibrate_gyroscope(raw, rate)
 
 
 def _magnetometer(seed: int, truth: Any) -> dict[str, float]:

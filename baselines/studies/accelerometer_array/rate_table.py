@@ -14,7 +14,6 @@ import numpy as np
 from ....envs.data.calibration.channels import accelerometer_channel
 from ....envs.data.calibration.records import CalibrationRecord, ChannelCalibration
 from ....envs.hand.calibration_runs import (
-    ACCELEROMETER_MOUNTINGS,
     GYROSCOPE_RANGE,
     accelerometer_runs,
     counts,
@@ -32,7 +31,7 @@ from ....filters.core.quantity import DEG, STANDARD_GRAVITY
 from ..claims import Claim
 from ..kit import Study
 from ..report import Report
-from .calibration import AXES
+from .calibration import gyroscope_fits, upward
 from .rate_table_figures import rate_table_figures
 
 MILLI_G = 1e-3 * STANDARD_GRAVITY
@@ -89,17 +88,15 @@ def measured(seed: int, hold: float) -> dict[str, Any]:
     runs = accelerometer_runs(CONTROLLER, truth, seed, hold=hold)
     found: dict[str, Any] = {"accelerometer": {}, "gyroscope": {}, "runs": {}}
     for index, (name, axis) in enumerate(zip(TABLE_4_1, CONTROLLER.e, strict=True)):
-        upward = {
-            f"{up} up, out {out}": float(axis[AXES[up[1]]] * float(up[0] + "1")) for up, out in ACCELEROMETER_MOUNTINGS
-        }
-        one = calibrate_accelerometer(runs.raw[:, index], runs.rate, runs.mounting, upward, gravity=STANDARD_GRAVITY)
+        vertical = upward(axis)
+        one = calibrate_accelerometer(runs.raw[:, index], runs.rate, runs.mounting, vertical)
         curved = bent(runs.raw[:, index], one.scale, one.offset, "accelerometer")
-        left = calibrate_accelerometer(curved, runs.rate, runs.mounting, upward, gravity=STANDARD_GRAVITY).largest
+        left = calibrate_accelerometer(curved, runs.rate, runs.mounting, vertical).largest
         found["accelerometer"][name] = [one.scale / MILLI_G, one.offset / MILLI_G, one.largest, left]
         if index == 0:
             # imposed acceleration in the sensor's axis: gravity less the centripetal one of the place that was found
             place = np.array([one.positions.get(mounting, 0.0) for mounting in runs.mounting])
-            up = np.array([upward[mounting] for mounting in runs.mounting])
+            up = np.array([vertical[mounting] for mounting in runs.mounting])
             found["runs"] = {
                 "time": runs.time.tolist(),
                 "mounting": list(map(str, runs.mounting)),
@@ -109,17 +106,14 @@ def measured(seed: int, hold: float) -> dict[str, Any]:
                 "fitted": [one.scale, one.offset],
             }
     turns = gyroscope_runs(truth, seed, hold=hold)
-    for index, name in enumerate("xyz"):
-        along = np.char.startswith(turns.mounting, f"+{name} up")
-        raw, rate = turns.raw[along, index], turns.rate[along]
-        one = calibrate_gyroscope(raw, rate)
+    for name, (raw, rate, one) in zip("xyz", gyroscope_fits(turns), strict=True):
         unsaturated = np.abs(one.scale * raw + one.offset - rate) < 5.0 * DEG
         correlation = float(np.corrcoef(raw[unsaturated], rate[unsaturated])[0, 1])
         left = calibrate_gyroscope(bent(raw, one.scale, one.offset, "gyroscope"), rate).largest / DEG
         found["gyroscope"][name] = [one.scale / DEG * 1e3, one.offset / DEG, correlation, one.largest / DEG, left]
         if name == "z":
             found["turns"] = {
-                "time": turns.time[along].tolist(),
+                "time": turns.time[np.char.startswith(turns.mounting, "+z up")].tolist(),
                 "rate": np.degrees(rate).tolist(),
                 "raw": raw.tolist(),
                 "fitted": [one.scale, one.offset],

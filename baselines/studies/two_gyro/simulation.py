@@ -28,17 +28,6 @@ RATE = 50.0
 """Hz of the simulated studies"""
 ROUGH = 10.0 * (1.0 / RATE) ** 0.5
 """°/s/√Hz: 10 °/s a sample at 50 Hz"""
-INDEPENDENT = {
-    ("circle", "sigma2"): (0.41, 0.15),
-    ("circle", "sigma1"): (3.8, 8.6),
-    ("sine", "sigma2"): (0.83, 0.15),
-    ("vibration", "sigma2"): (0.45, 0.16),
-    ("pulses", "sigma2"): (1.14, 0.41),
-    ("pulses", "sigma1"): (4.9, 4.6),
-    ("straight", "sigma2"): (6.7, 8.4),
-    ("straight", "sigma1"): (4.9, 4.7),
-}
-"""Motion and model → RMS of φ over 60 s and from 60 to 120 s, deg, of an independent simulation (Euler step)."""
 
 
 @dataclass(frozen=True)
@@ -134,21 +123,17 @@ def simulations(study: Study, report: Report) -> None:
         for step in ("midpoint", "euler")
     ]
     found = averaged(study, "simulations", cases, count)
-    rows = []
-    for case, result in zip(cases, found, strict=True):
-        independent = INDEPENDENT.get((case.motion, case.model), (None, None))
-        rows.append(
-            {
-                "motion": case.motion,
-                "model": case.model,
-                "step": case.integration,
-                **angles(result["first"]),
-                "φ other": independent[0] if case.integration == "euler" else None,
-                "φ 60 to 120 s": round(float(result["late"][3]), 2),
-                "φ late other": independent[1] if case.integration == "euler" else None,
-                "error / σ of φ": round(result["ratio"], 2),
-            }
-        )
+    rows: list[dict[str, Any]] = [
+        {
+            "motion": case.motion,
+            "model": case.model,
+            "step": case.integration,
+            **angles(result["first"]),
+            "φ 60 to 120 s": round(float(result["late"][3]), 2),
+            "error / σ of φ": round(result["ratio"], 2),
+        }
+        for case, result in zip(cases, found, strict=True)
+    ]
     for motion in dict.fromkeys(case.motion for case in cases):
         ride = simulate(MOTIONS[motion], 120.0, 1.0 / RATE)
         for name, errors in RIDES.baselines(ride.time, true_angles(ride.truth)).items():
@@ -159,8 +144,7 @@ def simulations(study: Study, report: Report) -> None:
         "Simulated motions",
         rows,
         f"RMS in deg over 60 s, from a roll that is 4° off, {count} runs at 50 Hz: 0.1 °/s a gyroscope sample, 1° a "
-        "camera frame at every sample, biases of 0.3 °/s. *Other*: an independent simulation with its own motions of "
-        "the body. The last column is 1 where the covariance is right.",
+        "camera frame at every sample, biases of 0.3 °/s. The last column is 1 where the covariance is right.",
     )
     by_case = {(case.motion, case.model, case.integration): result for case, result in zip(cases, found, strict=True)}
     claims = claims_of_motions(by_case) + disturbed(study, report, count)

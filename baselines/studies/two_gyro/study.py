@@ -36,7 +36,7 @@ def reproduce(study: Study, report: Report) -> None:
         "and relative measurements. The paper gives no noises, no sampling period, no prior and no camera errors; what "
         "is used instead is in the defaults of `two-gyro` and in the table of the simulated sensors."
     )
-    bounds(study, report)
+    bounds(report)
     exactness(report)
     observability(study, report)
     simulations(study, report)

@@ -29,7 +29,7 @@ COURSES = ("indoor", "outdoor", "held")
 
 @dataclass(frozen=True)
 class SensorErrors:
-    """Errors of the synthetic sensors; defaults are an independent simulation's, with biases at 30 % of table I."""
+    """Errors of the synthetic sensors; by default biases lie within 30 % of table I."""
 
     gyroscope: float = math.radians(0.5)
     """rad/s a sample, bicycle and trunk"""
