@@ -325,10 +325,9 @@ def check_module(trainer: Trainer, features: torch.Tensor) -> None:
             raise ValueError(f"module must give {wanted} for features {tuple(features.shape)}, got {shapes}")
 
 
-def whole_sequences(
-    trainer: Trainer, data: SequenceData, size: int = 64, length: int = 1000
-) -> Iterator[tuple[slice, torch.Tensor]]:
-    """Outputs ``(B, N, O)`` of all sequences, ``size`` at a time: which these are, and what the network says."""
+def whole_sequences(trainer: Trainer, data: SequenceData) -> Iterator[tuple[slice, torch.Tensor]]:
+    """Outputs ``(B, N, O)`` of all sequences, 64 at a time: which these are, and what the network says."""
+    size, length = 64, 1000
     trainer.module.eval()
     for start in range(0, len(data), size):
         part = slice(start, start + size)

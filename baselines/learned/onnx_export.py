@@ -65,9 +65,9 @@ class Graph:
         bounds = [self.constant([number], np.int64) for number in (start, stop, axis)]
         return self.node("Slice", value, *bounds)
 
-    def reshaped(self, value: str, *shape: int, to: str = "") -> str:
+    def reshaped(self, value: str, *shape: int) -> str:
         """Another shape; 0 keeps an axis."""
-        return self.node("Reshape", value, self.constant(shape, np.int64), to=to)
+        return self.node("Reshape", value, self.constant(shape, np.int64))
 
 
 def write_gru(graph: Graph, network: GruNetwork, to: str = "output") -> None:

@@ -277,6 +277,6 @@ def tilt_variance(kalman: KalmanFilter, P: Array, up: Array) -> Array:
     return block[..., 0, 0] + block[..., 1, 1] + block[..., 2, 2] - along
 
 
-def most_samples(interval: float, rate: float = 300.0) -> int:
-    """Samples that an interval of training data has room for: those of sensors of up to ``rate`` Hz."""
-    return round(interval * rate) + 1
+def most_samples(interval: float) -> int:
+    """Samples that an interval of training data has room for: those of sensors of up to 300 Hz."""
+    return round(300.0 * interval) + 1

@@ -188,7 +188,7 @@ class FilterFeatures:
         return GapWatch(self.kalman.model, LONGEST_GAP, every=True)
 
 
-def standardisation(features: np.ndarray, mask: np.ndarray, least: float = 1e-3) -> tuple[np.ndarray, np.ndarray]:
+def standardisation(features: np.ndarray, mask: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Mean and standard deviation ``(F,)`` of features ``(E, N, F)`` where the mask ``(E, N)`` says so.
 
     A feature that hardly varies tells nothing: its deviation is infinite, which removes it.
@@ -197,4 +197,4 @@ def standardisation(features: np.ndarray, mask: np.ndarray, least: float = 1e-3)
     if not len(chosen):
         return np.zeros(features.shape[-1]), np.ones(features.shape[-1])
     mean, deviation = chosen.mean(axis=0), chosen.std(axis=0)
-    return mean, np.where(deviation > least * (1.0 + np.abs(mean)), deviation, math.inf)
+    return mean, np.where(deviation > 1e-3 * (1.0 + np.abs(mean)), deviation, math.inf)

@@ -31,10 +31,10 @@ def move_figure(trajectory: Trajectory) -> Any:
     return figure
 
 
-def readings_figure(trajectory: Trajectory, seconds: float = 10.0) -> Any:
+def readings_figure(trajectory: Trajectory) -> Any:
     """One reading of each sensor, with and without noise (5.5)."""
     figure, axes = time_figure(7.5, 5.0, 3)
-    part = trajectory.time <= seconds
+    part = trajectory.time <= 10.0
     q, time = trajectory.truth["orientation"][part], trajectory.time[part]
     truth = {name: trajectory.truth[name][part] for name in ("external_acceleration", "angular_rate")}
     # the first accelerometer lies off the reference point; what rotation adds there is small beside gravity

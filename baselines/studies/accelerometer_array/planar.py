@@ -117,9 +117,9 @@ def planar_errors(seed: int, motion: str, duration: float = DURATION) -> list[Ro
     return rows
 
 
-def inflation_errors(seed: int, duration: float = DURATION) -> list[Row]:
+def inflation_errors(seed: int) -> list[Row]:
     """Rows as above of the extended filter on the ∞, for each value of R in :data:`INFLATIONS` (``R``)."""
-    trajectory, rows = moved(seed, "infinity", duration), []
+    trajectory, rows = moved(seed, "infinity"), []
     for R in INFLATIONS:
         filter = estimator(EXTENDED, "infinity", inertial_acceleration=float(np.sqrt(R)))
         rows.append({"motion": "infinity", "seed": seed, "R": R} | errors_of(trajectory, filter))
@@ -255,9 +255,9 @@ def likenesses(rows: list[Row]) -> list[Claim]:
 def planar(study: Study, report: Report) -> None:
     """Errors of figures 3.5 to 3.12."""
     # as long as the thesis' in any case: errors of averaged angles come with whole turns
-    seeds, duration = 2 if study.quick else 10, DURATION
+    seeds = 2 if study.quick else 10
     roots = [study.seed_of("planar", index) for index in range(seeds)]
-    jobs = [(seed, motion, duration) for motion in MOTIONS for seed in roots]
+    jobs = [(seed, motion) for motion in MOTIONS for seed in roots]
     rows = [row for found in study.map("planar", planar_errors, jobs) for row in found]
     report.numbers(results_of(rows, "rms", "{motion} {seed}", PLANAR_ANGLE.name, "angle", "deg"))
     report.compare(
@@ -267,7 +267,7 @@ def planar(study: Study, report: Report) -> None:
             | {"values": values_of(rows, "largest", motion=motion, method=method)}
             for motion, method, published in PUBLISHED
         ],
-        f"{seeds} motions of {duration:g} s.",
+        f"{seeds} motions of {DURATION:g} s.",
         interval=OVER_MOTIONS,
     )
     note = (
@@ -275,7 +275,7 @@ def planar(study: Study, report: Report) -> None:
         "*Literal* averages raw angles; *published R* and *published H* are (3.44) and (3.45) as in the thesis."
     )
     report.table("Planar methods", planar_table(rows), note)
-    found = study.map("planar inflation", inflation_errors, [(seed, duration) for seed in roots])
+    found = study.map("planar inflation", inflation_errors, [(seed,) for seed in roots])
     inflated = [row for part in found for row in part]
     report.table("Extended filter on the ∞ by R", planar_table(inflated, "R"), "R in (m/s²)².")
     difference = study.cached("unscented", unscented_difference, roots[0], "planar-walk")

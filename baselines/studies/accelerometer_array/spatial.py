@@ -88,14 +88,12 @@ PUBLISHED = {
 """Device and method → what figures 5.6 to 5.10 show of the largest errors, deg"""
 
 
-def pointed(
-    device: str, seed: int, duration: float = DURATION, dip: float = 0.0, *, gesture: Pointing | None = None
-) -> Trajectory:
+def pointed(device: str, seed: int, duration: float = DURATION, dip: float = 0.0) -> Trajectory:
     """A device that points at targets, in a magnetic field ``dip`` rad below north."""
     name = "octa-gyroscope" if device == "octa" else device
     field = (0.0, FIELD * math.cos(dip), -FIELD * math.sin(dip))
     held = replace(DEVICES[name], magnetic_field=field)
-    return simulate_hand(gesture or Pointing(), seed, None, RATE, duration, device=held)
+    return simulate_hand(Pointing(), seed, None, RATE, duration, device=held)
 
 
 def estimated(*args: Any, **kwargs: Any) -> np.ndarray:

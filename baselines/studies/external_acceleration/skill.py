@@ -12,7 +12,7 @@ from ....envs.sensors.presets import sensor_preset
 from ....filters.analysis.lasting_errors import Lasting, lasting_and_white, lasting_bound
 from ....filters.core.estimator import run
 from ....filters.core.kalman import KalmanFilter
-from ....filters.core.metrics import DEGREES, direction_error
+from ....filters.core.metrics import DEGREES, direction_error, rms
 from ....filters.core.rotation import normalize
 from ....filters.imu.external_acceleration import ExternalAcceleration
 from ...registry import make_estimator
@@ -112,7 +112,7 @@ def beyond_the_trial(found: dict[str, dict[str, float]]) -> list[Claim]:
 
 
 def _inclination(up: np.ndarray, true: np.ndarray) -> list[float]:
-    return (np.sqrt(np.mean(direction_error(up, true) ** 2, axis=0)) * DEGREES).tolist()
+    return (rms(direction_error(up, true)) * DEGREES).tolist()
 
 
 def tangent_nees(up: np.ndarray, true: np.ndarray, covariance: np.ndarray) -> list[float]:
@@ -127,12 +127,9 @@ def tangent_nees(up: np.ndarray, true: np.ndarray, covariance: np.ndarray) -> li
     return values.mean(axis=0).tolist()
 
 
-def first_correction(samples: int = 20) -> int:
+def first_correction() -> int:
     """Number of quiet samples that mode 3 sees before its first correction, of a sensor at rest."""
-    still = {
-        "imu/gyr": np.zeros((samples, 3)),
-        "imu/acc": np.tile([0.0, 0.0, ExternalAcceleration().gravity], (samples, 1)),
-    }
+    still = {"imu/gyr": np.zeros((20, 3)), "imu/acc": np.tile([0.0, 0.0, ExternalAcceleration().gravity], (20, 1))}
     found = run(KalmanFilter(ExternalAcceleration(dt=1.0 / RATE, mode=3), restart=False), still)
     assert found.covariance is not None
     size = np.trace(found.covariance, axis1=-2, axis2=-1)

@@ -51,13 +51,13 @@ def course_figures(
 TORQUE = "At the true pose, smoothed over 0.2 s: what seat and hands read, and what both models require."
 
 
-def convergence_figure(study: RideStudy, path: Path, seconds: float = 8.0) -> Any:
-    """φ_h over the first seconds, true and estimated from starts that are wrong by more than 30°."""
+def convergence_figure(study: RideStudy, path: Path) -> Any:
+    """φ_h over the first 8 s, true and estimated from starts that are wrong by more than 30°."""
     ride = study.load(path)
     samples = {channel.name: ride.measurements[channel.name] for channel in ForceInertial.channels}
     truth, kalman = dict(study.truth(ride.truth)), study.estimator(ride, Variant())
     figure, (ax,) = time_figure(7.5, 3.0)
-    shown = ride.time[1:] - ride.time[0] <= seconds
+    shown = ride.time[1:] - ride.time[0] <= 8.0
     time = ride.time[1:][shown]
     true = truth["force-inertial/trunk_angles"][1:, 0][shown] / DEG
     ax.plot(time, true, color=TRUTH_COLOR, linewidth=1.2, label="truth")
@@ -71,16 +71,16 @@ def convergence_figure(study: RideStudy, path: Path, seconds: float = 8.0) -> An
     return figure
 
 
-def torque_figure(study: RideStudy, path: Path, begin: float = 5.0, seconds: float = 15.0) -> Any:
-    """Both torques: read, dynamic and static model."""
+def torque_figure(study: RideStudy, path: Path) -> Any:
+    """Both torques over 15 s: read, dynamic and static model."""
     ride = study.load(path)
     samples = {channel.name: ride.measurements[channel.name] for channel in ForceInertial.channels}
     model = study.estimator(ride, Variant()).model
     named = smoothed_torques(model, samples, dict(study.truth(ride.truth)))
     figure, axes = time_figure(7.5, 4.6, 2)
-    start = min(begin, 0.25 * float(ride.time[-1]))
+    start = min(5.0, 0.25 * float(ride.time[-1]))
     # averages over 0.2 s do not reach to the end
-    part = (ride.time >= start) & (ride.time <= min(start + seconds, ride.time[-1] - 0.2))
+    part = (ride.time >= start) & (ride.time <= min(start + 15.0, ride.time[-1] - 0.2))
     colors = {"read": TRUTH_COLOR, "static": DRAWN[1], "dynamic": DRAWN[-1]}
     for index, (ax, label) in enumerate(zip(axes, ("τ_φh, N·m", "τ_θ, N·m"), strict=True)):
         for name, color in colors.items():

@@ -51,11 +51,10 @@ class Learnt:
     tuned: dict[str, float]
 
 
-def learn(paper: str, start: str, source: RideSource, seed: int, *, samples: int = 32, refinements: int = 40) -> Learnt:
+def learn(paper: str, start: str, source: RideSource, seed: int) -> Learnt:
     """Learn from the training rides of ``source``, with ``seed`` as their root seed.
 
-    ``start`` names the filter that the regression corrects, that of the network; ``samples`` and ``refinements`` are
-    those of :func:`.best_constant_gains`.
+    ``start`` names the filter that the regression corrects, that of the network.
     """
     published: Any = make(paper)
     outputs = tuple(quantity for quantity in published.outputs if quantity.kind == "angle")
@@ -86,7 +85,7 @@ def learn(paper: str, start: str, source: RideSource, seed: int, *, samples: int
         best_ridge(inputs, targets, rides),
         front_end,
         head,
-        tuned_parameters(published, tuning, [quantity.name for quantity in outputs], samples, refinements),
+        tuned_parameters(published, tuning, [quantity.name for quantity in outputs]),
     )
 
 
@@ -106,10 +105,8 @@ def best_ridge(inputs: list[np.ndarray], targets: list[np.ndarray], rides: list[
     return Ridge.fit(np.concatenate(inputs), np.concatenate(targets), penalty)
 
 
-def tuned_parameters(
-    kalman: KalmanFilter, rides: list[Trajectory], quantities: list[str], samples: int, refinements: int
-) -> dict[str, float]:
+def tuned_parameters(kalman: KalmanFilter, rides: list[Trajectory], quantities: list[str]) -> dict[str, float]:
     """Noises of the filter with the constant gains that are best for all angles of these rides."""
-    found = best_constant_gains(kalman, rides, quantity=quantities, samples=samples, refinements=refinements)
+    found = best_constant_gains(kalman, rides, quantity=quantities, samples=32, refinements=40)
     sizes = gain_sizes(kalman.model, TunedFilter.of(kalman).gains(found.action))
     return {kalman.model.gains[name].parameter: float(size) for name, size in sizes.items()}

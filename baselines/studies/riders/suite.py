@@ -34,6 +34,8 @@ MEAN, BIAS, RIDGE, TUNED, ORACLE, CONSTANT = (
     "deviations constant",
 )
 """What is no estimator: references of the table."""
+UPDATE = 0.04
+"""s between the updates of a network"""
 ROLL_ONLY = ("odometry-aided", "balanced-gyro", "platform-gyro+turning", "two-gyro-level+turning")
 """Estimators of the roll, the first angle of every paper."""
 
@@ -164,11 +166,11 @@ def wrapped(angles: np.ndarray) -> np.ndarray:
     return np.asarray(rotation.wrap(angles))
 
 
-def scored_samples(ride: Trajectory, interval: float = 0.04) -> np.ndarray:
+def scored_samples(ride: Trajectory) -> np.ndarray:
     """Samples ``(T,)`` at the ends of a network's updates that are in the evaluation mask."""
     from ...learned.inputs.front_end import interval_ends
 
-    return np.asarray(ride.mask & interval_ends(0, len(ride), ride.dt, interval))
+    return np.asarray(ride.mask & interval_ends(0, len(ride), ride.dt, UPDATE))
 
 
 def ride_rows(settings: RiderSuite, learnt: Mapping[str, Learnt], group: str, index: int) -> list[Row]:

@@ -92,11 +92,11 @@ def eigenvalue_checks(speeds: tuple[float, ...] = (3.0, 5.0, 6.0)) -> Iterator[C
             yield Check(f"weave, castering, capsize at {speed:g} m/s, {what}, against theory", asked, found, holds)
 
 
-def stable_range(width: float = 0.02) -> tuple[float, float]:
-    """Speeds (m/s) between which the simulated benchmark bicycle is stable by itself, found by halving."""
+def stable_range() -> tuple[float, float]:
+    """Speeds (m/s) between which the simulated benchmark bicycle is stable by itself, found by halving to 0.02 m/s."""
 
     def edge(low: float, high: float, unstable_below: Callable[[float], bool]) -> float:
-        while high - low > width:
+        while high - low > 0.02:
             middle = 0.5 * (low + high)
             low, high = (middle, high) if unstable_below(middle) else (low, middle)
         return 0.5 * (low + high)
@@ -106,12 +106,12 @@ def stable_range(width: float = 0.02) -> tuple[float, float]:
     return weave, capsize
 
 
-def momentum_checks(steps: int = 2500) -> Iterator[Check]:
+def momentum_checks() -> Iterator[Check]:
     """Seat, hands and feet, from the rider's motion, against what moves the bicycle: its mass, tyres and drag."""
     straight, circle = Path(np.zeros(2)), Path(smooth_curvature(lambda s: np.where(s > 3.0, 0.4, 0.0), 60.0))
     for fidelity in ("full", "lumped"):
         for name, path, speed in (("straight 4 m/s", straight, 4.0), ("circle 1.2 m/s", circle, 1.2)):
-            force, moment = momentum_residual(fidelity, path, speed, steps)
+            force, moment = momentum_residual(fidelity, path, speed, 2500)
             limit = 1.0 if fidelity == "full" else 0.1
             asked, holds = f"{limit:g} %, {limit:g} %", 100.0 * max(force, moment) <= limit
             found = f"{100.0 * force:.4f} %, {100.0 * moment:.4f} %"
@@ -197,12 +197,12 @@ def sensor_checks(duration: float = 10.0) -> Iterator[Check]:
         yield Check(what, f"{limit:g} {unit}", f"{found:.4f} {unit}", found <= limit)
 
 
-def lean_checks(duration: float = 20.0) -> Iterator[Check]:
+def lean_checks() -> Iterator[Check]:
     """Mean lean of the trunk in the indoor circle, and the load cells of rider 0, style by style."""
     from .statistics import trunk_lean
 
     for style in ("mild", "normal", "aggressive"):
-        ride = ridden(0, scenario="indoor_circle", style=style, suite=["seat/load_cells"], duration=duration)
+        ride = ridden(0, scenario="indoor_circle", style=style, suite=["seat/load_cells"], duration=20.0)
         turning = slice(len(ride) // 3, None)
         against, to_bicycle = (
             np.degrees(trunk_lean(ride.truth)[turning]),
@@ -248,16 +248,16 @@ def saddle_checks() -> Iterator[Check]:
         )
 
 
-def reset_checks(repeats: int = 3) -> Iterator[Check]:
-    """CPU time of the three kinds of reset."""
+def reset_checks() -> Iterator[Check]:
+    """CPU time of the three kinds of reset, each done three times."""
     for fidelity in ("full", "lumped"):
         env = RiderBicycleEnv(fidelity=fidelity, duration=1.0)
         try:
             env.reset(seed=0)
             times = {
-                "another person": [_cpu(env, seed, subject=1 + seed % 4) for seed in range(1, 1 + repeats)],
-                "another motion": [_cpu(env, seed, subject=1) for seed in range(20, 21 + repeats)][1:],
-                "the same motion": [_cpu(env, 20 + repeats, subject=1) for _ in range(repeats)],
+                "another person": [_cpu(env, seed, subject=1 + seed % 4) for seed in range(1, 4)],
+                "another motion": [_cpu(env, seed, subject=1) for seed in range(20, 24)][1:],
+                "the same motion": [_cpu(env, 23, subject=1) for _ in range(3)],
             }
         finally:
             env.close()

@@ -40,11 +40,8 @@ def symbols() -> dict[str, Any]:
     return dict(zip(names.split(), sympy.symbols(names), strict=True))
 
 
-def equations(model: str) -> tuple[dict[str, sympy.Matrix], sympy.Matrix, sympy.Matrix]:
-    """Vector fields of (17), output h = θ and state, of ``sigma2`` or ``sigma1``.
-
-    In Σ1 the three rates of the platform are f4 (x), f5 (z) and f6 (y).
-    """
+def equations() -> tuple[dict[str, sympy.Matrix], sympy.Matrix, sympy.Matrix]:
+    """Vector fields of (17), output h = θ and state of Σ2; the rates of the platform are f4 (x) and f5 (z)."""
     import sympy
 
     v = symbols()
@@ -53,30 +50,24 @@ def equations(model: str) -> tuple[dict[str, sympy.Matrix], sympy.Matrix, sympy.
     A = sympy.Matrix([[c3 / c2, -s3 / c2, 0], [s3, c3, 0], [-c3 * s2 / c2, s3 * s2 / c2, 1]])
     M = sympy.Matrix([[-1, -s1 * s2 / c2, c1 * s2 / c2], [0, -c1, -s1], [0, s1 / c2, -c1 / c2]])
     body, theta = sympy.Matrix([v["h1"], v["h2"], v["h3"]]), sympy.Matrix([v["t1"], v["t2"], v["t3"]])
-    if model == "sigma2":
-        tangent = sin(v["phi"]) / cos(v["phi"])
-        D, platform = M * sympy.Matrix([[1, 0], [0, tangent], [0, 1]]), sympy.Matrix([v["p1"], v["p3"]])
-        columns = {"f4": 0, "f5": 1}
-    else:
-        D, platform, columns = M, sympy.Matrix([v["p1"], v["p2"], v["p3"]]), {"f4": 0, "f6": 1, "f5": 2}
-    count = platform.rows
+    tangent = sin(v["phi"]) / cos(v["phi"])
+    D, platform = M * sympy.Matrix([[1, 0], [0, tangent], [0, 1]]), sympy.Matrix([v["p1"], v["p3"]])
     state = sympy.Matrix.vstack(sympy.Matrix([v["phi"]]), theta, body, platform)
     drift = sympy.Matrix.vstack(
         sympy.Matrix([-v["p1"]]), -A * body - D * platform, -v["qh"] * body, -v["qp"] * platform
     )
-    zeros = sympy.zeros(3 + count, 1)
+    zeros = sympy.zeros(5, 1)
     fields = {"f0": drift}
     for index in range(3):
         fields[f"f{index + 1}"] = sympy.Matrix.vstack(sympy.zeros(1, 1), A[:, index], zeros)
-    for name, index in columns.items():
-        roll = sympy.Matrix([1 if name == "f4" else 0])
-        fields[name] = sympy.Matrix.vstack(roll, D[:, index], zeros)
+    for index, name in enumerate(("f4", "f5")):
+        fields[name] = sympy.Matrix.vstack(sympy.Matrix([1 - index]), D[:, index], zeros)
     return fields, theta, state
 
 
-def ranks(model: str = "sigma2") -> dict[str, int]:
+def ranks() -> dict[str, int]:
     """Generic rank of each of :data:`STACKS`, exact at a rational point. Needs the package sympy."""
-    fields, output, state = equations(model)
+    fields, output, state = equations()
     angles, values = point()
     return {
         name: exact_rank(lie_gradients(fields, output, state, words), angles, values)[0]

@@ -15,7 +15,7 @@ from ....filters.bicycle.two_gyro.filter import TwoGyro
 from ....filters.bicycle.two_gyro.truth import true_angles, true_states
 from ....filters.core import rotation
 from ....filters.core.kalman import KalmanFilter
-from ....filters.core.quantity import DEG
+from ....filters.core.quantity import DEG, Estimate
 from ..ride_study import SETTLED, RideStudy
 from ..sensors import without_errors
 from ..signals import gauss_markov
@@ -33,7 +33,7 @@ SITES = {"bicycle_imu/gyr": "platform", "trunk_imu/gyr": "body"}
 """Gyroscope → what the filter calls what carries it."""
 
 
-def bounds_of_ride(study: RideStudy, ride: Trajectory) -> dict[str, Any]:
+def bounds_of_ride(study: RideStudy, ride: Trajectory, _: Mapping[str, Estimate]) -> dict[str, Any]:
     """Numbers of one ride for :attr:`.RideStudy.extra`.
 
     Returns:

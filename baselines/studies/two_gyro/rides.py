@@ -7,11 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from ....envs.data.trajectory import Trajectory
 from ....filters.bicycle.platform_gyro import PlatformGyro, TwoGyroIntegration
 from ....filters.bicycle.two_gyro.filter import TwoGyro
 from ....filters.bicycle.two_gyro.truth import true_angles
-from ....filters.core.quantity import DEG, Estimate
+from ....filters.core.quantity import DEG
 from ..averages import mean_of, mean_rms
 from ..claims import Claim
 from ..kit import Study
@@ -40,10 +39,6 @@ SCENARIOS = {
 def _windows(time: np.ndarray) -> dict[str, tuple[float, float]]:
     """Errors count from 10 s on; a drift shows most in the last 20 s."""
     return {"settled": (SETTLED, np.inf), "last 20 s": (max(SETTLED, time[-1] - 20.0), np.inf)}
-
-
-def _extra(study: RideStudy, ride: Trajectory, _: dict[str, Estimate]) -> dict[str, Any]:
-    return bounds_of_ride(study, ride)
 
 
 RIDES = RideStudy(
@@ -93,7 +88,7 @@ RIDES = RideStudy(
     drawn=(ALONE, "Σ1", INTEGRATED, "Σ2"),
     sampled="relative/orientation",
     windows=_windows,
-    extra=_extra,
+    extra=bounds_of_ride,
     bound="for the true noises, with the alignment error of the camera's marker (1° constant, 1° over 60 s) to be "
     "estimated too",
 )

@@ -17,7 +17,7 @@ def test_ranks():
 
 def test_what_the_published_gradients_miss():
     """A common rate about the vertical in both gyroscopes is their null vector; it is seen by L_f0 f1 h."""
-    fields, output, state = study.equations("sigma2")
+    fields, output, state = study.equations()
     angles, values = study.point()
     v = study.symbols()
     _, printed = exact_rank(lie_gradients(fields, output, state, study.PUBLISHED), angles, values)
@@ -31,25 +31,20 @@ def test_what_the_published_gradients_miss():
     assert added * exact != sympy.zeros(3, 1)
 
 
-def test_roll_is_never_in_the_first_model_and_needs_a_turning_platform_in_the_second():
-    fields, output, state = study.equations("sigma1")
-    words = [(), ("f0",), ("f5",), ("f6",), ("f0", "f1"), ("f5", "f0"), ("f0", "f0")]
-    assert lie_gradients(fields, output, state, words)[:, 0] == sympy.zeros(21, 1)
-    fields, output, state = study.equations("sigma2")
+def test_roll_needs_a_turning_platform():
+    fields, output, state = study.equations()
     still = {study.symbols()["p3"]: 0}
     words = [(), ("f0",), ("f4",), ("f0", "f1"), ("f0", "f4"), ("f0", "f0")]
     assert lie_gradients(fields, output, state, words)[:, 0].subs(still) == sympy.zeros(18, 1)
     assert lie_gradients(fields, output, state, [("f5",)])[:, 0].subs(still) != sympy.zeros(3, 1)
 
 
-@pytest.mark.parametrize("name", ["sigma1", "sigma2"])
-def test_fields_are_those_of_the_filter(name):
+def test_fields_are_those_of_the_filter():
     rng = np.random.default_rng(0)
-    fields, _, state = study.equations(name)
-    model = TwoGyro(dt=1.0, model=name, integration="euler", imu_tilt=0.0, body_bias_time=11.0, platform_bias_time=13.0)
+    fields, _, state = study.equations()
+    model = TwoGyro(dt=1.0, integration="euler", imu_tilt=0.0, body_bias_time=11.0, platform_bias_time=13.0)
     x, body, platform = rng.uniform(-0.6, 0.6, len(state)), rng.normal(size=3), rng.normal(size=3)
     inputs = {"f0": 1.0, "f1": body[0], "f2": body[1], "f3": body[2], "f4": platform[0], "f5": platform[2]}
-    inputs |= {"f6": platform[1]} if name == "sigma1" else {}
     v = study.symbols()
     rate = sum((fields[key] * value for key, value in inputs.items()), sympy.zeros(len(state), 1))
     values = dict(zip(state, x, strict=True)) | {v["qh"]: 1 / 11.0, v["qp"]: 1 / 13.0}
@@ -60,7 +55,7 @@ def test_fields_are_those_of_the_filter(name):
 
 
 def test_wrong_words_are_refused():
-    fields, output, state = study.equations("sigma2")
+    fields, output, state = study.equations()
     with pytest.raises(ValueError, match="words must consist of"):
         lie_gradients(fields, output, state, [("f9",)])
     with pytest.raises(ValueError, match="are missing"):
