@@ -13,6 +13,7 @@ import gymnasium
 import numpy as np
 
 from ..filters.support.parameters import arguments_of, check_parameters
+from .registration import refuse_unknown_arguments
 
 RENDER_MODES = ("human", "rgb_array")
 BODY_COLOUR = (0.25, 0.28, 0.33)
@@ -88,6 +89,7 @@ class DrawnEnv(gymnasium.Env[Any, np.ndarray]):
         rate: steps per second of the environment, Hz.
 
     Raises:
+        TypeError: an argument that the environment does not have.
         ValueError: another render mode.
     """
 
@@ -97,7 +99,8 @@ class DrawnEnv(gymnasium.Env[Any, np.ndarray]):
     _made_with: tuple[tuple[Any, ...], dict[str, Any]]
 
     def __new__(cls, *args: Any, **kwargs: Any) -> Self:
-        """Check the types of the arguments, and remember them for copies."""
+        """Check the names and types of the arguments, and remember them for copies."""
+        refuse_unknown_arguments(cls, kwargs)
         passed_on = kwargs | arguments_of(cls.__init__, args, kwargs)
         for kind in cls.__mro__:
             if (made_by := vars(kind).get("__init__")) is not None:

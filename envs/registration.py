@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import inspect
+from collections.abc import Iterable
 from typing import Any
 
 import gymnasium
 
-from ..filters.support.names import look_up
+from ..filters.support.names import look_up, unknown
 
 ENTRY_POINTS: dict[str, str] = {
     "poise/HandMotion-v0": "poise.envs.hand.environment:HandMotionEnv",
@@ -63,15 +64,42 @@ def environment_class(identity: str) -> Any:
 
 
 def accepted_arguments(identity: str) -> list[str]:
-    """Names of the arguments of an environment, also of those that it hands on to its base."""
-    kind = environment_class(identity)
+    """Names of the arguments of an environment, also of those that it hands on."""
+    return arguments_of_class(environment_class(identity))
+
+
+def arguments_of_class(kind: Any) -> list[str]:
+    """The same of a class: what it hands on goes to its base, or, from a vector environment, to its single one."""
     names: dict[str, None] = {}
     for each in getattr(kind, "__mro__", (kind,)):
-        parameters = inspect.signature(each.__init__ if inspect.isclass(each) else each).parameters
+        made_by = each if not inspect.isclass(each) else vars(each).get("__init__")
+        if made_by is None:
+            continue
+        parameters = inspect.signature(made_by).parameters
         names |= dict.fromkeys(name for name, one in parameters.items() if one.kind != one.VAR_KEYWORD)
         if all(one.kind != one.VAR_KEYWORD for one in parameters.values()):
             break
+        if (single := getattr(kind, "kind", None)) is not None:
+            names |= dict.fromkeys(arguments_of_class(single))
+            break
     return [name for name in names if name != "self"]
+
+
+def refuse_unknown_arguments(kind: type, given: Iterable[str]) -> None:
+    """Refuse names that a registered environment has no argument for; other classes, as of users, have their own.
+
+    Raises:
+        TypeError: one is unknown; the message names environment, argument, the nearest one and all.
+    """
+    place = f"{kind.__module__}:{kind.__qualname__}"
+    registered = (*ENTRY_POINTS.items(), *VECTOR_ENTRY_POINTS.items())
+    identity = next((name for name, entry_point in registered if entry_point == place), None)
+    if identity is None:
+        return
+    known = arguments_of_class(kind)
+    for name in given:
+        if name not in known:
+            raise TypeError(f"{identity}: {unknown('argument', name, known)}")
 
 
 def list_environments() -> tuple[str, ...]:

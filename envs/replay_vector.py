@@ -30,12 +30,13 @@ class ReplayVectorEnv(RowsVectorEnv):
         ValueError: see :class:`.RowsVectorEnv` and :class:`.ReplayEnv`.
     """
 
+    kind = ReplayEnv
     single: ReplayEnv
 
     def __init__(
         self, num_envs: int = 1, *, autoreset_mode: str | AutoresetMode = "NextStep", **arguments: Any
     ) -> None:
-        super().__init__(num_envs, ReplayEnv(**arguments), autoreset_mode)
+        super().__init__(num_envs, self.kind(**arguments), autoreset_mode)
         self._blocks: list[Block | None] = [None] * self.num_envs
         self._seen: list[Observation] = [{}] * self.num_envs
         self._step, self._last = np.zeros(self.num_envs, int), np.zeros(self.num_envs, int)

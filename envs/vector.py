@@ -9,13 +9,15 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from typing import Any, ClassVar, Self
 
 import gymnasium
 import numpy as np
 from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
+
+from .registration import refuse_unknown_arguments
 
 
 class RowsVectorEnv(VectorEnv[Any, np.ndarray, np.ndarray]):
@@ -29,8 +31,17 @@ class RowsVectorEnv(VectorEnv[Any, np.ndarray, np.ndarray]):
             is ``info["final_obs"]``), or ``Disabled`` (``reset(options={"reset_mask": …})`` does it).
 
     Raises:
+        TypeError: an argument that neither the vector environment nor its single one has.
         ValueError: ``num_envs`` is not positive, an unknown mode, or an environment that renders.
     """
+
+    kind: ClassVar[type[gymnasium.Env[Any, Any]]]
+    """Class of the single environment."""
+
+    def __new__(cls, *args: Any, **kwargs: Any) -> Self:
+        """Check the names of the arguments."""
+        refuse_unknown_arguments(cls, kwargs)
+        return super().__new__(cls)
 
     def __init__(
         self, num_envs: int, single: gymnasium.Env[Any, Any], autoreset_mode: str | AutoresetMode = "NextStep"

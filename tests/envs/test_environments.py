@@ -12,6 +12,8 @@ from gymnasium.utils.env_checker import check_env
 from stable_baselines3.common.env_checker import check_env as check_env_sb3
 
 from poise.envs import list_environments, register_environments
+from poise.envs.hand.environment import HandMotionEnv
+from poise.envs.registration import VECTOR_ENTRY_POINTS, accepted_arguments
 
 IDS = list_environments()
 ROLLOUT = """
@@ -70,6 +72,36 @@ def structure(value):
 
 def test_make_by_module_prefix(identity):
     gym.make(f"poise:{identity}").close()
+
+
+@pytest.mark.parametrize("together", [False, True])
+def test_an_unknown_argument_is_named_with_the_nearest_one_and_all(identity, together):
+    def make_one(**options):
+        if not together:
+            return gym.make(identity, **options)
+        mode = "vector_entry_point" if identity in VECTOR_ENTRY_POINTS else "sync"
+        return gym.make_vec(identity, num_envs=2, vectorization_mode=mode, **options)
+
+    known = accepted_arguments(identity)
+    for wrong in (known[0] + "z", "render_mod"):
+        with pytest.raises(
+            TypeError, match=f"{identity}: unknown argument '{wrong}', did you mean '{wrong[:-1]}"
+        ) as at:
+            make_one(**{wrong: None})
+        assert all(name in str(at.value) for name in known)
+    if together and identity in VECTOR_ENTRY_POINTS:
+        with pytest.raises(TypeError, match="did you mean 'autoreset_mode'"):
+            make_one(autoreset_mod="SameStep")
+
+
+def test_a_class_of_ones_own_has_its_own_arguments():
+    class Mine(HandMotionEnv):
+        def __init__(self, **options):
+            self.mine = options.pop("mine")
+            super().__init__(**options)
+
+    with Mine(mine=3, gesture="slow") as env:
+        assert env.mine == 3
 
 
 def test_registering_twice_is_harmless():

@@ -133,7 +133,7 @@ def test_kept_rides_are_the_same_rides(tmp_path, monkeypatch):
     [
         ({"site": "thigh_left"}, "site must be one of"),
         ({"filter": "kalman"}, "unknown estimator 'kalman'"),
-        ({"scenario": "moon"}, "scenario must be one of"),
+        ({"scenario": "moon"}, "unknown scenario"),
         ({"scenario": ()}, "at least one scenario"),
         ({"subject": 9}, "subject"),
         ({"duration": 0.1, "interval": 0.5}, "one interval at least"),

@@ -9,6 +9,7 @@ from functools import partial
 
 import numpy as np
 
+from ....filters.support.names import unknown
 from .events import Events, coasting_phases, gusts, usual_cadence
 from .path import Path, smooth_curvature, wandering_path
 from .surfaces import SURFACES, Surface
@@ -295,9 +296,9 @@ def scenario(name: str | Scenario) -> Scenario:
     if isinstance(name, Scenario):
         return name
     parts = str(name).split("+")
-    unknown = [part for part in parts if part not in SCENARIOS]
-    if unknown:
-        raise ValueError(f"scenario must be one of {list_scenarios()} or several joined by '+', got {name!r}")
+    for part in parts:
+        if part not in SCENARIOS:
+            raise ValueError(f"{unknown('scenario', part, SCENARIOS)}; several are joined by '+', got {name!r}")
     first, *others = (SCENARIOS[part] for part in parts)
     if not others:
         return first

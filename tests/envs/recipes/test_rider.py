@@ -180,7 +180,7 @@ def test_settings_are_drawn_from_what_the_recipe_names() -> None:
 @pytest.mark.parametrize(
     ("described", "message"),
     [
-        ({"scenarios": ["ice"]}, "scenario must be one of"),
+        ({"scenarios": ["ice"]}, "unknown scenario"),
         ({"sensors": {"timing": {"late_share": 2.0}}}, r"late_share must lie in \[0, 1\], got 2.0"),
         ({"scenarios": []}, "scenarios must hold one name at least"),
         ({"bicycles": ["tricycle"]}, "bicycles must be among .*got 'tricycle'"),
