@@ -11,10 +11,9 @@ from typing import Any
 
 from ..filters.core.estimator import Estimator
 from ..filters.core.offline import SUFFIX, Offline
-from ..filters.registry import FILTERS, Entry, Kind
+from ..filters.registry import FILTERS, HERE, Entry, Kind
 from ..filters.support.names import look_up
 
-HERE = "this package"
 RULES = {
     "pitch-rate": "its belief in level ground lowered by a rule on the pitch rate",
     "innovation": "its measurement variance adapted to the innovations",

@@ -22,6 +22,7 @@ from .support.names import look_up
 from .support.parameters import check_parameters
 
 Kind = Literal["filter", "adaptive", "learned", "baseline", "external"]
+HERE = "this package"
 
 
 @dataclass(frozen=True)
@@ -32,7 +33,7 @@ class Entry:
         factory: a class of equations, a class of estimators, or a function that makes an estimator; or its location,
             ``.module:name`` relative to this package.
         description: what it estimates and how, in one line.
-        source: where it was published.
+        source: where it was published; by default in this package only.
         kind: ``filter`` (published or this package's), ``adaptive`` (a filter whose gains a policy or a rule sets),
             ``learned``, ``baseline`` (a classical reference without tuning), ``external`` (another package's).
         fixed: parameters that the name implies; they cannot be passed.
@@ -43,7 +44,7 @@ class Entry:
 
     factory: str | Callable[..., Any]
     description: str
-    source: str
+    source: str = HERE
     kind: Kind = "filter"
     fixed: Mapping[str, Any] = field(default_factory=dict)
     describes: str | Callable[..., Any] = ""
@@ -117,7 +118,6 @@ def _load(place: Any) -> Any:
 
 
 HE = "He, thesis, Université Laval"
-HERE = "this package"
 TWO_GYRO, FORCE_INERTIAL, WHOLE_BODY = (
     "Zhang, Chen, Yi et al.",
     "Zhang, Chen, Yi 2013",
@@ -134,24 +134,20 @@ FILTERS: dict[str, Entry] = {
         "Lee, Park, Robinovitch 2012",
     ),
     "mekf": Entry(
-        ".imu.mekf:MEKF",
-        "multiplicative extended Kalman filter with gyroscope bias",
-        "Lefferts, Markley, Shuster 1982",
+        ".imu.mekf:MEKF", "multiplicative extended Kalman filter with gyroscope bias", "Lefferts, Markley, Shuster 1982"
     ),
-    "mekf-9": Entry(".imu.mekf:MEKF9", WITH_HEADING, HERE),
+    "mekf-9": Entry(".imu.mekf:MEKF9", WITH_HEADING),
     "bounded-motion": Entry(
         ".imu.bounded_motion:BoundedMotion",
         "for bodies that accelerate but stay in one place: velocity near zero as pseudo-measurement",
-        HERE,
     ),
     "bounded-motion-rest": Entry(
         ".imu.rest:RestingBoundedMotion",
         "bounded-motion, the bias of the gyroscope measured whenever the device lies still",
-        HERE,
     ),
-    "bounded-motion-9": Entry(".imu.bounded_motion:BoundedMotion9", WITH_HEADING, HERE),
+    "bounded-motion-9": Entry(".imu.bounded_motion:BoundedMotion9", WITH_HEADING),
     "bounded-motion-rest-9": Entry(
-        ".imu.rest:RestingBoundedMotion9", "bounded-motion-rest with the heading of a magnetometer", HERE
+        ".imu.rest:RestingBoundedMotion9", "bounded-motion-rest with the heading of a magnetometer"
     ),
     "array-orientation": Entry(
         SPATIAL, 'orientation from an accelerometer array; array="controller", "octa" or your own', HE
@@ -191,12 +187,10 @@ FILTERS: dict[str, Entry] = {
     "two-gyro-consistent": Entry(
         f"{BICYCLE}.two_gyro.consistent:ConsistentTwoGyro",
         "two-gyro with noises that hold on rides: its covariance is that of its errors",
-        HERE,
     ),
     "two-gyro-level": Entry(
         f"{BICYCLE}.two_gyro.filter:TwoGyro",
         "two-gyro by Σ1, with level ground as pseudo-measurement: the roll no longer drifts",
-        HERE,
         fixed={"model": "sigma1", "constraint": True},
     ),
     "force-inertial": Entry(
@@ -207,7 +201,6 @@ FILTERS: dict[str, Entry] = {
     "force-inertial-consistent": Entry(
         f"{BICYCLE}.force_inertial.consistent:ConsistentForceInertial",
         "force-inertial from the usual posture, with noises that hold on rides: its covariance is that of its errors",
-        HERE,
     ),
     "whole-body": Entry(
         f"{BICYCLE}.whole_body.filter:WholeBody",
@@ -218,54 +211,51 @@ FILTERS: dict[str, Entry] = {
         f"{BICYCLE}.whole_body.consistent:ConsistentWholeBody",
         "whole-body with biases and errors of the rider's geometry as states, from the usual posture: its covariance "
         "is that of its errors",
-        HERE,
     ),
     "balanced-gyro": Entry(
         f"{BICYCLE}.balanced_gyro:BalancedGyro",
         "roll and pitch of a bicycle from its gyroscope alone: level on average, balanced in turns of unknown speed",
-        HERE,
     ),
     "odometry-aided": Entry(
         f"{BICYCLE}.odometry_aided:OdometryAided",
         "roll and pitch of a bicycle from its IMU and the wheel's speed: the wheel rolls and does not slide",
-        HERE,
     ),
     **{
         name: Entry(place, description, source, "baseline")
-        for name, place, description, source in (
+        for name, source, place, description in (
             (
                 "two-gyro-integration",
+                TWO_GYRO,
                 f"{BICYCLE}.platform_gyro:TwoGyroIntegration",
                 "both gyroscopes integrated",
-                TWO_GYRO,
             ),
             (
                 "platform-gyro",
+                HERE,
                 f"{BICYCLE}.platform_gyro:PlatformGyro",
                 "roll from the bicycle's gyroscope alone: pitch rate near zero as pseudo-measurement",
-                HERE,
             ),
             (
                 "force-inertial-integration",
+                FORCE_INERTIAL,
                 f"{BICYCLE}.force_inertial.integration:ForceInertialIntegration",
                 "gyroscopes integrated from the angles that the first forces determine",
-                FORCE_INERTIAL,
             ),
             (
                 "whole-body-integration",
+                WHOLE_BODY,
                 f"{BICYCLE}.whole_body.integration:WholeBodyIntegration",
                 "six gyroscopes integrated",
-                WHOLE_BODY,
             ),
             (
                 "gyroscope-integration",
+                "textbook",
                 ".imu.classical:GyroscopeIntegration",
                 "gyroscope alone, from the first inclination",
-                "textbook",
             ),
-            ("tilt", ".imu.classical:Tilt", "accelerometer alone, sample by sample", "textbook"),
-            ("mahony", ".imu.classical:Mahony", "explicit complementary filter with bias, published gains", MAHONY),
-            ("mahony-9", ".imu.classical:Mahony9", "the same with a magnetometer", MAHONY),
+            ("tilt", "textbook", ".imu.classical:Tilt", "accelerometer alone, sample by sample"),
+            ("mahony", MAHONY, ".imu.classical:Mahony", "explicit complementary filter with bias, published gains"),
+            ("mahony-9", MAHONY, ".imu.classical:Mahony9", "the same with a magnetometer"),
         )
     },
     **{

@@ -12,10 +12,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...filters.arrays.array import AccelerometerArray
+from ...filters.arrays.array import AccelerometerArray, recorded_channel
 from ...filters.core import rotation
 from ...filters.core.quantity import STANDARD_GRAVITY
-from ..data.calibration.channels import accelerometer_channel, spatial_axes
+from ..data.calibration.channels import spatial_axes
 from ..data.calibration.data import MagnetometerData, RateTableData, mounting_matrix
 from ..data.calibration.records import CalibrationRecord, ChannelCalibration
 from ..sensors.ideal import magnetic_field
@@ -45,7 +45,7 @@ def nominal_calibration(array: AccelerometerArray) -> CalibrationRecord:
     """Values of the data sheets: typical scales, no offsets, a magnetometer along the axes of the device."""
     return CalibrationRecord(
         {
-            accelerometer_channel(array): ChannelCalibration.scaled(
+            recorded_channel(array).name: ChannelCalibration.scaled(
                 [ACCELEROMETER_SCALE] * array.size, [0.0] * array.size, "m/s²"
             ),
             "imu/gyr": ChannelCalibration.scaled([GYROSCOPE_SCALE] * 3, [0.0] * 3, "rad/s"),
@@ -67,7 +67,7 @@ def random_calibration(array: AccelerometerArray, seed: int) -> CalibrationRecor
     matrix = MAGNETOMETER_SCALE * turned @ (np.eye(3) + 0.5 * (soft + soft.T))
     return CalibrationRecord(
         {
-            accelerometer_channel(array): ChannelCalibration.scaled(
+            recorded_channel(array).name: ChannelCalibration.scaled(
                 ACCELEROMETER_SCALE * (1.0 + 0.05 * acc.standard_normal(m)), acc.normal(0.0, 1.0, m), "m/s²"
             ),
             "imu/gyr": ChannelCalibration.scaled(
@@ -99,7 +99,7 @@ def accelerometer_runs(
     The reference point of the array is 0.1 m from the axis of the table, which holds each rate for ``hold`` s.
     """
     device = HandDevice(array.name, _spatial(array), "array-data-sheet", gyroscope=False, magnetometer=False)
-    channel = truth.channels[accelerometer_channel(array)]
+    channel = truth.channels[recorded_channel(array).name]
     tables = {
         (up, out): RateTable(UPWARDS if out.startswith("+") else DOWNWARDS, hold, offset=(0.1, 0.0, 0.0))
         for up, out in ACCELEROMETER_MOUNTINGS

@@ -41,63 +41,49 @@ VARYING = PROMPT | {
     "gyroscope_temperature": (INDUSTRIAL.gyroscope.temperature_coefficient, CONSUMER.gyroscope.temperature_coefficient),
 }
 """The same, whose bias depends on the specific force and on the temperature, from one grade to the other."""
+IN_HAND: dict[str, Any] = {"carried_share": 0.0}
+WALKED: dict[str, Any] = {"carried_share": 1.0, "carried": {"first_rest": (0.3, 20.0), "running_share": 0.0}}
+RUN: dict[str, Any] = {
+    "carried_share": 1.0,
+    "carried": WALKED["carried"] | {"running_share": 1.0, "standing_share": 0.0},
+}
+"""Motions of hand-held sensors alone, of carried ones alone without running, and of those of somebody who runs."""
 SURROUNDINGS = ["undisturbed", "laboratory", "indoor", "fixed-magnets", "passing-magnets", "attached-magnet"]
 """Of a magnetometer in the hand."""
 RECIPES: dict[str, ShippedRecipe] = {
     "hand-held": ShippedRecipe(
-        "hand",
-        "a sensor in the hand, at rest or shaken, tapped, put down, from laboratory to phone grade",
-        {"carried_share": 0.0},
+        "hand", "a sensor in the hand, at rest or shaken, tapped, put down, from laboratory to phone grade", IN_HAND
     ),
     "carried": ShippedRecipe(
-        "hand",
-        "a phone carried by somebody who walks or stands: in the hand, swinging, in a pocket",
-        {"carried_share": 1.0, "carried": {"first_rest": (0.3, 20.0), "running_share": 0.0}},
+        "hand", "a phone carried by somebody who walks or stands: in the hand, swinging, in a pocket", WALKED
     ),
-    "carried-running": ShippedRecipe(
-        "hand",
-        "the same of somebody who runs",
-        {"carried_share": 1.0, "carried": {"first_rest": (0.3, 20.0), "running_share": 1.0, "standing_share": 0.0}},
-    ),
+    "carried-running": ShippedRecipe("hand", "the same of somebody who runs", RUN),
     "hand-held-prompt": ShippedRecipe(
         "hand",
         "hand-held by sensors without delay or low-pass, so that a network does not learn to predict; larger biases",
-        {"carried_share": 0.0, "sensors": PROMPT},
+        IN_HAND | {"sensors": PROMPT},
     ),
-    "carried-prompt": ShippedRecipe(
-        "hand",
-        "carried, by the same sensors",
-        {"carried_share": 1.0, "carried": {"first_rest": (0.3, 20.0), "running_share": 0.0}, "sensors": PROMPT},
-    ),
+    "carried-prompt": ShippedRecipe("hand", "carried, by the same sensors", WALKED | {"sensors": PROMPT}),
     "hand-held-varying": ShippedRecipe(
         "hand",
         "hand-held by the same sensors, whose bias in motion is not that at rest: force and warming change it",
-        {"carried_share": 0.0, "sensors": VARYING},
+        IN_HAND | {"sensors": VARYING},
     ),
-    "carried-varying": ShippedRecipe(
-        "hand",
-        "carried, by the same sensors",
-        {"carried_share": 1.0, "carried": {"first_rest": (0.3, 20.0), "running_share": 0.0}, "sensors": VARYING},
-    ),
+    "carried-varying": ShippedRecipe("hand", "carried, by the same sensors", WALKED | {"sensors": VARYING}),
     "gestures-varying": ShippedRecipe(
         "hand",
         "gestures of poise/HandMotion-v0, slow to severe, by the same sensors",
-        {"carried_share": 0.0, "gestures": ["slow", "fast", "severe", "mixed"], "sensors": VARYING},
+        IN_HAND | {"gestures": ["slow", "fast", "severe", "mixed"], "sensors": VARYING},
     ),
     "hand-held-magnetic": ShippedRecipe(
         "hand",
         "hand-held-varying with a magnetometer: in rooms, near magnets, with one on the device, or undisturbed",
-        {"carried_share": 0.0, "sensors": VARYING, "magnetics": SURROUNDINGS},
+        IN_HAND | {"sensors": VARYING, "magnetics": SURROUNDINGS},
     ),
     "carried-magnetic": ShippedRecipe(
         "hand",
         "carried-varying with a magnetometer, in rooms, near magnets or on a street",
-        {
-            "carried_share": 1.0,
-            "carried": {"first_rest": (0.3, 20.0), "running_share": 0.0},
-            "sensors": VARYING,
-            "magnetics": ["undisturbed", "laboratory", "indoor", "passing-magnets", "street"],
-        },
+        WALKED | {"sensors": VARYING, "magnetics": [*SURROUNDINGS[:3], "passing-magnets", "street"]},
     ),
     "rider": ShippedRecipe("rider", "rides of anybody anywhere with sensors of several grades", {}),
 }

@@ -105,15 +105,8 @@ CONSUMER = Grade(
 """Single chips of phones, watches and game controllers, as they leave the factory."""
 
 FILLED = (
-    "white_noise",
-    "bias_random_walk",
-    "bias_instability",
-    "turn_on_bias",
-    "scale_factor",
-    "misalignment",
-    "g_sensitivity",
-    "temperature_coefficient",
-    "warm_up",
+    *("white_noise", "bias_random_walk", "bias_instability", "turn_on_bias"),
+    *("scale_factor", "misalignment", "g_sensitivity", "temperature_coefficient", "warm_up"),
 )
 """fields that :func:`completed` fills"""
 

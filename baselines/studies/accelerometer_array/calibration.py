@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from ....envs.data.calibration.channels import accelerometer_channel
 from ....envs.data.calibration.data import AXES, RateTableData
 from ....envs.hand.calibration_runs import (
     ACCELEROMETER_MOUNTINGS,
@@ -16,7 +15,7 @@ from ....envs.hand.calibration_runs import (
     magnetometer_run,
     random_calibration,
 )
-from ....filters.arrays.array import CONTROLLER
+from ....filters.arrays.array import CONTROLLER, recorded_channel
 from ....filters.arrays.calibration.magnetometer import align_magnetometer, fit_ellipsoid
 from ....filters.arrays.calibration.rate_table import AxisCalibration, calibrate_accelerometer, calibrate_gyroscope
 from ..claims import Claim
@@ -32,7 +31,7 @@ def calibrated(seed: int, hold: float) -> dict[str, Any]:
     """A controller with drawn scales and offsets, calibrated on the rate table, ``hold`` s at each rate: errors."""
     truth = random_calibration(CONTROLLER, seed)
     runs = accelerometer_runs(CONTROLLER, truth, seed, hold=hold)
-    channel = truth.channels[accelerometer_channel(CONTROLLER)]
+    channel = truth.channels[recorded_channel(CONTROLLER).name]
     scale, offset = np.diag(np.array(channel.matrix)), np.array(channel.offset)
     found: dict[str, Any] = {"scale": [], "offset": [], "residual": [], "largest": []}
     for index, axis in enumerate(CONTROLLER.e):

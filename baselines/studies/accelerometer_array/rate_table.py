@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 
-from ....envs.data.calibration.channels import accelerometer_channel
 from ....envs.data.calibration.records import CalibrationRecord, ChannelCalibration
 from ....envs.hand.calibration_runs import (
     GYROSCOPE_RANGE,
@@ -24,7 +23,7 @@ from ....envs.hand.calibration_runs import (
 from ....envs.hand.controller_gestures import BOTH_WAYS, RateTable
 from ....envs.hand.devices import HandDevice
 from ....envs.hand.sensing import simulate_hand
-from ....filters.arrays.array import CONTROLLER, AccelerometerArray
+from ....filters.arrays.array import CONTROLLER, AccelerometerArray, recorded_channel
 from ....filters.arrays.calibration.magnetometer import fit_ellipsoid
 from ....filters.arrays.calibration.rate_table import calibrate_accelerometer, calibrate_gyroscope
 from ....filters.core.quantity import DEG, STANDARD_GRAVITY
@@ -54,7 +53,7 @@ PLACES = (0.0, 0.2)
 
 def thesis_device(seed: int) -> CalibrationRecord:
     """A controller whose accelerometers and gyroscope have the scales and offsets of Tables 4.1 and 4.2."""
-    channel = accelerometer_channel(CONTROLLER)
+    channel = recorded_channel(CONTROLLER).name
     found = dict(random_calibration(CONTROLLER, seed).channels)
     scales, offsets = (MILLI_G * np.array([row[k] for row in TABLE_4_1.values()]) for k in (0, 1))
     found[channel] = ChannelCalibration.scaled(scales, offsets, "m/s²")

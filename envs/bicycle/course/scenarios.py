@@ -108,6 +108,10 @@ def _steady_speed(rng: np.random.Generator, duration: float, low: float, high: f
     return SpeedProfile(rng.uniform(low, high, 1))
 
 
+def _steady(low: float, high: float) -> Factory:
+    return partial(_steady_speed, low=low, high=high)
+
+
 def _varied_speed(rng: np.random.Generator, duration: float, low: float, high: float, hold: float) -> SpeedProfile:
     """Levels from the whole range, each part of it once, in random order."""
     size = max(2, math.ceil(duration / hold) + 1)
@@ -190,7 +194,7 @@ SCENARIOS = {
         Scenario(
             "indoor_circle",
             "a circle of about 2.5 m radius at about 1 m/s on a hall floor",
-            partial(_steady_speed, low=0.9, high=1.1),
+            _steady(0.9, 1.1),
             _circle,
             _flat,
             surface="hall",
@@ -206,46 +210,24 @@ SCENARIOS = {
         Scenario(
             "straight",
             "nearly straight at 2.5 to 3.5 m/s, turning only now and then",
-            partial(_steady_speed, low=2.5, high=3.5),
+            _steady(2.5, 3.5),
             _nudged,
             _flat,
             "mild",
             "tarmac",
         ),
-        Scenario(
-            "bumps",
-            "two bumps at 13 and 15 s",
-            partial(_steady_speed, low=2.8, high=3.4),
-            _straight,
-            _two_bumps,
-            "mild",
-            "tarmac",
-        ),
-        Scenario(
-            "pitch",
-            "up and down a ramp of up to 20°",
-            partial(_steady_speed, low=3.6, high=4.2),
-            _straight,
-            _hill,
-            "mild",
-            "tarmac",
-        ),
+        Scenario("bumps", "two bumps at 13 and 15 s", _steady(2.8, 3.4), _straight, _two_bumps, "mild", "tarmac"),
+        Scenario("pitch", "up and down a ramp of up to 20°", _steady(3.6, 4.2), _straight, _hill, "mild", "tarmac"),
         Scenario(
             "slalom",
             "left and right around cones at 2.5 to 3.5 m/s",
-            partial(_steady_speed, low=2.5, high=3.5),
+            _steady(2.5, 3.5),
             _weave,
             _flat,
             surface="tarmac",
         ),
         Scenario(
-            "slow",
-            "walking pace and less: 0.7 to 0.9 m/s",
-            partial(_steady_speed, low=0.7, high=0.9),
-            _straight,
-            _flat,
-            "mild",
-            "tarmac",
+            "slow", "walking pace and less: 0.7 to 0.9 m/s", _steady(0.7, 0.9), _straight, _flat, "mild", "tarmac"
         ),
         Scenario(
             "stop-and-go",
@@ -268,7 +250,7 @@ SCENARIOS = {
         Scenario(
             "gusts",
             "nearly straight at 3 to 6 m/s in gusts of cross wind and pushes from the side",
-            partial(_steady_speed, low=3.0, high=6.0),
+            _steady(3.0, 6.0),
             _nudged,
             _flat,
             "mild",

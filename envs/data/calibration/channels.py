@@ -26,11 +26,6 @@ def spatial_axes(array: AccelerometerArray) -> np.ndarray:
     return np.pad(array.e, ((0, 0), (0, 3 - array.dimension)))
 
 
-def accelerometer_channel(array: AccelerometerArray) -> str:
-    """Name of the channel: ``imu/acc`` for a triaxial accelerometer, else ``array/acc``."""
-    return recorded_channel(array).name
-
-
 def accelerometer_record(
     data: RateTableData,
     array: AccelerometerArray,
@@ -90,7 +85,7 @@ def accelerometer_record(
     positions = positions[:, :n] + np.array(array.reference)
     built = type(array)(positions.tolist(), axes[:, :n].tolist(), array.name, array.reference)
     details = {"array": built.describe(), "estimated_axes": estimate_axes, "gravity": gravity, "axes": rows}
-    return _record(channel or accelerometer_channel(array), found, "m/s²", details)
+    return _record(channel or recorded_channel(array).name, found, "m/s²", details)
 
 
 def along(one: AxisCalibration, data: RateTableData, axis: np.ndarray, nominal: np.ndarray) -> float | None:

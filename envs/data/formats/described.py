@@ -20,19 +20,19 @@ from .tables.names import Group, counter_column, groups, is_ros, time_column, ti
 from .tables.table import Table, factor
 
 RATES = (
-    *("Update Rate", "Sample Rate", "Sampling Rate", "OutputRate", "Rate", "Frequency", "Sampling Frequency"),
     *(
-        "fs",
-        "ODR",
+        "Update Rate",
+        "Sample Rate",
+        "Sampling Rate",
+        "OutputRate",
         "Output Data Rate",
+        "Rate",
+        "ODR",
+        "fs",
         "Abtastrate",
-        "Abtastfrequenz",
-        "Sample Frequency",
-        "Sampling Interval",
-        "Sample Interval",
-        "Sampling Period",
-        "Sample Period",
     ),
+    *("Frequency", "Sampling Frequency", "Sample Frequency", "Abtastfrequenz"),
+    *("Sampling Interval", "Sample Interval", "Sampling Period", "Sample Period"),
 )
 """Keys of a header for the sampling rate."""
 APPS = {("gFx", "wx"): {"acc": ("gFx gFy gFz", "g"), "gyr": ("wx wy wz", "rad/s"), "mag": ("Bx By Bz", "uT")}}

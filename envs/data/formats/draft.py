@@ -101,9 +101,9 @@ def explanation(path: Path) -> str:
     """What was seen in a file that no reader knows, and how to map it."""
     try:
         table = read_table(path)
+        mapping = mapping_of(table)
     except (ValueError, ImportError) as reason:
         return str(reason)
-    mapping = mapping_of(table)
     suggested = ", ".join(f"{channel} = {list(columns)}" for channel, columns in mapping.columns.items())
     return (
         f"it holds a table ({table.seen()}) whose names and units do not identify gyroscope and accelerometer"

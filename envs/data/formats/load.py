@@ -271,13 +271,9 @@ def unknown_file(path: Path) -> str:
     if is_folder_of_streams(Head(path.parent)):
         return f"{path} is one stream of a device that writes a file a sensor: load its folder, {path.parent}"
     accepted = ", ".join(known.name for known in FORMATS)
-    state = "is empty" if path.stat().st_size == 0 else "is of no known format, or truncated"
-    try:
-        seen = explanation(path)
-    except ValueError as reason:
-        seen = str(reason)
-    seen = "" if state == "is empty" else f": {seen}"
-    return f"{path} {state}{seen}. Known formats: {accepted}"
+    if path.stat().st_size == 0:
+        return f"{path} is empty. Known formats: {accepted}"
+    return f"{path} is of no known format, or truncated: {explanation(path)}. Known formats: {accepted}"
 
 
 def recognise(path: Path) -> RecordingFormat | None:

@@ -222,7 +222,7 @@ def read_map(path: Path) -> tuple[Path, RecordingMap]:
         raise ValueError(f"there is no {data}")
     arguments = {key: content[key] for key in known if key in content and key not in ("file", "name")}
     made = make_map(**arguments)
-    return data, RecordingMap(**{**made.__dict__, "details": {"name": content["name"]} if "name" in content else {}})
+    return data, replace(made, details={"name": content["name"]} if "name" in content else {})
 
 
 def apply_map(table: Table, mapping: RecordingMap, path: Path) -> list[Trajectory]:

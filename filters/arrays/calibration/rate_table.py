@@ -96,15 +96,8 @@ def calibrate_accelerometer(
     labels = ["scale", "offset", *(f"position {name}" for name in horizontal)]
     solution = _least_squares(np.stack(columns, axis=-1), gravity * up, labels)
     left = np.stack(columns, axis=-1) @ solution - gravity * up
-    return AxisCalibration(
-        float(solution[0]),
-        float(solution[1]),
-        dict(zip(horizontal, solution[2:].tolist(), strict=True)),
-        float(np.sqrt(np.mean(left**2))),
-        float(np.abs(left).max()),
-        len(raw),
-        discarded,
-    )
+    positions = dict(zip(horizontal, solution[2:].tolist(), strict=True))
+    return _calibration(solution[0], solution[1], positions, left, discarded)
 
 
 def calibrate_direction(
@@ -139,16 +132,9 @@ def calibrate_direction(
     solution = _least_squares(np.stack(columns, axis=-1), raw, labels)
     scale = 1.0 / float(np.linalg.norm(solution[:3]))
     left = scale * (np.stack(columns, axis=-1) @ solution - raw)
-    return AxisCalibration(
-        scale,
-        -scale * float(solution[3]),
-        dict(zip(names, (scale * solution[4:]).tolist(), strict=True)),
-        float(np.sqrt(np.mean(left**2))),
-        float(np.abs(left).max()),
-        len(raw),
-        discarded,
-        tuple((scale * solution[:3]).tolist()),
-    )
+    positions = dict(zip(names, (scale * solution[4:]).tolist(), strict=True))
+    axis = tuple((scale * solution[:3]).tolist())
+    return _calibration(scale, -scale * float(solution[3]), positions, left, discarded, axis)
 
 
 def calibrate_gyroscope(raw: np.ndarray, rate: np.ndarray, *, saturation: float | None = None) -> AxisCalibration:
@@ -173,16 +159,20 @@ def calibrate_gyroscope(raw: np.ndarray, rate: np.ndarray, *, saturation: float 
         raise ValueError(f"at least three different rates that are not saturated are needed, got {len(rates)}")
     columns = np.stack([raw, np.ones_like(raw)], axis=-1)
     solution = _least_squares(columns, rate, ["scale", "offset"])
-    left = columns @ solution - rate
-    return AxisCalibration(
-        float(solution[0]),
-        float(solution[1]),
-        {},
-        float(np.sqrt(np.mean(left**2))),
-        float(np.abs(left).max()),
-        len(raw),
-        int(lost.sum()),
-    )
+    return _calibration(solution[0], solution[1], {}, columns @ solution - rate, int(lost.sum()))
+
+
+def _calibration(
+    scale: float,
+    offset: float,
+    positions: dict[str, float],
+    left: np.ndarray,
+    discarded: int,
+    axis: tuple[float, ...] | None = None,
+) -> AxisCalibration:
+    """The calibration with its residuals ``left`` ``(T,)`` summed up."""
+    rms, largest = float(np.sqrt(np.mean(left**2))), float(np.abs(left).max())
+    return AxisCalibration(float(scale), float(offset), positions, rms, largest, len(left), discarded, axis)
 
 
 def saturated(raw: np.ndarray, rate: np.ndarray, mounting: np.ndarray, limit: float | None) -> np.ndarray:

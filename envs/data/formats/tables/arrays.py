@@ -95,7 +95,7 @@ def as_table(arrays: dict[str, Any], kind: str) -> Table:
         array = np.ma.filled(np.ma.asarray(values).astype(float), np.nan) if np.ma.isMaskedArray(values) else values
         array = np.asarray(array)
         if array.dtype.names:
-            found |= {f"{field}": np.ravel(array[field]) for field in array.dtype.names}
+            found |= {field: np.ravel(array[field]) for field in array.dtype.names}
             continue
         array = array.reshape(-1) if array.ndim == 2 and 1 in array.shape else array
         if array.dtype.kind not in "fiub" or array.ndim not in (1, 2) or array.size == 0:
@@ -238,8 +238,9 @@ def table_of_frame(frame: pandas.DataFrame, kind: str) -> Table:
 
 def as_named(arrays: dict[str, np.ndarray], kind: str) -> Table:
     """A table of arrays whose names may end with a unit."""
-    units = {split_unit(name)[0]: split_unit(name)[1] for name in arrays if split_unit(name)[1]}
-    return Table({split_unit(name)[0]: values for name, values in arrays.items()}, units=units, kind=kind)
+    parts = [split_unit(name) for name in arrays]
+    units = {name: unit for name, unit in parts if unit}
+    return Table({name: values for (name, _), values in zip(parts, arrays.values(), strict=True)}, units, kind=kind)
 
 
 def columns_or_records(text: str) -> Any:

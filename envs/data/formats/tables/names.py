@@ -21,58 +21,27 @@ TRANSLATIONS = {
 OTHER_LANGUAGES = {word.replace("_", " "): known for known, others in TRANSLATIONS.items() for word in others.split()}
 FOREIGN = re.compile("|".join(sorted(OTHER_LANGUAGES, key=len, reverse=True)), re.IGNORECASE)
 WORDS = re.compile(r"[A-Z]+(?=[A-Z][a-z])|[A-Z]?[a-z]+|[A-Z]+|\d+|[µ°]")
-FILLERS = {"cal", "calibrated", "raw", "data", "s", "rs", "sensor", "field", "values", "value", "axis", "imu"}
-FILLERS |= {"element", "measured", "rate", "velocity", "vel", "signal", "body", "b", "wideband", "float", "motion"}
-FILLERS |= {"uncalibrated"}
-GRAVITY_FREE = {"free", "linear", "user", "lin", "gravity", "increment", "global", "world"}
+
+
+def _words(text: str) -> set[str]:
+    return set(text.split())
+
+
+FILLERS = _words(
+    "cal calibrated uncalibrated raw data s rs sensor field values value axis imu element measured rate velocity vel "
+    "signal body b wideband float motion"
+)
+GRAVITY_FREE = _words("free linear user lin gravity increment global world")
 KINDS = {
-    "gyr": {
-        "gyr",
-        "gyro",
-        "gyros",
-        "gyroscope",
-        "gyroscopes",
-        "omega",
-        "angvel",
-        "angrate",
-        "rotationrate",
-        "as",
-        "w",
-        "g",
-    },
-    "acc": {
-        "acc",
-        "accel",
-        "accelerometer",
-        "accelerometers",
-        "acceleration",
-        "accelerations",
-        "accl",
-        "a",
-        "specific",
-    },
-    "mag": {"mag", "magn", "magneto", "magnetometer", "magnetometers", "magnetic", "m", "mf", "h"},
-    "quaternion": {"q", "quat", "quats", "quaternion", "orientation", "attitude", "rotation", "ori"},
-    "matrix": {"mat", "matrix", "dcm", "rotmat"},
+    "gyr": _words("gyr gyro gyros gyroscope gyroscopes omega angvel angrate rotationrate as w g"),
+    "acc": _words("acc accel accelerometer accelerometers acceleration accelerations accl a specific"),
+    "mag": _words("mag magn magneto magnetometer magnetometers magnetic m mf h"),
+    "quaternion": _words("q quat quats quaternion orientation attitude rotation ori"),
+    "matrix": _words("mat matrix dcm rotmat"),
 }
 """Kind → words that name it; single letters count only right before an axis."""
-TIME = {
-    "time",
-    "timestamp",
-    "timestamps",
-    "t",
-    "seconds",
-    "sampletimefine",
-    "datetime",
-    "epoch",
-    "epoc",
-    "clock",
-    "ts",
-    "cts",
-    "stamp",
-    "stmp",
-}
-COUNTER = {"packetcounter", "counter", "sample", "samplenumber", "index", "frame", "packet", "samples", "n"}
+TIME = _words("time timestamp timestamps t seconds sampletimefine datetime epoch epoc clock ts cts stamp stmp")
+COUNTER = _words("packetcounter counter sample samplenumber index frame packet samples n")
 AXES = {"x": 0, "y": 1, "z": 2}
 QUATERNION = {"w": 0, "scalar": 0, "x": 1, "y": 2, "z": 3, "0": 0, "1": 1, "2": 2, "3": 3, "4": 4}
 
@@ -108,7 +77,7 @@ def classify(name: str) -> tuple[str, str, str, str] | None:
     numbered = re.fullmatch(r"(gyr|gyro|acc|accel|mag)_?([xyz])_?(\d+)", name.strip(), re.IGNORECASE)
     if numbered:
         return numbered[3], next(kind for kind in KINDS if numbered[1].lower() in KINDS[kind]), "", numbered[2].lower()
-    if len(parts) >= 1 and len(parts[-1]) > 1 and re.fullmatch(r"(gyr|gyro|acc|accel|mag|quat)[xyzw0-3]", parts[-1]):
+    if parts and re.fullmatch(r"(gyr|gyro|acc|accel|mag|quat)[xyzw0-3]", parts[-1]):
         parts = [*parts[:-1], parts[-1][:-1], parts[-1][-1]]
     where = next((i for i, word in enumerate(parts) if word in QUATERNION and i == len(parts) - 1), None)
     letters = [i for i, word in enumerate(parts) if word in AXES]

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import csv
 import io
+import itertools
 import re
 import warnings
 from pathlib import Path
@@ -252,12 +253,8 @@ def parse(data: list[str], delimiter: str, width: int) -> pandas.DataFrame:
     decimal = "."
     if delimiter != ",":
         tokens = [field for line in data[:SAMPLE] for field in fields_of(line, delimiter)]
-        decimal = (
-            ","
-            if sum("," in token and is_number(token) for token in tokens)
-            > 0.5 * sum("." in token and is_number(token) for token in tokens)
-            else "."
-        )
+        commas, points = (sum(mark in token and is_number(token) for token in tokens) for mark in ",.")
+        decimal = "," if commas > 0.5 * points else "."
     try:
         return pandas.read_csv(
             io.StringIO("\n".join(data)),
@@ -313,8 +310,8 @@ def names_and_units(heads: list[list[str]], width: int) -> tuple[list[str], dict
     for column in range(width):
         parts = [row[column] for row in rows if row[column]]
         name, unit = split_unit("/".join(parts))
-        if name in names:
-            name = f"{name}.{names.count(name)}" if name else ""
+        if name and name in names:
+            name = next(each for each in (f"{name}.{number}" for number in itertools.count(1)) if each not in names)
         names.append(name)
         if unit or unit_line[column]:
             units[name] = unit or unit_line[column]

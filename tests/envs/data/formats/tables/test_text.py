@@ -217,6 +217,14 @@ def test_names_that_occur_twice_are_named(tmp_path):
         load_recording(tmp_path / "twice.csv")
 
 
+def test_each_of_several_columns_of_one_name_is_kept(tmp_path):
+    lines = ["t,x,x.1,x,x"] + [f"{0.01 * row:.2f},{row},{row}.1,{row}.2,{row}.3" for row in range(1, 30)]
+    with pytest.warns(UserWarning, match="more than once"):
+        table = table_of(tmp_path / "a.csv", "\n".join(lines))
+    first = {name: float(values[0]) for name, values in table.arrays.items()}
+    assert first == {"t": 0.01, "x": 1.0, "x.1": 1.1, "x.2": 1.2, "x.3": 1.3}
+
+
 def test_a_parquet_table_with_units_needs_no_mapping(tmp_path):
     pandas = pytest.importorskip("pandas")
     pytest.importorskip("pyarrow")
