@@ -36,7 +36,7 @@ def stated_ranges(table: Table) -> dict[str, float]:
     found: dict[str, float] = {}
     for line in table.preamble:
         match = STATED.search(line.strip(' ,;\t"'))
-        number = None if match is None else NUMBER.search(match["rest"])
+        number = None if match is None else NUMBER.search(re.sub(r"(?<=\d),(?=\d{3}\b)", "", match["rest"]))
         if match is None or number is None:
             continue
         kind = "acc" if match["kind"].lower().startswith("acc") else "gyr"

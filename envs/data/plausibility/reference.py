@@ -129,13 +129,13 @@ def check_frozen(trajectory: Trajectory) -> Iterator[Finding]:
     q, gyr = trajectory.truth.get("orientation"), seen(trajectory, "imu/gyr")
     if q is None or gyr is None or len(q) < 3:
         return
-    begins = np.flatnonzero(np.append(True, ~(q[1:] == q[:-1]).all(axis=1)))
-    ends = np.append(begins[1:], len(q))
+    begins, lengths = runs_of(q)
+    ends = begins + lengths
     speed = np.linalg.norm(np.nan_to_num(gyr), axis=1)
     turned = np.add.reduceat(np.where(speed > SLOW, speed, 0.0) * np.gradient(trajectory.time), begins)
     frozen = (trajectory.time[ends - 1] - trajectory.time[begins] > HELD) & (turned > FROZEN)
     if frozen.any():
-        share = 100.0 * float((ends - begins)[frozen].sum()) / len(q)
+        share = 100.0 * float(lengths[frozen].sum()) / len(q)
         what = (
             f"{share:.3g} % of it repeat one orientation, while the gyroscope turns by {turned[frozen].max():.2g} rad"
         )

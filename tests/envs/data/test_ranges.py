@@ -20,6 +20,7 @@ DPS, G = np.pi / 180.0, 9.80665
     [
         ("# Gyroscope range: ±2000 deg/s", {"gyr": 2000 * DPS}),
         ("// Gyro Full Scale (dps), 500", {"gyr": 500 * DPS}),
+        ("Gyroscope range: 2,000 deg/s", {"gyr": 2000 * DPS}),
         ("gyr_range=34.9 rad/s", {"gyr": 34.9}),
         ('"GyroRange";"1000"', {"gyr": 1000 * DPS}),
         ("Angular velocity range [deg/s]: 450", {"gyr": 450 * DPS}),

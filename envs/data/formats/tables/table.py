@@ -15,21 +15,15 @@ from .....filters.support.names import unknown
 UNIT = re.compile(r"^(?P<name>.*?)[\s_]*(\((?P<a>(?:[^()]|\([^()]*\))*)\)|\[(?P<b>[^\[\]]*)\])$")
 SPELLED = {"deg_s": "deg/s", "degs": "deg/s", "dps": "deg/s", "mdps": "mdps", "rad_s": "rad/s", "rads": "rad/s"}
 SPELLED |= {"deg/s": "deg/s", "rad/s": "rad/s", "m/s/s": "m/s/s", "m/s2": "m/s2", "t": "T", "s": "s", "rad": "rad/s"}
-SPELLED |= {
-    "m_s2": "m/s2",
-    "ms2": "m/s2",
-    "mps2": "m/s2",
-    "g": "g",
-    "mg": "mg",
-    "ut": "uT",
-    "nt": "nT",
-    "gauss": "gauss",
-}
+SPELLED |= dict.fromkeys(("m_s2", "ms2", "mps2"), "m/s2") | {"g": "g", "mg": "mg", "ut": "uT", "nt": "nT"}
+SPELLED |= {"gauss": "gauss"}
 """Units within names of columns, ``gyr_x_dps`` or ``acc_mps2_x``."""
 ONLY_OF = {"g": "acc", "t": "^m", "s": "^time", "rad": "^gyr"}
 """Short ones that are units only within names that match."""
 MULTIPLE = re.compile(r"(?P<times>\d+\.?\d*|\.\d+)(?:/(?P<parts>[1-9]\d*\.?\d*))?(?P<unit>\D.*)")
 """A number of units, or parts of one as raw readings have, ``1/16 deg/s``."""
+RATE = re.compile(r"(\d+(?:[.,]\d+)?)\s*(k?hz|[mµu]?s\b(?![-^⁻]))?", re.IGNORECASE)
+"""A rate, or the interval of a sample."""
 QUOTIENT = re.compile(r"^(?P<name>.*?(?:[xyz]|time|\bt))\s*(?:/|:| - )\s*(?P<unit>\S+)$", re.IGNORECASE)
 """Quantity over unit as ISO 80000 writes it, ``acc_x/(m/s²)`` or ``t/s``, and the same with a colon or a dash."""
 SUFFIX = re.compile(rf"^(?P<name>\w*?[a-z])_(?P<unit>{'|'.join(SPELLED)})(?P<axis>_[xyz]|\[\d\])?$", re.IGNORECASE)
@@ -268,13 +262,20 @@ class Table:
         return None
 
     def rate_in_header(self, *keys: str) -> float | None:
-        """A sampling rate in Hz that the preamble names, itself or by an interval (``10 ms``), or None."""
-        text = self.value_of(*keys)
-        number = None if text is None else re.search(r"(\d+(?:[.,]\d+)?)\s*(k?hz|m?s\b)?", text, re.IGNORECASE)
-        if number is None or float(number[1].replace(",", ".")) <= 0.0:
-            return None
-        value, unit = float(number[1].replace(",", ".")), (number[2] or "").lower()
-        return {"khz": 1e3 * value, "ms": 1e3 / value, "s": 1.0 / value}.get(unit, value)
+        """A sampling rate in Hz that the preamble names, itself or by an interval (``10 ms``), or None.
+
+        An interval without a unit is in s if it is below 1, else in ms.
+        """
+        for key in keys:
+            number = RATE.search(self.value_of(key) or "")
+            if number is None or float(number[1].replace(",", ".")) <= 0.0:
+                continue
+            value, unit = float(number[1].replace(",", ".")), (number[2] or "").lower()
+            if not unit and key.endswith(("Interval", "Period")):
+                unit = "s" if value < 1.0 else "ms"
+            parts = {"s": 1.0, "ms": 1e3, "us": 1e6, "µs": 1e6}.get(unit)
+            return parts / value if parts is not None else 1e3 * value if unit == "khz" else value
+        return None
 
     def renamed(self, spelling: Callable[[str], str]) -> Table:
         """The table with other names of columns."""

@@ -7,10 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from poise.envs.data.formats.described import RATES
 from poise.envs.data.formats.load import load_recording
 from poise.envs.data.formats.tables.arrays import read_table
 from poise.envs.data.formats.tables.names import classify, groups, time_column
-from poise.envs.data.formats.tables.table import factor, split_unit
+from poise.envs.data.formats.tables.table import Table, factor, split_unit
 
 VALUES = np.round(np.random.default_rng(5).standard_normal((50, 4)), 4)
 NAMES = ["t", "Gyr_X", "Gyr_Y", "Gyr_Z"]
@@ -215,6 +216,22 @@ def test_names_that_occur_twice_are_named(tmp_path):
     (tmp_path / "twice.csv").write_text("\n".join(lines) + "\n")
     with pytest.warns(UserWarning, match=r"twice.csv: names of columns occur more than once.*'gyr_x.1'"):
         load_recording(tmp_path / "twice.csv")
+
+
+@pytest.mark.parametrize(
+    ("line", "rate"),
+    [
+        ("# Sample Rate: 51.2 Hz", 51.2),
+        ("# ODR: 1.6 kHz", 1600.0),
+        ("# Sampling Rate: 100 s-1", 100.0),
+        ("# Sample Period: 10 ms", 100.0),
+        ("# Sampling Interval: 10000 µs", 100.0),
+        ("# Sampling Interval = 0.01", 100.0),
+        ("# Sample Period, 5", 200.0),
+    ],
+)
+def test_a_rate_or_an_interval_in_a_header(line, rate):
+    assert Table({}, preamble=(line,)).rate_in_header(*RATES) == pytest.approx(rate)
 
 
 def test_each_of_several_columns_of_one_name_is_kept(tmp_path):
