@@ -64,11 +64,11 @@ def linear_system(
     The state is δ (3), of each sensor the Gauss-Markov bias (3) and the random walk (3).
     """
     dt, R = trajectory.dt, np.asarray(rotation.to_matrix(trajectory.truth[ORIENTATION.name]))
-    ticks, turned = len(R), dt * R[:-1]
-    F, Q = (np.zeros((ticks - 1, 15, 15)) for _ in range(2))
+    samples, turned = len(R), dt * R[:-1]
+    F, Q = (np.zeros((samples - 1, 15, 15)) for _ in range(2))
     F[:] = np.eye(15)
     F[:, :3, 3:6], F[:, :3, 6:9] = -turned, -turned
-    H, variances = np.zeros((ticks, 3, 15)), [WIDE**2] * 3
+    H, variances = np.zeros((samples, 3, 15)), [WIDE**2] * 3
     H[:, :, :3] = GRAVITY * np.asarray(rotation.skew(np.array([0.0, 0.0, 1.0])))
     H[:, :, 9:12], H[:, :, 12:15] = R, R
     Q[:, :3, :3] = dt * gyroscope["white_noise"] ** 2 * np.eye(3)
@@ -79,6 +79,6 @@ def linear_system(
             Q[:, axis, axis] = (1.0 - kept**2) * stationary
             Q[:, axis + 3, axis + 3] = dt * noise["bias_random_walk"] ** 2
         variances += [stationary] * 3 + [noise["turn_on_bias"] ** 2] * 3
-    white = np.broadcast_to(accelerometer["white_noise"] ** 2 / dt * np.eye(3), (ticks, 3, 3))
+    white = np.broadcast_to(accelerometer["white_noise"] ** 2 / dt * np.eye(3), (samples, 3, 3))
     seen = np.isfinite(trajectory.measurements["imu/acc"])
     return Linearisation(F, Q, H, white, seen), np.diag(variances)

@@ -233,10 +233,10 @@ def load_baseline(path: Path) -> pandas.DataFrame:
     try:
         table = pandas.read_csv(path)
     except ValueError as reason:
-        raise ValueError(f"--baseline {path} is no table: {reason}") from None
+        raise ValueError(f"--baseline {path} is not a table: {reason}") from None
     lacking = [name for name in ("suite", *RESULT) if name not in table.columns]
     if lacking:
-        raise ValueError(f"--baseline {path} is no results.csv of poise benchmark: it lacks {', '.join(lacking)}")
+        raise ValueError(f"--baseline {path} is not a results.csv of poise benchmark: it lacks {', '.join(lacking)}")
     return table
 
 

@@ -78,7 +78,7 @@ def options_of(texts: Sequence[str]) -> dict[str, Any]:
     """Options by name.
 
     Raises:
-        ValueError: one is no option, or is named twice.
+        ValueError: one is not an option, or is named twice.
     """
     found: dict[str, Any] = {}
     for text in texts:

@@ -43,6 +43,8 @@ def run(args: Args) -> int:
     from ..baselines.studies.rides import study as work
     from ..envs.bicycle.course.scenarios import list_scenarios, scenario
 
+    if args.checks and args.pilots:
+        raise ValueError("--checks and --pilots are two reports: name one of them")
     scenarios = args.scenarios or tuple(list_scenarios())
     for name in scenarios:
         scenario(name)

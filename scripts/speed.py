@@ -39,7 +39,7 @@ def run(args: Args) -> int:
 
     parts = {"filters": filter_speeds, "latency": latencies, "environments": environment_speeds}
     parts |= {"vectors": vector_speeds, "learned": learned_speeds}
-    parts |= {family: partial(family_speeds, family) for family in FAMILIES}
+    parts |= {family: partial(family_speeds, names) for family, names in FAMILIES.items()}
     with Output("speed", args) as out:
         for name in args.what:
             for group, rows in groupby(parts[name](), key=lambda speed: speed.group):

@@ -121,8 +121,8 @@ def constant_errors(
     for trajectory in trajectories:
         own = replace(tuned, kalman=filter_for(tuned.kalman, trajectory))
         estimate = own.kalman.run(trajectory.measurements, own.gains(action))
-        per_tick = [error(q, estimate.pose[q.name], true_values(trajectory, q, own.kalman)) for q in outputs]
-        errors.append(float(np.mean([rms(each, trajectory.mask) for each in per_tick])))
+        found = [error(q, estimate.pose[q.name], true_values(trajectory, q, own.kalman)) for q in outputs]
+        errors.append(float(np.mean([rms(each, trajectory.mask) for each in found])))
     return np.array(errors)
 
 
@@ -148,6 +148,6 @@ def policy_errors(
         estimate = estimator.run(batch).pose[output.name]
         for column, index in enumerate(members):
             trajectory = trajectories[index]
-            per_tick = error(output, estimate[:, column], true_values(trajectory, output, filters[index]))
-            errors[index] = float(rms(per_tick, trajectory.mask))
+            found = error(output, estimate[:, column], true_values(trajectory, output, filters[index]))
+            errors[index] = float(rms(found, trajectory.mask))
     return errors

@@ -271,6 +271,10 @@ def run(args: Args) -> int:
     from ...baselines.online import OnlineEstimator
     from ...baselines.registry import make_estimator
 
+    if args.udp is not None and args.source != "-":
+        raise ValueError(f"lines come from a source or from --udp, not from both; got {args.source!r} and {args.udp}")
+    if args.output is not None and args.send is not None:
+        raise ValueError(f"estimates go to --output or to --send, not to both; got {args.output} and {args.send}")
     check_file("output", args.output, () if args.source == "-" else (Path(args.source),))
     made = make_estimator(args.estimator)
     reader, clock, counts = reader_of(args, made.channels), clock_of(args.rate), Counts()

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import signal
 import threading
-import time
 import webbrowser
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, contextmanager
@@ -24,19 +23,10 @@ from ..output import Output
 from ..targets import check_file
 from .curves import TRUTH
 from .lines import LineFormat
-from .sources import lines_of
-from .stream import Counts, clock_of, reader_of, timed_samples
 
 if TYPE_CHECKING:
     from ...envs.data.trajectory import Trajectory
     from .motion import Motion, Subject
-    from .online import Timed
-    from .shown import LiveMotion
-
-AHEAD = 0.25
-"""s of an environment that are simulated at a time."""
-PICTURE, MANY = 1.0 / 30.0, 200
-"""s, or samples, that are shown together while they arrive."""
 
 
 @dataclass
@@ -186,11 +176,13 @@ def opened(args: Args, out: Output) -> Iterator[Opened]:
         ValueError: an unknown environment, estimator or option, or a recording that cannot be read.
         FileNotFoundError: the source is neither a file nor an environment.
     """
+    from .growing import environment_blocks, fed, line_blocks
+
     lines = args.udp is not None or args.source == "-"
     path = Path(args.source)
     device = path.exists() and not (path.is_file() or path.is_dir())
     if lines or device or (args.live and path.exists()):
-        with fed(line_blocks(args), args) as found:
+        with fed(line_blocks(args), args.estimators) as found:
             yield Opened("samples", *found)
     elif path.exists():
         yield whole(path.name, recording(args, out), args)
@@ -198,7 +190,7 @@ def opened(args: Args, out: Output) -> Iterator[Opened]:
         env_id, env = environment(args)
         with closing(env):
             if args.live:
-                with fed(environment_blocks(env, args.seed), with_tuned_filter(args, env)) as found:
+                with fed(environment_blocks(env, args.seed), with_tuned_filter(args, env).estimators) as found:
                     yield Opened(env_id, *found)
                 return
             from ...envs.record import record
@@ -216,9 +208,9 @@ def whole(title: str, trajectory: Trajectory, args: Args) -> Opened:
         ValueError: an estimator does not fit to it.
     """
     from ...baselines.registry import list_estimators
-    from .shown import finished
+    from .shown import finished, usual_estimators
 
-    shown = finished(trajectory, chosen(args, trajectory))
+    shown = finished(trajectory, args.estimators or usual_estimators(tuple(trajectory.measurements)))
     addable = [name for name, info in list_estimators().items() if set(info.channels) <= set(trajectory.measurements)]
     return Opened(title, *shown, None, addable, partial(finished, trajectory))
 
@@ -248,13 +240,6 @@ def with_tuned_filter(args: Args, env: Any) -> Args:
     return args if args.estimators else replace(args, estimators=tuned_estimators(env))
 
 
-def chosen(args: Args, trajectory: Trajectory) -> tuple[str, ...]:
-    """The estimators that are named, or the usual ones."""
-    from .shown import usual_estimators
-
-    return args.estimators or usual_estimators(tuple(trajectory.measurements))
-
-
 def recording(args: Args, out: Output) -> Trajectory:
     """A recording, one of its sensors.
 
@@ -275,103 +260,3 @@ def recording(args: Args, out: Output) -> Trajectory:
             names = ", ".join(str(each.metadata.get("sensor") or each.name) for each in sensors)
             out.say(f"showing the first of {names}; name another one by its file, or by --site")
         return sensors[0].reference_clock_corrected()
-
-
-Blocks = Iterator["tuple[list[Timed], dict[str, Any], Trajectory | None]"]
-"""Samples, their truth, and a trajectory that says channels, truth, metadata and rate; None before the first sample."""
-
-
-def environment_blocks(env: Any, seed: int) -> Blocks:
-    """An environment in real time, as fast as it is simulated."""
-    from ...envs.record import describe
-    from ...envs.replay import ReplayEnv
-    from .shown import PlayedEnvironment, tuned_episode
-
-    tuned = tuned_episode(env, seed)
-    played = PlayedEnvironment(env if tuned is None else ReplayEnv(tuned), seed)
-    metadata = {**describe(env, seed), "rate": env.unwrapped.rate} if tuned is None else tuned.metadata
-    begin, shown, kind = time.monotonic(), 0.0, None
-    while not played.over:
-        shown = min(time.monotonic() - begin, shown + AHEAD)
-        samples, truth = played.block(shown)
-        if samples and kind is None:
-            first = {name: values[:1] for name, values in truth.items()}
-            kind = described(samples[0], first, metadata)
-        yield samples, truth, kind
-        if not samples:
-            time.sleep(0.01)
-
-
-def described(sample: Timed, truth: dict[str, Any], metadata: dict[str, Any]) -> Trajectory:
-    """A trajectory of the first sample, which says what those after it hold."""
-    import numpy as np
-
-    from ...envs.data.trajectory import Trajectory
-
-    measurements = {name: values[None] for name, values in sample.measurement.items()}
-    return Trajectory(np.array([sample.time]), measurements, truth, metadata=metadata)
-
-
-def line_blocks(args: Args) -> Blocks:
-    """Lines of samples as they arrive."""
-    from ...baselines.registry import make_estimator
-
-    channels = [channel for name in args.estimators for channel in make_estimator(name).channels]
-    reader, clock = reader_of(args, channels), clock_of(args.rate)
-    lines = lines_of(args.source, udp=args.udp, follow=args.live, baud=args.baud)
-    waiting: list[Timed] = []
-    kind: Trajectory | None = None
-    for sample in timed_samples(lines, reader, clock, Counts()):
-        if sample is not None:
-            waiting.append(sample)
-            if kind is None:
-                assert clock.dt is not None
-                kind = described(sample, {}, {"rate": 1.0 / clock.dt})
-            if len(waiting) < MANY and sample.time - waiting[0].time < PICTURE:
-                continue
-        yield waiting, {}, kind
-        waiting = []
-    yield waiting, {}, kind
-
-
-@contextmanager
-def fed(blocks: Blocks, args: Args) -> Iterator[tuple[Subject, Motion, Callable[[], Motion | None]]]:
-    """A motion that grows by blocks in a thread of its own; it begins with the first samples.
-
-    Raises:
-        ValueError: no sample came, an unknown estimator, or a channel is lacking.
-    """
-    from .shown import live_motion
-
-    live: LiveMotion | None = None
-    for samples, truth, trajectory in blocks:
-        if samples and trajectory is not None:
-            live = live_motion(chosen(args, trajectory), trajectory)
-            live.add(samples, truth)
-            break
-    if live is None or live.motion is None:
-        raise ValueError("no sample came")
-    stop = threading.Event()
-    failures: list[Exception] = []
-
-    def feed(live: LiveMotion) -> None:
-        try:
-            for samples, truth, _ in blocks:
-                live.add(samples, truth)
-                if stop.is_set():
-                    return
-        except Exception as reason:
-            failures.append(reason)
-
-    def newer() -> Motion | None:
-        if failures:
-            raise failures.pop()
-        return live.motion
-
-    thread = threading.Thread(target=feed, args=(live,), daemon=True)
-    thread.start()
-    try:
-        yield live.subject, live.motion, newer
-    finally:
-        stop.set()
-        thread.join(timeout=2.0)

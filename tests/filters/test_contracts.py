@@ -31,10 +31,7 @@ STRAPDOWN = [
     # where the angular rate is a state, it follows the gyroscope with a lag
     if "imu/gyr" in FILTERS[name].channels and "angular_rate" not in FILTERS[name].outputs
 ]
-TURNED = [
-    name for name in SINGLE_IMU if "imu/gyr" in FILTERS[name].channels and "angular_rate" not in FILTERS[name].outputs
-]
-"""Methods whose attitude turns as the gyroscope says; others estimate the rate from it."""
+"""Methods whose attitude turns as the gyroscope says."""
 # Rounding is amplified by what a filter feeds back; the network of an external package computes in single precision.
 ROUNDING = 1e-8
 

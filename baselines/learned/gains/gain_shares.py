@@ -16,7 +16,7 @@ from typing import Any, ClassVar
 
 from ....filters.core.backend import Array, expand, namespace
 from ....filters.core.kalman import KalmanFilter
-from ....filters.core.model import Gain, Model
+from ....filters.core.model import Gain, Model, equations_of, parameters_of
 from ....filters.imu.external_acceleration import ExternalAcceleration
 from ....filters.imu.mekf import MEKF
 from ....filters.registry import make, name_of
@@ -85,9 +85,7 @@ def described_filter(kalman: KalmanFilter) -> dict[str, Any]:
     """
     model = kalman.model
     shared = next((name for name, kind in SHARED.items() if type(model) is kind), None)
-    name = name_of(model) if shared is None else shared
-    if name is None:
-        raise ValueError(f"{type(model).__name__} is not registered: a card could not name it")
+    name = registered_name(model) if shared is None else shared
     usual: Any = filter_of({"name": name, "shares": shared is not None, "parameters": {}}, model.dt).model
     changed = {
         field.name: getattr(model, field.name)
@@ -95,6 +93,26 @@ def described_filter(kalman: KalmanFilter) -> dict[str, Any]:
         if getattr(model, field.name) != getattr(usual, field.name)
     }
     return {"name": name, "shares": shared is not None, "parameters": changed}
+
+
+def with_changed_numbers(model: Model) -> dict[str, Any]:
+    """Name of a filter and what differs from the registered one among its numbers, persons and vehicles aside."""
+    name = registered_name(model)
+    usual, own = parameters_of(equations_of(make(name))), parameters_of(model)
+    changed = {key: own[key] for key in own if key != "dt" and key in usual and own[key] != usual[key]}
+    return {"name": name, "parameters": {key: value for key, value in changed.items() if "[" not in key}}
+
+
+def registered_name(model: Model) -> str:
+    """Name in the registry.
+
+    Raises:
+        ValueError: there is none.
+    """
+    name = name_of(model)
+    if name is None:
+        raise ValueError(f"{type(model).__name__} is not registered: a card could not name it")
+    return name
 
 
 def filter_of(described: Mapping[str, Any], dt: float) -> KalmanFilter:

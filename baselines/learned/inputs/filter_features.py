@@ -12,11 +12,10 @@ import numpy as np
 
 from ....filters.core.estimator import check_measurements
 from ....filters.core.kalman import KalmanFilter
-from ....filters.core.model import equations_of, parameters_of
+from ....filters.core.model import parameters_of
 from ....filters.core.quantity import Channel, Estimate, Measurement, Quantity
 from ....filters.core.sampling import FilterState, GapWatch
-from ....filters.registry import make, name_of
-from ..gains.gain_shares import filter_of
+from ..gains.gain_shares import filter_of, with_changed_numbers
 from .front_end import IntervalSums, Seen, check_interval, interval_sums
 
 LONGEST_GAP = 0.5
@@ -111,15 +110,10 @@ class FilterFeatures:
         return replace(self, kalman=replace(self.kalman, model=model))
 
     def describe(self) -> dict[str, Any]:
-        """See :class:`.front_end.FrontEnd`: what differs from the registered filter, persons and vehicles aside."""
-        name = name_of(self.kalman.model)
-        if name is None:
-            raise ValueError(f"{type(self.kalman.model).__name__} is not registered: a card could not name it")
-        usual, own = parameters_of(equations_of(make(name))), parameters_of(self.kalman.model)
-        noises = {key: own[key] for key in own if key != "dt" and key in usual and own[key] != usual[key]}
+        """See :class:`.front_end.FrontEnd`."""
         seen = None if self.channels_seen is None else list(self.channels_seen)
-        filter = {"name": name, "parameters": {key: value for key, value in noises.items() if "[" not in key}}
         told = {"parameters_seen": list(self.parameters_seen)} if self.parameters_seen else {}
+        filter = with_changed_numbers(self.kalman.model)
         return {"kind": self.kind, "filter": filter, "interval": self.interval, "channels_seen": seen, **told}
 
     @classmethod

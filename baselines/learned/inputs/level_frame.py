@@ -9,12 +9,10 @@ from typing import Any, ClassVar, NamedTuple, Self
 from ....filters.core.backend import Array, namespace
 from ....filters.core.estimator import check_measurements
 from ....filters.core.kalman import KalmanFilter
-from ....filters.core.model import equations_of, parameters_of
 from ....filters.core.observer import Observer
 from ....filters.core.quantity import ACCELEROMETER, GYROSCOPE, Channel, Estimate, Measurement
 from ....filters.core.sampling import FilterState
-from ....filters.registry import make, name_of
-from ..gains.gain_shares import filter_of
+from ..gains.gain_shares import filter_of, with_changed_numbers
 from .filter_frame import ATTITUDE, BIAS, TILT_STD, FilterFrame, frame_of
 from .front_end import Seen, check_interval
 from .gravity_aligned_frame import GravityAlignedFrame
@@ -96,16 +94,8 @@ class LevelFrame:
     def describe(self) -> dict[str, Any]:
         """See :class:`.front_end.FrontEnd`."""
         frame = {name: value for name, value in asdict(self.frame).items() if name != "dt"}
-        described: dict[str, Any] = {"kind": self.kind, "frame": frame, "filter": None}
-        if self.kalman is not None:
-            name = name_of(self.kalman.model)
-            if name is None:
-                raise ValueError(f"{type(self.kalman.model).__name__} is not registered: a card could not name it")
-            usual = parameters_of(equations_of(make(name)))
-            own = parameters_of(self.kalman.model)
-            changed = {key: value for key, value in own.items() if key != "dt" and value != usual[key]}
-            described["filter"] = {"name": name, "parameters": changed}
-        return described
+        filter = None if self.kalman is None else with_changed_numbers(self.kalman.model)
+        return {"kind": self.kind, "frame": frame, "filter": filter}
 
     @classmethod
     def read(cls, described: Mapping[str, Any], dt: float) -> Self:

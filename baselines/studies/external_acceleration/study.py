@@ -6,7 +6,7 @@ of the same levels and intervals is drawn anew for every subject and index. A nu
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +18,7 @@ from ....filters.core.metrics import DEGREES, direction_error, rms
 from ....filters.imu.external_acceleration import ExternalAcceleration
 from ...registry import make_estimator
 from ...scoring import has_truth
+from ..averages import mean
 from ..claims import Claim
 from ..coverage import cover
 from ..kit import Study
@@ -180,34 +181,28 @@ def table_i(report: Report, tests: dict[str, Any]) -> None:
 
 def table_ii(report: Report, tests: dict[str, Any], still: dict[str, Any]) -> None:
     """Errors of mode 1 against c_a."""
-    rows = [
-        {"test": test, "c_a": c_a, "quantity": quantity, "published": published[index][which], "unit": "deg"}
-        | {"values": tests[test]["c_a"][f"{c_a:g}"][quantity]}
-        for index, test in enumerate(TESTS)
-        for c_a, published in TABLE_II.items()
-        for which, quantity in enumerate(("roll", "pitch"))
-    ]
+    rows = [{"test": test} | row for test in TESTS for row in rows_of_test(test, "c_a", TABLE_II, tests[test]["c_a"])]
     report.compare("Table II: mode 1 against c_a", rows, interval=TRIALS)
-    rows = [
-        {"c_a": c_a, "quantity": quantity, "published": published[0][which], "unit": "deg"}
-        | {"values": still["c_a"][f"{c_a:g}"][quantity]}
-        for c_a, published in TABLE_II.items()
-        for which, quantity in enumerate(("roll", "pitch"))
-    ]
     note = "A quarter of the motion, a reference that is off by 1.84° and 1.39°, a bias of 0.5 °/s an axis, 180 s."
+    rows = rows_of_test("A", "c_a", TABLE_II, still["c_a"])
     report.compare("Table II, test A nearly at rest", rows, note, interval=TRIALS)
 
 
 def table_iii(report: Report, tests: dict[str, Any]) -> None:
     """Errors of mode 3 against its threshold."""
-    rows = [
-        {"test": test, "ε_A, n": f"{threshold:g}, {n}", "quantity": quantity, "published": published[index][which]}
-        | {"values": tests[test]["threshold"][f"{threshold:g}, {n}"][quantity], "unit": "deg"}
-        for index, test in enumerate(TESTS)
-        for (threshold, n), published in TABLE_III.items()
+    found = {test: rows_of_test(test, "ε_A, n", TABLE_III, tests[test]["threshold"]) for test in TESTS}
+    rows = [{"test": test} | row for test in TESTS for row in found[test]]
+    report.compare("Table III: mode 3 against threshold and window", rows, interval=TRIALS)
+
+
+def rows_of_test(test: str, constant: str, table: Mapping[Any, Any], found: dict[str, Any]) -> list[dict[str, Any]]:
+    """Published and found errors of roll and pitch of a test, for every value of a constant."""
+    return [
+        {constant: value, "quantity": quantity, "published": published[list(TESTS).index(test)][which]}
+        | {"values": each[quantity], "unit": "deg"}
+        for (value, each), published in zip(found.items(), table.values(), strict=True)
         for which, quantity in enumerate(("roll", "pitch"))
     ]
-    report.compare("Table III: mode 3 against threshold and window", rows, interval=TRIALS)
 
 
 def claims(tests: dict[str, Any], still: dict[str, Any]) -> list[Claim]:
@@ -354,9 +349,3 @@ def recorded_errors(path: Path) -> dict[str, Any]:
         up = run(estimator, trial.measurements).pose["up"]
         row[name] = float(rms(direction_error(up, trial.truth_of("up")), trial.mask)) * DEGREES
     return row
-
-
-def mean(values: Any) -> float:
-    """Mean of what is finite."""
-    found = np.asarray(values, dtype=float)
-    return float(found[np.isfinite(found)].mean())

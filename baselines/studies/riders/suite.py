@@ -33,7 +33,7 @@ MEAN, BIAS, RIDGE, TUNED, ORACLE, CONSTANT = (
     "each ride's mean error removed",
     "deviations constant",
 )
-"""What is no estimator: references of the table."""
+"""References of the table that are not estimators."""
 UPDATE = 0.04
 """s between the updates of a network"""
 ROLL_ONLY = ("odometry-aided", "balanced-gyro", "platform-gyro+turning", "two-gyro-level+turning")

@@ -14,6 +14,7 @@ from ....filters.bicycle.two_gyro.truth import true_angles, true_states
 from ....filters.core import rotation
 from ....filters.core.consistency import consistency, nees
 from ....filters.core.kalman import KalmanFilter
+from ....filters.core.metrics import rms
 from ....filters.core.quantity import DEG, Estimate
 from ...plots import legend_above, time_figure
 from ..averages import rounded, windowed
@@ -69,11 +70,6 @@ class Case:
 def angle_errors(estimate: Estimate, truth: Mapping[str, np.ndarray]) -> np.ndarray:
     """Errors ``(T, 4)`` of θ₁, θ₂, θ₃ and φ, deg."""
     return np.stack(list(RIDES.errors(estimate.pose, truth).values()), axis=-1)
-
-
-def rms(errors: np.ndarray) -> np.ndarray:
-    """Root mean square over time."""
-    return np.sqrt(np.mean(errors**2, axis=0))
 
 
 def outcome(case: Case, seed: int) -> dict[str, Any]:

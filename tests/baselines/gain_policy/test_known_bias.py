@@ -88,7 +88,7 @@ def test_filters_that_estimate_a_bias_need_no_limit(motions):
     assert bias_limit(tunable_filter("mekf"), motions[:1]) == math.inf
 
 
-def test_wrong_limits_are_refused(motions):
+def test_wrong_limits_are_refused():
     for wrong in (0.0, -1.0, math.nan):
         with pytest.raises(ValueError, match="bias_limit must be a positive rate"):
             replace(GainPolicy.constant(TUNED, SLOW), bias_limit=wrong)

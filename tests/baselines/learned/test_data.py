@@ -157,7 +157,7 @@ def test_a_data_set_is_kept_and_found(tmp_path: Path) -> None:
     assert len(names) == 5
 
 
-def test_more_episodes_keep_the_first_ones(tmp_path: Path) -> None:
+def test_more_episodes_keep_the_first_ones() -> None:
     few, more = (SequenceData.from_recipe(SHORT, 3, count, END, HEAD) for count in (1, 2))
     length = few.features.shape[1]
     np.testing.assert_array_equal(few.features[0], more.features[0, :length])

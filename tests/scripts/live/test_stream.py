@@ -263,6 +263,8 @@ def test_estimates_of_a_file_equal_those_of_the_recording(motion, tmp_path, caps
         (["--rate", "-1"], "0,1,2,3,4,5,6\n", "rate must be a positive number"),
         (["--units", "gyr"], "0,1,2,3,4,5,6\n", "kind=unit"),
         (["--send", "nowhere"], "0,1,2,3,4,5,6\n", "HOST:PORT"),
+        (["--send", "127.0.0.1:9901", "--output", "out.csv"], "", "--output or to --send, not to both"),
+        (["--udp", "9900"], "", "a source or from --udp, not from both"),
         (["--estimator", "vqf-9", "--rate", "50"], "0,1,2,3,4,5,6\n" * 60, "imu/mag"),
         ([], "a,b\n" * 30, "none of the first 20 lines is a sample"),
         ([], "1,2,3,4,5,6\n" * 60, "--rate"),

@@ -17,6 +17,7 @@ import pytest
 
 import poise
 from poise.envs.data.trajectory import Trajectory
+from poise.scripts.live.growing import environment_blocks
 from poise.scripts.live.motion import Device, Rider, joined
 from poise.scripts.live.online import Timed
 from poise.scripts.live.player import Player
@@ -28,7 +29,6 @@ from poise.scripts.live.shown import (
     tuned_estimators,
     usual_estimators,
 )
-from poise.scripts.live.view import environment_blocks
 from poise.scripts.main import main
 
 viser = pytest.importorskip("viser")

@@ -128,7 +128,7 @@ def test_the_array_of_a_controller_stands_in_for_an_imu():
     assert noise["gyroscope_std"] == pytest.approx(0.0052, rel=0.1)
 
 
-def test_scores_join_what_an_estimator_tells(monkeypatch):
+def test_scores_join_what_an_estimator_tells():
     trajectory = array_comparison.carried("slow", "array-data-sheet", 1, 3.0)
     rows = array_comparison.scores(trajectory, {"six": "external-acceleration", "nine": "mekf-9"})
     assert [row["estimator"] for row in rows] == ["six", "nine"]

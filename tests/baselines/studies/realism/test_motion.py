@@ -10,7 +10,6 @@ from poise.envs.data.trajectory import Trajectory
 from poise.filters.core import rotation
 
 RATE = 100.0
-TIME = np.arange(1, 6001) / RATE
 
 
 def swinging(rate: float = RATE) -> Trajectory:
