@@ -10,7 +10,6 @@ from poise.envs.data.formats.draft import draft_map
 
 from ..motion import readings, same
 
-KINDS = (("gyr", "rad/s"), ("acc", "m/s^2"), ("mag", "uT"))
 UNITS = {"gyr": "rad/s", "acc": "m/s^2"}
 
 
