@@ -121,6 +121,14 @@ def merged(kept: Sequence[dict[str, Any]], new: Sequence[dict[str, Any]]) -> lis
     return [{**one, "errors": one["errors"] | found.get((one["name"], one["dataset"]), {})} for one in kept]
 
 
+def merged_papers(kept: Sequence[dict[str, Any]], new: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Results on rides with those of some papers replaced, papers in the order in which they are kept."""
+    order = list(dict.fromkeys(row["paper"] for row in (*kept, *new)))
+    replaced = {row["paper"] for row in new}
+    rows = [*(row for row in kept if row["paper"] not in replaced), *new]
+    return sorted(rows, key=lambda row: order.index(row["paper"]))
+
+
 def load_results(path: Path = RESULTS) -> dict[str, Any]:
     """Errors of a benchmark.
 

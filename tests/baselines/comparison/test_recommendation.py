@@ -11,6 +11,7 @@ from poise.baselines.comparison.recommendation import (
     dataset_errors,
     load_results,
     merged,
+    merged_papers,
     motion_of,
     recommend,
     results_of,
@@ -144,6 +145,12 @@ def test_errors_of_some_estimators_are_replaced():
     kept, new = [row("1", x=1.0, y=2.0), row("2", x=3.0)], [row("1", y=5.0), row("3", y=7.0)]
     assert merged(kept, new) == [row("1", x=1.0, y=5.0), row("2", x=3.0)]
     assert kept[0] == row("1", x=1.0, y=2.0)
+
+
+def test_a_benchmark_of_one_paper_leaves_the_others_as_they_are():
+    kept = [{"paper": paper, "method": name, "error": 1.0} for paper in ("two-gyro", "whole-body") for name in "ab"]
+    new = [{"paper": "two-gyro", "method": "a", "error": 2.0}]
+    assert merged_papers(kept, new) == [*new, *kept[2:]]
 
 
 def test_a_distance_is_that_of_ratios():
