@@ -196,7 +196,7 @@ class PlayedEnvironment:
             raise ValueError(f"{named} is not an environment whose agent estimates a pose")
         _, self._info = self.env.reset(seed=seed)
         self._begin = self._info["time"]
-        self.over = False
+        self._last = self.over = False
 
     def block(self, until: float) -> tuple[list[Timed], dict[str, np.ndarray]]:
         """Samples up to a time after the first one, s, and their truth."""
@@ -204,8 +204,10 @@ class PlayedEnvironment:
         while not self.over and self._info["time"] - self._begin <= until:
             samples.append(Timed(self._info["time"], self.env.measurement(), False, False))
             rows.append({**self._info["pose"], **self._info["truth"]})
-            _, _, terminated, truncated, self._info = self.env.step(self.env.neutral_action)
-            self.over = terminated or truncated
+            self.over = self._last
+            if not self.over:
+                _, _, terminated, truncated, self._info = self.env.step(self.env.neutral_action)
+                self._last = terminated or truncated
         return samples, {name: np.array([row[name] for row in rows]) for name in rows[0]} if rows else {}
 
 

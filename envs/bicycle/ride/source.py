@@ -161,7 +161,8 @@ class RideSource:
             raise ValueError("the ride that is shared must have begun, with the same scenario, rider and seed")
         self.ride, self._tape, self._motion_key = leader.ride, leader._tape, key
         self.posture, self.ground = leader.posture, leader.ground
-        self._head = HeadMotion(self.posture, self.ride.rider.motion.gaze, self.rate)
+        movement = self.ride.rider.motion
+        self._head = HeadMotion(self.posture, movement.gaze, self.rate, movement.steadied)
 
     def _ride_first_second(self, scenario: Scenario, subject: Any, motion: np.random.Generator) -> None:
         """Draw rider, course and movements, and settle on the saddle."""
@@ -210,7 +211,7 @@ class RideSource:
             )
             self._world_key, self.posture = world, posture
         self.ground = course.ground
-        self._head = HeadMotion(posture, movement.gaze, self.rate)
+        self._head = HeadMotion(posture, movement.gaze, self.rate, movement.steadied)
         if self._taped:
             self._tape = Tape(self.ride)
             return

@@ -31,8 +31,9 @@ SHIFT_TIME, GLANCE_TIME = (0.5, 1.5), (0.3, 0.5)
 """s: from one posture to another, and into a glance"""
 GLANCE_HOLD = (0.3, 1.2)
 """s: looking aside"""
-NODS, LOOKS_AHEAD = 0.4, 0.4
-"""1: pitch relative to yaw of the head's turns, and share of looks that return ahead; assumed"""
+NODS, LOOKS_AHEAD, ACROSS = 0.4, 0.1, 0.8
+"""1: pitch relative to yaw of the head's turns, share of looks that return ahead, and share of the others that go to
+the other side than the last one; assumed"""
 TURN_TIME, TURN_PACE = 0.3, 0.25
 """s, and s/rad: how long a turn of the head lasts. 38 deg peak at 155 deg/s: free movements of people reach 185 deg/s,
 and voluntary ones far more (Grossman et al., Exp. Brain Res. 70, 1988)"""
@@ -88,7 +89,7 @@ def posture_changes(rng: np.random.Generator, time: np.ndarray, deviation: float
 
 
 def glances(rng: np.random.Generator, time: np.ndarray, turn: float, interval: float) -> np.ndarray:
-    """Turns ``(n,)`` to either side and back: of the trunk in looks over a shoulder, or of the head; ``turn`` rad."""
+    """Turns ``(n,)`` of the trunk to either side and back, in looks over a shoulder; ``turn`` rad."""
     found = np.zeros(len(time))
     for begin in events(rng, interval, float(time[-1])):
         size = turn * float(rng.uniform(0.5, 1.5)) * (1.0 if rng.random() < 0.5 else -1.0)
@@ -98,19 +99,42 @@ def glances(rng: np.random.Generator, time: np.ndarray, turn: float, interval: f
     return found
 
 
-def gaze_shifts(rng: np.random.Generator, time: np.ndarray, deviation: float, interval: float) -> np.ndarray:
-    """Yaw and pitch of the head ``(n, 2)`` towards what the rider looks at: held, now and then elsewhere, often ahead.
-
-    A larger turn takes longer (:data:`TURN_TIME`, :data:`TURN_PACE`). Deviations of pitch are :data:`NODS` of those of
-    yaw. Before the first look the rider looks ahead.
-    """
-    now, found = np.zeros(2), np.zeros((len(time), 2))
+def scans(rng: np.random.Generator, time: np.ndarray, turn: float, interval: float) -> np.ndarray:
+    """Turns ``(n,)`` of the head to either side and back, at the pace of :func:`turn_time`; ``turn`` rad."""
+    found = np.zeros(len(time))
     for begin in events(rng, interval, float(time[-1])):
-        where, ahead = deviation * rng.standard_normal(2) * (1.0, NODS), rng.random() < LOOKS_AHEAD
-        following = np.zeros(2) if ahead else where
-        change = following - now
-        found += smooth_step(time, begin, TURN_TIME + TURN_PACE * math.hypot(*change))[:, None] * change
-        now = following
+        size = turn * float(rng.uniform(0.5, 1.5)) * (1.0 if rng.random() < 0.5 else -1.0)
+        length, hold = turn_time(size), float(rng.uniform(*GLANCE_HOLD))
+        found += size * (smooth_step(time, begin, length) - smooth_step(time, begin + length + hold, length))
+    return found
+
+
+def turn_time(angle: float) -> float:
+    """Time (s) that the head takes to turn by an angle (rad)."""
+    return TURN_TIME + TURN_PACE * abs(angle)
+
+
+def gaze_shifts(rng: np.random.Generator, time: np.ndarray, deviation: float, interval: float) -> np.ndarray:
+    """Yaw and pitch of the head ``(n, 2)`` towards what the rider looks at: held, and now and then elsewhere.
+
+    A look goes ahead, or to a side, mostly the other one than before; a turn begins when the last one has ended, and
+    takes the time of :func:`turn_time`. Deviations of pitch are :data:`NODS` of those of yaw. Before the first look the
+    rider looks ahead.
+    """
+    now, side, found = np.zeros(2), 1.0, np.zeros((len(time), 2))
+    begin = float(rng.exponential(interval)) if math.isfinite(interval) else math.inf
+    while begin < time[-1]:
+        ahead, across = rng.random(2) < (LOOKS_AHEAD, ACROSS)
+        where = deviation * rng.standard_normal(2) * (1.0, NODS)
+        if ahead:
+            where = np.zeros(2)
+        else:
+            side = -side if across else side
+            where[0] = side * abs(where[0])
+        length = turn_time(math.hypot(*(where - now)))
+        found += smooth_step(time, begin, length)[:, None] * (where - now)
+        now = where
+        begin += length + float(rng.exponential(max(0.0, interval - length)))
     return found
 
 

@@ -6,10 +6,12 @@ yaw, then roll, from the levelled head) is what the rider intends, g, and a devi
     d'' = −w' − m (c × a) / I − 2 ζ ω d' − ω² d − 2 ζᵥ ω (w + d') − κ ω² (s + d)
 
 with the trunk's rate w and tilt s from upright about the axis, and the acceleration a of the neck's joint (gravity is
-held by muscles). The first terms are inertia and the passive neck, the last two the reflexes that steady the head in
-space (vestibulocollic) with what the rider does on purpose. Yaw has no upright: its s leaks away within
-:data:`LEAK`, so that the head follows turns of the path. The mass of the head belongs to the trunk, so the head does
-not act back on the ride.
+held by muscles). The upper spine, which bends where the trunk of this simulator is rigid, and the neck's muscles keep a
+share of that acceleration from the head, which is drawn for each rider between none and all: no published value was
+found. The first terms are inertia and the passive neck, the last two the reflexes that steady the head in space
+(vestibulocollic) with what the rider does on purpose. Yaw has no upright: its s leaks away within :data:`LEAK`, so that
+the head follows turns of the path. The mass of the head belongs to the trunk, so the head does not act back on the
+ride.
 
 Source: G. C. Y. Peng, T. C. Hain, B. W. Peterson, A dynamical model for reflex activated head movements in the
 horizontal plane, Biol. Cybern. 75 (1996): the passive head and neck answer turns of the trunk with a second-order peak
@@ -90,16 +92,17 @@ class HeadMotion:
         posture: the person on the bicycle; the head is level where the trunk is at rest.
         gaze: ``(n, 2)`` intended yaw and pitch over time, a table of :mod:`.body_motion`, rad.
         rate: samples per second, Hz.
+        steadied: share of the acceleration of the neck's joint that does not reach the head, 0 to 1.
     """
 
-    def __init__(self, posture: Posture, gaze: np.ndarray, rate: float) -> None:
+    def __init__(self, posture: Posture, gaze: np.ndarray, rate: float, steadied: float = 0.0) -> None:
         self._gaze, self._rate = gaze, rate
         level = rotation.conjugate(posture.trunk_orientation())
         self._neck = Mounting(posture.neck, tuple(level.tolist()))
         head = posture.body.segment("head")
         above = np.array(posture.head_centre)
         moments = np.array(head.moments) + head.mass * (above @ above - above**2)
-        self._pull = head.mass * above, moments
+        self._pull = (1.0 - steadied) * head.mass * above, moments
         stiff, damp = FREQUENCY**2 * (1.0 + STEADYING), 2.0 * FREQUENCY * (DAMPING + STEADY_DAMPING)
         self._stiff, self._damp = stiff, damp
         block = expm(np.array([[0.0, 1.0, 0.0], [-stiff, -damp, 1.0], [0.0, 0.0, 0.0]]) / rate)

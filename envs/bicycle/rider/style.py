@@ -20,6 +20,7 @@ from .body_motion import (
     glances,
     posture_changes,
     row_at,
+    scans,
     standing_phases,
 )
 
@@ -38,9 +39,9 @@ MOST_UPRIGHT = 0.04
 """rad by which the trunk straightens at most: beyond, the arms would be straight, above all the outer one in a turn"""
 
 
-LOOK, MOST_TURNED = 5.0, 1.2
+LOOK, MOST_TURNED = 5.0, 1.3
 """1: turn of the head in a look over the shoulder, relative to the twist of the trunk; rad that the neck turns at most
-(ranges of motion of adults are about 70°)"""
+(ranges of motion of young adults are about 75°)"""
 
 
 @dataclass(frozen=True)
@@ -87,9 +88,10 @@ class RiderStyle:
     breath: float = 0.0
     """rad: amplitude of the trunk's flexion with each breath"""
     gaze: float = 0.0
-    """rad: standard deviation of the head's yaw to the trunk where the rider looks around; assumed"""
+    """rad: standard deviation of the head's yaw to the trunk where the rider looks aside, before the neck's limit;
+    assumed, up to that limit: a recorded rider looked around that far during a whole ride"""
     gaze_interval: float = math.inf
-    """s between turns of the head, on average; assumed"""
+    """s between turns of the head, on average, or as long as a turn lasts; assumed"""
     standing: float = 0.0
     """1: share of the time that the rider stands on the pedals, in phases of 15 to 30 s, above walking pace"""
     swing: float = 0.0
@@ -124,6 +126,8 @@ class RiderStyle:
 
 SIZES = ("lean", "flexion", "twist", "swivel", "pedalling", "posture", "glance", "breath", "swing")
 """fields that are angles of movements"""
+LOOKING = ("gaze", "gaze_interval", "scan", "scan_interval")
+"""fields of how much a rider looks around"""
 STYLES = {
     style.name: style
     for style in (
@@ -141,7 +145,7 @@ STYLES = {
         RiderStyle(
             "aggressive", 0.06, 0.05, 0.07, 0.8, 0.6, unsteadiness=0.25,
             pedalling=0.06, posture=0.015, posture_interval=15.0, glance=0.2, glance_interval=15.0, breath=0.01,
-            gaze=0.5, gaze_interval=1.5, scan=0.93, scan_interval=3.7,
+            gaze=1.3, gaze_interval=1.0, scan=0.93, scan_interval=3.7,
         ),
         RiderStyle(
             "standing", 0.04, 0.038, 0.05, 0.25, 0.3,
@@ -154,12 +158,25 @@ STYLES = {
 
 
 def random_style(rng: np.random.Generator) -> RiderStyle:
-    """A style between mild and aggressive, each parameter by itself, uniform on a logarithmic scale; always seated."""
+    """A style between mild and aggressive, uniform on a logarithmic scale; always seated.
+
+    Each parameter is drawn by itself, but those of :data:`LOOKING` are drawn together: who looks around does so often
+    and far.
+    """
     low, high = STYLES["mild"], STYLES["aggressive"]
-    drawn = {}
-    for field in fields(RiderStyle)[1:]:
-        a, b = getattr(low, field.name), getattr(high, field.name)
-        drawn[field.name] = float(a * (b / a) ** rng.random()) if a > 0.0 else a
+    drawn: dict[str, float] = {}
+    looking = None
+    for name in (field.name for field in fields(RiderStyle)[1:]):
+        least, most = getattr(low, name), getattr(high, name)
+        if not least > 0.0:
+            drawn[name] = least
+            continue
+        if name not in LOOKING or looking is None:
+            part = float(rng.random())
+            looking = part if name in LOOKING else looking
+        else:
+            part = looking
+        drawn[name] = least * (most / least) ** part
     return RiderStyle("random", **drawn)
 
 
@@ -228,7 +245,9 @@ class RiderMotion:
 
     def __init__(self, style: RiderStyle, rng: np.random.Generator, duration: float = 120.0) -> None:
         self.style, self.duration = style, duration
-        for_noise, for_posture, for_glances, for_breath, for_rest, for_gaze, for_standing, for_scans = rng.spawn(8)
+        for_noise, for_posture, for_glances, for_breath, for_rest, for_gaze, for_standing, for_scans, for_neck = (
+            rng.spawn(9)
+        )
         # one row before time 0 and two after the end, for the interpolation
         rows = math.ceil(duration * TABLE_RATE) + 4
         time = (np.arange(rows) - 1.0) / TABLE_RATE
@@ -245,8 +264,10 @@ class RiderMotion:
         phases = for_rest.uniform(0.0, 2.0 * math.pi, 3)
         self.gaze = gaze_shifts(for_gaze, time, style.gaze, style.gaze_interval)
         """yaw and pitch of the head to the trunk, a table of :mod:`.body_motion`, rad"""
-        self.gaze[:, 0] += LOOK * looks + glances(for_scans, time, style.scan, style.scan_interval)
+        self.gaze[:, 0] += LOOK * looks + scans(for_scans, time, style.scan, style.scan_interval)
         self.gaze = MOST_TURNED * np.tanh(self.gaze / MOST_TURNED)
+        self.steadied = float(for_neck.random())
+        """share of the acceleration of the neck's joint that spine and muscles keep from the head, see :mod:`.head`"""
         self.habits = np.array([style.turn_lean, style.levelling, style.pedalling, *phases])
 
     @property

@@ -21,6 +21,7 @@ from poise.envs.bicycle.rider.body_motion import (
 from poise.envs.bicycle.rider.style import (
     AT_REST,
     LEAST_EASE,
+    LOOKING,
     START,
     STYLES,
     RiderMotion,
@@ -129,6 +130,13 @@ def test_random_styles_lie_between_mild_and_aggressive():
         assert ends[0] <= min(drawn) < max(drawn) <= ends[1]
         assert np.ptp(drawn) > 0.7 * (ends[1] - ends[0])
     assert rider_style("random", rng(1)) == styles[1]
+
+
+def test_who_looks_around_does_so_often_and_far():
+    looking = np.array([[np.log(getattr(random_style(rng(seed)), name)) for name in LOOKING] for seed in range(20)])
+    np.testing.assert_allclose(np.abs(np.corrcoef(looking.T)), 1.0)
+    others = [np.log(random_style(rng(seed)).lean) for seed in range(20)]
+    assert abs(np.corrcoef(others, looking[:, 0])[0, 1]) < 0.5
 
 
 @pytest.mark.parametrize(

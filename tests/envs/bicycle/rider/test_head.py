@@ -9,7 +9,16 @@ import pytest
 
 from poise.envs.bicycle.frame.parameters import MOUNTAIN_BIKE
 from poise.envs.bicycle.rider.anthropometry import SUBJECTS
-from poise.envs.bicycle.rider.body_motion import TABLE_RATE, gaze_shifts, row_at, rows_at
+from poise.envs.bicycle.rider.body_motion import (
+    ACROSS,
+    LOOKS_AHEAD,
+    TABLE_RATE,
+    gaze_shifts,
+    row_at,
+    rows_at,
+    scans,
+    turn_time,
+)
 from poise.envs.bicycle.rider.head import HeadMotion
 from poise.envs.bicycle.rider.posture import sit
 from poise.envs.bicycle.rider.style import MOST_TURNED, STYLES, RiderMotion, RiderStyle
@@ -96,13 +105,47 @@ def test_in_parts_it_is_the_same_bit_for_bit():
 def test_gaze_moves_as_the_style_says():
     time = np.arange(0.0, 2000.0, 1.0 / TABLE_RATE)
     looks = gaze_shifts(np.random.default_rng(0), time, 0.3, 3.0)
-    assert looks.std(axis=0) == pytest.approx([0.3 * np.sqrt(0.6), 0.3 * np.sqrt(0.6) * 0.4], rel=0.15)
+    assert looks.std(axis=0) == pytest.approx([0.3 * np.sqrt(0.9), 0.3 * np.sqrt(0.9) * 0.4], rel=0.1)
     assert np.abs(np.diff(looks[:, 0])).max() * TABLE_RATE < np.radians(400.0)
     for style in STYLES.values():
         assert np.abs(RiderMotion(style, np.random.default_rng(1), 60.0).gaze).max() <= MOST_TURNED
     assert not RiderMotion(STYLES["still"], np.random.default_rng(1), 60.0).gaze.any()
     with pytest.raises(ValueError, match="gaze must not be negative"):
         RiderStyle("odd", 0.0, 0.0, 0.0, 0.0, 0.0, gaze=-1.0)
+
+
+def test_most_looks_go_to_the_other_side_than_the_last():
+    time = np.arange(0.0, 2000.0, 1.0 / TABLE_RATE)
+    yaw = gaze_shifts(np.random.default_rng(0), time, 0.8, 3.0)[:, 0].round(9)
+    held = yaw[1:][np.diff(yaw) == 0.0]
+    looks = held[np.concatenate([[True], np.diff(held) != 0.0])]
+    aside = np.sign(looks[looks != 0.0])
+    assert np.mean(aside[1:] != aside[:-1]) == pytest.approx(ACROSS, abs=0.05)
+    assert np.mean(looks == 0.0) == pytest.approx(LOOKS_AHEAD, abs=0.05)
+
+
+def test_the_head_turns_at_its_own_pace_in_scans():
+    time = np.arange(0.0, 300.0, 1.0 / TABLE_RATE)
+    yaw = scans(np.random.default_rng(0), time, 0.9, 60.0)
+    moving = np.flatnonzero(np.diff((np.diff(yaw) != 0.0).astype(int)))
+    begin, end = moving[:2]
+    assert (end - begin) / TABLE_RATE == pytest.approx(turn_time(yaw[end]), abs=3.0 / TABLE_RATE)
+
+
+def test_an_acceleration_that_is_kept_from_the_head_does_not_pitch_it():
+    shaken = trunk(lambda t: 0.0 * t[:, None] * np.ones(3), 4.0)
+    forward = 2.0 * np.sin(2.0 * np.pi * 4.0 * shaken.time)
+    velocity = np.cumsum(forward) / RATE
+    shaken = shaken._replace(
+        velocity=velocity[:, None] * np.array([1.0, 0.0, 0.0]),
+        acceleration=forward[:, None] * np.array([1.0, 0.0, 0.0]),
+    )
+    passive, half, steady = (
+        HeadMotion(POSTURE, AHEAD, RATE, steadied).carry(shaken).angular_velocity[:, 1] for steadied in (0.0, 0.5, 1.0)
+    )
+    np.testing.assert_allclose(half, 0.5 * passive, rtol=0.02, atol=1e-3)
+    np.testing.assert_allclose(steady, 0.0, atol=1e-12)
+    assert np.degrees(passive.std()) > 5.0
 
 
 def test_scans_of_crossings_turn_the_head_alone():
