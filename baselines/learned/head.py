@@ -150,7 +150,6 @@ class AngleHead:
         outputs: what is corrected, in this order.
         scale: rad; each output of the network is in this unit, one for each corrected number.
         limit: largest correction in standard deviations of the front end, if it knows any; None: not limited.
-        huber: rad; errors beyond count linearly.
         deviations: standard deviations in rad of what remains, found on held-out data; empty: no covariance.
         growth: what the variances grow by where inputs are unlike those of the training, ``deviations² (1 + growth u)``
             (:mod:`.calibration`); the network says u after its corrections. Empty: they are constant.
@@ -159,7 +158,6 @@ class AngleHead:
     outputs: tuple[Quantity, ...]
     scale: tuple[float, ...]
     limit: float | None = None
-    huber: float = 0.035
     deviations: tuple[float, ...] = ()
     growth: tuple[float, ...] = ()
 
@@ -197,14 +195,14 @@ class AngleHead:
         """See :class:`Head`."""
         outputs = [[q.name, q.kind, q.size, q.unit] for q in self.outputs]
         numbers = {"scale": list(self.scale), "deviations": list(self.deviations), "growth": list(self.growth)}
-        return {"kind": self.kind, "outputs": outputs, "limit": self.limit, "huber": self.huber, **numbers}
+        return {"kind": self.kind, "outputs": outputs, "limit": self.limit, **numbers}
 
     @classmethod
     def read(cls, described: Mapping[str, Any]) -> Self:
         """The inverse of :meth:`describe`."""
         outputs = tuple(Quantity(*given) for given in described["outputs"])
         numbers = (tuple(described.get(name, ())) for name in ("deviations", "growth"))
-        return cls(outputs, tuple(described["scale"]), described.get("limit"), described["huber"], *numbers)
+        return cls(outputs, tuple(described["scale"]), described.get("limit"), *numbers)
 
     def estimate(self, seen: Seen, output: Array) -> Estimate:
         """See :class:`Head`."""
@@ -247,16 +245,11 @@ class AngleHead:
         return np.concatenate(parts, axis=-1)
 
     def loss(self, output: Any, target: Any, spread: Any, mask: Any) -> Any:
-        """Mean Huber error of all angles in units of ``scale``."""
-        import torch
+        """Mean over sequences and angles of the root mean square error in time, rad: what tables of rides show.
 
-        scale = torch.as_tensor(self.scale, dtype=output.dtype)
-        error = (self.correction(output, spread) - target) / scale
-        bend = self.huber / scale
-        size = error.abs()
-        cost = torch.where(size < bend, 0.5 * error * error, bend * (size - 0.5 * bend))
-        weight = mask[..., None].to(output.dtype)
-        return (cost * weight).sum() / (weight.sum() * self.corrected).clamp(min=1.0)
+        Its gradient weights angles that a filter knows to 0.3° as much as those that it knows to 5°.
+        """
+        return mean_of_sequences(self.correction(output, spread) - target, mask)
 
     def errors(self, output: Array, target: Array, spread: Array) -> Array:
         """See :class:`Head`."""
@@ -270,14 +263,14 @@ class AngleHead:
 
 
 def mean_of_sequences(error: Array, mask: Array) -> Array:
-    """Mean over sequences ``(B, N)`` of the root mean square in time of what is in the mask; 0 where nothing is."""
+    """Mean over sequences ``(B, N, …)`` of the root mean square in time of what is in the mask; 0 where nothing is."""
     xp, each = namespace(error), of_sequences(error, mask)
     count = xp.sum(xp.astype(xp.any(scored(error, mask), axis=1), each.dtype))
     return xp.sum(each) / xp.where(count > 0.0, count, xp.ones_like(count))
 
 
 def of_sequences(error: Array, mask: Array) -> Array:
-    """Root mean square in time ``(B,)`` of what is in the mask of each sequence ``(B, N)``; 0 where nothing is."""
+    """Root mean square in time ``(B, …)`` of what is in the mask of sequences ``(B, N, …)``; 0 where nothing is."""
     xp, each = namespace(error), rms(error, mask, axis=1)
     return xp.where(xp.any(scored(error, mask), axis=1), each, xp.zeros_like(each))
 

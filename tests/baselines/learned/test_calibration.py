@@ -92,9 +92,7 @@ def trained() -> LearnedEstimator:
     head = made.head
     assert isinstance(head, AngleHead)
     # growth that no covariance of this toy asks for, so that the forms are compared with it
-    return LearnedEstimator(
-        made.network, END, AngleHead(HEAD.outputs, HEAD.scale, None, 0.035, head.deviations, (2.0, 0.5))
-    )
+    return LearnedEstimator(made.network, END, AngleHead(HEAD.outputs, HEAD.scale, None, head.deviations, (2.0, 0.5)))
 
 
 def test_every_form_states_the_same_covariance(trained: LearnedEstimator, tmp_path: Path) -> None:

@@ -214,6 +214,18 @@ def test_angles_are_corrected_in_their_scale() -> None:
     assert np.abs(limited.correction(100.0 * told, np.array([[0.01, 0.01]]))).max() <= 0.0101
 
 
+def test_an_angle_that_is_known_well_weighs_as_much_as_another() -> None:
+    """The loss of angles is the mean of their root mean square errors; samples outside the mask have no part in it."""
+    head = AngleHead((Quantity("a", "angle", 2, "rad"),), (0.02, 0.05))
+    outputs = torch.tensor([[[0.1, 2.0], [-0.1, -2.0], [9.0, 9.0]]], requires_grad=True)
+    mask = torch.tensor([[True, True, False]])
+    loss = head.loss(outputs, torch.zeros_like(outputs), torch.ones(1, 3, 0), mask)
+    assert loss.item() == pytest.approx(0.5 * (0.1 * 0.02 + 2.0 * 0.05))
+    loss.backward()
+    assert outputs.grad is not None
+    np.testing.assert_allclose(outputs.grad[0] / torch.tensor(head.scale), [[0.25, 0.25], [-0.25, -0.25], [0.0, 0.0]])
+
+
 def test_equal_seeds_give_equal_weights(data: tuple[SequenceData, SequenceData]) -> None:
     first, second, other = (trained(data, replace(SMALL, seed=seed)) for seed in (0, 0, 1))
     assert first.history == second.history
