@@ -12,6 +12,7 @@ share. Three rules let an average begin anew. One of a few samples begins with a
 the estimator; after these few a sample that points elsewhere decides nothing, as a hand that is flung up and checked
 feels forces from any direction. One that later samples make too short to be trusted begins with them. And one of forces
 begins with the average force of the last moment where that is steady and contradicts it: in strong motion it is not.
+It does so once in a while only.
 """
 
 from __future__ import annotations
@@ -41,6 +42,9 @@ LARGEST_MOVE = math.radians(20.0)
 """Angle between it and the average force beyond which the latter is of samples of two directions."""
 STEADY = 0.8
 """Least length of the average of a moment, in root mean squares of its samples, that says so."""
+PAUSE = 3.0
+"""s for which no other moment does so: what moments contradict again and again is a motion, such as that of an arm that
+swings, and an average that began anew each time would never be trusted."""
 
 
 class Average(NamedTuple):
@@ -73,7 +77,7 @@ class Step(NamedTuple):
     unconfirmed: Array
 
 
-def averaged(memory: Array, sample: Array, step: Step, shortest: float) -> tuple[Average, Array]:
+def averaged(memory: Array, sample: Array, step: Step, shortest: float, mixed: Array) -> tuple[Average, Array]:
     """The average after a sample, and whether the sample contradicts the few before it.
 
     Args:
@@ -81,6 +85,7 @@ def averaged(memory: Array, sample: Array, step: Step, shortest: float) -> tuple
         sample: ``(..., 3)``; NaN where there is none.
         step: the time step.
         shortest: least length of an average that is trusted, in root mean squares.
+        mixed: ``(..., 1)`` whether one that is shorter begins anew.
     """
     xp, there = namespace(memory, sample), present(sample)
     dt, zero = step.dt, 0.0 * step.dt
@@ -101,7 +106,7 @@ def averaged(memory: Array, sample: Array, step: Step, shortest: float) -> tuple
     # Samples that point elsewhere shorten the average: what was before them must not bend it. From here on the few
     # samples behind it do not make a start that the next one could contradict.
     short = xp.less(xp.sum(mean * mean, axis=-1)[..., None], shortest**2 * square)
-    short = xp.logical_and(xp.logical_and(there, step.unconfirmed), xp.logical_and(short, xp.greater(time, FEW)))
+    short = xp.logical_and(xp.logical_and(there, mixed), xp.logical_and(short, xp.greater(time, FEW)))
     mean, square = xp.where(short, sample, mean), xp.where(short, squared(sample), square)
     return Average(mean, square, xp.where(short, zero + FEW + dt, time)), contrary
 
@@ -124,13 +129,16 @@ def of_moment(mean: Array, square: Array, sample: Array, step: Step, time: Array
     return xp.where(there, after, mean), xp.where(there, scattered, square)
 
 
-def left_behind(force: Average, lately: Array, scattered: Array, step: Step) -> tuple[Average, Array]:
-    """The average force, begun anew if a steady moment contradicts it, and whether it does.
+def left_behind(
+    force: Average, lately: Array, scattered: Array, calm: Array, step: Step
+) -> tuple[Average, Array, Array]:
+    """The average force, begun anew if a steady moment contradicts it; whether it does; s since it did.
 
     Args:
         force: the average.
         lately: ``(..., 3)`` that of the last moment.
         scattered: ``(..., 1)`` mean square of its samples.
+        calm: ``(..., 1)`` s since the last moment that did, from -:data:`PAUSE`, or since the start.
         step: the time step.
     """
     xp, size = namespace(lately), squared(lately)
@@ -138,8 +146,10 @@ def left_behind(force: Average, lately: Array, scattered: Array, step: Step) -> 
     moved = xp.less(xp.sum(lately * force.mean, axis=-1)[..., None], math.cos(LARGEST_MOVE) * lengths)
     moved = xp.logical_and(moved, xp.greater(size, STEADY**2 * scattered))
     moved = xp.logical_and(xp.logical_and(moved, step.unconfirmed), xp.greater(force.time, MOMENT))
+    moved = xp.logical_and(moved, xp.greater_equal(calm, 0.0))
     begun = Average(lately, size, 0.0 * step.dt + FEW + step.dt)
-    return Average(*(xp.where(moved, new, old) for new, old in zip(begun, force, strict=True))), moved
+    calm = xp.where(moved, 0.0 * calm - PAUSE, calm + step.dt)
+    return Average(*(xp.where(moved, new, old) for new, old in zip(begun, force, strict=True))), moved, calm
 
 
 def trusted(average: Average, shortest: float) -> Array:

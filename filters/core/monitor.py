@@ -35,7 +35,7 @@ from .averages import (
 )
 from .backend import Array, constant, expand, namespace
 from .model import Equations
-from .quantity import ACCELEROMETER, GYROSCOPE, MAGNETOMETER, Channel, Quantity
+from .quantity import ACCELEROMETER, GYROSCOPE, GYROSCOPE_BIAS, MAGNETOMETER, Channel, Quantity
 from .rotation import cross, exp, rotate, up_in_body
 
 LARGEST_LEAN, LARGEST_LEAN_AT_START = math.radians(40.0), math.radians(20.0)
@@ -51,6 +51,9 @@ REST_OF_PATIENCE = 0.2
 """What is left of it where the average force began anew, as the last moment had contradicted it."""
 CONFIRMED = 2.0
 """s of agreement after which the inclination of a start counts as good."""
+LEARNED_BIAS, LARGEST_BIAS = 8.0, math.radians(10.0)
+"""s after a start from which on the estimated bias of the gyroscope counts, and rad/s that none exceeds: meanwhile a
+filter takes a part of a wrong start for one."""
 CONFIRMED_HEADING = 8.0
 """The same for the heading. After a start with a wrong inclination a filter takes every sample of the field for
 disturbed until it has learned the field anew, and the heading drifts away meanwhile."""
@@ -62,24 +65,24 @@ LONGEST_IMPACT = 0.05
 INFLATION = 4.0
 """Factor on the covariance of a prior that is formed of averages in motion."""
 
-INPUTS = 20
-"""Of :func:`watch`: rate (3), force (3), field (3), up (3), orientation (4), age of the rate, dt, declination, and
-whether the inclination is watched for good (1) or until it was confirmed (0). One more where equations keep the field
-of their start: its vertical component."""
-MEMORY = 19
+INPUTS = 23
+"""Of :func:`watch`: rate (3), force (3), field (3), up (3), orientation (4), age of the rate, dt, declination, whether
+the inclination is watched for good (1) or until it was confirmed (0), and estimated bias of the rate (3). One more
+where equations keep the field of their start: its vertical component."""
+MEMORY = 20
 """Of :func:`watch`: average force (3), mean square, time, time of contradiction; the same of the field (3, 1, 1, 1);
 times of agreement of the heading and of the inclination; zero, or if the estimate is lost the factor on the covariance
-of its prior; average force of the last moment (3), its mean square."""
+of its prior; average force of the last moment (3), its mean square; s since the start or a moment that decided."""
 FORCE, SQUARE, TIME, FIELD, FIELD_TIME, LOST, LATELY = slice(0, 3), 3, 4, slice(6, 9), 10, 14, slice(15, 18)
 """Where some of it is."""
 
 
 def watch(memory: Array, inputs: Array) -> Array:
-    """Memory ``(..., 19)`` after a sample; the estimator starts anew at the next one if it is lost.
+    """Memory ``(..., 20)`` after a sample; the estimator starts anew at the next one if it is lost.
 
     Args:
-        memory: ``(..., 19)``; zeros at the start.
-        inputs: ``(..., 20)`` or ``(..., 21)``; force and field NaN where there is no sample, the vertical NaN for
+        memory: ``(..., 20)``; zeros at the start.
+        inputs: ``(..., 23)`` or ``(..., 24)``; force and field NaN where there is no sample, the vertical NaN for
             that of the orientation.
     """
     xp = namespace(memory, inputs)
@@ -87,17 +90,23 @@ def watch(memory: Array, inputs: Array) -> Array:
     up = xp.where(xp.isfinite(up), up, up_in_body(q))
     age, dt, declination, always = (inputs[..., i : i + 1] for i in (16, 17, 18, 19))
     stood, zero = memory[..., 13:14], 0.0 * dt
-    step = Step(exp(inputs[..., :3] * dt), dt, xp.greater(age, GYROSCOPE_GAP), xp.less(stood, CONFIRMED))
-    force, force_contrary = averaged(memory[..., :5], inputs[..., 3:6], step, SHORTEST_FORCE)
+    unconfirmed = xp.less(stood, CONFIRMED)
+    step = Step(
+        exp((inputs[..., :3] - bias(inputs, memory[..., 19:20])) * dt), dt, xp.greater(age, GYROSCOPE_GAP), unconfirmed
+    )
+    force, force_contrary = averaged(memory[..., :5], inputs[..., 3:6], step, SHORTEST_FORCE, unconfirmed)
     lately, scattered = of_moment(memory[..., LATELY], memory[..., 18:19], inputs[..., 3:6], step, force.time)
-    force, moved = left_behind(force, lately, scattered, step)
-    field, field_contrary = averaged(memory[..., 6:11], inputs[..., 6:9], step, SHORTEST_FIELD)
+    force, moved, calm = left_behind(force, lately, scattered, memory[..., 19:20], step)
+    keeps = inputs.shape[-1] > INPUTS
+    # A device that calibrates its magnetometer meanwhile gives another field from one sample to the next.
+    mixed = xp.less(memory[..., 12:13], CONFIRMED_HEADING) if keeps else unconfirmed
+    field, field_contrary = averaged(memory[..., 6:11], inputs[..., 6:9], step, SHORTEST_FIELD, mixed)
     leaning, standing, leant, stood = inclination(force, up, moved, memory[..., 5:6], stood, dt)
     confirmed = xp.greater_equal(stood, CONFIRMED)
     known = xp.logical_and(trusted(force, SHORTEST_FORCE), xp.logical_not(leaning))
     known = xp.logical_and(known, trusted(field, SHORTEST_FIELD))
     turned, agreeing = heading(rotate(q, field.mean), declination)
-    if inputs.shape[-1] > INPUTS:
+    if keeps:
         wrong, right = kept_field(force.mean, field.mean, q, declination, inputs[..., INPUTS : INPUTS + 1])
         turned, agreeing = xp.logical_or(turned, wrong), xp.logical_and(agreeing, right)
     off = xp.where(xp.logical_and(known, turned), memory[..., 11:12] + dt, xp.where(known, zero, memory[..., 11:12]))
@@ -110,9 +119,21 @@ def watch(memory: Array, inputs: Array) -> Array:
         xp.logical_and(xp.greater(off, PATIENCE), xp.less(agreed, CONFIRMED_HEADING)),
     )
     early = xp.logical_or(force_contrary, field_contrary)
-    leant, off, agreed = (xp.where(xp.logical_or(lost, early), zero, value) for value in (leant, off, agreed))
+    leant, off, agreed, calm = (
+        xp.where(xp.logical_or(lost, early), zero, value) for value in (leant, off, agreed, calm)
+    )
     factor = xp.where(early, zero + 1.0, xp.where(lost, zero + INFLATION, zero))
-    return xp.concat([*force, leant, *field, off, agreed, stood, factor, lately, scattered], axis=-1)
+    return xp.concat([*force, leant, *field, off, agreed, stood, factor, lately, scattered, calm], axis=-1)
+
+
+def bias(inputs: Array, calm: Array) -> Array:
+    """The bias ``(..., 3)`` of the gyroscope as far as it is known; zero until a start is that old.
+
+    One of degrees per second turns averages of seconds further than some errors that they tell.
+    """
+    xp, estimated = namespace(inputs), inputs[..., 20:23]
+    known = xp.logical_and(xp.greater_equal(calm, LEARNED_BIAS), xp.less(squared(estimated), LARGEST_BIAS**2))
+    return xp.where(known, estimated, xp.zeros_like(estimated))
 
 
 def inclination(
@@ -180,6 +201,7 @@ class Places:
     field: int
     up: int
     orientation: int
+    bias: int
     supposed: int
     """in the state: the unit field in the world that equations keep"""
 
@@ -197,7 +219,15 @@ def places_of(model: Equations) -> Places | None:
         return None
     field = samples[MAGNETOMETER.name] if heading else -1
     supposed = model.supposed_field if heading else -1
-    return Places(samples[GYROSCOPE.name], samples[ACCELEROMETER.name], field, up, orientation, supposed)
+    return Places(
+        samples[GYROSCOPE.name],
+        samples[ACCELEROMETER.name],
+        field,
+        up,
+        orientation,
+        pose.get(GYROSCOPE_BIAS.name, -1),
+        supposed,
+    )
 
 
 def starts_of(parts: Sequence[Channel | Quantity]) -> dict[str, int]:
@@ -230,6 +260,7 @@ def inputs_of(
     parts = [part(held, places.rate, 3), part(sample, places.force, 3), part(sample, places.field, 3)]
     parts += [part(pose, places.up, 3), part(pose, places.orientation, 4), age]
     parts += [zero + expand(model.dt, 1), zero + declination, zero + float(model.error_size > 0)]
+    parts += [part(pose, places.bias, 3) if places.bias >= 0 else zero + constant([0.0] * 3, zero)]
     parts += [state[..., places.supposed + 2 : places.supposed + 3]] if places.supposed >= 0 else []
     return xp.concat(parts, axis=-1)
 
@@ -240,7 +271,7 @@ def without_impacts(places: Places, sample: Array, memory: Array, age: Array) ->
     Args:
         places: of :func:`places_of`.
         sample: ``(..., d)``.
-        memory: ``(..., 19)`` of the sample before.
+        memory: ``(..., 20)`` of the sample before.
         age: ``(..., 1)`` s since the last valid force, at the sample before.
     """
     xp = namespace(sample, memory)
