@@ -12,8 +12,9 @@ import pytest
 from poise.envs.data.trajectory import Trajectory
 from poise.envs.hand.sensing import simulate_hand
 from poise.filters.core import metrics, rotation
+from poise.filters.core.averages import SETTLED
 from poise.filters.core.estimator import run_by_steps
-from poise.filters.core.monitor import INFLATION
+from poise.filters.core.monitor import FORCE, INFLATION, TIME
 from poise.filters.registry import make
 
 FILTERS = ["external-acceleration", "mekf", "mekf-9", "bounded-motion", "bounded-motion-9"]
@@ -143,6 +144,54 @@ def test_averages_do_not_depend_on_the_equations() -> None:
     data = {name: array[:300] for name, array in motion("slow").measurements.items()}
     found = [make(name, dt=0.01).run_from(None, data)[1].monitor[:4] for name in ("mekf-9", "marins")]  # type: ignore[attr-defined]
     np.testing.assert_allclose(*found, rtol=1e-9)
+
+
+def test_a_swinging_arm_does_not_keep_an_average_from_being_trusted() -> None:
+    """The force of each half of a swing contradicts the average of the other; the estimate is wrong in heading only."""
+    estimator: Any = make("mekf-9", dt=0.01)
+    time = np.arange(1500) / 100.0
+    angle = 0.9 * np.sin(2.0 * np.pi * 0.8 * time)
+    q = rotation.exp(np.stack([angle, 0.0 * angle, 0.0 * angle], axis=-1))
+    # On a rope of this length the device feels no force across it.
+    force = 9.81 * np.stack([0.0 * angle, 0.5 * np.sin(angle), np.cos(angle)], axis=-1)
+    field = rotation.rotate_back(q, np.tile([20.0, 0.0, -40.0], (1500, 1)))
+    data = {"imu/gyr": np.gradient(angle, 0.01)[:, None] * [1.0, 0.0, 0.0], "imu/acc": force, "imu/mag": field}
+    state, times = estimator.init({name: array[0] for name, array in data.items()}), []
+    for row in range(1500):
+        state, _ = estimator.step(state, {name: array[row] for name, array in data.items()})
+        times.append(float(state.monitor[TIME]))
+    assert np.mean(np.array(times[300:]) >= SETTLED) > 0.6
+
+
+@pytest.mark.parametrize("name", ["marins", "array-orientation-imu"])
+def test_a_magnetometer_that_is_calibrated_meanwhile_is_followed(name: str) -> None:
+    """Phones do so some seconds after the start: another field, half as strong, from one sample to the next."""
+    trajectory, estimator = motion("slow"), make(name, dt=0.01)
+    q, data = trajectory.truth["orientation"], dict(trajectory.measurements)
+    field = data["imu/mag"].copy()
+    field[:600] += np.linalg.norm(field[0]) * np.array([1.2, -0.9, 0.6])
+
+    def error(samples: dict[str, np.ndarray]) -> float:
+        found: Any = estimator.run(samples)  # type: ignore[attr-defined]
+        angle = rotation.angle(rotation.multiply(found.pose["orientation"], rotation.conjugate(q)))
+        return float(np.degrees(np.sqrt(np.mean(angle[1100:1500] ** 2))))
+
+    assert error(data | {"imu/mag": field}) < error(data) + 5.0
+
+
+@pytest.mark.parametrize("name", ["mekf", "bounded-motion-9"])
+def test_averages_leave_out_the_bias_that_was_estimated(name: str) -> None:
+    """A phone's 5.6 degrees per second, about an axis across, turn an average of three seconds by 15 degrees."""
+    estimator: Any = make(name, dt=0.01, bias_prior=0.1)
+    data = {
+        "imu/gyr": np.tile([0.098, 0.0, 0.0], (4000, 1)),
+        "imu/acc": np.tile([0.0, 0.0, 9.81], (4000, 1)),
+        "imu/mag": np.tile([0.0, 20.0, -40.0], (4000, 1)),
+    }
+    estimate, state = estimator.run_from(None, {channel.name: data[channel.name] for channel in estimator.channels})
+    assert np.degrees(metrics.direction_error(estimate.pose["up"][-1], np.array([0.0, 0.0, 1.0]))) < 1.0
+    force = state.monitor[FORCE]
+    assert np.degrees(np.arccos(force[2] / np.linalg.norm(force))) < 2.0
 
 
 @pytest.mark.parametrize("glitch", [400.0, 1e3, 1.9e3])
