@@ -9,7 +9,7 @@ import numpy as np
 
 from ....filters.compile.cache import jit
 from ....filters.core import rotation
-from .leg_loads import leg_swing, pedal_of_swing, weight_on_pedal
+from .leg_loads import leg_swing, weight_on_pedal
 from .limbs import reach_to, three_turns
 from .posture import CRANKS, KNEE_OUT, LIMBS, POINTS, Posture
 
@@ -47,9 +47,7 @@ class LimbTables:
         # (point, limb, value and slopes)
         self.table = np.stack(rows, axis=1)
         # (point, weight on the pedal, what a swing without muscles does to the body, and the pedal's force in it)
-        pedal = pedal_of_swing(posture)
-        swing = leg_swing(posture), np.concatenate([pedal, pedal[:1]])
-        self.legs = np.column_stack([weight_on_pedal(posture, gravity), *swing])
+        self.legs = np.column_stack([weight_on_pedal(posture, gravity), leg_swing(posture)])
 
     def angles(
         self,
