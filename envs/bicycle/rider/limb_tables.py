@@ -115,7 +115,7 @@ def legs_on_pedals(table, crank):  # type: ignore[no-untyped-def]
     """Forces (N, bicycle axes) of the left and the right leg's own weight on the pedals, and the legs' swing.
 
     The swing of legs without muscles, per (rad/s)² of the crank: a force upwards and a moment to the right, see
-    :func:`.leg_swing`; forces of the left and the right pedal, see :func:`.pedal_of_swing`.
+    :func:`.leg_swing`; forces of the left and the right pedal, likewise.
 
     Args:
         table: :attr:`LimbTables.legs`.
