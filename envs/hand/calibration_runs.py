@@ -15,7 +15,6 @@ import numpy as np
 from ...filters.arrays.array import AccelerometerArray, recorded_channel
 from ...filters.core import rotation
 from ...filters.core.quantity import STANDARD_GRAVITY
-from ..data.calibration.channels import spatial_axes
 from ..data.calibration.data import MagnetometerData, RateTableData, mounting_matrix
 from ..data.calibration.records import CalibrationRecord, ChannelCalibration
 from ..sensors.ideal import magnetic_field
@@ -98,7 +97,7 @@ def accelerometer_runs(
 
     The reference point of the array is 0.1 m from the axis of the table, which holds each rate for ``hold`` s.
     """
-    device = HandDevice(array.name, _spatial(array), "array-data-sheet", gyroscope=False, magnetometer=False)
+    device = HandDevice(array.name, array.spatial, "array-data-sheet", gyroscope=False, magnetometer=False)
     channel = truth.channels[recorded_channel(array).name]
     tables = {
         (up, out): RateTable(UPWARDS if out.startswith("+") else DOWNWARDS, hold, offset=(0.1, 0.0, 0.0))
@@ -127,12 +126,6 @@ def magnetometer_run(truth: CalibrationRecord, seed: int, *, duration: float = 6
     error = np.random.default_rng(reference).normal(0.0, 0.002, (len(unit), 3))
     attitude = rotation.multiply(trajectory.truth["orientation"], rotation.exp(error))
     return MagnetometerData(trajectory.time, counts(truth.channels["imu/mag"], unit), attitude)
-
-
-def _spatial(array: AccelerometerArray) -> AccelerometerArray:
-    """The same sensors in space."""
-    padding = ((0, 0), (0, 3 - array.dimension))
-    return AccelerometerArray(np.pad(array.r, padding).tolist(), spatial_axes(array).tolist(), array.name)
 
 
 def _runs(

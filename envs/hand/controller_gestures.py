@@ -140,8 +140,7 @@ def pointing_attitude(azimuth: np.ndarray, elevation: np.ndarray) -> np.ndarray:
 def shaken(generator: np.random.Generator, band: tuple[float, float], acceleration: float) -> Series:
     """A random position whose acceleration is evenly spread over ``band`` (Hz), of given rms a coordinate, m/s²."""
     position = Series.draw(generator, band, 3, components=30, slope=-2.0)
-    power = 0.5 * np.sum(position.frequency[:, None] ** 4 * (position.cosine**2 + position.sine**2)) / 3.0
-    return position.scaled(acceleration / math.sqrt(power))
+    return position.scaled(acceleration / position.acceleration)
 
 
 @dataclass(frozen=True)

@@ -14,24 +14,9 @@ import numpy as np
 
 from ...filters.core import rotation
 from ..sensors.ideal import BodyState
-from .motion import euler_motion
+from .motion import spatial_state
 from .planar_motion import ORIGIN, planar_state
 from .smooth import Jet, Series, column, product, smoothstep, smoothstep_integral
-
-
-def spatial_state(times: np.ndarray, position: Jet, angles: Jet, heading: np.ndarray) -> BodyState:
-    """The state of a body at ``heading ⊗ Rz(yaw) Ry(pitch) Rx(roll)``.
-
-    Args:
-        times: ``(T,)`` s.
-        position: jet ``(T, 3)``, m.
-        angles: jet ``(T, 3)`` of yaw, pitch and roll, rad.
-        heading: ``(4,)`` quaternion.
-    """
-    orientation, *rates = euler_motion(angles)
-    turning, turning_faster = (rotation.rotate(heading, rate) for rate in rates)
-    attitude = rotation.multiply(heading, orientation)
-    return BodyState(times, position[0], attitude, position[1], turning, position[2], turning_faster)
 
 
 @dataclass(frozen=True)

@@ -229,8 +229,7 @@ def array_reading(motion: SiteMotion) -> np.ndarray:
             planar one lie in the x-y plane.
     """
     array: AccelerometerArray = motion.surroundings
-    padding = ((0, 0), (0, 3 - array.dimension))
-    positions, axes = np.pad(array.r, padding), np.pad(array.e, padding)
+    positions, axes = array.spatial.r, array.spatial.e
     readings = np.empty((len(motion.now.position), array.size))
     for position in np.unique(positions, axis=0):
         members = np.flatnonzero((positions == position).all(axis=1))

@@ -68,6 +68,21 @@ def euler_motion(angles: Jet) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return rotation.from_euler_zyx(yaw, pitch, roll), velocity, acceleration
 
 
+def spatial_state(times: np.ndarray, position: Jet, angles: Jet, heading: np.ndarray) -> BodyState:
+    """The state of a body at ``heading ⊗ Rz(yaw) Ry(pitch) Rx(roll)``.
+
+    Args:
+        times: ``(T,)`` s.
+        position: jet ``(T, 3)``, m.
+        angles: jet ``(T, 3)`` of yaw, pitch and roll, rad.
+        heading: ``(4,)`` quaternion.
+    """
+    orientation, *rates = euler_motion(angles)
+    turning, turning_faster = (rotation.rotate(heading, rate) for rate in rates)
+    attitude = rotation.multiply(heading, orientation)
+    return BodyState(times, position[0], attitude, position[1], turning, position[2], turning_faster)
+
+
 @dataclass(frozen=True)
 class Segment:
     """Random motion between two rests.
@@ -123,8 +138,7 @@ class Segment:
         """
         position = Series.draw(generator, position_band, 3, slope=-1.0)
         if acceleration_rms is not None:
-            power = 0.5 * np.sum(position.frequency[:, None] ** 4 * (position.cosine**2 + position.sine**2))
-            position_rms = acceleration_rms / np.sqrt(power / 3.0)
+            position_rms = acceleration_rms / position.acceleration
         angles = Series.draw(generator, angle_band, 3, slope=-1.0)
         shift = generator.normal(0.0, 0.1, 3) * (position_rms > 0.0)
         return cls(start, end, ramp, position.scaled(position_rms), angles.scaled(angle_rms), shift, turn)
@@ -202,13 +216,10 @@ class SegmentedGesture:
         if (np.diff(times) < 0.0).any():
             ascending, ranks = np.unique(times, return_inverse=True)
             return self.sample(ascending).at(ranks)
-        position, angles = self.position_and_angles(times)
-        orientation, *rates = euler_motion(angles)
-        orientation = rotation.multiply(self.heading, orientation)
-        if self.axes is not None:
-            orientation = rotation.multiply(orientation, self.axes)
-        turning, turning_faster = (rotation.rotate(self.heading, rate) for rate in rates)
-        return BodyState(times, position[0], orientation, position[1], turning, position[2], turning_faster)
+        state = spatial_state(times, *self.position_and_angles(times), self.heading)
+        if self.axes is None:
+            return state
+        return state._replace(orientation=rotation.multiply(state.orientation, self.axes))
 
 
 @dataclass(frozen=True)

@@ -97,6 +97,12 @@ class Series:
         coefficients = weight[:, None] * generator.standard_normal((2, components, size))
         return cls(frequency, coefficients[0], coefficients[1])
 
+    @property
+    def acceleration(self) -> float:
+        """Root mean square of the second derivatives, the mean over all functions."""
+        power = 0.5 * np.sum(self.frequency[:, None] ** 4 * (self.cosine**2 + self.sine**2))
+        return float(np.sqrt(power / self.cosine.shape[1]))
+
     def sample(self, times: np.ndarray) -> Jet:
         """The jet ``(T, n)`` at ``times`` ``(T,)``."""
         phase = times[:, None] * self.frequency

@@ -220,27 +220,11 @@ class Physics:
         """States of several links, stacked along the first axis; :data:`BASE` may be among them."""
         moving = [link for link in links if link != BASE]
         # PyBullet reads invalid memory when the base is asked for as a link
-        rows = (
-            pybullet.getLinkStates(
-                body, moving, computeLinkVelocity=1, computeForwardKinematics=1, physicsClientId=self.client
-            )
-            if moving
-            else ()
-        )
-        found = dict(zip(moving, rows, strict=True))
-        states = [
-            self.state(body)
-            if link == BASE
-            else self._body_frame(
-                body,
-                link,
-                np.array(found[link][0]),
-                rotation.from_xyzw(np.array(found[link][1])),
-                np.array(found[link][6]),
-                np.array(found[link][7]),
-            )
-            for link in links
-        ]
+        rows = pybullet.getLinkStates(body, moving, 1, 1, self.client) if moving else ()
+        found: dict[int, TupleState] = {BASE: self.base_tuples(body)} if BASE in links else {}
+        for link, (position, (x, y, z, w), *_, velocity, turning) in zip(moving, rows, strict=True):
+            found[link] = position, (w, x, y, z), velocity, turning
+        states = [self._body_frame(body, link, *map(np.array, found[link])) for link in links]
         stacked = (np.stack([np.asarray(state[field]) for state in states]) for field in range(5))
         return BodyState(*stacked)
 

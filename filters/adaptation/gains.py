@@ -132,5 +132,5 @@ def gain_sizes(
     base, sizes = parameters_of(model) if base is None else base, {}
     for name, factor in gains.items():
         gain = model.gains[name]
-        sizes[name] = np.minimum(base[gain.parameter] * np.exp(gain.power * factor), gain.maximum)
+        sizes[name] = gain.scaled(base[gain.parameter], factor)
     return sizes

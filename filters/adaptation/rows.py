@@ -6,6 +6,7 @@ parameters of each. The numbers are those of one :class:`.TunedFilter` a row, bi
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, cast
 
@@ -49,7 +50,7 @@ class TunedRows:
     def __init__(self, tuned: TunedFilter, count: int) -> None:
         self.tuned, self.count = tuned, count
         empty = {channel.name: np.full((count, channel.size), np.nan) for channel in tuned.kalman.channels}
-        self.state = owned(tuned.init(empty))
+        self.state = mapped(tuned.init(empty), np.array)  # of its own, to write into
         self._initial = taken(self.state, np.array([0]))
         self._groups: dict[Any, RowGroup] = {}
         self._models: dict[Any, Equations] = {}
@@ -164,18 +165,16 @@ def arrays_of(state: TunedState) -> list[np.ndarray]:
     return [*state.filter, *(part for part in state.memory if part.ndim), state.action]
 
 
-def owned(state: TunedState) -> TunedState:
-    """A copy that may be written into."""
-    filter = type(state.filter)(*(np.array(array) for array in state.filter))
-    memory = type(state.memory)(*(np.array(array) for array in state.memory))
-    return TunedState(filter, memory, np.array(state.action))
+def mapped(state: TunedState, function: Callable[[np.ndarray], np.ndarray]) -> TunedState:
+    """The state of what a function gives of each array."""
+    filter, memory = state.filter, state.memory
+    moved = type(filter)(*map(function, filter)), type(memory)(*map(function, memory))
+    return TunedState(*moved, function(state.action))
 
 
 def taken(state: TunedState, rows: Rows) -> TunedState:
     """Some rows of a state, copied."""
-    filter = type(state.filter)(*(array[rows] for array in state.filter))
-    memory = type(state.memory)(*(array[rows] if array.ndim else array for array in state.memory))
-    return TunedState(filter, memory, state.action[rows])
+    return mapped(state, lambda array: array[rows] if array.ndim else array)
 
 
 def put(state: TunedState, rows: Rows, part: TunedState) -> None:

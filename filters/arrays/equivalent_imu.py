@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..core.backend import Array, constant
+from ..core.matrices import times
 from .array import AccelerometerArray
 
 
@@ -22,7 +23,7 @@ def array_to_imu(array: AccelerometerArray, readings: Array) -> Array:
     Raises:
         ValueError: the array is planar, or its axes do not span space.
     """
-    return (constant(force_matrix(array), readings) @ readings[..., None])[..., 0]
+    return times(constant(force_matrix(array), readings), readings)
 
 
 def force_matrix(array: AccelerometerArray) -> np.ndarray:

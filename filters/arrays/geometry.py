@@ -27,6 +27,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from ..core.backend import Array, constant, namespace
+from ..core.matrices import times
 from ..core.quantity import Channel
 from ..core.rotation import cross
 from .products import centripetal, products
@@ -98,6 +99,12 @@ class AccelerometerArray:
     def e(self) -> np.ndarray:
         """Axes, ``(m, dimension)``."""
         return _frozen(np.array(self.axes))
+
+    @cached_property
+    def spatial(self) -> AccelerometerArray:
+        """The same sensors in space, their reference point as origin; those of a planar array lie in x and y."""
+        padding = ((0, 0), (0, 3 - self.dimension))
+        return AccelerometerArray(np.pad(self.r, padding).tolist(), np.pad(self.e, padding).tolist(), self.name)
 
     @cached_property
     def A_P(self) -> np.ndarray:
@@ -189,7 +196,7 @@ class AccelerometerArray:
         """
         xp = namespace(force, angular_acceleration, angular_rate)
         z = xp.concat([force, angular_acceleration, self.square(angular_rate)], axis=-1)
-        return (constant(self.A, z) @ z[..., None])[..., 0]
+        return times(constant(self.A, z), z)
 
     def solve(self, readings: Array) -> tuple[Array, Array, Array]:
         """Specific force, angular acceleration and products of angular rates ``(..., 3 | 3 | 6)``: ẑ = A⁺â.
@@ -202,7 +209,7 @@ class AccelerometerArray:
             raise ValueError(
                 f"array {self.name!r} has rank {self.rank} of {self.A.shape[1]}: {open_} are not determined"
             )
-        z = (constant(self.pseudo_inverse, readings) @ readings[..., None])[..., 0]
+        z = times(constant(self.pseudo_inverse, readings), readings)
         return z[..., self.blocks["P"]], z[..., self.blocks["T"]], z[..., self.blocks["C"]]
 
     @staticmethod

@@ -43,7 +43,7 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from ..core.backend import Array, constant, expand, namespace
-from ..core.matrices import diagonal_matrix, solve_positive
+from ..core.matrices import diagonal_matrix, solve_positive, times
 from ..core.model import Recurrence
 from ..core.quantity import ANGULAR_RATE, GYROSCOPE, Channel, Measurement, Quantity
 from ..support.parameters import check_positive
@@ -190,7 +190,7 @@ class ArrayRate(ArrayEquations, Recurrence):
         """ω_TI (2.15), and Σ' + T."""
         xp, dt, name = namespace(x), expand(self.dt, 1), self.array.channel.name
         solve = constant(self.array.pseudo_inverse[self.array.blocks["T"]], x)
-        rate = x[..., :3] + 0.5 * dt * (solve @ (previous[name] + z[name])[..., None])[..., 0]
+        rate = x[..., :3] + 0.5 * dt * times(solve, previous[name] + z[name])
         if self.method != "weighted":
             return rate
         B, weights = constant(self.array.B_T, x), x[..., 12:15]
@@ -207,7 +207,7 @@ class ArrayRate(ArrayEquations, Recurrence):
         xp, a = namespace(x), z[self.array.channel.name]
         there = xp.all(xp.isfinite(a), axis=-1)[..., None]
         a = xp.where(there, a, 0.0 * xp.where(xp.isfinite(a), a, xp.zeros_like(a)))
-        xi = (constant(self.array.pseudo_inverse[self.array.blocks["C"]], x) @ a[..., None])[..., 0]
+        xi = times(constant(self.array.pseudo_inverse[self.array.blocks["C"]], x), a)
         rate = x[..., :3]
         if self.method == "parsa":
             return xp.where(there, parsa_step(rate, xi), x)

@@ -30,7 +30,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from ..core.backend import Array, constant, expand, namespace
 from ..core.held_inputs import ridden
@@ -39,8 +39,8 @@ from ..core.model import Gain, Model
 from ..core.quantity import DEG, GRAVITY, Measurement, Quantity
 from ..core.rotation import rotate_back, wrap
 from ..support.parameters import check_positive
-from .geometry import RiderEquations, RiderGeometry
-from .odometry_aided import BIAS, PITCH
+from .geometry import RiderEquations
+from .odometry_aided import BIAS, PITCH, mounting
 from .platform_gyro import PLATFORM_GYROSCOPE, ROLL
 from .two_gyro.kinematics import SIGNS, platform_rate
 
@@ -103,11 +103,6 @@ class BalancedGyro(RiderEquations, Model):
         super().__post_init__()
         check_positive(self, "pitch_noise", "balance_noise", "averaging", "gravity", "gyroscope_noise")
 
-    @classmethod
-    def rider_parameters(cls, geometry: RiderGeometry) -> dict[str, Any]:
-        """Mounting of the sensor on the bicycle."""
-        return {"imu_tilt": geometry.bicycle_imu_tilt}
-
     def prior(self, z: Measurement) -> tuple[Array, Array]:
         """Upright, level, straight ahead, at a usual speed."""
         known = zero_where_known(z["bicycle_imu/gyr"])
@@ -161,12 +156,9 @@ class BalancedGyro(RiderEquations, Model):
 
     def pose(self, x: Array) -> dict[str, Array]:
         """Roll and pitch (rad), the bias in the sensor's axes (rad/s), the speed (m/s)."""
-        xp = namespace(x)
-        half = expand(0.5 * self.imu_tilt, 1) + 0.0 * x[..., :1]
-        mounting = xp.concat([xp.cos(half), 0.0 * half, -xp.sin(half), 0.0 * half], axis=-1)
         return {
             ROLL.name: wrap(x[..., :1]),
             PITCH.name: -wrap(x[..., 1:2]),
-            BIAS.name: rotate_back(mounting, x[..., 2:5] * constant(SIGNS, x)),
+            BIAS.name: rotate_back(mounting(self.imu_tilt, x), x[..., 2:5] * constant(SIGNS, x)),
             SPEED.name: expand(self.gravity, 1) * x[..., 5:6],
         }

@@ -199,9 +199,9 @@ class RiderEquations(Equations):
 
     @classmethod
     def rider_parameters(cls, geometry: RiderGeometry) -> dict[str, Any]:
-        """The parameters that the geometry determines, by field: those of the same name, by default."""
-        names = {field.name for field in fields(cls)} & {field.name for field in fields(geometry)}
-        return {name: getattr(geometry, name) for name in names}
+        """The parameters that the geometry determines, by field: those of its names, and ``imu_tilt``, by default."""
+        known = asdict(geometry) | {"imu_tilt": geometry.bicycle_imu_tilt}
+        return {field.name: known[field.name] for field in fields(cls) if field.name in known}
 
     @classmethod
     def for_rider(cls, geometry: RiderGeometry, **parameters: Any) -> Self:

@@ -217,18 +217,12 @@ class OdometryAided(RiderEquations, Model):
     def pose(self, x: Array) -> dict[str, Array]:
         """Roll, pitch (rad) and the bias in the sensor's axes (rad/s)."""
         roll, pitch = roll_pitch(up_in_body(x[..., :4]))
-        bias = rotate_back(self._mounting(x), x[..., 4:7])
+        bias = rotate_back(mounting(self.imu_tilt, x), x[..., 4:7])
         return {"bicycle/roll": roll[..., None], "bicycle/pitch": pitch[..., None], BIAS.name: bias}
-
-    def _mounting(self, like: Array) -> Array:
-        """Quaternion ``(..., 4)`` from the sensor's axes to the bicycle's: nose up by α."""
-        xp = namespace(like)
-        half = expand(0.5 * self.imu_tilt, 1) + 0.0 * like[..., :1]
-        return xp.concat([xp.cos(half), 0.0 * half, -xp.sin(half), 0.0 * half], axis=-1)
 
     def _bicycle_axes(self, sample: Array) -> Array:
         """A sample of the IMU ``(..., 3)`` in bicycle axes."""
-        return rotate(self._mounting(sample), sample)
+        return rotate(mounting(self.imu_tilt, sample), sample)
 
     def _lever(self, like: Array) -> Array:
         """Lever c ``(..., 3)`` from the IMU to the contact, bicycle axes."""
@@ -236,3 +230,10 @@ class OdometryAided(RiderEquations, Model):
         return namespace(like).concat(
             [zero - expand(self.imu_forward, 1), zero, zero - expand(self.imu_height, 1)], axis=-1
         )
+
+
+def mounting(tilt: Array, like: Array) -> Array:
+    """Quaternion ``(..., 4)`` from the axes of a sensor to the bicycle's: nose up by ``tilt``, rad."""
+    xp = namespace(like)
+    half = expand(0.5 * tilt, 1) + 0.0 * like[..., :1]
+    return xp.concat([xp.cos(half), 0.0 * half, -xp.sin(half), 0.0 * half], axis=-1)

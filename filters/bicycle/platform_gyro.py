@@ -20,7 +20,7 @@ from ..core.model import Gain, Model, Recurrence
 from ..core.quantity import DEG, Channel, Measurement, Quantity
 from ..core.rotation import conjugate, exp, from_euler_xyz, multiply, normalize, to_euler_zyx
 from ..support.parameters import check_positive
-from .geometry import RiderEquations, RiderGeometry
+from .geometry import RiderEquations
 from .relative_sensor import relative_angles
 from .two_gyro.kinematics import SIGNS, level_constraint, platform_rate
 from .two_gyro.truth import true_angles
@@ -80,11 +80,6 @@ class PlatformGyro(RiderEquations, Model):
         super().__post_init__()
         check_positive(self, "gyroscope_noise", "bias_time")
 
-    @classmethod
-    def rider_parameters(cls, geometry: RiderGeometry) -> dict[str, Any]:
-        """Mounting of the sensor on the bicycle."""
-        return {"imu_tilt": geometry.bicycle_imu_tilt}
-
     def prior(self, z: Measurement) -> tuple[Array, Array]:
         """The given roll, no bias."""
         known = zero_where_known(z["bicycle_imu/gyr"])
@@ -140,11 +135,6 @@ class TwoGyroIntegration(RiderEquations, Recurrence):
     )
     outputs: ClassVar[tuple[Quantity, ...]] = (ROLL, Quantity("two-gyro/relative_angles", "angle", 3, "rad"))
     state_size: ClassVar[int] = 8
-
-    @classmethod
-    def rider_parameters(cls, geometry: RiderGeometry) -> dict[str, Any]:
-        """Mounting of the sensor on the bicycle."""
-        return {"imu_tilt": geometry.bicycle_imu_tilt}
 
     def prior(self, z: Measurement) -> Array:
         """The given roll, zero pitch, and the orientation from the camera."""

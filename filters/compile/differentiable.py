@@ -150,8 +150,7 @@ class DifferentiableEquations:
         """Parameters ``(T, B, count)`` for log factors ``(T, B, gains)``."""
         table = np.broadcast_to(self.base, (*factors.shape[:2], self.base.shape[-1])).copy()
         for index, (gain, column) in enumerate(zip(self.scaled, self.columns, strict=True)):
-            scaled = self.base[..., column] * np.exp(gain.power * factors[..., index])
-            table[:, :, column] = np.minimum(scaled, gain.maximum)
+            table[:, :, column] = gain.scaled(self.base[..., column], factors[..., index])
         return table
 
     def of_rows(self, models: Sequence[Model]) -> DifferentiableEquations:

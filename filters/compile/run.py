@@ -83,7 +83,7 @@ class CompiledEquations:
             gain = model.gains[name]
             column = self.names.index(gain.parameter)
             flat = np.broadcast_to(array, (length, *batch)).reshape(length, -1) if array.ndim > 1 else array[:, None]
-            table[:, :, column] = np.minimum(base[column] * np.exp(gain.power * flat), gain.maximum)
+            table[:, :, column] = gain.scaled(base[column], flat)
         return table
 
     def _outputs(self, model: Equations, length: int, count: int, kept: int) -> list[np.ndarray]:

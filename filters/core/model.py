@@ -14,6 +14,8 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, fields, replace
 from typing import Any, ClassVar, Self, TypeVar
 
+import numpy as np
+
 from ..support.parameters import check_parameters
 from .backend import Array
 from .held_inputs import HeldInput
@@ -44,6 +46,10 @@ class Gain:
     description: str = ""
     bounds: tuple[float, float] | None = None
     acted: bool = True
+
+    def scaled(self, value: Any, factor: Any) -> Any:
+        """The constant of this value at a log factor, NumPy arrays that broadcast."""
+        return np.minimum(value * np.exp(self.power * factor), self.maximum)
 
 
 @dataclass(frozen=True)

@@ -27,6 +27,7 @@ from ..compile.run import compiled_equations
 from .backend import Array, constant, is_torch, namespace
 from .estimator import check_measurements, stack_estimates
 from .held_inputs import grown_parameters, longest_gap
+from .matrices import times
 from .model import Gain, Model, Recurrence, with_parameters
 from .monitor import LOST, inputs_of, places_of, realigned, watch, without_impacts
 from .quantity import ACCELEROMETER, GYROSCOPE, Channel, Estimate, Measurement, Quantity
@@ -269,4 +270,4 @@ def correct(P: Array, r: Array, H: Array, R: Array) -> tuple[Array, Array, Array
     A = constant(np.eye(P.shape[-1]), P) - K @ H
     joseph = A @ P @ A.mT + K @ R @ K.mT
     whitened = xp.linalg.solve(L, r[..., None])[..., 0]
-    return (K @ r[..., None])[..., 0], 0.5 * (joseph + joseph.mT), whitened
+    return times(K, r), 0.5 * (joseph + joseph.mT), whitened

@@ -47,6 +47,7 @@ import numpy as np
 
 from ..core.backend import Array, constant, expand, namespace
 from ..core.held_inputs import HeldInput
+from ..core.matrices import times
 from ..core.model import Gain, Model
 from ..core.quantity import ACCELEROMETER, EXTERNAL_ACCELERATION, GYROSCOPE, UP, Measurement
 from ..core.rotation import exp_matrix, norm, normalize, skew
@@ -142,7 +143,7 @@ class ExternalAcceleration(Model):
         squared = xp.sum(up * up, axis=-1)[..., None, None]
         variance = expand(self.dt**2 * self.gyroscope_noise**2, 2) * clipped
         Q = variance * (squared * identity - up[..., :, None] * up[..., None, :])
-        return xp.concat([(phi @ up[..., None])[..., 0], x[..., 3:]], axis=-1), phi, Q
+        return xp.concat([times(phi, up), x[..., 3:]], axis=-1), phi, Q
 
     def residual(self, x: Array, z: Measurement) -> tuple[Array, Array, Array]:
         """Equations (16)–(23), or the threshold (30): rows beyond it are NaN, and their update is skipped."""

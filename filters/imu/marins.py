@@ -37,7 +37,7 @@ from dataclasses import dataclass
 from typing import ClassVar, Literal
 
 from ..core.backend import Array, constant, expand, namespace
-from ..core.matrices import block_diagonal, block_matrix, covariance_of, identity, solve_positive, vector_of
+from ..core.matrices import block_diagonal, block_matrix, covariance_of, identity, solve_positive, times, vector_of
 from ..core.model import Gain, Model, checked_quaternion
 from ..core.quantity import (
     ACCELEROMETER,
@@ -195,7 +195,7 @@ def solve_orientation(q: Array, world: tuple[Array, Array], body: tuple[Array, A
             blocks.append(matrix_jacobian(q, seen))
         jacobian, error = xp.concat(blocks, axis=-2), xp.concat(errors, axis=-1)
         normal = jacobian.mT @ jacobian
-        q = q + solve_positive(normal, (jacobian.mT @ error[..., None])[..., 0])
+        q = q + solve_positive(normal, times(jacobian.mT, error))
     q = normalize(q)
     aligned = xp.sum(q * start, axis=-1, keepdims=True)
     return xp.where(xp.less(aligned, 0.0), -q, q)

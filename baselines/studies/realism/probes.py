@@ -68,6 +68,11 @@ def arm_apart() -> float:
     return 1e3 * float(np.sqrt(np.mean(np.sum((paths[0] - paths[1]) ** 2, axis=1))))
 
 
+def default_drive() -> str:
+    """What moves the hand by default."""
+    return HandMotionEnv().drive_kind
+
+
 def gravity_residual() -> float:
     """Largest difference (m/s²) of an ideal accelerometer from what the environment documents, of a shaken device."""
     found = record_once(HandMotionEnv("severe", sensors="ideal", duration=10.0), SEED)

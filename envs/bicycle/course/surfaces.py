@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ....filters.support.parameters import check_positive
 from .terrain import CELLS, SPACING, FlatGround, Ground, RoughTile
 
 REFERENCE = 0.1
@@ -48,9 +49,7 @@ class Surface:
     """m: longest wave; beyond it a road is a slope, not a surface"""
 
     def __post_init__(self) -> None:
-        for name in ("roughness", "stone", "relief", "longest"):
-            if not 0.0 <= getattr(self, name) < math.inf:
-                raise ValueError(f"{name} must not be negative and be finite, got {getattr(self, name)}")
+        check_positive(self, or_zero=("roughness", "stone", "relief", "longest"))
         if not 1.0 <= self.waviness <= 4.0:
             raise ValueError(f"waviness must lie in [1, 4], got {self.waviness}")
         if self.relief and self.stone < 2.0 * SPACING:

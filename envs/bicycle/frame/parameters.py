@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -19,6 +20,17 @@ Vector3 = tuple[float, float, float]
 
 AIR_DENSITY = 1.2
 """kg/m³"""
+
+
+class Mass(NamedTuple):
+    """A rigid body in some frame."""
+
+    mass: float
+    """kg"""
+    centre: np.ndarray
+    """(3,) m"""
+    tensor: np.ndarray
+    """(3, 3) kg·m² about the centre of mass"""
 
 
 @dataclass(frozen=True)
@@ -51,6 +63,13 @@ class RigidPart:
         """Inertia ``(3, 3)`` about the centre of mass, kg·m²."""
         xx, yy, zz, xz = self.inertia
         return np.array([[xx, 0.0, xz], [0.0, yy, 0.0], [xz, 0.0, zz]])
+
+    @classmethod
+    def of(cls, body: Mass) -> Self:
+        """A body as one that is symmetric about the x-z plane."""
+        (x, _, z), tensor = body.centre.tolist(), body.tensor
+        inertia = (float(tensor[0, 0]), float(tensor[1, 1]), float(tensor[2, 2]), float(tensor[0, 2]))
+        return cls(float(body.mass), (x, 0.0, z), inertia)
 
 
 @dataclass(frozen=True)
@@ -179,17 +198,19 @@ def parallel_axes(mass: float, offset: np.ndarray) -> np.ndarray:
     return np.asarray(mass * (offset @ offset * np.eye(3) - np.outer(offset, offset)))
 
 
-def combine(parts: Sequence[RigidPart]) -> RigidPart:
-    """One rigid body made of several, symmetric about the x-z plane as a whole."""
+def join(parts: Sequence[Mass]) -> Mass:
+    """Several bodies as one."""
     mass = sum(part.mass for part in parts)
-    centre = sum((part.mass * np.array(part.centre) for part in parts), np.zeros(3)) / mass
+    centre = sum((part.mass * part.centre for part in parts), np.zeros(3)) / mass
     tensor = np.zeros((3, 3))
     for part in parts:
-        d = np.array(part.centre) - centre
-        tensor += part.tensor + parallel_axes(part.mass, d)
-    x, y, z = centre.tolist()
-    inertia = (float(tensor[0, 0]), float(tensor[1, 1]), float(tensor[2, 2]), float(tensor[0, 2]))
-    return RigidPart(float(mass), (x, y, z), inertia)
+        tensor += part.tensor + parallel_axes(part.mass, part.centre - centre)
+    return Mass(mass, centre, tensor)
+
+
+def combine(parts: Sequence[RigidPart]) -> RigidPart:
+    """One rigid body made of several, symmetric about the x-z plane as a whole."""
+    return RigidPart.of(join([Mass(part.mass, np.array(part.centre), part.tensor) for part in parts]))
 
 
 BENCHMARK = BicycleParameters(

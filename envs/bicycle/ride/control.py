@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ....filters.core.quantity import GRAVITY
+from ....filters.support.parameters import check_positive
 from ..course.path import Path
 from ..frame.bicycle import SPEED
 from ..frame.parameters import AIR_DENSITY, BicycleParameters
@@ -85,10 +86,7 @@ class ControlSettings:
     """Hz"""
 
     def __post_init__(self) -> None:
-        for name, value in vars(self).items():
-            positive = name in POSITIVE
-            if not (value > 0.0 if positive else value >= 0.0) or not math.isfinite(value):
-                raise ValueError(f"{name} must be {'positive' if positive else 'not negative'} and finite, got {value}")
+        check_positive(self, *POSITIVE, or_zero=[name for name in vars(self) if name not in POSITIVE])
 
 
 class PilotMemory(NamedTuple):

@@ -10,8 +10,7 @@ from ....filters.core import rotation
 from ....filters.core.quantity import GRAVITY, STANDARD_GRAVITY
 from ..course.path import Path
 from ..frame.bicycle import SPEED
-from ..frame.parameters import BicycleParameters
-from ..rider.anthropometry import join
+from ..frame.parameters import BicycleParameters, join
 from ..rider.muscles import TRUNK_DAMPING, TRUNK_STIFFNESS
 from ..rider.posture import Posture
 from .control import ControlSettings, Pilot, PilotMemory

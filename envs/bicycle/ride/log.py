@@ -10,7 +10,7 @@ from ....filters.core import rotation
 from ...physics.kinematics import BASE_SIZE, TURNING, carry_frames, orientations
 from ...sensors.ideal import BodyState, Sampling
 from ..rider.limbs import Limb, LimbPosture, reach_to
-from ..rider.posture import KNEE_OUT, LIMBS, two_turns
+from ..rider.posture import KNEE_OUT, LIMBS, segments_of, two_turns
 from .contact_forces import Contact, contact
 from .ride import Ride
 from .tape import RiderStep, Tape, rider_step
@@ -54,6 +54,11 @@ def in_reach(target: np.ndarray, limb: Limb) -> np.ndarray:
     return target * np.minimum(1.0, 0.9999 * limb.reach / rotation.norm(target))
 
 
+def limb_root(frames: dict[str, BodyState], limb: str) -> np.ndarray:
+    """Orientation ``(n, 4)`` of the frame in which a limb's posture is given."""
+    return frames["trunk" if limb.startswith("arm") else "rear_frame"].orientation
+
+
 class RideRecorder:
     """Advances a ride sample by sample.
 
@@ -75,8 +80,7 @@ class RideRecorder:
         rider, links = ride.rider, ride.bicycle.links
         self._names = ["rear_frame", "front_assembly", "crank", "pelvis", "trunk"]
         if rider.full:
-            kinds = {"arm": ("upper_arm", "forearm"), "leg": ("thigh", "shank")}
-            self._names += [f"{part}_{limb[4:]}" for limb in LIMBS for part in kinds[limb[:3]]]
+            self._names += [part for limb in LIMBS for part in segments_of(limb)]
         self._rows = [links[name] + 1 for name in self._names]
         mounts = [ride.physics.inertial_frame(ride.bicycle.body.body, links[name]) for name in self._names]
         self._mounts = np.stack([centre for centre, _ in mounts]), np.stack([axes for _, axes in mounts])
@@ -144,8 +148,7 @@ class RideRecorder:
         time: np.ndarray,
         fallen: np.ndarray,
     ) -> RideLog:
-        rider, names = self.ride.rider, self._names
-        frames = self._frames(motion, time)
+        rider, frames = self.ride.rider, self._frames(motion, time)
         angles, rates = joints[..., 0], joints[..., 1]
         steer, crank, trunk = angles[:, 0], angles[:, 1], angles[:, 3:6]
         limbs, pelvis = {}, angles[:, self._pelvis]
@@ -153,10 +156,9 @@ class RideRecorder:
         trunk_turn = rotation.multiply(turn, frames["trunk"].orientation)
         for index, name in enumerate(LIMBS):
             if rider.full:
-                upper, lower = names[5 + 2 * index], names[6 + 2 * index]
-                root = frames["trunk" if name.startswith("arm") else "rear_frame"].orientation
+                back = rotation.conjugate(limb_root(frames, name))
                 upper_turn, lower_turn = (
-                    rotation.multiply(rotation.conjugate(root), frames[part].orientation) for part in (upper, lower)
+                    rotation.multiply(back, frames[part].orientation) for part in segments_of(name)
                 )
                 hinge = rotation.rotate(upper_turn, np.array([0.0, 0.0, -rider.posture.limb(name).upper]))
                 limbs[name] = LimbPosture(upper_turn, lower_turn, angles[:, 6 + 4 * index : 10 + 4 * index], hinge)

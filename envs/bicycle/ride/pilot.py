@@ -14,6 +14,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from ....filters.support.parameters import check_positive
+
 
 @dataclass(frozen=True)
 class PilotParameters:
@@ -75,22 +77,15 @@ class PilotParameters:
     """s: how long it lasts"""
 
     def __post_init__(self) -> None:
-        may_be_zero = ("care", "arm_damping", "tremor", "motor_noise")
-        for name, value in vars(self).items():
-            if name == "name":
-                continue
-            zero = name in may_be_zero
-            if not (value >= 0.0 if zero else value > 0.0) or not math.isfinite(value):
-                raise ValueError(f"{name} must be {'not negative' if zero else 'positive'} and finite, got {value}")
+        or_zero = ("care", "arm_damping", "tremor", "motor_noise")
+        check_positive(self, *(name for name in vars(self) if name not in ("name", *or_zero)), or_zero=or_zero)
         if not self.vestibular_delay <= self.visual_delay <= 0.5:
             raise ValueError(
                 f"delays must be vestibular ≤ visual ≤ 0.5 s, got {self.vestibular_delay} and {self.visual_delay} s"
             )
 
 
-def _skill(
-    name: str, delays: tuple[float, float], noise: float, motor: float, effort: float, care: float
-) -> PilotParameters:
+def _skill(name: str, delays: tuple[float, float], noise: float, motor: float, care: float) -> PilotParameters:
     """A rider whose senses are ``noise`` times as noisy as those of the skilled one, and hands as well."""
     degree = math.radians(1.0)
     return PilotParameters(
@@ -104,7 +99,7 @@ def _skill(
         offset_noise=0.0075 * noise,
         motor_noise=motor,
         tremor=0.025 * noise,
-        effort=effort,
+        effort=0.05,
         care=care,
     )
 
@@ -112,9 +107,9 @@ def _skill(
 PILOTS = {
     pilot.name: pilot
     for pilot in (
-        _skill("expert", (0.10, 0.15), 0.6, 0.03, 0.05, 0.5),
-        _skill("skilled", (0.11, 0.18), 1.0, 0.04, 0.05, 0.3),
-        _skill("novice", (0.12, 0.20), 1.15, 0.06, 0.05, 0.2),
+        _skill("expert", (0.10, 0.15), 0.6, 0.03, 0.5),
+        _skill("skilled", (0.11, 0.18), 1.0, 0.04, 0.3),
+        _skill("novice", (0.12, 0.20), 1.15, 0.06, 0.2),
     )
 }
 """Human pilots by name, from the most to the least skilled."""

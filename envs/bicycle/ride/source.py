@@ -179,20 +179,13 @@ class RideSource:
         skills = list(PILOTS)
         pilot = skills[int(for_pilot.integers(len(skills)))] if self.pilot == RANDOM else self.pilot
         noise = np.random.SeedSequence(for_pilot.integers(2**63, size=2).tolist())
+        chosen: dict[str, Any] = {"ground": course.ground, "events": course.events, "crank": crank}
+        chosen |= {"pilot": pilot, "noise": noise}
         if self.ride is not None and same:
             for memory in (*self._kept.values(), self._first):
                 self.ride.forget(memory)
             self._kept = {}
-            self.ride.begin(
-                movement,
-                course.path,
-                course.speed,
-                ground=course.ground,
-                pilot=pilot,
-                noise=noise,
-                events=course.events,
-                crank=crank,
-            )
+            self.ride.begin(movement, course.path, course.speed, **chosen)
         else:
             self.close()
             self.ride = Ride(
@@ -200,14 +193,10 @@ class RideSource:
                 movement,
                 course.path,
                 course.speed,
-                ground=course.ground,
                 fidelity=self.fidelity,
                 physics_rate=self.physics_rate,
                 tyre=self.tyre,
-                pilot=pilot,
-                noise=noise,
-                events=course.events,
-                crank=crank,
+                **chosen,
             )
             self._world_key, self.posture = world, posture
         self.ground = course.ground

@@ -13,8 +13,8 @@ from ....filters.core import rotation
 from ....filters.core.quantity import Quantity
 from ...sensors.ideal import BodyState
 from ..rider.limbs import LimbPosture
-from ..rider.posture import LIMBS, SIDES
-from .log import RideLog
+from ..rider.posture import LIMBS, SIDES, segments_of
+from .log import RideLog, limb_root
 
 ISB = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 """Our axes (forward, left, up) to those of the ISB (forward, up, right)."""
@@ -52,20 +52,17 @@ Quaternions = dict[str, np.ndarray]
 """Orientation → quaternion ``(4,)`` of one sample."""
 
 
+def isb_matrix(q: np.ndarray) -> np.ndarray:
+    """Rotation matrix ``(..., 3, 3)`` in ISB axes."""
+    return np.clip(ISB @ rotation.to_matrix(q) @ ISB.T, -1.0, 1.0)
+
+
 def isb_zxy(q: np.ndarray) -> np.ndarray:
     """Flexion, bending (to the right positive) and axial rotation ``(..., 3)``: Z-X-Y angles in ISB axes.
 
     ``q`` ``(..., 4)`` turns the child into the parent, our axes.
     """
-    R = ISB @ rotation.to_matrix(q) @ ISB.T
-    return np.stack(
-        [
-            np.arctan2(-R[..., 0, 1], R[..., 1, 1]),
-            np.arcsin(np.clip(R[..., 2, 1], -1.0, 1.0)),
-            np.arctan2(-R[..., 2, 0], R[..., 2, 2]),
-        ],
-        axis=-1,
-    )
+    return rotation.euler_zxy(isb_matrix(q))
 
 
 def isb_yxy(q: np.ndarray) -> np.ndarray:
@@ -73,19 +70,7 @@ def isb_yxy(q: np.ndarray) -> np.ndarray:
 
     ``q`` ``(..., 4)`` turns the humerus into the trunk, our axes.
     """
-    R = ISB @ rotation.to_matrix(q) @ ISB.T
-    return np.stack(
-        [
-            np.arctan2(-R[..., 0, 1], -R[..., 2, 1]),
-            -np.arccos(np.clip(R[..., 1, 1], -1.0, 1.0)),
-            np.arctan2(-R[..., 1, 0], R[..., 1, 2]),
-        ],
-        axis=-1,
-    )
-
-
-def _limb_root(log: RideLog, limb: str) -> np.ndarray:
-    return log.frames["trunk" if limb.startswith("arm") else "rear_frame"].orientation
+    return rotation.euler_yxy(isb_matrix(q))
 
 
 def segment_states(log: RideLog) -> dict[str, BodyState]:
@@ -95,14 +80,12 @@ def segment_states(log: RideLog) -> dict[str, BodyState]:
     """
     states = {"bicycle": log.frames["rear_frame"], "trunk": log.frames["trunk"]}
     for limb, held in log.limbs.items():
-        kinds = ("upper_arm", "forearm") if limb.startswith("arm") else ("thigh", "shank")
-        for kind, turn in zip(kinds, (held.upper, held.lower), strict=True):
-            name = f"{kind}_{limb[4:]}"
+        for name, turn in zip(segments_of(limb), (held.upper, held.lower), strict=True):
             if name in log.frames:
                 states[name] = log.frames[name]
             else:
                 still = np.zeros((len(log.time), 3))
-                orientation = rotation.multiply(_limb_root(log, limb), turn)
+                orientation = rotation.multiply(limb_root(log.frames, limb), turn)
                 states[name] = BodyState(log.time, still, orientation, still, still)
     return states
 

@@ -7,13 +7,12 @@ Source: P. de Leva, Adjustments to Zatsiorsky-Seluyanov's segment inertia parame
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
-from ..frame.parameters import parallel_axes
+from ..frame.parameters import Mass
 
 
 class SegmentTable(NamedTuple):
@@ -182,29 +181,6 @@ def rider_body(subject: int | str | RiderBody, rng: np.random.Generator | None =
     raise ValueError(f"subject must be 0…{len(SUBJECTS) - 1}, 'random' or a RiderBody, got {subject!r}")
 
 
-class Mass(NamedTuple):
-    """A rigid body in some frame."""
-
-    mass: float
-    """kg"""
-    centre: np.ndarray
-    """(3,) m"""
-    tensor: np.ndarray
-    """(3, 3) kg·m² about the centre of mass"""
-
-
-def join(parts: list[Mass]) -> Mass:
-    """Several bodies as one."""
-    mass = sum(part.mass for part in parts)
-    centre = sum((part.mass * part.centre for part in parts), np.zeros(3)) / mass
-    tensor = np.zeros((3, 3))
-    for part in parts:
-        tensor += part.tensor + parallel_axes(part.mass, part.centre - centre)
-    return Mass(mass, centre, tensor)
-
-
-def hanging(segment: Segment, top: np.ndarray, turn: float = 0.0) -> Mass:
-    """A segment that hangs from the point ``top`` along −z, turned by ``turn`` (rad) about y, in that frame."""
-    c, s = math.cos(turn), math.sin(turn)
-    R = np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
-    return Mass(segment.mass, top + R @ np.array([0.0, 0.0, -segment.centre]), R @ np.diag(segment.moments) @ R.T)
+def hanging(segment: Segment, top: np.ndarray) -> Mass:
+    """A segment that hangs from the point ``top`` along −z."""
+    return Mass(segment.mass, top - np.array([0.0, 0.0, segment.centre]), np.diag(segment.moments))

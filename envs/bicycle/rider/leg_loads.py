@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ....filters.core import rotation
-from .anthropometry import Mass
+from ..frame.parameters import Mass
 from .limbs import forward, reach_to
 from .posture import CRANKS, KNEE_OUT, Posture
 
@@ -83,26 +83,16 @@ def leg_swing(posture: Posture) -> np.ndarray:
     The pedal's reaction to the leg's inertia less the rate of change of the leg's own momentum.
 
     Returns:
-        ``(n, 2)`` per (rad/s)² of a steadily turning crank: force upwards, N; moment about the saddle point, N·m, that
-        tips to the right.
-    """
-    _, pose, rates = _turn(posture)
-    forces, moments = _momentum_rates(posture, pose, rates)
-    pedal = pedal_of_swing(posture)
-    hip = posture.hip - posture.bicycle.saddle
-    tip = rotation.cross(hip + pose.tip, pedal) - (rotation.cross(hip + pose.centres, forces) + moments).sum(axis=1)
-    felt = np.stack([pedal[:, 2] - forces[..., 2].sum(axis=1), tip[:, 0]], axis=1)
-    return np.concatenate([felt, felt[:1]])
-
-
-def pedal_of_swing(posture: Posture) -> np.ndarray:
-    """Force of the pedal on the left leg that swings it, at all but the last angle of :data:`.CRANKS`.
-
-    Returns:
-        ``(n − 1, 3)`` N per (rad/s)² of a steadily turning crank.
+        ``(n, 5)`` per (rad/s)² of a steadily turning crank: force upwards, N; moment about the saddle point, N·m, that
+        tips to the right; force of the pedal on the leg that swings it, N.
     """
     angles, pose, rates = _turn(posture)
-    return _on_pedal(posture, angles, *_momentum_rates(posture, pose, rates))
+    forces, moments = _momentum_rates(posture, pose, rates)
+    pedal = _on_pedal(posture, angles, forces, moments)
+    hip = posture.hip - posture.bicycle.saddle
+    tip = rotation.cross(hip + pose.tip, pedal) - (rotation.cross(hip + pose.centres, forces) + moments).sum(axis=1)
+    felt = np.column_stack([pedal[:, 2] - forces[..., 2].sum(axis=1), tip[:, 0], pedal])
+    return np.concatenate([felt, felt[:1]])
 
 
 def legs_at_crank(posture: Posture) -> float:

@@ -9,7 +9,7 @@ import numpy as np
 
 from ....filters.compile.cache import jit
 from ....filters.core import rotation
-from .leg_loads import leg_swing, pedal_of_swing, weight_on_pedal
+from .leg_loads import leg_swing, weight_on_pedal
 from .limbs import reach_to, three_turns
 from .posture import CRANKS, KNEE_OUT, LIMBS, POINTS, Posture
 
@@ -47,9 +47,7 @@ class LimbTables:
         # (point, limb, value and slopes)
         self.table = np.stack(rows, axis=1)
         # (point, weight on the pedal, what a swing without muscles does to the body, and the pedal's force in it)
-        pedal = pedal_of_swing(posture)
-        swing = leg_swing(posture), np.concatenate([pedal, pedal[:1]])
-        self.legs = np.column_stack([weight_on_pedal(posture, gravity), *swing])
+        self.legs = np.column_stack([weight_on_pedal(posture, gravity), leg_swing(posture)])
 
     def angles(
         self,
@@ -117,7 +115,7 @@ def legs_on_pedals(table, crank):  # type: ignore[no-untyped-def]
     """Forces (N, bicycle axes) of the left and the right leg's own weight on the pedals, and the legs' swing.
 
     The swing of legs without muscles, per (rad/s)² of the crank: a force upwards and a moment to the right, see
-    :func:`.leg_swing`; forces of the left and the right pedal, see :func:`.pedal_of_swing`.
+    :func:`.leg_swing`; forces of the left and the right pedal, likewise.
 
     Args:
         table: :attr:`LimbTables.legs`.

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from ...physics.urdf import Tree, ball_shape, box_shape, rod_shape
-from .anthropometry import Mass, join
-from .posture import LIMBS, SIGNS, Posture
+from ..frame.parameters import Mass, join
+from .posture import LIMBS, SEGMENTS, SIGNS, Posture, segments_of
 
 PIVOT_MASS, PIVOT_INERTIA = 1e-3, (1e-4, 1e-4, 1e-4)
 """kg, kg·m² of the links between two of a joint's three axes: negligible"""
@@ -17,15 +17,13 @@ SEAT_JOINTS = ("pelvis_y", "pelvis_x", "pelvis")
 SLIDES = ("pelvis_along", "pelvis_across")
 """the pelvis of a rider who stands up also moves along and across the bicycle"""
 TRUNK_JOINTS = ("trunk_y", "trunk_x", "trunk")
-NAMES = {"arm": ("upper_arm", "forearm"), "leg": ("thigh", "shank")}
 LUMPED_MASSES = ("pelvis", "trunk")
 
 
 def limb_joints(limb: str) -> tuple[str, str, str, str]:
     """Names of the links below a limb's four joints, such as ``thigh_left_y``, …, ``shank_left``."""
-    kind, side = limb.split("_")
-    upper, lower = NAMES[kind]
-    return f"{upper}_{side}_y", f"{upper}_{side}_x", f"{upper}_{side}", f"{lower}_{side}"
+    upper, lower = segments_of(limb)
+    return f"{upper}_y", f"{upper}_x", upper, lower
 
 
 def segment_links() -> tuple[str, ...]:
@@ -68,7 +66,7 @@ def add_full_rider(tree: Tree, posture: Posture, slides: bool) -> None:
     for name in LIMBS:
         kind, side = name.split("_")
         flip = np.array([1.0, SIGNS[side], 1.0])
-        upper, lower = NAMES[kind]
+        upper, lower = SEGMENTS[kind]
         parent, root = ("trunk", posture.shoulder) if kind == "arm" else ("pelvis", posture.hip - saddle)
         _three_joints(tree, parent, f"{upper}_{side}", root * flip, segments[upper], shapes[upper])
         mass = segments[lower]

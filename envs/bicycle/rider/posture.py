@@ -10,13 +10,15 @@ import numpy as np
 from scipy.optimize import brentq
 
 from ....filters.core import rotation
-from ..frame.parameters import BicycleParameters, RigidPart
-from .anthropometry import Mass, RiderBody, hanging, join
+from ..frame.parameters import BicycleParameters, Mass, RigidPart, join
+from .anthropometry import RiderBody, hanging
 from .limbs import Limb, reach_to, three_turns
 
 SIDES = ("left", "right")
 SIGNS = {"left": 1.0, "right": -1.0}
 LIMBS = ("arm_left", "arm_right", "leg_left", "leg_right")
+SEGMENTS = {"arm": ("upper_arm", "forearm"), "leg": ("thigh", "shank")}
+"""of a limb, the upper one first"""
 
 LEG_REACH = 0.955
 """part of the straight leg at the farthest pedal"""
@@ -38,6 +40,13 @@ CRANKS = np.linspace(0.0, 2.0 * math.pi, POINTS)
 """rad at which whatever depends on the crank is tabulated"""
 AT_REST = np.zeros(3)
 """Displacement of the pelvis: rad of forward tip and of tip to the right, m off the saddle"""
+
+
+def segments_of(limb: str) -> tuple[str, str]:
+    """Names of a limb's segments, such as ``thigh_left`` and ``shank_left``."""
+    kind, side = limb.split("_")
+    upper, lower = SEGMENTS[kind]
+    return f"{upper}_{side}", f"{lower}_{side}"
 
 
 def rising_root(function: Callable[[float], float], low: float, high: float, message: str) -> float:
@@ -100,12 +109,25 @@ class Posture:
         across = np.full_like(along, drive.pedal_offset)
         return np.array(drive.axle) + sign * np.stack([along, across, -down], axis=-1)
 
+    @property
+    def grip_arms(self) -> np.ndarray:
+        """Left and right hand ``(2, 3)`` from a point of the steering axis, at straight steering, m."""
+        return np.stack([self._grip_arm(side) for side in SIDES])
+
+    @property
+    def pedal_arms(self) -> np.ndarray:
+        """Left and right pedal ``(2, 3)`` from the crank's axle, with the left one in front, m."""
+        assert self.bicycle.drive is not None
+        return np.stack([self.pedal(side, 0.0) - np.array(self.bicycle.drive.axle) for side in SIDES])
+
+    def _grip_arm(self, side: str) -> np.ndarray:
+        return np.array(self.bicycle.grip) * (1.0, SIGNS[side], 1.0) - self.bicycle.steer_origin
+
     def grip(self, side: str, steer: np.ndarray | float) -> np.ndarray:
         """Hand's position ``(..., 3)`` at a steering angle (rad, left positive)."""
         origin, axis = self.bicycle.steer_origin, self.bicycle.steer_axis
-        zero = np.array(self.bicycle.grip) * (1.0, SIGNS[side], 1.0) - origin
         angle = np.asarray(steer, dtype=float)[..., None]
-        return origin + rotation.rotate(rotation.exp(axis * angle), zero)
+        return origin + rotation.rotate(rotation.exp(axis * angle), self._grip_arm(side))
 
     def elbow_out(self, side: str, trunk: np.ndarray) -> np.ndarray:
         """Direction ``(..., 3)`` in which the elbow points, trunk axes: sideways in the bicycle frame."""
@@ -180,16 +202,17 @@ class Posture:
         """Arms (in the trunk frame) and legs (in the bicycle frame) at a crank angle, straight steering."""
         trunk, segments, found = self.trunk_orientation(), self.segments(), {}
         for name in LIMBS:
-            side = name.split("_")[1]
+            kind, side = name.split("_")
             flip = np.array([1.0, SIGNS[side], 1.0])
-            if name.startswith("arm"):
-                root, names = self.shoulder * flip, ("upper_arm", "forearm")
+            if kind == "arm":
+                root = self.shoulder * flip
                 posture = reach_to(self.arm, self.arm_target(side, 0.0, trunk), self.elbow_out(side, trunk))
             else:
-                root, names = self.hip * flip, ("thigh", "shank")
+                root = self.hip * flip
                 posture = reach_to(self.leg, self.leg_target(side, crank), KNEE_OUT)
-            places = ((root, posture.upper), (root + posture.hinge, posture.lower))
-            found[name] = join([placed(segments[part], *place) for part, place in zip(names, places, strict=True)])
+            upper, lower = (segments[part] for part in SEGMENTS[kind])
+            below = placed(lower, root + posture.hinge, posture.lower)
+            found[name] = join([placed(upper, root, posture.upper), below])
         return found
 
     def trunk_orientation(self) -> np.ndarray:
@@ -204,11 +227,7 @@ class Posture:
             for name, mass in self.limbs_at(crank).items():
                 where = placed(mass, self.lumbar, trunk) if name.startswith("arm") else mass
                 parts.append(Mass(0.5 * where.mass, where.centre, 0.5 * where.tensor))
-        whole = join(parts)
-        x, _, z = whole.centre.tolist()
-        tensor = whole.tensor
-        inertia = (float(tensor[0, 0]), float(tensor[1, 1]), float(tensor[2, 2]), float(tensor[0, 2]))
-        return RigidPart(whole.mass, (x, 0.0, z), inertia)
+        return RigidPart.of(join(parts))
 
 
 def two_turns(pelvis: np.ndarray) -> np.ndarray:
@@ -291,10 +310,10 @@ def loop_closure_error(truth: Mapping[str, np.ndarray], posture: Posture) -> np.
         kind, side = name.split("_")
         limb = posture.limb(name)
         if kind == "arm":
-            root, parts, target = trunk, ("upper_arm", "forearm"), posture.arm_target(side, steer, relative, pelvis)
+            root, target = trunk, posture.arm_target(side, steer, relative, pelvis)
         else:
-            root, parts, target = frame, ("thigh", "shank"), posture.leg_target(side, crank, pelvis)
-        upper, lower = (truth[f"{part}_{side}/orientation"] for part in parts)
+            root, target = frame, posture.leg_target(side, crank, pelvis)
+        upper, lower = (truth[f"{part}/orientation"] for part in segments_of(name))
         reached = rotation.rotate(upper, np.array([0.0, 0.0, -limb.upper]))
         reached = reached + rotation.rotate(lower, np.array([limb.tip[0], 0.0, limb.tip[1]]))
         errors.append(np.linalg.norm(rotation.rotate_back(root, reached) - target, axis=1))

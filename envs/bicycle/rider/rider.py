@@ -48,7 +48,7 @@ from .muscles import (
     plan,
     tense,
 )
-from .posture import LIMBS, SIDES, SIGNS, Posture
+from .posture import LIMBS, Posture
 from .rigid_limbs import holds
 from .saddle import AHEAD, ARMS_ON_HANDS, balanced_hand_load, resting_load, seat_contact
 from .standing import StandingForces, stance
@@ -83,11 +83,10 @@ class Rider:
         self.posture, self.fidelity = posture, fidelity
         self.full = fidelity == "full"
         self._stance = stance(posture) if stands else None
-        axis, origin = posture.bicycle.steer_axis, posture.bicycle.steer_origin
-        arm = np.array(posture.bicycle.grip) - origin
-        self._grip_arm = float(np.linalg.norm(np.cross(axis, arm)))
+        axis, arms = posture.bicycle.steer_axis, posture.grip_arms
+        self._grip_arm = float(np.linalg.norm(np.cross(axis, arms[0])))
         # direction in which each hand moves when the bar turns to the left, at straight steering
-        pulls = [np.cross(axis, arm * (1.0, SIGNS[side], 1.0)) / self._grip_arm for side in SIDES]
+        pulls = [np.cross(axis, arm) / self._grip_arm for arm in arms]
         self._pulls = np.array([(pull, np.cross(axis, pull)) for pull in pulls])
         segments = posture.segments()
         upper, lower = (segments[part] for part in ("upper_arm", "forearm"))
@@ -288,17 +287,12 @@ class Rider:
         """Positions ``(2, 3)`` of left and right hand now, world, m."""
         link = self.bicycle.links["front_assembly"]
         front = self.bicycle.physics.state(self.bicycle.body.body, link)
-        arm = np.array(self.posture.bicycle.grip) - self.posture.bicycle.steer_origin
-        arms = np.stack([arm * (1.0, SIGNS[side], 1.0) for side in SIDES])
-        return front.position + rotation.rotate(front.orientation, arms)
+        return front.position + rotation.rotate(front.orientation, self.posture.grip_arms)
 
     def pedals(self) -> np.ndarray:
         """Positions ``(2, 3)`` of left and right pedal now, world, m."""
         crank = self.bicycle.physics.state(self.bicycle.body.body, self.bicycle.links["crank"])
-        drive = self.posture.bicycle.drive
-        assert drive is not None
-        arms = np.stack([self.posture.pedal(side, 0.0) - np.array(drive.axle) for side in SIDES])
-        return crank.position + rotation.rotate(crank.orientation, arms)
+        return crank.position + rotation.rotate(crank.orientation, self.posture.pedal_arms)
 
     def raw_forces(self) -> list[float]:
         """Forces ``(12,)`` of hands and feet in the last step, N: in world axes (full) or in bicycle axes (lumped)."""

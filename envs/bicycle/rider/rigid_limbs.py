@@ -8,7 +8,7 @@ from ....filters.compile.cache import jit
 from ....filters.core import rotation
 from ...physics.kinematics import add_force
 from ..frame.bicycle import Bicycle
-from .posture import SIDES, SIGNS, Posture
+from .posture import Posture
 
 
 def holds(bicycle: Bicycle, posture: Posture) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -16,14 +16,11 @@ def holds(bicycle: Bicycle, posture: Posture) -> tuple[np.ndarray, np.ndarray, n
 
     Hands act on the handlebar and, oppositely, on the trunk; feet on the pedals and on the pelvis.
     """
-    links, physics, bike = bicycle.links, bicycle.physics, posture.bicycle
-    assert bike.drive is not None
-    grips = [np.array(bike.grip) * (1.0, SIGNS[side], 1.0) - bike.steer_origin for side in SIDES]
-    pedals = [posture.pedal(side, 0.0) - np.array(bike.drive.axle) for side in SIDES]
+    links, physics = bicycle.links, bicycle.physics
     held = [links["front_assembly"]] * 2 + [links["crank"]] * 2
     holding = [links["trunk"]] * 2 + [links["pelvis"]] * 2
     arms = []
-    for link, arm in zip(held, (*grips, *pedals), strict=True):
+    for link, arm in zip(held, (*posture.grip_arms, *posture.pedal_arms), strict=True):
         centre, axes = physics.inertial_frame(bicycle.body.body, link)
         arms.append(rotation.rotate_back(axes, arm - centre))
     axes = rotation.to_matrix(rotation.conjugate(physics.inertial_frame(bicycle.body.body)[1]))

@@ -11,8 +11,9 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from ....filters.compile.cache import jit
+from ....filters.support.parameters import check_positive
 from ...sensors.ideal import STANDARD_GRAVITY
-from .anthropometry import Mass
+from ..frame.parameters import Mass
 from .posture import Posture, placed
 
 
@@ -43,12 +44,8 @@ class SaddleParameters:
     """N·s/m, likewise"""
 
     def __post_init__(self) -> None:
-        for name in ("stiffness", "sit_bones", "behind", "front", "tissue_stiffness"):
-            if not 0.0 < getattr(self, name) < float("inf"):
-                raise ValueError(f"{name} must be positive and finite (N/m or m), got {getattr(self, name)}")
-        for name in ("damping", "tissue_damping"):
-            if not 0.0 <= getattr(self, name) < float("inf"):
-                raise ValueError(f"{name} must not be negative and be finite (N·s/m), got {getattr(self, name)}")
+        positive = ("stiffness", "sit_bones", "behind", "front", "tissue_stiffness")
+        check_positive(self, *positive, or_zero=("damping", "tissue_damping"))
 
 
 class SeatContact(NamedTuple):

@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ....filters.core import rotation
-from .anthropometry import join
+from ..frame.parameters import join
 from .leg_loads import weight_on_pedal
 from .limb_tables import legs_on_pedals
 from .muscles import HANDS as OF_HANDS

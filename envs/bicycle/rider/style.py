@@ -8,6 +8,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from ....filters.compile.cache import jit
+from ....filters.support.parameters import check_positive
 from .body_motion import (
     CHANNELS,
     HANDS,
@@ -109,9 +110,7 @@ class RiderStyle:
     """
 
     def __post_init__(self) -> None:
-        for name in (*SIZES, "hand_load", "unsteadiness", "gaze", "scan"):
-            if not 0.0 <= getattr(self, name) < math.inf:
-                raise ValueError(f"{name} must not be negative, got {getattr(self, name)}")
+        check_positive(self, or_zero=(*SIZES, "hand_load", "unsteadiness", "gaze", "scan"))
         for name in ("posture_interval", "glance_interval", "gaze_interval", "scan_interval"):
             if not getattr(self, name) >= 1.0:
                 raise ValueError(f"{name} must be at least 1 s, got {getattr(self, name)}")

@@ -21,11 +21,6 @@ from .data import AXES, MagnetometerData, RateTableData
 from .records import CalibrationRecord, ChannelCalibration
 
 
-def spatial_axes(array: AccelerometerArray) -> np.ndarray:
-    """Sensitive axes ``(m, 3)``; those of a planar array lie in x and y."""
-    return np.pad(array.e, ((0, 0), (0, 3 - array.dimension)))
-
-
 def accelerometer_record(
     data: RateTableData,
     array: AccelerometerArray,
@@ -59,7 +54,7 @@ def accelerometer_record(
         )
     found, rows = [], []
     up_of = {name: AXES[up] for name, up in zip(data.mounting.tolist(), data.up.tolist(), strict=True)}
-    positions, axes = np.pad(array.r, ((0, 0), (0, 3 - array.dimension))), spatial_axes(array)
+    positions, axes = array.spatial.r.copy(), array.spatial.e.copy()
     for number, axis in enumerate(axes):
         columns = (data.raw[:, number], data.rate, data.mounting)
         try:

@@ -29,6 +29,7 @@ import numpy as np
 
 from ...core.backend import Array, constant, expand, namespace
 from ...core.held_inputs import HeldInput
+from ...core.matrices import times
 from ...core.model import Gain, Model
 from ...core.quantity import GRAVITY, Channel, Measurement, Quantity
 from ...core.rotation import wrap
@@ -93,7 +94,7 @@ class PlanarEquations(ArrayEquations):
     def specific_force(self, z: Measurement) -> Array:
         """c̈ ``(..., 2)``, m/s², body axes."""
         a = z[self.array.channel.name]
-        return (constant(self.array.pseudo_inverse[:2], a) @ a[..., None])[..., 0]
+        return times(constant(self.array.pseudo_inverse[:2], a), a)
 
     def tilt(self, z: Measurement) -> Array:
         """φ̄ ``(..., 1)``: the angle if the specific force is gravity alone (3.20)."""

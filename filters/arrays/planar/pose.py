@@ -26,7 +26,7 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from ...core.backend import Array, constant, expand, namespace, rows
-from ...core.matrices import diagonal_matrix, vector_of
+from ...core.matrices import diagonal_matrix, times, vector_of
 from ...core.model import Gain, Model, with_parameters
 from ...core.quantity import Channel, Measurement, Quantity
 from .orientation import PLANAR_ANGLE, PlanarEquations
@@ -113,7 +113,7 @@ class PlanarPose(PlanarEquations, Model):
         ]
         variances = (self.angular_jerk, self.jerk, self.jerk)
         Q = sum(expand(s**2, 2) * g * g.mT for s, g in zip(variances, G, strict=True)) + 0.0 * F
-        return (F @ x[..., None])[..., 0], F, Q
+        return times(F, x), F, Q
 
     def residual(self, x: Array, z: Measurement) -> tuple[Array, Array, Array]:
         """Readings less the expected ones (3.42), H and R."""
@@ -126,7 +126,7 @@ class PlanarPose(PlanarEquations, Model):
     def expected(self, x: Array) -> Array:
         """Readings h(x) ``(..., m)``, m/s²."""
         z = namespace(x).concat([self._force(x, self._turn_back(x)), x[..., 2:3], x[..., 1:2] ** 2], axis=-1)
-        return (constant(self.array.A, x) @ z[..., None])[..., 0]
+        return times(constant(self.array.A, x), z)
 
     def slope(self, x: Array) -> Array:
         """Jacobian H of h ``(..., m, 9)``."""
@@ -151,4 +151,4 @@ class PlanarPose(PlanarEquations, Model):
     def _force(self, x: Array, matrix: Array) -> Array:
         """The product matrix (b̈ − g) ``(..., 2)``."""
         up = namespace(x).concat([x[..., 7:8], x[..., 8:9] + expand(self.gravity, 1)], axis=-1)
-        return (matrix @ up[..., None])[..., 0]
+        return times(matrix, up)

@@ -10,33 +10,15 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar
 
 import numpy as np
 
 from ...core.backend import constant, to_numpy
 from ...core.estimator import check_measurements, run_by_steps
 from ...core.quantity import Estimate, Measurement
-from ...core.sampling import aged, check_batch, filled, hold, join, split
+from ...core.sampling import FilterState, aged, check_batch, empty_state, filled, hold, join, split
 from .orientation import PLANAR_ANGLE, PLANAR_GYROSCOPE, TURNED_IN_A_PLANE, PlanarEquations, PlanarOrientation
-
-
-class UnscentedState(NamedTuple):
-    """State of the filter; NumPy arrays.
-
-    Attributes:
-        x: ``(*batch, 1)`` angle, rad; zero before the start.
-        covariance: ``(*batch, 1, 1)``, rad².
-        held: ``(*batch, d)`` last finite sample of every channel element, NaN if there was none.
-        age: ``(*batch, channels)`` s since the last sample of each channel.
-        started: ``(*batch,)`` bool.
-    """
-
-    x: np.ndarray
-    covariance: np.ndarray
-    held: np.ndarray
-    age: np.ndarray
-    started: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -72,19 +54,12 @@ class PlanarUnscented(PlanarEquations):
         made.R = model.force_covariance(np.zeros(1))
         return made
 
-    def init(self, measurement: Measurement) -> UnscentedState:
-        """Empty memory with the batch shape of ``measurement``."""
-        sample = to_numpy(join(check_measurements(self.channels, measurement, time_axis=False), self.channels))
-        batch = sample.shape[:-1]
-        return UnscentedState(
-            np.zeros((*batch, 1)),
-            np.zeros((*batch, 1, 1)),
-            np.full(sample.shape, np.nan),
-            np.zeros((*batch, len(self.channels))),
-            np.zeros(batch, bool),
-        )
+    def init(self, measurement: Measurement) -> FilterState:
+        """Empty memory, NumPy arrays, with the batch shape of ``measurement``."""
+        arrays = check_measurements(self.channels, measurement, time_axis=False)
+        return empty_state(self._model, to_numpy(join(arrays, self.channels)).astype(float))
 
-    def step(self, state: UnscentedState, measurement: Measurement) -> tuple[UnscentedState, Estimate]:
+    def step(self, state: FilterState, measurement: Measurement) -> tuple[FilterState, Estimate]:
         """Take one sample of every channel, ``(*batch, size)``; NaN where there is none."""
         arrays = check_measurements(self.channels, measurement, time_axis=False)
         check_batch(arrays, state.started)
@@ -113,7 +88,7 @@ class PlanarUnscented(PlanarEquations):
         angle = np.where(started[..., None], x, np.nan)
         covariance = np.where(started[..., None, None], P, np.nan)
         estimate = Estimate({PLANAR_ANGLE.name: constant(angle, like)}, constant(covariance, like))
-        return UnscentedState(x, P, current, age, started), estimate
+        return FilterState(x, P, current, age, state.monitor, started), estimate
 
     def run(self, measurements: Mapping[str, Any]) -> Estimate:
         """Estimates of a whole sequence, ``(T, *batch, size)`` in and out; equal to stepping."""

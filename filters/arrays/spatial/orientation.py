@@ -47,7 +47,7 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from ...core.backend import Array, constant, expand, namespace
-from ...core.matrices import block_diagonal, block_matrix, covariance_of, identity, vector_of
+from ...core.matrices import block_diagonal, block_matrix, covariance_of, identity, times, vector_of
 from ...core.model import Gain, Model, checked_quaternion
 from ...core.quantity import (
     ANGULAR_RATE,
@@ -201,7 +201,7 @@ class ArrayOrientation(ArrayEquations, Model):
         readings, field = z[self.readings.name], self._body_field(z)
         xp = namespace(readings)
         zero = 0.0 * field + 0.0 * xp.sum(readings, axis=-1)[..., None]
-        q = align((constant(self._mean, readings) @ readings[..., None])[..., 0], field, self.declination)
+        q = align(times(constant(self._mean, readings), readings), field, self.declination)
         if self.start == "given":
             q = 0.0 * q + vector_of(self.start_orientation, 0.0 * q[..., :1])
         world = rotate(q, normalize(field))
@@ -303,7 +303,7 @@ class ArrayOrientation(ArrayEquations, Model):
         external = xp.where(there, external, xp.zeros_like(external))
         virtual = advance(
             x[..., 18:24],
-            (Q @ external[..., None])[..., 0],
+            times(Q, external),
             self.dt,
             velocity_damping=self.velocity_damping,
             position_damping=self.position_damping,

@@ -32,7 +32,6 @@ Gyroscope offsets (14) must be subtracted from the samples beforehand.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal, Self
 
@@ -56,6 +55,7 @@ from .kinematics import (
     gyroscope_accelerations,
     rate_jacobians,
     rates,
+    regular,
     triple,
     up_the_trunk,
 )
@@ -66,8 +66,6 @@ TRUNK_ANGLES = Quantity("force-inertial/trunk_angles", "angle", 3, "rad")
 """φ_h, θ, φ."""
 ROLL = Quantity("bicycle/roll", "angle", 1, "rad")
 TRUNK_BIAS = Quantity("trunk_imu/gyroscope_bias", "vector", 3, "rad/s")
-THETA_LIMIT = 5.0 * DEG
-"""θ keeps this distance from 0 and 180°, where the trunk angles are singular."""
 # indices in the state
 ANGLES, BIAS, OMEGA_H, OMEGA_B, SPEED = slice(0, 4), slice(4, 7), slice(7, 10), slice(10, 13), slice(13, 14)
 TURN_H, TURN_B, PUSH, ACC_H, ACC_B = slice(14, 17), slice(17, 20), slice(20, 21), slice(21, 24), slice(24, 27)
@@ -229,10 +227,7 @@ class ForceInertial(ForceInertialParameters, Model):
         """Additive; angles are wrapped and θ keeps its distance from the singularities."""
         xp = namespace(x)
         parts = [x[..., index] + dx[..., index] for index in range(7)]
-        low, high = THETA_LIMIT, math.pi - THETA_LIMIT
-        theta = xp.where(xp.less(parts[1], low), low + 0.0 * parts[1], parts[1])
-        parts[1] = xp.where(xp.greater(theta, high), high + 0.0 * theta, theta)
-        parts[0], parts[2], parts[3] = wrap(parts[0]), wrap(parts[2]), wrap(parts[3])
+        parts[:4] = wrap(parts[0]), regular(parts[1]), wrap(parts[2]), wrap(parts[3])
         return xp.concat([xp.stack(parts, axis=-1), x[..., 7:]], axis=-1)
 
     def pose(self, x: Array) -> dict[str, Array]:

@@ -6,7 +6,6 @@ integration of (3) and (4) from the angles that the first forces determine. It d
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -15,8 +14,8 @@ from ...core.backend import Array, namespace
 from ...core.model import Recurrence
 from ...core.quantity import Channel, Measurement, Quantity
 from ...core.rotation import wrap
-from .filter import ROLL, THETA_LIMIT, TRUNK_ANGLES
-from .kinematics import Angles, down, rates, up_the_trunk
+from .filter import ROLL, TRUNK_ANGLES
+from .kinematics import Angles, down, rates, regular, up_the_trunk
 from .parameters import CHANNELS, ForceInertialParameters
 from .readings import readings, static_angles, steering
 
@@ -41,15 +40,11 @@ class ForceInertialIntegration(ForceInertialParameters, Recurrence):
 
     def predict(self, x: Array, z: Measurement, previous: Measurement) -> Array:
         """Angles after one interval; θ keeps its distance from the singularities."""
-        xp = namespace(x)
         angles = Angles(*(x[..., index] for index in range(4)))
         omega = up_the_trunk(z["trunk_imu/gyr"]), down(z["bicycle_imu/gyr"])
         rate = rates(angles, *omega, self.imu_tilt)
         phi_h, theta, phi, phi_b = (angle + self.dt * change for angle, change in zip(angles, rate[:4], strict=True))
-        low, high = THETA_LIMIT, math.pi - THETA_LIMIT
-        theta = xp.where(xp.less(theta, low), low + 0.0 * theta, theta)
-        theta = xp.where(xp.greater(theta, high), high + 0.0 * theta, theta)
-        return xp.stack([wrap(phi_h), theta, wrap(phi), wrap(phi_b)], axis=-1)
+        return namespace(x).stack([wrap(phi_h), regular(theta), wrap(phi), wrap(phi_b)], axis=-1)
 
     def pose(self, x: Array) -> dict[str, Array]:
         """Roll (right positive) and trunk angles in the paper's frame R."""

@@ -16,6 +16,7 @@ default differentiates the gyroscopes, which is exact, does not involve gravity 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
@@ -24,12 +25,15 @@ import numpy as np
 from ...analysis.forward_mode import Scalar, cos, sin
 from ...core import rotation
 from ...core.backend import Array, namespace, rows
+from ...core.quantity import DEG
 
 Triple = tuple[Scalar, Scalar, Scalar]
 DOWN = np.diag([1.0, -1.0, -1.0])
 """A vector of the bicycle from this package's axes to the paper's."""
 UP_THE_TRUNK = np.array([[0.0, 0.0, 1.0], [0.0, -1.0, 0.0], [1.0, 0.0, 0.0]])
 """A vector of the trunk from this package's axes to the paper's."""
+THETA_LIMIT = 5.0 * DEG
+"""θ keeps this distance from 0 and 180°, where the trunk angles are singular."""
 
 
 def down(v: Array) -> Triple:
@@ -45,6 +49,13 @@ def up_the_trunk(v: Array) -> Triple:
 def from_trunk(x: Scalar, y: Scalar, z: Scalar) -> Array:
     """A vector in the paper's trunk axes in this package's ``(..., 3)``."""
     return namespace(x).stack([z, -y, x], axis=-1)
+
+
+def regular(theta: Array) -> Array:
+    """θ ``(...)`` at :data:`THETA_LIMIT` from its singularities at least."""
+    xp, low, high = namespace(theta), THETA_LIMIT, math.pi - THETA_LIMIT
+    theta = xp.where(xp.less(theta, low), low + 0.0 * theta, theta)
+    return xp.where(xp.greater(theta, high), high + 0.0 * theta, theta)
 
 
 class Angles(NamedTuple):

@@ -14,6 +14,7 @@ from __future__ import annotations
 from typing import Literal, NamedTuple
 
 from ...core.backend import Array, constant, expand, namespace
+from ...core.matrices import times
 from ...core.rotation import cross, euler_axes, euler_matrix, euler_yxy, euler_zxy, norm, normalize, skew
 
 
@@ -44,7 +45,7 @@ def arm(trunk: Array, shoulder: Array, pivot: Array, joint: Array, hand: Array, 
     # matrices to the bicycle's axes, and the rotation axes of the angles: d(R v) = −[R v]× J dΘ
     R, J = euler_matrix("zxy", trunk), euler_axes("zxy", trunk)
     RH, JH = R @ euler_matrix("yxy", shoulder), R @ euler_axes("yxy", shoulder)
-    offset = (R @ joint[..., None])[..., 0]
+    offset = times(R, joint)
     u = expand(-upper, 1) * RH[..., :, 1]
     z = RH[..., :, 2]
     # f: from the hand to the elbow, whose length is the forearm's (C1)
@@ -117,7 +118,7 @@ def _bend(distance: Array, upper: float, lower: float) -> Array:
 
 def elbow_flexion(trunk: Array, pivot: Array, joint: Array, hand: Array, upper: float, lower: float) -> Array:
     """C4 (14): flexion α ``(...)`` of the elbow, 0 if straight; arguments as for :func:`arm`."""
-    reach = pivot + (euler_matrix("zxy", trunk) @ joint[..., None])[..., 0] - hand
+    reach = pivot + times(euler_matrix("zxy", trunk), joint) - hand
     return _bend(norm(reach), upper, lower)
 
 

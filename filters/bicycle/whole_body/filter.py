@@ -33,22 +33,37 @@ from typing import Any, ClassVar, Literal
 
 from ...core.backend import Array, constant, expand, namespace
 from ...core.held_inputs import ridden
-from ...core.matrices import diagonal_matrix, identity
+from ...core.matrices import diagonal_matrix, identity, times
 from ...core.model import Gain, Model
 from ...core.quantity import STANDARD_GRAVITY, Measurement
 from ...core.rotation import cross, euler_axes, euler_matrix, norm, skew
 from ...support.parameters import check_positive
 from ..geometry import Point, RiderGeometry
 from . import constraints as limb_constraints
-from . import linkage
 from .blocks import BLOCKS, assemble, row_of
-from .linkage import CRANK, ERROR_SIZE, HIP, ROLL, SHOULDER, SIDES, STEER, TRUNK, RiderLinkage, paper_axes
+from .linkage import (
+    CRANK,
+    ERROR_PARTS,
+    ERROR_SIZE,
+    HIP,
+    RELATIVE_ACCELERATION,
+    ROLL,
+    SHOULDER,
+    SIDES,
+    STEER,
+    TRUNK,
+    USUAL,
+    YAW_ACCELERATION,
+    RiderLinkage,
+    paper_axes,
+    seat_moments,
+)
 from .rates import Rates, advance
 
 RATE, ACCELERATION_OF_RATE, SEAT_FORCE = slice(22, 25), slice(25, 28), slice(28, 31)
 SPEED, SHOCK = slice(31, 32), slice(32, 33)
 CONSTRAINTS = ("C1", "C2", "C3", "C5", "C6", "C7")
-TURNING, SITTING = linkage.seat_moments(linkage.USUAL)
+TURNING, SITTING = seat_moments(USUAL)
 NOISES = ("lateral", "trunk", "torque", "length", "hinge", "swivel", "twist")
 TIMES = ("yaw_acceleration_time", "relative_acceleration_time", "shock_time", "shock_scale")
 POSITIVE = (*(f"{name}_noise" for name in NOISES), *TIMES)
@@ -85,7 +100,7 @@ class WholeBody(RiderLinkage, Model):
     seat_share: float = 0.0
     """share of the trunk's sideways lean that the seat carries; 1 in the paper, 0 for riders who support themselves on
     the handlebar, as in the environment"""
-    cells_wide: float = linkage.USUAL.cells_wide
+    cells_wide: float = USUAL.cells_wide
     """m between the rear load cells"""
 
     bicycle_gyroscope_noise: float = 1.0e-2
@@ -140,7 +155,7 @@ class WholeBody(RiderLinkage, Model):
 
     state_size: ClassVar[int] = 33
     error_size: ClassVar[int] = ERROR_SIZE
-    error_parts: ClassVar = linkage.ERROR_PARTS
+    error_parts: ClassVar = ERROR_PARTS
     held_inputs: ClassVar = (
         ridden("bicycle_imu/gyr", "bicycle_gyroscope_noise"),
         ridden("trunk_imu/gyr", "trunk_gyroscope_noise", part="trunk"),
@@ -167,7 +182,7 @@ class WholeBody(RiderLinkage, Model):
     @classmethod
     def rider_parameters(cls, geometry: RiderGeometry) -> dict[str, Any]:
         """Lengths and joint positions of the linkage, and the first moments of the rider's mass."""
-        turning, sitting = linkage.seat_moments(geometry)
+        turning, sitting = seat_moments(geometry)
         return super().rider_parameters(geometry) | {"turning_moment": turning, "sitting_moment": sitting}
 
     @property
@@ -209,8 +224,8 @@ class WholeBody(RiderLinkage, Model):
         Q: dict[tuple[int, int], Array] = {(0, 0): one[..., None] * expand(dt * self.bicycle_gyroscope_noise**2, 2)}
         # Gauss–Markov processes (4)*, (7): ϑ̈ (block 1) and a_ts (block 3)
         memories = (
-            (1, linkage.YAW_ACCELERATION, self.yaw_acceleration_time, self.yaw_acceleration_std),
-            (3, linkage.RELATIVE_ACCELERATION, self.relative_acceleration_time, self.relative_acceleration_std),
+            (1, YAW_ACCELERATION, self.yaw_acceleration_time, self.yaw_acceleration_std),
+            (3, RELATIVE_ACCELERATION, self.relative_acceleration_time, self.relative_acceleration_std),
         )
         for index, part, time, deviation in memories:
             keep = xp.exp(-(dt / time) * one)
@@ -280,8 +295,8 @@ class WholeBody(RiderLinkage, Model):
         )
         # (8): the trunk's accelerometer reads R_BTᵀ (f + a_ts), three rows
         R, J = euler_matrix("zxy", x[..., TRUNK]), euler_axes("zxy", x[..., TRUNK])
-        total = x[..., SEAT_FORCE] + x[..., linkage.RELATIVE_ACCELERATION]
-        residual = paper_axes(z["trunk_imu/acc"]) - (R.mT @ total[..., None])[..., 0]
+        total = x[..., SEAT_FORCE] + x[..., RELATIVE_ACCELERATION]
+        residual = paper_axes(z["trunk_imu/acc"]) - times(R.mT, total)
         by_trunk = R.mT @ skew(total) @ J
         for i in range(3):
             rows.append(
@@ -329,7 +344,7 @@ class WholeBody(RiderLinkage, Model):
         s, c = xp.sin(x[..., ROLL]), xp.cos(x[..., ROLL])
         rate = x[..., RATE][..., 1:2]
         gravity = self.gravity if self.lateral == "published" else -self.gravity
-        yaw = x[..., linkage.YAW_ACCELERATION]
+        yaw = x[..., YAW_ACCELERATION]
         # gravity, centripetal and Euler term of the yaw at the sensor
         expected = gravity * s - py * s / c * rate * rate - px * c * yaw
         if self.lateral == "corrected":
@@ -341,7 +356,7 @@ class WholeBody(RiderLinkage, Model):
         """(9*) ``(..., 1)`` and its derivative ``(..., 3)`` by Θ; the support's moment on the rider about x."""
         xp = namespace(x)
         turning = paper_axes(constant([*self.turning_moment], x))
-        k = (R @ turning[..., None])[..., 0]
+        k = times(R, turning)
         if self.torque == "published":
             s, c = xp.sin(x[..., TRUNK]), xp.cos(x[..., TRUNK])
             weight, zero = turning[..., 1:2] * self.gravity, 0.0 * s[..., :1]

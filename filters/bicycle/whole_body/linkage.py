@@ -18,6 +18,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ...core.backend import Array, constant, namespace
+from ...core.matrices import times
 from ...core.quantity import Channel, Measurement, Quantity
 from ...core.rotation import elementary_matrix, euler_matrix, exp, rotate
 from ..geometry import ARM_MASS, Point, RiderEquations, RiderGeometry
@@ -174,7 +175,7 @@ class RiderLinkage(RiderEquations):
     def bicycle_axes(self, vector: Array) -> Array:
         """A sample of the bicycle's IMU ``(..., 3)`` in the paper's axes of the bicycle: R_z(ξ)."""
         R = elementary_matrix(2, self.bicycle_imu_tilt + 0.0 * vector[..., 0])
-        return (R @ paper_axes(vector)[..., None])[..., 0]
+        return times(R, paper_axes(vector))
 
     def rates(self, z: Measurement) -> dict[str, Array]:
         """Gyroscope channel → rate ``(..., 3)`` in the paper's axes of the body that carries it."""
@@ -206,10 +207,7 @@ class RiderLinkage(RiderEquations):
         """
         R, zero, parts = euler_matrix("zxy", trunk), 0.0 * steer, {}
         for side in SIDES:
-            root = (
-                self.point(self.trunk_pivot, "left", steer)
-                + (R @ self.point(self.shoulder, side, steer)[..., None])[..., 0]
-            )
+            root = self.point(self.trunk_pivot, "left", steer) + times(R, self.point(self.shoulder, side, steer))
             outward = constant([0.0, 0.0, -SIGNS[side]], steer)
             frame, _ = limb_constraints.limb_frame(
                 root, self.hand(side, steer), self.upper_arm, self.forearm, outward, "arm"

@@ -20,11 +20,11 @@ from poise.scripts.pages.studies import update
 
 
 def test_a_row_holds_where_all_values_do() -> None:
-    row = point(1, "cells", {"here": -4.0, "there": 20.0}, "least force of a load cell")
-    bad = point(1, "cells", {"here": -6.0, "there": 20.0}, "least force of a load cell")
-    assert (row["found"], row["accepted"], row["holds"]) == ("-4 … 20 N", "≥ -5 N", True)
-    assert (bad["found"], bad["holds"]) == ("-6 … 20 N; outside: here (-6)", False)
-    assert not point(1, "cells", [math.nan], "least force of a load cell")["holds"]
+    row = point(1, "cells", "-475 N", {"here": -4.0, "there": 20.0}, "least force of a load cell")
+    bad = point(1, "cells", "-475 N", {"here": -6.0, "there": 20.0}, "least force of a load cell")
+    assert (row["now"], row["asked"], row["holds"]) == ("-4 … 20 N", "≥ -5 N", True)
+    assert (bad["now"], bad["holds"]) == ("-6 … 20 N; outside: here (-6)", False)
+    assert not point(1, "cells", "-475 N", [math.nan], "least force of a load cell")["holds"]
 
 
 def test_what_people_do_must_be_covered() -> None:
@@ -48,7 +48,7 @@ def test_a_seated_rider_who_pulls_is_found_and_one_in_flight_is_not() -> None:
     for rides, holds in (([quiet, thrown], True), ([quiet, pulled], False)):
         share, least, *_ = saddle({"straight": rides, "bumps": [pulled]})
         assert (share["holds"], least["holds"]) == (holds, holds)
-    assert share["found"] == "50 %; outside: straight (50)"
+    assert share["now"] == "50 %; outside: straight (50)"
 
 
 def test_bodies_are_compared_scenario_by_scenario() -> None:
@@ -67,8 +67,8 @@ def test_the_order_of_estimators_is_a_row_for_every_group_that_has_one(monkeypat
     monkeypatch.setattr(table, "ranked", ranked)
     groups = [Recorded(role, name, ()) for role, name in (("hand", "broad"), ("carried", "mine"), ("chest", "ride"))]
     rows = list(orders(None, 2, groups))  # type: ignore[arg-type]
-    assert [(row["found"], row["holds"]) for row in rows] == [("0.8", True), ("0.2", False)]
-    assert "2 estimators on broad" in rows[0]["quantity"]
+    assert [(row["before"], row["now"], row["holds"]) for row in rows] == [("0.86", "0.8", True), ("–", "0.2", False)]
+    assert "2 estimators on broad" in rows[0]["claim"]
 
 
 def test_quick_measurements() -> None:
@@ -76,6 +76,7 @@ def test_quick_measurements() -> None:
     assert probes.gravity_residual() < 1e-9
     assert probes.misplaced() == pytest.approx(15.0 * math.sqrt(8.0 / math.pi), rel=0.1)
     assert probes.fixture_picture() > 20.0
+    assert probes.default_drive() == "kinematic"
     least, most, lossy = probes.delays()
     assert least < 2.4 < 2.7 < most
     assert 0.05 < lossy < 0.3

@@ -7,7 +7,7 @@ import pytest
 
 from poise.envs.bicycle.frame.parameters import MOUNTAIN_BIKE
 from poise.envs.bicycle.rider.anthropometry import SUBJECTS
-from poise.envs.bicycle.rider.leg_loads import leg_swing, legs_at_crank, pedal_of_swing, weight_on_pedal
+from poise.envs.bicycle.rider.leg_loads import leg_swing, legs_at_crank, weight_on_pedal
 from poise.envs.bicycle.rider.limbs import reach_to
 from poise.envs.bicycle.rider.posture import CRANKS, KNEE_OUT, sit
 from poise.filters.core import rotation
@@ -58,17 +58,18 @@ def test_the_weight_of_a_leg_turns_the_crank_as_it_sinks() -> None:
 def test_the_pedal_does_the_work_of_a_swinging_leg() -> None:
     """At a steady crank its power is the rate of change of the leg's energy."""
     energies = [0.5 * momentum(CRANKS[:-1] + step)[2] for step in (1e-2, -1e-2)]
-    np.testing.assert_allclose(along_circle(pedal_of_swing(POSTURE)), (energies[0] - energies[1]) / 2e-2, atol=2e-3)
+    pedal = leg_swing(POSTURE)[:-1, 2:]
+    np.testing.assert_allclose(along_circle(pedal), (energies[0] - energies[1]) / 2e-2, atol=2e-3)
     assert legs_at_crank(POSTURE) == pytest.approx(2.0 * momentum(CRANKS[:-1])[2].mean(), rel=1e-3)
 
 
 def test_a_swing_is_the_pedals_force_less_the_change_of_momentum() -> None:
     late, early = (momentum(CRANKS[:-1] + step) for step in (1e-2, -1e-2))
     force, moment = ((after - before) / 2e-2 for after, before in zip(late[:2], early[:2], strict=True))
-    pedal, saddle = pedal_of_swing(POSTURE), np.array(POSTURE.bicycle.saddle)
+    swing, saddle = leg_swing(POSTURE), np.array(POSTURE.bicycle.saddle)
+    pedal = swing[:-1, 2:]
     lift = pedal[:, 2] - force[:, 2]
     places = POSTURE.pedal("left", CRANKS[:-1]) - saddle
     tip = rotation.cross(places, pedal) - rotation.cross(POSTURE.hip - saddle, force) - moment
-    swing = leg_swing(POSTURE)
-    np.testing.assert_allclose(swing[:-1], np.stack([lift, tip[:, 0]], axis=1), atol=5e-3)
+    np.testing.assert_allclose(swing[:-1, :2], np.stack([lift, tip[:, 0]], axis=1), atol=5e-3)
     assert np.array_equal(swing[0], swing[-1])
