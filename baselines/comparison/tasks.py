@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ...envs.data.trajectory import Trajectory
-from ...filters.compile.cache import cache_folder
+from ...filters.compile.cache import cache_folder, unless_full
 from ...filters.support.parallel import in_parallel
 from ...filters.support.resume import is_kept, keep, kept
 from ...filters.support.rows import RESULT
@@ -159,7 +159,8 @@ def compile_ahead(names: Sequence[str], channels: Sequence[str], offline: bool, 
     shares = [(labels[first::processes], tuple(names), tuple(channels), offline) for first in range(processes)]
     for _ in in_parallel(compile_some, shares, processes):
         pass
-    keep(done, key, None)
+    with unless_full(done.parent):
+        keep(done, key, None)
 
 
 def compile_some(labels: Sequence[str], names: Sequence[str], channels: Sequence[str], offline: bool) -> None:

@@ -2,7 +2,8 @@
 
 The folder is ``compiled`` below the one that the environment variable ``POISE_CACHE`` names, or below the user's cache
 folder. Machine code is stored with a checksum, so that a damaged file is compiled anew. What cannot be written, for
-want of a permission or of space, is compiled in memory, at every start, after one warning.
+want of a permission or of space, is compiled in memory, at every start, after one warning. A folder that was filled
+before and cannot be written is read.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ import tempfile
 import threading
 import warnings
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -30,13 +31,15 @@ PATIENCE = 1.0
 
 
 def cache_folder() -> Path | None:
-    """Folder of what is compiled; None, with one warning, where it cannot be written."""
+    """Folder of what is compiled; None, with one warning, where it cannot be written and holds nothing."""
     folder = user_cache("compiled")
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):
             return folder
     except OSError as reason:
+        if next(folder.rglob("*.nbi"), None) or next(folder.glob("*.o"), None):
+            return folder
         warn_once(folder, reason)
         return None
 
@@ -90,13 +93,21 @@ def jit(function: Callable[..., Any]) -> Any:
     with _LOCK:
         # numba reads the place when it decorates; other code that uses numba keeps its own.
         before, numba.config.CACHE_DIR = numba.config.CACHE_DIR, str(folder)
+        locator = importlib.import_module("numba.core.caching")._CacheLocator
+        required, locator.ensure_cache_path = locator.ensure_cache_path, _made_if_possible
         try:
             compiled = numba.njit(cache=True, **options)(function)
         finally:
-            numba.config.CACHE_DIR = before
+            numba.config.CACHE_DIR, locator.ensure_cache_path = before, required
     files = compiled._cache._cache_file
     files.__class__ = _checked(type(files))
     return compiled
+
+
+def _made_if_possible(locator: Any) -> None:
+    """Make the folder of a function; numba would not read one that cannot be written."""
+    with suppress(OSError):
+        Path(locator.get_cache_path()).mkdir(parents=True, exist_ok=True)
 
 
 def _checked(files: Any) -> type:
@@ -177,6 +188,11 @@ def _alone(name: str) -> Iterator[None]:
     if folder is None:
         yield
         return
-    with open(folder / f"{name}.lock", "w") as file:
+    try:
+        file = open(folder / f"{name}.lock", "w")  # noqa: SIM115
+    except OSError:  # nothing can be kept
+        yield
+        return
+    with file:
         fcntl.flock(file, fcntl.LOCK_EX)
         yield

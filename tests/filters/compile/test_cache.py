@@ -127,6 +127,22 @@ def test_without_a_folder_there_is_one_warning_and_nothing_is_left(
 
 
 @pytest.mark.filterwarnings("error")
+def test_a_filled_folder_that_cannot_be_written_is_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refused(*_: object, **__: object) -> None:
+        raise PermissionError(errno.EACCES, "Permission denied")
+
+    compiled(tmp_path, monkeypatch)
+    assert printed(tmp_path, monkeypatch) == 6.0
+    monkeypatch.setattr(tempfile, "TemporaryFile", refused)
+    monkeypatch.setattr(os, "replace", refused)
+    assert compiled(tmp_path, monkeypatch) == (1, 0)
+    assert printed(tmp_path, monkeypatch) == 6.0
+    next((tmp_path / "compiled").rglob("*.nbc")).unlink()
+    with pytest.warns(UserWarning, match="Permission denied"):
+        assert compiled(tmp_path, monkeypatch) == (0, 1)
+
+
+@pytest.mark.filterwarnings("error")
 def test_a_full_disk_costs_one_warning_and_no_result(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def full(source: object, target: object) -> None:
         raise OSError(errno.ENOSPC, "No space left on device")
