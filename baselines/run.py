@@ -35,7 +35,8 @@ def run(
 
     With a trajectory, the estimator runs on the uniform grid behind the time stamps. Gaps are missing samples, for
     which it only predicts, and so are glitches (:mod:`poise.envs.data.glitches`); an estimator with another sampling
-    interval is adjusted. Arrays have no time stamps, so their interval must be given.
+    interval is adjusted. Arrays have no time stamps, so their interval must be given; arrays of one recording are read
+    without glitches, too.
 
     Args:
         estimator: a name (see :func:`poise.list_estimators`), or an estimator. One given by name is configured for
@@ -62,7 +63,7 @@ def run(
     if not isinstance(data, Trajectory):
         made = for_arrays(estimator, data, interval)
         assert interval is not None
-        estimate = warned_of(run_sequence(made, data), made, data)
+        estimate = warned_of(run_sequence(made, as_recorded(data, interval)), made, data)
         length = len(next(iter(estimate.pose.values())))
         return estimate._replace(time=interval * np.arange(length), layout=layout_of(made))
     on_grid = data.on_grid()
@@ -148,6 +149,15 @@ def for_arrays(estimator: str | Estimator[Any], data: Any, interval: float | Non
             f"use estimator.with_dt({interval:.6g})"
         )
     return estimator
+
+
+def as_recorded(data: Mapping[str, Any], interval: float) -> Mapping[str, Any]:
+    """Arrays of one recording as a trajectory of them would be read, without glitches; batches as they are."""
+    arrays = [values for values in data.values() if isinstance(values, np.ndarray) and values.ndim == 2]
+    lengths = {len(values) for values in arrays}
+    if len(arrays) < len(data) or len(lengths) != 1 or min(lengths) < 2:
+        return data
+    return without_glitches(Trajectory(interval * np.arange(lengths.pop()), dict(data)))
 
 
 def run_on(estimator: Estimator[Any], trajectory: Trajectory) -> Estimate:

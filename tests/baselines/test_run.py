@@ -117,3 +117,14 @@ def test_no_estimate_at_all_has_its_cause(motion, channel, value):
         pytest.raises(ValueError, match=f"nothing could be run: vqf: {cause}"),
     ):
         poise.evaluate("vqf", motion.replace(measurements=empty))
+
+
+def test_arrays_are_read_as_a_trajectory_of_them_would_be(motion):
+    arrays = {name: np.array(motion.measurements[name]) for name in ("imu/gyr", "imu/acc")}
+    arrays["imu/acc"][1000] = 70.0
+    arrays["imu/gyr"][1500:1540] = arrays["imu/gyr"][1500]
+    with pytest.warns(UserWarning, match="count as missing samples"):
+        found = poise.run("bounded-motion", arrays, dt=motion.dt)
+    with pytest.warns(UserWarning, match="count as missing samples"):
+        expected = poise.run("bounded-motion", motion.replace(measurements=motion.measurements | arrays))
+    np.testing.assert_allclose(found.pose["up"], expected.pose["up"], atol=1e-9)
