@@ -21,8 +21,10 @@ LEAST_MOTION = 0.3
 """rad/s; root mean square rate below which offsets are not determined."""
 LARGEST_ERROR = 2e-4
 """s; offsets with a larger standard error are not reported."""
-LARGEST = 0.5
-"""s; offsets are looked for within it."""
+LARGEST, FARTHEST = 0.5, 8.0
+"""s; offsets are looked for within the one, and within the other where rates are not alike so near."""
+ALIKE, LESS_ALIKE = 0.85, 0.8
+"""Correlation of rates' magnitudes from which on they are alike, and the share of it that they have at other lags."""
 
 
 class Rates(NamedTuple):
@@ -86,9 +88,20 @@ def coarse_shift(orientation: np.ndarray, gyr: np.ndarray, dt: float) -> int:
     a, b = (np.where(known, values - values[known].mean(), 0.0) for values in (a, b))
     size = 1 << int(np.ceil(np.log2(2 * len(a))))
     correlation = np.fft.irfft(np.fft.rfft(a, size) * np.conj(np.fft.rfft(b, size)), size)
-    reach = min(round(LARGEST / dt), len(a) // 2)
-    lags = np.concatenate([np.arange(reach + 1), np.arange(-reach, 0)])
-    return int(lags[np.argmax(correlation[lags])])
+
+    def best(within: float) -> int:
+        reach = min(round(within / dt), len(a) // 2)
+        lags = np.concatenate([np.arange(reach + 1), np.arange(-reach, 0)])
+        return int(lags[np.argmax(correlation[lags])])
+
+    def alike(shift: int) -> float:
+        one, other = (
+            values[max(shift * sign, 0) : len(a) + min(shift * sign, 0)] for values, sign in ((a, 1), (b, -1))
+        )
+        return float((one * other).sum() / np.sqrt((one * one).sum() * (other * other).sum() + 1e-12))
+
+    near, far = best(LARGEST), best(FARTHEST)
+    return far if alike(far) > ALIKE and alike(near) < LESS_ALIKE * alike(far) else near
 
 
 def measured(trajectory: Trajectory) -> Trajectory:

@@ -14,7 +14,7 @@ from ..trajectory import Trajectory
 from .clocks import check_clock
 from .lateness import agreements, check_gyroscope_scale, check_lag
 from .readings import Finding, check_alive, check_copies
-from .reference import check_frozen, check_reference, check_steps, reference_on_sensor
+from .reference import check_drift, check_frozen, check_reference, check_steps, reference_on_sensor
 from .sites import seen, sites, vectors
 from .turning import check_rates, compared
 from .units import check_field, check_force, check_noise, check_rest, check_sign
@@ -48,6 +48,7 @@ def check_recording(trajectory: Trajectory) -> list[Finding]:
         findings += check_site(trajectory, site, wrong_clock)
     if not any(finding.channel == "imu/gyr" and finding.severity == "warning" for finding in findings):
         findings += [*check_frozen(trajectory), *check_steps(trajectory)]
+        findings += [] if wrong_clock else check_drift(trajectory)
     return sorted(findings, key=lambda finding: finding.severity != "warning")
 
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ....filters.core import rotation
-from ..reference_clock import WINDOW, aligned, rate_error
+from ..reference_clock import WINDOW, aligned, clock_offset, mean_rates, rate_error
 from ..repeats import HELD, runs_of, usual_run
 from ..trajectory import REFERENCE_CLOCK, Trajectory
 from .readings import Finding, Severity
@@ -30,6 +30,12 @@ JUMP = 0.35
 """rad that a reference turns between two samples beyond what the gyroscope shows."""
 STALE = 0.01
 """rad that a gyroscope turns, on average, while a slower reference repeats one value."""
+DRIFT = 0.5 * LARGE_OFFSET
+"""s between the offsets of the two halves of a recording, from which on a clock drifts."""
+TURNS = 0.009
+"""rad/s by which a reference turns about the vertical and the gyroscope does not."""
+TILTS, SURE = 0.05, 6.0
+"""Variance of the vertical in the sensor's axes without which that is no other than a bias; standard errors."""
 FEWEST = 500
 """Samples that determine how a reference lies."""
 
@@ -122,6 +128,41 @@ def check_steps(trajectory: Trajectory) -> Iterator[Finding]:
         cause = "a tracking system that lost the body, or mistook its markers"
         remedy = "The gyroscope does not show them: replace the wrong rows by NaN."
         yield Finding("warning", "orientation", what, cause, remedy)
+
+
+def check_drift(trajectory: Trajectory) -> Iterator[Finding]:
+    """A clock that drifts against the gyroscope's, and a heading that does."""
+    q, gyr = trajectory.truth.get("orientation"), seen(trajectory, "imu/gyr")
+    if q is None or gyr is None or len(q) < FEWEST:
+        return
+    q, half = without_jumps(trajectory), len(q) // 2
+    offsets = [clock_offset(q[part], gyr[part], trajectory.dt) for part in (slice(half), slice(half, None))]
+    if offsets[0] is not None and offsets[1] is not None and abs(offsets[1] - offsets[0]) > DRIFT:
+        speed = (offsets[1] - offsets[0]) / (half * trajectory.dt)
+        what = "it is {:+.0f} ms ahead of the gyroscope in the first half, {:+.0f} ms in the second".format(
+            *(1e3 * offset for offset in offsets)
+        )
+        cause = (
+            f"a clock that runs about {100.0 * abs(speed):.1g} % {'fast' if speed > 0.0 else 'slow'}, or lost samples"
+        )
+        yield Finding("warning", "orientation", what, cause, "Bring both to one clock.")
+        return
+    rates = mean_rates(q, gyr, trajectory.dt)
+    middle = (len(q) - len(rates.reference)) // 2
+    up = rotation.up_in_body(q)[middle : middle + len(rates.reference)]
+    difference = rates.reference - rates.gyroscope
+    known = np.isfinite(difference).all(axis=1) & np.isfinite(up).all(axis=1)
+    if known.sum() < FEWEST:
+        return
+    size = np.linalg.norm(difference - np.median(difference[known], axis=0), axis=1)
+    known &= size <= 5.0 * np.median(size[known]) + 1e-9
+    up, difference = (values[known] - values[known].mean(axis=0) for values in (up, difference))
+    turning = float((up * difference).sum() / max(float((up * up).sum()), 1e-9))
+    error = np.sqrt(np.mean((difference - turning * up) ** 2) / np.sum(up * up) * WINDOW / trajectory.dt)
+    if (up * up).sum() > TILTS * len(up) and abs(turning) > max(TURNS, SURE * error):
+        what = f"it turns about the vertical by {np.degrees(turning):.1f} °/s, and the gyroscope does not"
+        cause = "a heading that drifts, as that of a reference which is an inertial sensor itself"
+        yield Finding("warning", "orientation", what, cause, "Score the inclination, or take another reference.")
 
 
 def check_frozen(trajectory: Trajectory) -> Iterator[Finding]:

@@ -125,8 +125,10 @@ def check_axes(site: str, found: dict[str, RateConsistency]) -> Iterator[Finding
     what = f"gyroscope and {' and '.join(odd)} do not turn together"
     proper = float(np.linalg.det(axes)) > 0.0
     of_gyroscope = f"of the gyroscope {axes_in_words(axes)}"
-    # A vector's own sign does not show: of the two arrangements that look alike, the one with fewer signs is meant.
-    of_vector = f"of the {name} {axes_in_words(min(axes, -axes, key=lambda m: int((m < 0.0).sum())))}"
+    # A vector's own sign does not show: of the two arrangements that look alike, the one with fewer signs is meant, of
+    # a reference the one that is a rotation.
+    unlikely = (lambda m: float(np.linalg.det(m)) < 0.0) if name == "reference" else (lambda m: (m < 0.0).sum())
+    of_vector = f"of the {name} {axes_in_words(min(axes, -axes, key=unlikely))}"
     if proper and agreeing:
         channel = {"accelerometer": f"{site}/acc", "magnetometer": f"{site}/mag", "reference": "orientation"}[name]
         cause = of_vector

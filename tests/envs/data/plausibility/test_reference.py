@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 
 import numpy as np
@@ -36,10 +37,10 @@ def wrong(rows: slice, value: tuple[float, ...]) -> Callable[[np.ndarray], np.nd
     return changed
 
 
-def told(gesture: str, change: Callable[[np.ndarray], np.ndarray]) -> list[str]:
+def told(gesture: str, change: Callable[[np.ndarray], np.ndarray], ends: int = 100) -> list[str]:
     known = MOTIONS[gesture]
     q = change(np.array(known.truth["orientation"]))
-    trajectory: Trajectory = known.replace(truth={"orientation": q})[100:-100]
+    trajectory: Trajectory = known.replace(truth={"orientation": q})[ends:-ends]
     return [f"{each.severity}: {each.what}" for each in check_recording(trajectory) if each.channel == "orientation"]
 
 
@@ -68,6 +69,41 @@ def test_each_kind_is_named(gesture: str, change: Callable[[np.ndarray], np.ndar
     assert len(found) == 1, found
     assert found[0].startswith("warning")
     assert words in found[0]
+
+
+@pytest.mark.parametrize("gesture", list(MOTIONS))
+@pytest.mark.parametrize("samples", [80, 150, 300, 500, -100, -450])
+def test_seconds_are_found(gesture: str, samples: int) -> None:
+    (found,) = told(gesture, late(samples), 500)
+    side = "behind" if samples > 0 else "ahead of"
+    assert f"the reference is {10 * abs(samples):.1f} ms {side} the gyroscope" in found
+
+
+def fast(share: float) -> Callable[[np.ndarray], np.ndarray]:
+    return lambda q: q[np.rint(np.arange(100, len(q) - 100) * (1.0 + share)).astype(int).clip(0, len(q) - 1)]
+
+
+@pytest.mark.parametrize(
+    ("gesture", "share"), [("mixed", 0.001), ("mixed", -0.0015), ("mixed", 0.002), ("slow", 0.001)]
+)
+def test_a_clock_that_drifts(gesture: str, share: float) -> None:
+    known = MOTIONS[gesture][100:-100]
+    truth = {"orientation": fast(share)(np.array(MOTIONS[gesture].truth["orientation"]))}
+    found = [each.what + each.cause for each in check_recording(known.replace(truth=truth))]
+    assert any(
+        re.search(rf"a clock that runs about 0\.\d+ % {'fast' if share > 0 else 'slow'}", each) for each in found
+    )
+
+
+@pytest.mark.parametrize("gesture", list(MOTIONS))
+@pytest.mark.parametrize("speed", [0.8, -2.0])
+def test_a_heading_that_drifts(gesture: str, speed: float) -> None:
+    def change(q: np.ndarray) -> np.ndarray:
+        angle = np.radians(speed) * 0.01 * np.arange(len(q))
+        return np.asarray(rotation.multiply(rotation.exp(angle[:, None] * [0.0, 0.0, 1.0]), q))
+
+    (found,) = told(gesture, change)
+    assert f"turns about the vertical by {speed:.1f} °/s" in found
 
 
 def test_a_reference_whose_samples_are_never_near_each_other_is_left_alone() -> None:
