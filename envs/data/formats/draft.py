@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from .described import mapping_of, plausible_units
+from .described import mapping_of, plausible_units, units_of
 from .mapping import RecordingMap
 from .tables.arrays import read_table
 from .tables.stamps import as_seconds
@@ -105,6 +105,13 @@ def explanation(path: Path) -> str:
     except (ValueError, ImportError) as reason:
         return str(reason)
     suggested = ", ".join(f"{channel} = {list(columns)}" for channel, columns in mapping.columns.items())
+    known = {name.rpartition("/")[2] for name in mapping.columns if all(units_of(table, mapping, name))}
+    if {"gyr", "acc"} <= known and mapping.time is None and mapping.rate is None:
+        return (
+            f"it holds a table ({table.seen()}) with gyroscope and accelerometer, but neither a column of the time nor "
+            "a sampling rate is told: in Python poise.load_recording(path, rate=100.0) or time=…; or `poise inspect "
+            f"{path.name} --write-map {path.stem}.toml` drafts a mapping to complete and to use in place of the file"
+        )
     return (
         f"it holds a table ({table.seen()}) whose names and units do not identify gyroscope and accelerometer"
         f"{f' (they suggest {suggested})' if suggested else ''}. Describe the columns: `poise inspect {path.name} "

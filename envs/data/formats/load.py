@@ -21,7 +21,7 @@ from .dot import is_dot, is_xsens, load_dot, load_xsens
 from .draft import explanation
 from .folders import is_folder_of_streams, is_member, load_member
 from .mapping import RecordingMap, apply_map, make_map, read_map
-from .tables.arrays import MATLAB, PARQUET, read_table
+from .tables.arrays import MATLAB, PARQUET, is_json, read_table
 from .tables.cells import SENSOR
 from .tables.head import Head
 from .tables.rows import widened
@@ -72,7 +72,8 @@ def is_described(head: Head) -> bool:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            table = read_table(head.path) if arrays else widened(table_of(head.text, head.path.name))
+            whole = arrays or is_json(head.text)
+            table = read_table(head.path) if whole else widened(table_of(head.text, head.path.name))
             if any(SENSOR.search(name) and name not in table.labels for name in table.texts):
                 # The first rows may be of one sensor only.
                 table = read_table(head.path)
@@ -242,6 +243,8 @@ def chosen_map(path: Path, given: Mapping[str, Any]) -> RecordingMap:
             raise ValueError(explanation(path))
         arguments["columns"] = {name.removeprefix("imu/"): list(names) for name, names in drafted.columns.items()}
         arguments.setdefault("time", drafted.time)
+        if arguments["time"] is None and drafted.rate is not None:
+            arguments.setdefault("rate", drafted.rate)
         made = make_map(**arguments)
         units = {name.removeprefix("imu/"): unit for name, unit in drafted.units.items()} | dict(made.units)
         return replace(made, units=units, reference=made.reference or drafted.reference)

@@ -2,25 +2,27 @@
 
 from __future__ import annotations
 
+import re
 import zipfile
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ...storage import HDF5_SIGNATURE, LARGEST, LARGEST_RATIO, objects, read_hdf5
-from .cells import labels_of, numeric
+from .frame import as_named, table_of_frame
 from .head import decode, is_text
 from .packed import OPENERS, ZIP, content_of, is_archive_of_arrays
+from .records import read_json
 from .rows import widened
-from .table import Table, split_unit
+from .table import Table
 from .text import read_text
 
-if TYPE_CHECKING:
-    import pandas
-
 NPY, PARQUET, MATLAB = b"\x93NUMPY", b"PAR1", b"MATLAB"
+MOST_NAMES = 1000
+"""Texts in a list of names of columns."""
 
 
 OTHERS: dict[bytes, str] = {
@@ -82,32 +84,61 @@ def read_table(path: Path) -> Table:
     if is_text(head):
         if head.lstrip()[:1] == b"<":
             raise ValueError("it is XML; save its samples as a table, such as CSV, one row a sample")
-        if head.lstrip()[:1] in (b"{", b"["):
+        if is_json(decode(head)):
             return widened(read_json(path))
         return widened(read_text(path))
     raise ValueError("it is empty" if not head else "it is neither a text nor a NumPy, MATLAB, HDF5 or Parquet file")
 
 
+def is_json(text: str) -> bool:
+    """Whether a text begins as JSON does, and not with the title of a section, ``[Header]``."""
+    return re.match(r"\s*(\{|\[\s*([\[{\"\d-]|$))", text) is not None
+
+
 def as_table(arrays: dict[str, Any], kind: str) -> Table:
-    """Numeric arrays of one or two dimensions and at least two rows, time along the first."""
+    """Numeric arrays of one or two dimensions and at least two rows, time along the first.
+
+    Single numbers and texts are the preamble, ``fs: 100``; a list of texts names the columns of a matrix beside it.
+    """
     found: dict[str, np.ndarray] = {}
-    for name, values in arrays.items():
+    preamble: list[str] = []
+    texts: list[np.ndarray] = []
+    for name, values in fields_of_structures(arrays):
         array = np.ma.filled(np.ma.asarray(values).astype(float), np.nan) if np.ma.isMaskedArray(values) else values
         array = np.asarray(array)
-        if array.dtype.names:
-            found |= {field: np.ravel(array[field]) for field in array.dtype.names}
-            continue
         array = array.reshape(-1) if array.ndim == 2 and 1 in array.shape else array
-        if array.dtype.kind not in "fiub" or array.ndim not in (1, 2) or array.size == 0:
-            continue
-        found[name] = time_first(array)
+        if array.dtype.kind in "Mm":
+            name, array = f"{name} (ns)", array.astype(f"{array.dtype.kind}8[ns]").astype(np.int64)
+        if array.size == 1 and array.dtype.kind in "fiuU":
+            preamble.append(f"{name.rpartition('/')[2]}: {array.item()}")
+        if array.dtype.kind == "U" and array.ndim == 1:
+            texts.append(array)
+        if array.dtype.kind in "fiub" and array.ndim in (1, 2) and array.size > 1:
+            found[name] = time_first(array)
+    for name, matrix in [each for each in found.items() if each[1].ndim == 2]:
+        heads = [each.tolist() for each in texts if len(set(each.tolist())) == matrix.shape[1] > 4]
+        if heads:
+            del found[name]
+            found |= {str(head): matrix[:, column] for column, head in enumerate(heads[0])}
     if len(found) == 1 and next(iter(found.values())).ndim == 2:
         # A single array of all columns: they go by their numbers.
         matrix = next(iter(found.values()))
-        return Table({str(column): matrix[:, column] for column in range(matrix.shape[1])}, kind=kind, named=False)
+        columns = {str(column): matrix[:, column] for column in range(matrix.shape[1])}
+        return Table(columns, preamble=tuple(preamble), kind=kind, named=False)
     if not found:
         raise ValueError(f"the {kind} holds no numeric array")
-    return as_named(found, kind)
+    return replace(as_named(found, kind), preamble=tuple(preamble))
+
+
+def fields_of_structures(arrays: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+    """Arrays by their names, those of structured ones by ``name/field``."""
+    for name, values in arrays.items():
+        if getattr(values, "dtype", np.dtype(float)).names:
+            whole = {f"{name}/{field}".removeprefix("array/"): values[field] for field in values.dtype.names}
+            for inner, part in fields_of_structures(whole):
+                yield inner, part.reshape(len(part), -1) if part.ndim > 1 else part
+        else:
+            yield name, values
 
 
 def time_first(array: np.ndarray) -> np.ndarray:
@@ -125,7 +156,7 @@ def load_npy(path: Path) -> np.ndarray:
 
 
 def load_npz(path: Path) -> dict[str, np.ndarray]:
-    """The arrays of an archive, dates in whole ns; what declares more than its file can hold is not unpacked."""
+    """The arrays of an archive; what declares more than its file can hold is not unpacked."""
     try:
         with zipfile.ZipFile(path) as archive:
             total = sum(entry.file_size for entry in archive.infolist())
@@ -138,9 +169,7 @@ def load_npz(path: Path) -> dict[str, np.ndarray]:
                     check_declared(file, entry)
         with np.load(path, allow_pickle=False) as archive:
             arrays = {name: archive[name] for name in archive.files}
-        dates = {name: array for name, array in arrays.items() if array.dtype.kind in "Mm"}
-        whole = {name: array.astype(f"{array.dtype.kind}8[ns]").astype(np.int64) for name, array in dates.items()}
-        return {name: array for name, array in (arrays | whole).items() if array.dtype.kind in "fiubUc"}
+        return {name: array for name, array in arrays.items() if array.dtype.kind in "fiubUVMm"}
     except (zipfile.BadZipFile, EOFError, OSError, KeyError) as reason:
         raise ValueError(f"it is not a readable NumPy archive; it may be truncated: {reason}") from None
 
@@ -174,6 +203,8 @@ def load_mat(path: Path) -> dict[str, Any]:
             for name, inner in value.items():
                 if not str(name).startswith("__"):
                     visit(f"{prefix}/{name}" if prefix else str(name), inner)
+        elif isinstance(value, str) or (len(np.shape(value)) == 1 and all(isinstance(one, str) for one in value)):
+            flat[prefix] = np.array(value)
         elif isinstance(value, list) or (isinstance(value, np.ndarray) and value.dtype == object):
             # An array of structures.
             for number, inner in enumerate(np.ravel(np.asarray(value, dtype=object))):
@@ -186,14 +217,29 @@ def load_mat(path: Path) -> dict[str, Any]:
 
 
 def hdf5_arrays(file: Any, path: Path) -> dict[str, np.ndarray]:
-    """All numeric datasets by their paths; those of MATLAB 7.3 transposed."""
-    found = {}
+    """Datasets of numbers, texts and structures by their paths, those of MATLAB 7.3 transposed, and attributes."""
+    found = {
+        name: np.asarray(value)
+        for name, value in file.attrs.items()
+        if isinstance(value, str | int | float | np.number)
+    }
     for name, item in objects(file):
-        if hasattr(item, "dtype") and item.dtype.kind in "fiub" and not name.startswith("#refs#"):
-            unit = item.attrs.get("units", item.attrs.get("Units", item.attrs.get("unit", "")))
-            unit = unit.decode(errors="replace") if isinstance(unit, bytes) else str(unit)
-            found[f"{name} ({unit})" if unit else name] = item[()].T if "MATLAB_class" in item.attrs else item[()]
+        if not hasattr(item, "dtype") or name.startswith("#refs#"):
+            continue
+        if item.dtype.kind in "fiubV":
+            unit = first_text(item.attrs.get("units", item.attrs.get("Units", item.attrs.get("unit", ""))))
+            values = item[()].T if "MATLAB_class" in item.attrs else item[()]
+            found[f"{name} ({unit})" if unit else name] = values
+        elif item.dtype.kind in "SO" and item.ndim == 1 and item.size <= MOST_NAMES:
+            found[name] = np.array([first_text(one) for one in item[()].tolist()])
     return found
+
+
+def first_text(value: Any) -> str:
+    """A text of HDF5, or the one that all of an array are; empty of others."""
+    several = {each if isinstance(each, bytes | str) else "" for each in np.ravel(value).tolist()}
+    one = several.pop() if len(several) == 1 else ""
+    return one.decode(errors="replace") if isinstance(one, bytes) else one
 
 
 def read_parquet(path: Path) -> Table:
@@ -209,73 +255,3 @@ def read_parquet(path: Path) -> Table:
     if frame.index.name or frame.index.dtype.kind in "mM":
         frame = frame.rename_axis(index=frame.index.name or "time").reset_index()
     return widened(table_of_frame(frame, "Parquet table"))
-
-
-def table_of_frame(frame: pandas.DataFrame, kind: str) -> Table:
-    """A table of a frame; texts are left out, dates become ns."""
-    import pandas
-
-    arrays: dict[str, np.ndarray] = {}
-    labels: dict[str, np.ndarray] = {}
-    for name, column in frame.items():
-        if column.dtype.kind == "m":
-            values: np.ndarray | None = column.to_numpy("timedelta64[ns]").astype(np.int64)
-        elif column.dtype.kind == "M":
-            values = pandas.to_datetime(column, utc=True).to_numpy("datetime64[ns]").astype(np.int64)
-        elif column.map(np.ndim).any():
-            rows = [list(each) if isinstance(each, list | tuple | np.ndarray) else [] for each in column]
-            if {len(row) for row in rows} == {3} and all(isinstance(one, int | float) for row in rows for one in row):
-                arrays |= {f"{name}_{axis}": np.array(rows, dtype=float)[:, i] for i, axis in enumerate("xyz")}
-            continue
-        else:
-            values, _ = numeric(column)
-        found = labels_of(str(name), column, values)
-        labels |= {str(name): found} if found is not None else {}
-        if values is not None:
-            arrays[f"{name} (ns)" if column.dtype.kind in "mM" else str(name)] = values
-    return replace(as_named(arrays, kind), labels=labels)
-
-
-def as_named(arrays: dict[str, np.ndarray], kind: str) -> Table:
-    """A table of arrays whose names may end with a unit."""
-    parts = [split_unit(name) for name in arrays]
-    units = {name: unit for name, unit in parts if unit}
-    return Table({name: values for (name, _), values in zip(parts, arrays.values(), strict=True)}, units, kind=kind)
-
-
-def columns_or_records(text: str) -> Any:
-    """The records of a JSON object that has one list of them, or lists of equal length for columns; else None."""
-    import json
-
-    try:
-        whole = json.loads(text)
-    except (ValueError, RecursionError):
-        return None
-    lists = {name: one for name, one in whole.items() if isinstance(one, list)} if isinstance(whole, dict) else {}
-    if len(lists) == 1:
-        return next(iter(lists.values()))
-    flat = lists and all(isinstance(one, int | float | str | None) for each in lists.values() for one in each)
-    if not flat or len({len(each) for each in lists.values()}) != 1:
-        return None
-    return [dict(zip(lists, row, strict=True)) for row in zip(*lists.values(), strict=True)]
-
-
-def read_json(path: Path) -> Table:
-    """A list of records, or a record a line, of numbers and of records of numbers."""
-    import json
-
-    import pandas
-
-    text = decode(content_of(path)).strip()
-    try:
-        records = json.loads(text) if text.startswith("[") else [json.loads(line) for line in text.splitlines()]
-    except (ValueError, RecursionError):
-        records = None
-    if text.startswith("{") and (records is None or len(records) == 1):
-        records = columns_or_records(text)
-    alike = isinstance(records, list) and len(records) > 1 and all(isinstance(one, dict) for one in records)
-    if not alike:
-        raise ValueError(
-            "it is JSON, but no list of records; save its samples as a table, such as CSV, one row a sample"
-        )
-    return table_of_frame(pandas.json_normalize(records, max_level=3), "JSON records")

@@ -20,8 +20,12 @@ MISSING = (
     "#name?", "#ref!", "#null!",
 )  # fmt: skip
 """Texts for no value, in lower case: of languages, databases, C libraries and spreadsheets."""
+HEX = re.compile(r"0x(?:[0-9a-f]{2}|[0-9a-f]{4}|[0-9a-f]{8})", re.IGNORECASE)
 NUMBER = re.compile(r"[-+]?(\d+[.,]?\d*|[.,]\d+)([eEdD][-+]?\d+)?|[-+]?(inf|infinity)", re.IGNORECASE)
-GROUPED = re.compile(r"[-+]?\d{1,3}('\d{3})+([.,]\d*)?|[-+]?\d{1,3}(,\d{3})*\.\d*|[-+]?\d{1,3}(\.\d{3})*,\d*")
+GROUPED = re.compile(
+    r"[-+]?\d{1,3}((?P<mark>[' ])\d{3}((?P=mark)\d{3})*)?([.,]\d*)?"
+    r"|[-+]?\d{1,3}(,\d{3})*\.\d*|[-+]?\d{1,3}(\.\d{3})*,\d*"
+)
 """Digits in groups of thousands, where the decimal mark is another one."""
 DURATION = re.compile(r"([-+]?\d+(?:[.,]\d+)?)\s*(s|secs?|seconds?|ms|msec|us|µs|min|minutes?|hr?|hours?)")
 """A duration with its unit, as MATLAB writes it."""
@@ -42,7 +46,8 @@ def is_number(field: str) -> bool:
 
 def is_value(field: str) -> bool:
     """Whether a field may stand in a table of numbers."""
-    return is_number(field) or field.lower() in MISSING or bool(DATE.fullmatch(field) or DURATION.fullmatch(field))
+    spelled = HEX.fullmatch(field) or DATE.fullmatch(field) or DURATION.fullmatch(field)
+    return is_number(field) or field.lower() in MISSING or bool(spelled)
 
 
 def labels_of(name: str, column: pandas.Series, values: np.ndarray | None) -> np.ndarray | None:
@@ -70,6 +75,8 @@ def numeric(column: pandas.Series) -> tuple[np.ndarray | None, np.ndarray]:
         values = pandas.to_numeric(texts.str.replace(",", ".", regex=False), errors="coerce")
     if values[filled].isna().any():
         values = pandas.to_numeric(spelled_out(texts, filled), errors="coerce")
+    if values[filled].isna().all() and texts[filled].str.fullmatch(HEX.pattern, flags=re.IGNORECASE).all():
+        values[filled] = signed(texts[filled])
     wrong = filled & values.isna()
     if not filled.any() or wrong.sum() > 0.5 * filled.sum():
         first = str(texts[filled].iloc[0]) if filled.any() else ""
@@ -80,6 +87,14 @@ def numeric(column: pandas.Series) -> tuple[np.ndarray | None, np.ndarray]:
             none = np.flatnonzero(~texts.str.fullmatch(DATE.pattern, flags=re.IGNORECASE).fillna(False).to_numpy(bool))
         return found, none
     return values.to_numpy(dtype=float), np.flatnonzero(wrong)
+
+
+def signed(texts: pandas.Series) -> np.ndarray:
+    """Hexadecimal numbers ``(N,)``, those of four or eight digits as registers of sensors hold them, with a sign."""
+    values = np.array([int(text, 16) for text in texts], dtype=float)
+    digits = {len(text) - 2 for text in texts}
+    range_of = 16.0 ** digits.pop()
+    return np.where(values >= range_of / 2.0, values - range_of, values) if not digits and range_of > 256.0 else values
 
 
 def durations(texts: pandas.Series) -> np.ndarray | None:
@@ -104,5 +119,5 @@ def spelled_out(texts: pandas.Series, filled: pandas.Series) -> pandas.Series:
     for group, decimal in ((",", "."), (".", ",")):
         marks = texts[filled].str.rfind(group), texts[filled].str.rfind(decimal)
         if (marks[1] >= 0).all() and (marks[0] < marks[1]).all():
-            return texts.str.replace(f"[{group}']", "", regex=True).str.replace(decimal, ".", regex=False)
-    return texts.str.replace("'", "", regex=False)
+            return texts.str.replace(f"[{group}' ]", "", regex=True).str.replace(decimal, ".", regex=False)
+    return texts.str.replace("[' ]", "", regex=True)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
+from .names import FOREIGN
 from .packed import OPENERS, ZIP, content_of, is_archive_of_arrays
 
 ALIKE = str.maketrans({"\u2212": "-", "\u00a0": " ", "\u202f": " ", "\u2009": " ", "\ufeff": None, "\x1a": None})
@@ -26,8 +27,17 @@ def decode(content: bytes) -> str:
         try:
             text = content.decode("utf-8-sig")
         except UnicodeDecodeError:
-            text = content.decode("cp1252", errors="replace")
+            text = of_letters(content)
     return text.translate(ALIKE).replace("\r\n", "\n").replace("\r", "\n")
+
+
+def of_letters(content: bytes) -> str:
+    """A text of letters of one byte, or of a Chinese, Japanese or Korean encoding, if its first words are known so."""
+    for encoding in ("gb18030", "shift_jis", "cp949"):
+        begin = content[:4096].decode(encoding, errors="replace")
+        if any(not match[0].isascii() and match[0][0] > "\u1100" for match in FOREIGN.finditer(begin)):
+            return content.decode(encoding, errors="replace")
+    return content.decode("cp1252", errors="replace")
 
 
 def wide(content: bytes) -> str:

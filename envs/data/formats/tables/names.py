@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 import unicodedata
 from collections.abc import Mapping
@@ -29,9 +30,11 @@ def _words(text: str) -> set[str]:
 
 FILLERS = _words(
     "cal calibrated uncalibrated raw data s rs sensor field values value axis imu element measured rate velocity vel "
-    "signal body b wideband float motion"
+    "signal body b wideband float motion array high low highg lowg"
 )
 GRAVITY_FREE = _words("free linear user lin gravity increment global world")
+SPREADS = _words("covariance cov variance std sigma")
+"""Words for how uncertain a reading is."""
 KINDS = {
     "gyr": _words("gyr gyro gyros gyroscope gyroscopes omega angvel angrate rotationrate as w g"),
     "acc": _words("acc accel accelerometer accelerometers acceleration accelerations accl a specific"),
@@ -74,7 +77,7 @@ def classify(name: str) -> tuple[str, str, str, str] | None:
         return match[1].strip("_./ "), "matrix", "", f"{match[2]}{match[3]}"
     if len(parts) == 1 and re.fullmatch(r"(gyr|gyro|acc|accel|mag|quat|[wagmqh])[xyzw0-3]", parts[0]):
         parts = [parts[0][:-1], parts[0][-1]]
-    numbered = re.fullmatch(r"(gyr|gyro|acc|accel|mag)_?([xyz])_?(\d+)", name.strip(), re.IGNORECASE)
+    numbered = re.fullmatch(r"(gyr|gyro|acc|accel|mag|[gawm])_?([xyz])[_.\[]?(\d+)\]?", name.strip(), re.IGNORECASE)
     if numbered:
         return numbered[3], next(kind for kind in KINDS if numbered[1].lower() in KINDS[kind]), "", numbered[2].lower()
     if parts and re.fullmatch(r"(gyr|gyro|acc|accel|mag|quat)[xyzw0-3]", parts[-1]):
@@ -85,21 +88,24 @@ def classify(name: str) -> tuple[str, str, str, str] | None:
         where = letters[0]  # of ``ACC.X 1`` the letter is the axis
     if where is None:
         where = next((i for i, word in enumerate(parts) if word in QUATERNION and not word.isdigit()), None)
-    if where is None or len(parts) < 2 or GRAVITY_FREE & set(parts) or "inc" in parts:
+    if where is None or len(parts) < 2 or (GRAVITY_FREE | SPREADS) & set(parts) or "inc" in parts:
         return None
     axis, rest = parts[where], parts[:where] + parts[where + 1 :]
     joined = " ".join(rest)
     if re.search(r"\b(angular (velocity|rate)|rotation rate)\b", joined):
         first = next(i for i, word in enumerate(rest) if word in ("angular", "rotation"))
         return " ".join(word for word in rest[:first] if word not in FILLERS), "gyr", "", axis
-    for kind, known in KINDS.items():
-        at = next((i for i, word in enumerate(rest) if word in known and (len(word) > 1 or len(rest) <= 3)), None)
-        if at is not None:
-            others = [word for word in rest[at + 1 :] if word not in FILLERS and word not in known]
-            others = [word for word in others if kind != "gyr" or word != "rotation"]
-            if kind != "quaternion" and axis not in AXES and not axis.isdigit():
-                return None
-            return " ".join(word for word in rest[:at] if word not in FILLERS), kind, " ".join(others), axis
+    # Words tell more than letters: of ``high g accelerometer`` the g is no gyroscope.
+    for letters_too in (False, len(rest) <= 3):
+        for kind, known in KINDS.items():
+            at = next((i for i, word in enumerate(rest) if word in known and (len(word) > 1 or letters_too)), None)
+            if at is not None:
+                others = [word for word in rest[at + 1 :] if word not in FILLERS and word not in known]
+                others = [word for word in others if kind != "gyr" or word != "rotation"]
+                if kind != "quaternion" and axis not in AXES and not axis.isdigit():
+                    return None
+                before = [word for word in rest[:at] if word not in FILLERS and (letters_too or word != "g")]
+                return " ".join(before), kind, " ".join(others), axis
     return None
 
 
@@ -182,7 +188,7 @@ def time_column(table: Table) -> str | None:
     def rank(name: str) -> int:
         flat = "".join(words(name))
         said = plain(table.units.get(name, "")) in UNITS["time"]
-        if flat in ("sampletimefine", "secondselapsed"):
+        if flat in ("sampletimefine", "secondselapsed") or words(name)[-2:] == ["header", "stamp"]:
             return 4
         if flat in TIME or flat in UNITS["time"] or (words(name) and words(name)[-1] in ("timestamp", "time")):
             return 3 + said
@@ -191,7 +197,12 @@ def time_column(table: Table) -> str | None:
     named = [name for name, values in table.arrays.items() if values.ndim == 1 and len(values) == len(table)]
     known = [name for name in named if "utc" not in words(name) and rank(name) > 0]
     timed = [name for name in named if plain(table.units.get(name, "")) in UNITS["time"]]
-    return max(known, key=rank, default=timed[0] if timed else None)
+    best = max(known, key=rank, default=timed[0] if timed else None)
+    # Programs that write a time beside each channel call all of them alike: that of the gyroscope is meant.
+    stem = re.sub(r"[.]\d+$", "", best or "")
+    alike = [name for name in named if best and re.sub(r"[.]\d+$", "", name) == stem]
+    before = list(itertools.takewhile(lambda name: (classify(name) or ("", ""))[1] != "gyr", table.arrays))
+    return next((name for name in reversed(before) if name in alike), best) if len(alike) > 1 else best
 
 
 def time_unit(table: Table, name: str) -> str:

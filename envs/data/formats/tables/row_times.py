@@ -23,6 +23,10 @@ def with_times(table: Table, time: str | None) -> Table:
     if values is None or values.dtype.kind != "f" or values.ndim != 1 or len(values) != len(table):
         return table
     known = np.isfinite(values)
+    rows = int(np.flatnonzero(known)[-1]) + 1 if known.any() else len(values)
+    if rows < len(values) and known[:rows].all():
+        # Other columns are longer: those of a faster sensor, with a time of its own.
+        return table.rows(np.arange(len(values)) < rows)
     lost = int((~known).sum())
     if not 0 < lost < DAMAGED * len(values):
         return table

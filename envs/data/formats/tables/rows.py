@@ -12,6 +12,7 @@ import numpy as np
 
 from .cells import OFTEN, SENSOR
 from .names import AXES, FILLERS, GRAVITY_FREE, KINDS, classify, time_column, time_unit, words
+from .sequences import unrolled
 from .stamps import as_seconds
 from .streams import Stream, joined
 from .table import Table
@@ -98,7 +99,11 @@ def kind_of(text: str) -> tuple[str, str]:
 
 
 def widened(table: Table) -> Table:
-    """The table with columns for each kind of reading, if it is of the long form; else with the sums of parts."""
+    """The table with columns for each kind of reading, if it is of the long form; else with the sums of parts.
+
+    Several samples in a row are given a row each.
+    """
+    table = unrolled(table)
     for name in table.labels:
         if {"gyr", "acc"} <= {kind_of(text)[0] for text in texts_of(table, name)} and "unit" not in name.lower():
             break

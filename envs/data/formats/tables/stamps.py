@@ -50,7 +50,14 @@ PERIODS = (60, HOUR, DAY, WEEK)
 FURTHEST_BACK = 2.5
 """Intervals by which rows may be out of order."""
 EPOCHS = (
-    *((1.0, 3e8, 4e9), (1e-3, 3e11, 4e12), (1e-6, 3e14, 4e15), (1e-7, 1.2e17, 1.5e17), (1e-7, 6.2e17, 6.6e17)),
+    *(
+        (1.0, 3e8, 4e9),
+        (1e-3, 3e11, 4e12),
+        (1e-4, 4e12, 4e13),
+        (1e-6, 3e14, 4e15),
+        (1e-7, 1.2e17, 1.5e17),
+        (1e-7, 6.2e17, 6.6e17),
+    ),
     *((1e-9, 3e17, 4e18), (86_400.0, 2.9e4, 7.7e5), (86_400.0, 2.44e6, 2.49e6)),
 )
 """s per unit, and stamps in that unit of the years 1980 to 2090: since 1970 (since 1601 or the year 1 in 100 ns, as

@@ -93,7 +93,7 @@ SPELLINGS = (
     (r"μ", "µ"),
     (r"\bper\b", "/"),
     (r"(?<=[a-z°])\s*[.*·]\s*(?=[a-z])|\s+", " "),
-    (r"[°º˚]|\b(degrees?|grad)\b", "deg"),
+    (r"[°º˚¡]|\b(degrees?|grad)\b", "deg"),
     (r"\bradians?\b", "rad"),
     (r"\bmet(er|re)s?\b", "m"),
     (r"(?<=[/ ])(seconds?|sec)\b", "s"),

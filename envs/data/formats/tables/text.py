@@ -21,6 +21,7 @@ import numpy as np
 from .cells import MISSING, is_number, is_value, labels_of, numeric
 from .head import decode
 from .packed import content_of
+from .sequences import without_lists
 from .table import DAMAGED, Table, split_unit, units_row
 
 if TYPE_CHECKING:
@@ -88,7 +89,7 @@ def table_of(text: str, name: str) -> Table:
     Raises:
         ValueError: there is no table of numbers, or a row has more fields than the others.
     """
-    lines = text.rstrip("\n\0 ").split("\n")
+    lines = without_lists(text.rstrip("\n\0 ").split("\n"))
     first = next((line for line in lines if line.strip()), "")
     said = re.fullmatch(r'"?sep=(.)"?[,;\t]*', first.strip())
     delimiter = said[1] if said and said[1] in DELIMITERS else guess_delimiter(lines)

@@ -132,3 +132,88 @@ def test_json_with_a_list_a_column_or_one_of_records(tmp_path, within):
     records = [dict(zip(lists, row, strict=True)) for row in zip(*lists.values(), strict=True)]
     (tmp_path / "a.json").write_text(json.dumps({"device": "x", "samples": records} if within else lists))
     right(tmp_path / "a.json", units=SI)
+
+
+@pytest.mark.parametrize(
+    ("encoding", "time", "acceleration", "rate", "unit"),
+    [
+        ("gbk", "时间(s)", "加速度{}(m/s²)", "角速度{}(°/s)", "deg/s"),
+        ("shift_jis", "時間 [s]", "加速度 {} [m/s^2]", "角速度 {} [rad/s]", "rad/s"),
+        ("cp949", "시간 [s]", "가속도 {} [m/s^2]", "각속도 {} [°/s]", "deg/s"),
+        ("mac_roman", "Temps [s]", "Accélération {} [m/s^2]", "Gyro {} [°/s]", "deg/s"),
+    ],
+)
+def test_encodings_without_a_mark(tmp_path, encoding, time, acceleration, rate, unit):
+    stamps, gyr, acc, *_ = readings()
+    names = [time, *(acceleration.format(axis) for axis in "XYZ"), *(rate.format(axis) for axis in "XYZ")]
+    path = table(tmp_path / "a.csv", names, stamps, acc, np.degrees(gyr) if unit == "deg/s" else gyr)
+    path.write_bytes(path.read_text().replace("m/s²", "m/s^2").encode(encoding))
+    if encoding == "mac_roman":
+        path.write_bytes(path.read_bytes().replace("Accélération".encode(encoding), b"Acceleration"))
+    right(path)
+
+
+@pytest.mark.parametrize(
+    ("name", "stamp"),
+    [
+        ("t (ms)", lambda t: f"{1e6 + 1e3 * t:,.0f}".replace(",", " ")),
+        ("t (ms)", lambda t: f"{1e6 + 1e3 * t:,.0f}".replace(",", "\u202f")),
+        ("timestamp", lambda t: f"{1.7e13 + 1e4 * t:.0f}"),
+        ("timestamp (ms)", lambda t: f"0x{round(2**31 - 2000 + 1e3 * t):08X}"),
+    ],
+)
+def test_stamps_in_other_spellings(tmp_path, name, stamp):
+    stamps, gyr, acc, *_ = readings()
+    assert right(
+        table(tmp_path / "a.csv", [name, *HEADER[1:]], [stamp(t) for t in stamps], gyr, acc, mark=";")
+    ).dt == pytest.approx(0.01)
+
+
+def test_registers_in_hexadecimal_have_a_sign(tmp_path):
+    stamps, gyr, acc, *_ = readings()
+    counts = [np.vectorize(lambda v: f"0x{round(v) & 0xFFFF:04x}")(values) for values in (gyr / 1e-3, acc / 5e-3)]
+    found = poise.load_recording(
+        table(tmp_path / "a.csv", ["time", *(each.split()[0] for each in HEADER[1:])], stamps, *counts),
+        units={"gyr": "0.001 rad/s", "acc": "0.005 m/s^2"},
+    )
+    same(found.measurements["imu/gyr"], gyr, 6e-4)
+    same(found.measurements["imu/acc"], acc, 3e-3)
+
+
+@pytest.mark.parametrize("coarse", ["High-g Accelerometer {} (g)", "highg_acc_{} (g)", "acc_high_{} (g)"])
+def test_a_second_accelerometer_is_no_gyroscope(tmp_path, coarse):
+    stamps, gyr, acc, *_ = readings()
+    header = [*HEADER, *(coarse.format(axis) for axis in "XYZ")]
+    right(table(tmp_path / "a.csv", header, stamps, gyr, acc, 1.02 * acc / G))
+
+
+def test_a_covariance_is_no_orientation(tmp_path):
+    stamps, gyr, acc, *_ = readings()
+    header = [*HEADER, *(f"orientation_covariance_{k}" for k in range(9))]
+    found = right(table(tmp_path / "a.csv", header, stamps, gyr, acc, np.tile(np.eye(3).ravel(), (len(stamps), 1))))
+    assert list(found.measurements) == ["imu/gyr", "imu/acc"]
+
+
+@pytest.mark.parametrize("faster", [False, True])
+def test_each_channel_may_have_a_time_of_its_own(tmp_path, faster):
+    """As an electromyograph's program writes them, whose electrodes are faster than the sensors in them."""
+    stamps, gyr, acc, *_ = readings()
+    fast = np.arange(10 * len(stamps) if faster else len(stamps)) / (1000.0 if faster else 100.0)
+    header, columns = ["X[s]", "EMG 1 [V]"], [fast, 0.0 * fast]
+    for name, values in (("GYRO.{} 1 [rad/s]", gyr), ("ACC.{} 1 [m/s^2]", acc)):
+        for i, axis in enumerate("XYZ"):
+            header += ["X[s]", f"Electrode 1: {name.format(axis)}"]
+            columns += [stamps, values[:, i]]
+    rows = [[str(column[k]) if k < len(column) else "" for column in columns] for k in range(len(fast))]
+    path = tmp_path / "a.csv"
+    path.write_text("\n".join(",".join(row) for row in [header, *rows]) + "\n")
+    with pytest.warns(UserWarning, match="names of columns occur more than once"):
+        assert right(path).dt == pytest.approx(0.01)
+
+
+def test_a_table_without_time_and_rate_says_so(tmp_path):
+    stamps, gyr, acc, *_ = readings()
+    path = table(tmp_path / "a.csv", ["temperature", *HEADER[1:]], 0.0 * stamps + 20.0, gyr, acc)
+    with pytest.raises(ValueError, match="neither a column of the time nor a sampling rate is told"):
+        poise.load_recording(path)
+    right(path, rate=100.0)
