@@ -134,7 +134,7 @@ def aligned(trajectory: Trajectory) -> Trajectory:
     orientation = shifted({"orientation": orientation}, time, offset)["orientation"]
     rates = mean_rates(orientation, grid.measurements["imu/gyr"], grid.dt)
     known = np.isfinite(rates.gyroscope).all(axis=1) & np.isfinite(rates.reference).all(axis=1)
-    if known.sum() < 50:
+    if known.sum() < 50 or np.abs(rates.reference[known]).max() < 1e-6:
         return trajectory
     turn = body_rotation(Rates(rates.gyroscope[known], rates.reference[known]))
     orientation = rotation.multiply(orientation, turn)

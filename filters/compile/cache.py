@@ -99,6 +99,8 @@ def jit(function: Callable[..., Any]) -> Any:
             compiled = numba.njit(cache=True, **options)(function)
         finally:
             numba.config.CACHE_DIR, locator.ensure_cache_path = before, required
+    place = compiled._cache._impl.locator
+    place.ensure_cache_path = functools.partial(_made_if_possible, place)
     files = compiled._cache._cache_file
     files.__class__ = _checked(type(files))
     return compiled

@@ -19,14 +19,17 @@ from .table import Table
 
 ALIKE, SMALLER = (0.6, 1.5), 1.3
 """Steps across the end of a row over those within it, and from row to row over those within it, of samples in a row."""
-MOST = 1000
-"""Samples in a row, and numbers in a cell."""
+LONGEST = 1.4
+"""Usual intervals of rows from which on rows are lost between two."""
+MOST, FEWEST = 1000, 10
+"""Samples in a row, and rows that tell."""
 
 
 def unrolled(table: Table) -> Table:
     """The table with a row a sample, if its rows hold several samples of each sensor."""
     bases, numbers = numbered(table)
-    if not bases or len(table) < 10:
+    used = {name for columns in bases.values() for one in columns.values() for name in one}
+    if len(table) < FEWEST or any(len(table.arrays[name]) != len(table) for name in used) or not used:
         return table
     values = {
         f"{base}_{axis}".strip("_"): np.stack([table.arrays[columns[number][place]] for number in numbers], axis=1)
@@ -49,16 +52,15 @@ def unrolled(table: Table) -> Table:
         for axis, place in AXES.items()
         if columns[numbers[0]][place] in table.units
     }
-    used = {name for columns in bases.values() for one in columns.values() for name in one}
     arrays = {}
     time, counter = time_column(table), counter_column(table)
     for name, column in table.arrays.items():
         if name == time:
-            arrays[name] = within(as_seconds(column, time_unit(table, name), name).elapsed, count, limited=True)
+            arrays[name] = within(as_seconds(column, time_unit(table, name), name).elapsed, count)
             units[name] = "s"
         elif name == counter:
             arrays[name] = np.rint(count * within(rows_of(column), count)).astype(int)
-        elif name not in used:
+        elif name not in used and len(column) == len(table):
             # Of other sensors a row holds one sample.
             arrays[name] = np.full((len(table) * count, *column.shape[1:]), np.nan)
             arrays[name][::count] = column
@@ -115,12 +117,11 @@ def rows_of(counter: np.ndarray) -> np.ndarray:
     return count / usual if usual > 0.0 else np.arange(len(count), dtype=float)
 
 
-def within(rows: np.ndarray, count: int, *, limited: bool = False) -> np.ndarray:
-    """Times ``(N * count,)`` of samples that begin at those of their rows; with gaps, none is longer than usual."""
+def within(rows: np.ndarray, count: int) -> np.ndarray:
+    """Times ``(N * count,)`` of samples that begin at those of their rows and fill the usual interval before a gap."""
     steps = np.diff(rows, append=2.0 * rows[-1] - rows[-2])
     usual = float(np.median(steps))
-    steps = np.minimum(steps, 1.5 * usual) if limited else np.full(len(rows), usual)
-    steps = np.where(steps > 1.4 * usual, usual, steps)
+    steps = np.where(steps > LONGEST * usual, usual, steps)
     return (rows[:, None] + steps[:, None] * np.arange(count) / count).reshape(-1)
 
 
