@@ -136,9 +136,9 @@ def check_drift(trajectory: Trajectory) -> Iterator[Finding]:
     if q is None or gyr is None or len(q) < FEWEST:
         return
     q, half = without_jumps(trajectory), len(q) // 2
-    offsets = [clock_offset(q[part], gyr[part], trajectory.dt) for part in (slice(half), slice(half, None))]
-    if offsets[0] is not None and offsets[1] is not None and abs(offsets[1] - offsets[0]) > DRIFT:
-        speed = (offsets[1] - offsets[0]) / (half * trajectory.dt)
+    first, second = (clock_offset(q[part], gyr[part], trajectory.dt) for part in (slice(half), slice(half, None)))
+    if first is not None and second is not None and abs(second - first) > DRIFT:
+        speed = (second - first) / (half * trajectory.dt)
         what = "it is {:+.0f} ms ahead of the gyroscope in the first half, {:+.0f} ms in the second".format(
             *(1e3 * offset for offset in offsets)
         )

@@ -24,7 +24,7 @@ def with_times(table: Table, time: str | None) -> Table:
         return table
     known = np.isfinite(values)
     rows = int(np.flatnonzero(known)[-1]) + 1 if known.any() else len(values)
-    if rows < len(values) and known[:rows].all():
+    if rows <= (1.0 - DAMAGED) * len(values) and known[:rows].all():
         # Other columns are longer: those of a faster sensor, with a time of its own.
         return table.rows(np.arange(len(values)) < rows)
     lost = int((~known).sum())
