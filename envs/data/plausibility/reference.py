@@ -139,12 +139,11 @@ def check_drift(trajectory: Trajectory) -> Iterator[Finding]:
     first, second = (clock_offset(q[part], gyr[part], trajectory.dt) for part in (slice(half), slice(half, None)))
     if first is not None and second is not None and abs(second - first) > DRIFT:
         speed = (second - first) / (half * trajectory.dt)
-        what = "it is {:+.0f} ms ahead of the gyroscope in the first half, {:+.0f} ms in the second".format(
-            *(1e3 * offset for offset in offsets)
+        offsets = (
+            f"{1e3 * first:+.0f} ms ahead of the gyroscope in the first half, {1e3 * second:+.0f} ms in the second"
         )
-        cause = (
-            f"a clock that runs about {100.0 * abs(speed):.1g} % {'fast' if speed > 0.0 else 'slow'}, or lost samples"
-        )
+        pace = f"about {100.0 * abs(speed):.1g} % {'fast' if speed > 0.0 else 'slow'}"
+        what, cause = f"it is {offsets}", f"a clock that runs {pace}, or lost samples"
         yield Finding("warning", "orientation", what, cause, "Bring both to one clock.")
         return
     rates = mean_rates(q, gyr, trajectory.dt)
