@@ -32,7 +32,7 @@ STALE = 0.01
 """rad that a gyroscope turns, on average, while a slower reference repeats one value."""
 DRIFT = 0.5 * LARGE_OFFSET
 """s between the offsets of the two halves of a recording, from which on a clock drifts."""
-TURNS = 0.009
+TURNS = 0.015
 """rad/s by which a reference turns about the vertical and the gyroscope does not."""
 TILTS, SURE = 0.05, 6.0
 """Variance of the vertical in the sensor's axes without which that is no other than a bias; standard errors."""

@@ -156,7 +156,7 @@ def load_npy(path: Path) -> np.ndarray:
 
 
 def load_npz(path: Path) -> dict[str, np.ndarray]:
-    """The arrays of an archive; what declares more than its file can hold is not unpacked."""
+    """The arrays of an archive, dates in whole ns; what declares more than its file can hold is not unpacked."""
     try:
         with zipfile.ZipFile(path) as archive:
             total = sum(entry.file_size for entry in archive.infolist())
@@ -169,7 +169,9 @@ def load_npz(path: Path) -> dict[str, np.ndarray]:
                     check_declared(file, entry)
         with np.load(path, allow_pickle=False) as archive:
             arrays = {name: archive[name] for name in archive.files}
-        return {name: array for name, array in arrays.items() if array.dtype.kind in "fiubUVMm"}
+        dates = {name: array for name, array in arrays.items() if array.dtype.kind in "Mm"}
+        whole = {name: array.astype(f"{array.dtype.kind}8[ns]").astype(np.int64) for name, array in dates.items()}
+        return {name: array for name, array in (arrays | whole).items() if array.dtype.kind in "fiubUcV"}
     except (zipfile.BadZipFile, EOFError, OSError, KeyError) as reason:
         raise ValueError(f"it is not a readable NumPy archive; it may be truncated: {reason}") from None
 

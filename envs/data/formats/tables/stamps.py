@@ -253,7 +253,9 @@ def unpacked(values: np.ndarray) -> np.ndarray | None:
     if of_day and len(jumps) and np.all(seconds[jumps] >= 59) and np.all(seconds[jumps + 1] < 1):
         return np.rint((3600.0 * (values // 10_000) + 60.0 * minutes + seconds) * 1e9).astype(np.int64)
     digits = len(str(abs(int(values[0]))))
-    if values.dtype.kind not in "iu" or digits not in (14, 17) or len(str(abs(int(values[-1])))) != digits:
+    years = str(abs(int(values[0])))[:4]
+    whole_digits = values.dtype.kind in "iu" and digits in (14, 17) and len(str(abs(int(values[-1])))) == digits
+    if not whole_digits or not "1970" <= years <= "2100":
         return None
     texts = pandas.Series(values).astype("string")
     pattern = texts.str[:14] + "." + (texts.str[14:] if digits == 17 else "0")

@@ -98,7 +98,7 @@ def test_a_clock_that_drifts(gesture: str, share: float) -> None:
 
 
 @pytest.mark.parametrize("gesture", list(MOTIONS))
-@pytest.mark.parametrize("speed", [0.8, -2.0])
+@pytest.mark.parametrize("speed", [1.5, -2.0])
 def test_a_heading_that_drifts(gesture: str, speed: float) -> None:
     def change(q: np.ndarray) -> np.ndarray:
         angle = np.radians(speed) * 0.01 * np.arange(len(q))
