@@ -66,5 +66,6 @@ def parts_of(name: str, column: pandas.Series) -> Iterator[tuple[str, pandas.Ser
 
 def as_named(arrays: dict[str, np.ndarray], kind: str) -> Table:
     """A table of arrays whose names may end with a unit."""
-    units = {split_unit(name)[0]: split_unit(name)[1] for name in arrays if split_unit(name)[1]}
-    return Table({split_unit(name)[0]: values for name, values in arrays.items()}, units=units, kind=kind)
+    parts = [split_unit(name) for name in arrays]
+    units = {name: unit for name, unit in parts if unit}
+    return Table({name: values for (name, _), values in zip(parts, arrays.values(), strict=True)}, units, kind=kind)
