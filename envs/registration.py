@@ -47,11 +47,12 @@ def make_environment(identity: str, **options: Any) -> gymnasium.Env[Any, Any]:
     register_environments()
     try:
         known = accepted_arguments(identity)
-        for name in options:
-            look_up("option", name, dict.fromkeys(known))
-        return gymnasium.make(identity, **options)
     except gymnasium.error.Error as reason:
         raise ValueError(str(reason)) from reason
+    for name in options:
+        look_up("option", name, dict.fromkeys(known))
+    try:
+        return gymnasium.make(identity, **options)
     except (TypeError, AttributeError) as reason:
         cause = str(reason).split(" was raised from the environment creator")[0]
         raise ValueError(f"{identity} cannot be made with {options}: {cause}; its arguments are {known}") from reason
