@@ -196,21 +196,27 @@ def show_data_sets(suites: dict[str, Results], out: Output) -> None:
 def keep(args: Args, folder: Run, parts: dict[str, list[dict[str, Any]]]) -> Path:
     """Write what this run has into the file of ``--save``, with its source, beside what is there now.
 
-    A run of all estimators replaces all errors, one of named estimators theirs alone: on recordings those of each
-    estimator, on rides those of each paper.
+    A run of all estimators replaces the errors on all data sets that it has, one of named estimators theirs alone: on
+    recordings those of each estimator, on rides those of each paper.
     """
-    from ..baselines.comparison.recommendation import load_results, merged, merged_papers
+    from ..baselines.comparison.recommendation import load_results, merged, merged_papers, merged_sets
 
     assert args.save is not None
     kept = load_results(args.save) if args.save.exists() else {}
     new = {part: rows for part, rows in parts.items() if rows}
-    named = list(new)
+    named, earlier = list(new), kept.get("source", {})
+    stay: dict[str, Any] = {}
+    if "recordings" in new and not args.estimators:
+        rows = merged_sets(kept.get("recordings", []), new["recordings"])
+        others = {one["dataset"] for one in rows} - {one["dataset"] for one in new["recordings"]}
+        stay = {one: earlier.get(one, earlier.get("recordings")) for one in sorted(others)}
+        new["recordings"] = rows
     for part, together in (("recordings", merged), ("riders", merged_papers)):
         if args.estimators and kept.get(part) and part in new:
             new[part] = together(kept[part], new[part])
             named = [name for name in named if name != part] + list(args.estimators)
     source = {key: folder.versions[key] for key in ("poise", "python", "packages")} | {"seed": args.seed}
-    sources = {**kept.get("source", {}), **dict.fromkeys(named, source)}
+    sources = {**earlier, **stay, **dict.fromkeys(named, source)}
     return write_json(args.save, {"recordings": [], **kept, **new, "source": sources}, indent=None)
 
 

@@ -121,6 +121,14 @@ def merged(kept: Sequence[dict[str, Any]], new: Sequence[dict[str, Any]]) -> lis
     return [{**one, "errors": one["errors"] | found.get((one["name"], one["dataset"]), {})} for one in kept]
 
 
+def merged_sets(kept: Sequence[dict[str, Any]], new: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Results on recordings with those of some data sets replaced, sets in the order in which they are kept."""
+    order = list(dict.fromkeys(one["dataset"] for one in (*kept, *new)))
+    replaced = {one["dataset"] for one in new}
+    rows = [*(one for one in kept if one["dataset"] not in replaced), *new]
+    return sorted(rows, key=lambda one: order.index(one["dataset"]))
+
+
 def merged_papers(kept: Sequence[dict[str, Any]], new: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
     """Results on rides with those of some papers replaced, papers in the order in which they are kept."""
     order = list(dict.fromkeys(row["paper"] for row in (*kept, *new)))

@@ -12,6 +12,7 @@ from poise.baselines.comparison.recommendation import (
     load_results,
     merged,
     merged_papers,
+    merged_sets,
     motion_of,
     recommend,
     results_of,
@@ -145,6 +146,12 @@ def test_errors_of_some_estimators_are_replaced():
     kept, new = [row("1", x=1.0, y=2.0), row("2", x=3.0)], [row("1", y=5.0), row("3", y=7.0)]
     assert merged(kept, new) == [row("1", x=1.0, y=5.0), row("2", x=3.0)]
     assert kept[0] == row("1", x=1.0, y=2.0)
+
+
+def test_data_sets_that_a_benchmark_does_not_have_stay():
+    kept = [{"name": name, "dataset": each, "errors": {}} for name, each in (("1", "hands"), ("2", "rides"))]
+    new = [{"name": "1", "dataset": "hands", "errors": {"x": {"inclination": 1.0}}}]
+    assert merged_sets(kept, new) == [*new, kept[1]]
 
 
 def test_a_benchmark_of_one_paper_leaves_the_others_as_they_are():
