@@ -152,10 +152,15 @@ def for_arrays(estimator: str | Estimator[Any], data: Any, interval: float | Non
 
 
 def as_recorded(data: Mapping[str, Any], interval: float) -> Mapping[str, Any]:
-    """Arrays of one recording as a trajectory of them would be read, without glitches; batches as they are."""
+    """Arrays of one recording as a trajectory of them would be read, without glitches; others and batches as they are.
+
+    A trajectory refuses infinite numbers, which the estimators take for missing samples.
+    """
     arrays = [values for values in data.values() if isinstance(values, np.ndarray) and values.ndim == 2]
     lengths = {len(values) for values in arrays}
     if len(arrays) < len(data) or len(lengths) != 1 or min(lengths) < 2:
+        return data
+    if any(values.dtype.kind != "f" or np.isinf(values).any() for values in arrays):
         return data
     return without_glitches(Trajectory(interval * np.arange(lengths.pop()), dict(data)))
 

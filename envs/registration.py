@@ -100,7 +100,9 @@ def refuse_unknown_arguments(kind: type, given: Iterable[str]) -> None:
     known = arguments_of_class(kind)
     for name in given:
         if name not in known:
-            raise TypeError(f"{identity}: {unknown('argument', name, known)}")
+            # Python's own words: TorchRL tries frameskip, and reads them to go on without.
+            text = unknown("argument", name, known).replace("unknown argument", "unexpected keyword argument", 1)
+            raise TypeError(f"{identity}: {text}")
 
 
 def list_environments() -> tuple[str, ...]:

@@ -17,7 +17,7 @@ from typing import Any, Literal
 from .core.estimator import Estimator
 from .core.kalman import KalmanFilter
 from .core.model import Equations, Model, Recurrence
-from .core.observer import Observer
+from .core.recursion import Observer
 from .support.names import look_up
 from .support.parameters import check_parameters
 

@@ -14,8 +14,8 @@ from ...filters.bicycle.geometry import RiderGeometry
 from ...filters.core import rotation
 from ...filters.core.consistency import nees
 from ...filters.core.kalman import KalmanFilter
-from ...filters.core.observer import Observer
 from ...filters.core.quantity import Estimate
+from ...filters.core.recursion import Observer
 from .averages import circular_mean, interval_of_mean, largest, leading, mean_of, mean_rms, rounded, windowed
 from .claims import Claim
 from .kit import RideJob, Study, load_ride

@@ -271,3 +271,18 @@ def correct(P: Array, r: Array, H: Array, R: Array) -> tuple[Array, Array, Array
     joseph = A @ P @ A.mT + K @ R @ K.mT
     whitened = xp.linalg.solve(L, r[..., None])[..., 0]
     return times(K, r), 0.5 * (joseph + joseph.mT), whitened
+
+
+@dataclass(frozen=True)
+class Observer(Recursion):
+    """Estimator for equations without covariance: the recursion of :class:`.KalmanFilter` without error state.
+
+    Attributes:
+        model: the equations and their parameters.
+        compiled: use the traced and compiled form for NumPy data.
+        restart: start anew when the estimate contradicts the sensors for too long (:mod:`.monitor`).
+    """
+
+    model: Recurrence
+    compiled: bool = True
+    restart: bool = True

@@ -85,7 +85,7 @@ def test_an_unknown_argument_is_named_with_the_nearest_one_and_all(identity, tog
     known = accepted_arguments(identity)
     for wrong in (known[0] + "z", "render_mod"):
         with pytest.raises(
-            TypeError, match=f"{identity}: unknown argument '{wrong}', did you mean '{wrong[:-1]}"
+            TypeError, match=f"{identity}: unexpected keyword argument '{wrong}', did you mean '{wrong[:-1]}"
         ) as at:
             make_one(**{wrong: None})
         assert all(name in str(at.value) for name in known)

@@ -9,8 +9,8 @@ from typing import Any, ClassVar, NamedTuple, Self
 from ....filters.core.backend import Array, namespace
 from ....filters.core.estimator import check_measurements
 from ....filters.core.kalman import KalmanFilter
-from ....filters.core.observer import Observer
 from ....filters.core.quantity import ACCELEROMETER, GYROSCOPE, Channel, Estimate, Measurement
+from ....filters.core.recursion import Observer
 from ....filters.core.sampling import FilterState
 from ..gains.gain_shares import filter_of, with_changed_numbers
 from .filter_frame import ATTITUDE, BIAS, TILT_STD, FilterFrame, frame_of

@@ -17,7 +17,7 @@ from ....envs.hand.sensing import simulate_hand
 from ....filters.arrays.rate import ANGULAR_RATE, ArrayRate
 from ....filters.core import metrics
 from ....filters.core.estimator import run
-from ....filters.core.observer import Observer
+from ....filters.core.recursion import Observer
 from ...plots import BLUE, TRUTH_COLOR, time_figure
 from ..claims import Claim
 from ..kit import Study

@@ -25,8 +25,8 @@ from ....filters.arrays.spatial.pointing import pointing_angles, tilt_error_boun
 from ....filters.core import metrics, rotation
 from ....filters.core.estimator import run
 from ....filters.core.kalman import KalmanFilter
-from ....filters.core.observer import Observer
 from ....filters.core.quantity import STANDARD_GRAVITY
+from ....filters.core.recursion import Observer
 from ....filters.imu.marins import Marins
 from ..claims import Claim
 from ..kit import Study

@@ -60,8 +60,7 @@ from .linkage import (
 )
 from .rates import Rates, advance
 
-RATE, ACCELERATION_OF_RATE, SEAT_FORCE = slice(22, 25), slice(25, 28), slice(28, 31)
-SPEED, SHOCK = slice(31, 32), slice(32, 33)
+RATE, ACCELERATION_OF_RATE, SEAT_FORCE, SPEED, SHOCK = map(slice, (22, 25, 28, 31, 32), (25, 28, 31, 32, 33))
 CONSTRAINTS = ("C1", "C2", "C3", "C5", "C6", "C7")
 TURNING, SITTING = seat_moments(USUAL)
 NOISES = ("lateral", "trunk", "torque", "length", "hinge", "swivel", "twist")

@@ -18,7 +18,7 @@ from poise.envs.hand.hand_held import HandHeld
 from poise.envs.recipes.hand import HandRecipe
 from poise.filters.core import rotation
 from poise.filters.core.estimator import run
-from poise.filters.core.observer import Observer
+from poise.filters.core.recursion import Observer
 
 END, HEAD = LevelFrame(), TiltHead()
 SHORT = HandRecipe(duration=12.0, carried_share=0.0, held=HandHeld(first_rest=(0.3, 2.0), longest=(4.0, 6.0)))

@@ -31,8 +31,8 @@ from poise.envs.sensors.suite import imu_suite
 from poise.filters.core import rotation
 from poise.filters.core.estimator import Estimator, run, run_by_steps
 from poise.filters.core.metrics import direction_error, score
-from poise.filters.core.observer import Observer
 from poise.filters.core.quantity import UP, Quantity
+from poise.filters.core.recursion import Observer
 from poise.filters.imu.classical import GyroscopeIntegration, Tilt
 from poise.filters.registry import make
 

@@ -13,7 +13,7 @@ from poise.envs.hand.sensing import simulate_hand
 from poise.filters.arrays.array import OCTA
 from poise.filters.arrays.files import read_array
 from poise.filters.arrays.rate import ArrayRate
-from poise.filters.core.observer import Observer
+from poise.filters.core.recursion import Observer
 
 NAME = "array/acc"
 COLUMNS = ("data sheet", "axes as drawn", "axes estimated", "perfect device")

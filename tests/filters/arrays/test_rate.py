@@ -14,7 +14,7 @@ from poise.filters.arrays.array import CONTROLLER, OCTA, PLANAR
 from poise.filters.arrays.products import product_jacobian, products
 from poise.filters.arrays.rate import ArrayRate, parsa_step, polynomial_roots, published_jacobian, roots_jacobian
 from poise.filters.arrays.reference_rate import reference_rate
-from poise.filters.core.observer import Observer
+from poise.filters.core.recursion import Observer
 from poise.filters.core.rotation import from_xyzw
 
 DT = 0.01

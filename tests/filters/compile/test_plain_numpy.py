@@ -14,8 +14,8 @@ from poise.filters.compile import run as compiled
 from poise.filters.core.estimator import run_by_steps
 from poise.filters.core.kalman import KalmanFilter
 from poise.filters.core.model import Model, Recurrence
-from poise.filters.core.observer import Observer
 from poise.filters.core.quantity import ACCELEROMETER, UP
+from poise.filters.core.recursion import Observer
 
 
 @dataclass(frozen=True)

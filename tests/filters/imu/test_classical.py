@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from poise.filters.core import metrics, rotation
-from poise.filters.core.observer import Observer
+from poise.filters.core.recursion import Observer
 from poise.filters.imu.classical import GyroscopeIntegration, Mahony, Mahony9, Tilt
 
 GRAVITY = np.array([0.0, 0.0, 9.81])

@@ -16,7 +16,7 @@ from poise.filters.arrays.planar.orientation import UNKNOWN_ANGLE, PlanarOrienta
 from poise.filters.arrays.planar.pose import PlanarPose
 from poise.filters.arrays.planar.unscented import PlanarUnscented
 from poise.filters.core.kalman import KalmanFilter
-from poise.filters.core.observer import Observer
+from poise.filters.core.recursion import Observer
 from poise.filters.core.rotation import wrap
 
 Data = dict[str, np.ndarray]

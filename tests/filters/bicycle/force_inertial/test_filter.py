@@ -21,7 +21,7 @@ from poise.filters.core import rotation
 from poise.filters.core.estimator import run
 from poise.filters.core.kalman import KalmanFilter
 from poise.filters.core.metrics import rms
-from poise.filters.core.observer import Observer
+from poise.filters.core.recursion import Observer
 
 RIDER = ForceInertial.for_rider(RiderGeometry())
 VARIANTS = [

@@ -19,7 +19,7 @@ from poise.filters.bicycle.two_gyro.truth import true_angles, true_states
 from poise.filters.core import rotation
 from poise.filters.core.consistency import consistency, nees
 from poise.filters.core.kalman import KalmanFilter
-from poise.filters.core.observer import Observer
+from poise.filters.core.recursion import Observer
 
 VARIANTS = [
     TwoGyro(dt=0.02, integration="euler"),

@@ -15,7 +15,7 @@ from poise.filters.bicycle.whole_body.integration import WholeBodyIntegration
 from poise.filters.bicycle.whole_body.linkage import ERROR_SIZE, OUTPUTS, seat_moments, true_angles
 from poise.filters.core import metrics
 from poise.filters.core.kalman import KalmanFilter
-from poise.filters.core.observer import Observer
+from poise.filters.core.recursion import Observer
 from poise.filters.core.rotation import euler_axes, euler_matrix
 
 from .whole_body_cases import RIDER
