@@ -199,7 +199,7 @@ def keep(args: Args, folder: Run, parts: dict[str, list[dict[str, Any]]]) -> Pat
     A run of all estimators replaces the errors on all data sets that it has, one of named estimators theirs alone: on
     recordings those of each estimator, on rides those of each paper.
     """
-    from ..baselines.comparison.recommendation import load_results, merged, merged_papers, merged_sets
+    from ..baselines.comparison.recommendation import load_results, merged, replaced
 
     assert args.save is not None
     kept = load_results(args.save) if args.save.exists() else {}
@@ -207,13 +207,14 @@ def keep(args: Args, folder: Run, parts: dict[str, list[dict[str, Any]]]) -> Pat
     named, earlier = list(new), kept.get("source", {})
     stay: dict[str, Any] = {}
     if "recordings" in new and not args.estimators:
-        rows = merged_sets(kept.get("recordings", []), new["recordings"])
+        rows = replaced(kept.get("recordings", []), new["recordings"], "dataset")
         others = {one["dataset"] for one in rows} - {one["dataset"] for one in new["recordings"]}
         stay = {one: earlier.get(one, earlier.get("recordings")) for one in sorted(others)}
         new["recordings"] = rows
-    for part, together in (("recordings", merged), ("riders", merged_papers)):
+    for part in ("recordings", "riders"):
         if args.estimators and kept.get(part) and part in new:
-            new[part] = together(kept[part], new[part])
+            before, after = kept[part], new[part]
+            new[part] = merged(before, after) if part == "recordings" else replaced(before, after, "paper")
             named = [name for name in named if name != part] + list(args.estimators)
     source = {key: folder.versions[key] for key in ("poise", "python", "packages")} | {"seed": args.seed}
     sources = {**earlier, **stay, **dict.fromkeys(named, source)}

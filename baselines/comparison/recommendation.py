@@ -121,20 +121,12 @@ def merged(kept: Sequence[dict[str, Any]], new: Sequence[dict[str, Any]]) -> lis
     return [{**one, "errors": one["errors"] | found.get((one["name"], one["dataset"]), {})} for one in kept]
 
 
-def merged_sets(kept: Sequence[dict[str, Any]], new: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Results on recordings with those of some data sets replaced, sets in the order in which they are kept."""
-    order = list(dict.fromkeys(one["dataset"] for one in (*kept, *new)))
-    replaced = {one["dataset"] for one in new}
-    rows = [*(one for one in kept if one["dataset"] not in replaced), *new]
-    return sorted(rows, key=lambda one: order.index(one["dataset"]))
-
-
-def merged_papers(kept: Sequence[dict[str, Any]], new: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Results on rides with those of some papers replaced, papers in the order in which they are kept."""
-    order = list(dict.fromkeys(row["paper"] for row in (*kept, *new)))
-    replaced = {row["paper"] for row in new}
-    rows = [*(row for row in kept if row["paper"] not in replaced), *new]
-    return sorted(rows, key=lambda row: order.index(row["paper"]))
+def replaced(kept: Sequence[dict[str, Any]], new: Sequence[dict[str, Any]], part: str) -> list[dict[str, Any]]:
+    """Results with those of some data sets (``part`` "dataset") or papers ("paper") replaced, parts in their order."""
+    order = list(dict.fromkeys(row[part] for row in (*kept, *new)))
+    had = {row[part] for row in new}
+    rows = [*(row for row in kept if row[part] not in had), *new]
+    return sorted(rows, key=lambda row: order.index(row[part]))
 
 
 def load_results(path: Path = RESULTS) -> dict[str, Any]:

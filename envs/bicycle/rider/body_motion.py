@@ -92,10 +92,9 @@ def glances(rng: np.random.Generator, time: np.ndarray, turn: float, interval: f
     """Turns ``(n,)`` of the trunk to either side and back, in looks over a shoulder; ``turn`` rad."""
     found = np.zeros(len(time))
     for begin in events(rng, interval, float(time[-1])):
-        size = turn * float(rng.uniform(0.5, 1.5)) * (1.0 if rng.random() < 0.5 else -1.0)
+        size = to_a_side(rng, turn)
         there, hold, back = (float(rng.uniform(*each)) for each in (GLANCE_TIME, GLANCE_HOLD, GLANCE_TIME))
-        end = begin + there + hold
-        found += size * (smooth_step(time, begin, there) - smooth_step(time, end, back))
+        found += there_and_back(time, begin, size, (there, hold, back))
     return found
 
 
@@ -103,10 +102,21 @@ def scans(rng: np.random.Generator, time: np.ndarray, turn: float, interval: flo
     """Turns ``(n,)`` of the head to either side and back, at the pace of :func:`turn_time`; ``turn`` rad."""
     found = np.zeros(len(time))
     for begin in events(rng, interval, float(time[-1])):
-        size = turn * float(rng.uniform(0.5, 1.5)) * (1.0 if rng.random() < 0.5 else -1.0)
-        length, hold = turn_time(size), float(rng.uniform(*GLANCE_HOLD))
-        found += size * (smooth_step(time, begin, length) - smooth_step(time, begin + length + hold, length))
+        size = to_a_side(rng, turn)
+        length = turn_time(size)
+        found += there_and_back(time, begin, size, (length, float(rng.uniform(*GLANCE_HOLD)), length))
     return found
+
+
+def to_a_side(rng: np.random.Generator, turn: float) -> float:
+    """An angle (rad) of half to one and a half times ``turn``, to either side."""
+    return turn * float(rng.uniform(0.5, 1.5)) * (1.0 if rng.random() < 0.5 else -1.0)
+
+
+def there_and_back(time: np.ndarray, begin: float, size: float, lengths: tuple[float, float, float]) -> np.ndarray:
+    """A turn ``(n,)`` by ``size`` (rad) that takes, rests and returns for these times (s)."""
+    there, hold, back = lengths
+    return size * (smooth_step(time, begin, there) - smooth_step(time, begin + there + hold, back))
 
 
 def turn_time(angle: float) -> float:
@@ -122,7 +132,7 @@ def gaze_shifts(rng: np.random.Generator, time: np.ndarray, deviation: float, in
     rider looks ahead.
     """
     now, side, found = np.zeros(2), 1.0, np.zeros((len(time), 2))
-    begin = float(rng.exponential(interval)) if math.isfinite(interval) else math.inf
+    begin = next(events(rng, interval, float(time[-1])), math.inf)
     while begin < time[-1]:
         ahead, across = rng.random(2) < (LOOKS_AHEAD, ACROSS)
         where = deviation * rng.standard_normal(2) * (1.0, NODS)

@@ -164,18 +164,13 @@ def random_style(rng: np.random.Generator) -> RiderStyle:
     """
     low, high = STYLES["mild"], STYLES["aggressive"]
     drawn: dict[str, float] = {}
-    looking = None
+    parts: dict[str, float] = {}
     for name in (field.name for field in fields(RiderStyle)[1:]):
         least, most = getattr(low, name), getattr(high, name)
-        if not least > 0.0:
-            drawn[name] = least
-            continue
-        if name not in LOOKING or looking is None:
-            part = float(rng.random())
-            looking = part if name in LOOKING else looking
-        else:
-            part = looking
-        drawn[name] = least * (most / least) ** part
+        group = LOOKING[0] if name in LOOKING else name
+        if least > 0.0 and group not in parts:
+            parts[group] = float(rng.random())
+        drawn[name] = least * (most / least) ** parts[group] if least > 0.0 else least
     return RiderStyle("random", **drawn)
 
 

@@ -11,10 +11,9 @@ from poise.baselines.comparison.recommendation import (
     dataset_errors,
     load_results,
     merged,
-    merged_papers,
-    merged_sets,
     motion_of,
     recommend,
+    replaced,
     results_of,
 )
 from poise.baselines.evaluation import evaluate
@@ -151,13 +150,13 @@ def test_errors_of_some_estimators_are_replaced():
 def test_data_sets_that_a_benchmark_does_not_have_stay():
     kept = [{"name": name, "dataset": each, "errors": {}} for name, each in (("1", "hands"), ("2", "rides"))]
     new = [{"name": "1", "dataset": "hands", "errors": {"x": {"inclination": 1.0}}}]
-    assert merged_sets(kept, new) == [*new, kept[1]]
+    assert replaced(kept, new, "dataset") == [*new, kept[1]]
 
 
 def test_a_benchmark_of_one_paper_leaves_the_others_as_they_are():
     kept = [{"paper": paper, "method": name, "error": 1.0} for paper in ("two-gyro", "whole-body") for name in "ab"]
     new = [{"paper": "two-gyro", "method": "a", "error": 2.0}]
-    assert merged_papers(kept, new) == [*new, *kept[2:]]
+    assert replaced(kept, new, "paper") == [*new, *kept[2:]]
 
 
 def test_a_distance_is_that_of_ratios():
