@@ -99,9 +99,10 @@ def test_benchmark_keeps_what_was_written_while_it_ran(tmp_path):
     kept = tmp_path / "kept.json"
     kept.write_text(json.dumps({"recordings": [], "riders": [{"paper": "two-gyro"}]}))
     folder = SimpleNamespace(versions={"poise": "0", "python": "3", "packages": {}})
-    keep(benchmark.Args(save=kept), folder, {"recordings": [{"errors": {}}], "riders": []})
+    broad = {"dataset": "broad", "errors": {}}
+    keep(benchmark.Args(save=kept), folder, {"recordings": [broad], "riders": []})
     saved = json.loads(kept.read_text())
-    assert (saved["recordings"], saved["riders"]) == ([{"errors": {}}], [{"paper": "two-gyro"}])
+    assert (saved["recordings"], saved["riders"]) == ([broad], [{"paper": "two-gyro"}])
 
 
 def test_benchmark_compares_and_reports(episodes, tmp_path, capsys):
