@@ -8,7 +8,7 @@ from typing import Any
 
 import gymnasium
 
-from ..filters.support.names import look_up, unknown
+from ..filters.support.names import unknown
 
 ENTRY_POINTS: dict[str, str] = {
     "poise/HandMotion-v0": "poise.envs.hand.environment:HandMotionEnv",
@@ -42,20 +42,13 @@ def make_environment(identity: str, **options: Any) -> gymnasium.Env[Any, Any]:
     """An environment of a registered id.
 
     Raises:
-        ValueError: the id is unknown, or an option is: the message lists the arguments that the environment takes.
+        ValueError: an unknown id, or whatever else :func:`gymnasium.make` or the environment refuses, in its words.
     """
     register_environments()
     try:
-        known = accepted_arguments(identity)
-    except gymnasium.error.Error as reason:
-        raise ValueError(str(reason)) from reason
-    for name in options:
-        look_up("option", name, dict.fromkeys(known))
-    try:
         return gymnasium.make(identity, **options)
-    except (TypeError, AttributeError) as reason:
-        cause = str(reason).split(" was raised from the environment creator")[0]
-        raise ValueError(f"{identity} cannot be made with {options}: {cause}; its arguments are {known}") from reason
+    except (gymnasium.error.Error, TypeError, AttributeError) as reason:
+        raise ValueError(str(reason).split(" was raised from the environment creator")[0]) from reason
 
 
 def environment_class(identity: str) -> Any:
@@ -101,8 +94,7 @@ def refuse_unknown_arguments(kind: type, given: Iterable[str]) -> None:
     for name in given:
         if name not in known:
             # Python's own words: TorchRL tries frameskip, and reads them to go on without.
-            text = unknown("argument", name, known).replace("unknown argument", "unexpected keyword argument", 1)
-            raise TypeError(f"{identity}: {text}")
+            raise TypeError(f"{identity}: {unknown('argument', name, known, 'unexpected keyword argument')}")
 
 
 def list_environments() -> tuple[str, ...]:

@@ -9,12 +9,19 @@ from typing import TypeVar
 T = TypeVar("T")
 
 
-def unknown(kind: str, name: object, known: Iterable[str]) -> str:
-    """Return ``unknown paper 'two-gyr', did you mean 'two-gyro'? (papers: two-gyro, …)``."""
+def unknown(kind: str, name: object, known: Iterable[str], begin: str = "") -> str:
+    """Return ``unknown paper 'two-gyr', did you mean 'two-gyro'? (papers: two-gyro, …)``.
+
+    Args:
+        kind: what is named, in the singular.
+        name: what is not known.
+        known: all that are.
+        begin: first words of the message, if not ``unknown`` and the kind.
+    """
     names = [str(each) for each in known]
     near = difflib.get_close_matches(str(name), names, n=1)
     hint = f", did you mean {near[0]!r}?" if near else ""
-    return f"unknown {kind} {name!r}{hint} ({kind}s: {', '.join(names)})"
+    return f"{begin or f'unknown {kind}'} {name!r}{hint} ({kind}s: {', '.join(names)})"
 
 
 def look_up(kind: str, name: str, known: Mapping[str, T]) -> T:

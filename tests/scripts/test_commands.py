@@ -67,7 +67,7 @@ def test_record_explains_bad_words(tmp_path, capsys):
     assert main(["record", "--folder", str(tmp_path), "--episodes", "0"]) == 2
     capsys.readouterr()
     for words, said in (
-        ("raet=3", "unknown option 'raet', did you mean 'rate'?"),
+        ("raet=3", "unexpected keyword argument 'raet', did you mean 'rate'?"),
         ("rate=fast", "rate must be a finite number (at most 1e+15 in magnitude) or None, got 'fast'"),
     ):
         assert main(["record", "--folder", str(tmp_path), "--options", words]) == 2

@@ -40,6 +40,7 @@ def test_an_unknown_name_gets_the_nearest_one_and_all() -> None:
     assert unknown("paper", "two-gyr", {"two-gyro": 1, "x": 2}) == (
         "unknown paper 'two-gyr', did you mean 'two-gyro'? (papers: two-gyro, x)"
     )
+    assert unknown("paper", "zzz", ["x"], "no such article").startswith("no such article 'zzz' (papers: x)")
     assert look_up("paper", "x", {"x": 2}) == 2
     with pytest.raises(ValueError, match=r"unknown paper 'zzz' \(papers: x\)"):
         look_up("paper", "zzz", {"x": 2})
