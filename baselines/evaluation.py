@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 import numpy as np
 
 from ..envs.data.formats.load import load_recordings
-from ..envs.data.plausibility.recording import check_recording
 from ..envs.data.plausibility.sites import sites
 from ..envs.data.reference_clock import measured
 from ..envs.data.trajectory import REFERENCE_CLOCK, Trajectory
@@ -24,7 +23,7 @@ from ..filters.support.parallel import progress_bar
 from ..filters.support.rows import RESULT
 from .measures import measures
 from .registry import list_estimators, make_estimator
-from .run import fitted, run_on, without_estimate
+from .run import fitted, report_findings, run_on, without_estimate
 from .scoring import (
     LARGEST_NORTH,
     ONBOARD,
@@ -263,13 +262,6 @@ def known_truth(trajectory: Trajectory) -> Trajectory:
     if all(scored.values()):
         return trajectory
     return trajectory.replace(truth={name: values for name, values in trajectory.truth.items() if scored[name]})
-
-
-def report_findings(trajectory: Trajectory) -> None:
-    """Warn of all findings that make estimates wrong."""
-    for finding in check_recording(trajectory):
-        if finding.severity == "warning":
-            warnings.warn(f"{trajectory.name}: {finding}", stacklevel=3)
 
 
 def named_trajectories(trajectories: Trajectories) -> list[Trajectory]:

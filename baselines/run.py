@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 
 from ..envs.data.glitches import without_glitches
-from ..envs.data.trajectory import Trajectory
+from ..envs.data.plausibility.recording import check_recording
+from ..envs.data.trajectory import TRUSTED, Trajectory, trusted
 from ..filters.core.backend import to_numpy
 from ..filters.core.estimator import Estimator, without_impossible
 from ..filters.core.estimator import run as run_sequence
@@ -30,6 +31,7 @@ def run(
     dt: float | None = None,
     *,
     grid: bool = False,
+    check: bool = True,
 ) -> Estimate:
     """Run an estimator over a recording.
 
@@ -44,20 +46,24 @@ def run(
         data: a trajectory, or channel name → ``(T, *batch, size)``, NaN where a channel has no valid sample.
         dt: sampling interval, s; needed with arrays. With a trajectory it may only confirm the trajectory's.
         grid: return the estimate on the uniform grid, gaps included, instead of at the trajectory's samples.
+        check: warn of implausible units, signs, axes and clocks (:func:`poise.check_recording`), once for each
+            trajectory; those that were simulated in this process need no check.
 
     Returns:
         The estimate, time first, with ``time``: as many samples as the trajectory has, or as its grid.
 
     Warns:
-        UserWarning: there is no estimate at all, as a channel has no valid sample; or see :func:`run_on`.
+        UserWarning: findings of ``check``; there is no estimate at all, as a channel has no valid sample; or see
+            :func:`run_on`.
 
     Raises:
         ValueError: no ``dt`` with arrays; a ``dt`` that contradicts trajectory or estimator; an unknown name; missing
             channels; a clock without uniform sampling (:meth:`Trajectory.on_grid`).
     """
     interval = checked_interval(dt)
-    if not isinstance(grid, bool):
-        raise ValueError(f"grid must be True or False, got {grid!r}")
+    for name, value in {"grid": grid, "check": check}.items():
+        if not isinstance(value, bool):
+            raise ValueError(f"{name} must be True or False, got {value!r}")
     if not isinstance(estimator, str | Estimator):
         raise ValueError(f"estimator must be a name (poise.list_estimators) or an estimator, got {estimator!r}")
     if not isinstance(data, Trajectory):
@@ -70,6 +76,8 @@ def run(
     if interval is not None and not same_interval(interval, on_grid.dt):
         raise ValueError(f"dt={interval:.6g} s contradicts {data.name!r}, which has {on_grid.dt:.6g} s; leave it out")
     made = fitted(estimator, on_grid)
+    if check and data not in TRUSTED:
+        report_findings(data)
     estimate = warned_of(run_on(made, on_grid), made, on_grid.measurements, f"{data.name}: ")
     return estimate if grid or on_grid is data else at_samples(estimate, data, on_grid)
 
@@ -80,6 +88,7 @@ def smooth(
     dt: float | None = None,
     *,
     grid: bool = False,
+    check: bool = True,
 ) -> Estimate:
     """Fixed-interval smoothing of a recording: every estimate uses all samples (offline use).
 
@@ -91,6 +100,7 @@ def smooth(
         data: as for :func:`run`.
         dt: as for :func:`run`.
         grid: as for :func:`run`.
+        check: as for :func:`run`.
 
     Returns:
         As :func:`run`; innovations and NIS are those of the filter.
@@ -99,8 +109,15 @@ def smooth(
         ValueError: as :func:`run`; or the estimator has no smoother.
     """
     if isinstance(estimator, str):
-        return run(estimator.removesuffix(SUFFIX) + SUFFIX, data, dt, grid=grid)
-    return run(estimator if isinstance(estimator, Offline) else Offline(estimator), data, dt, grid=grid)
+        return run(estimator.removesuffix(SUFFIX) + SUFFIX, data, dt, grid=grid, check=check)
+    return run(estimator if isinstance(estimator, Offline) else Offline(estimator), data, dt, grid=grid, check=check)
+
+
+def report_findings(trajectory: Trajectory) -> None:
+    """Warn whoever called the caller of all findings that make estimates wrong."""
+    for finding in check_recording(trusted(trajectory)):
+        if finding.severity == "warning":
+            warnings.warn(f"{trajectory.name}: {finding}", stacklevel=3)
 
 
 def checked_interval(dt: Any) -> float | None:

@@ -17,7 +17,7 @@ from ..filters.support.parallel import in_parallel, progress_bar
 from ..filters.support.seeds import child_seeds, root_seed
 from ..filters.support.version import poise_version
 from .base import Block, PoseEnv
-from .data.trajectory import Trajectory, load_trajectory
+from .data.trajectory import Trajectory, load_trajectory, trusted
 from .registration import make_environment
 
 Policy = Callable[[Any], Any]
@@ -162,7 +162,7 @@ def join(rows: list[Mapping[str, Any]], infos: list[Mapping[str, Any]], metadata
         mask=np.array([bool(info.get("scored", True)) for info in infos]),
         metadata=metadata,
     )
-    return rated(trajectory)
+    return trusted(rated(trajectory))
 
 
 def describe(env: Any, seed: int | None) -> dict[str, Any]:

@@ -13,6 +13,7 @@ from functools import cached_property
 from numbers import Real
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
+from weakref import WeakSet
 
 import numpy as np
 
@@ -355,6 +356,10 @@ class Trajectory:
         )
 
 
+TRUSTED: WeakSet[Trajectory] = WeakSet()
+"""Trajectories whose units and signs need no check: simulated in this process and not changed since, or checked."""
+
+
 def load_trajectory(path: str | Path) -> Trajectory:
     """Read a trajectory that :meth:`Trajectory.save` wrote.
 
@@ -368,3 +373,9 @@ def load_trajectory(path: str | Path) -> Trajectory:
         return Trajectory(**fields)
     except ValueError as reason:
         raise ValueError(f"{path}: {reason}") from None
+
+
+def trusted(trajectory: Trajectory) -> Trajectory:
+    """The trajectory, whose units and signs need no check any more."""
+    TRUSTED.add(trajectory)
+    return trajectory

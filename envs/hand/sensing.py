@@ -13,7 +13,7 @@ from ...filters.core import rotation
 from ...filters.support.parameters import check_positive
 from ...filters.support.seeds import root_seed
 from ..base import Block
-from ..data.trajectory import Trajectory
+from ..data.trajectory import Trajectory, trusted
 from ..sensors.ideal import BodyState, Mounting, Sampling, mounted, vector
 from ..sensors.magnetics import Magnetics
 from ..sensors.presets import SensorPreset, sensor_preset
@@ -214,4 +214,5 @@ def simulate_hand(
     }
     if held is not None:
         metadata["device"] = held.describe()
-    return Trajectory(block.time, dict(block.measurements), {**block.pose, **block.truth}, metadata=metadata)
+    truth = {**block.pose, **block.truth}
+    return trusted(Trajectory(block.time, dict(block.measurements), truth, metadata=metadata))

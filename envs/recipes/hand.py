@@ -15,7 +15,7 @@ import numpy as np
 from ...filters.core import rotation
 from ...filters.support.ranges import Range, log_uniform
 from ...filters.support.seeds import named_generator
-from ..data.trajectory import Trajectory
+from ..data.trajectory import Trajectory, trusted
 from ..hand.carried import Carried
 from ..hand.gestures import GESTURES, GestureConfig, gesture_config
 from ..hand.hand_held import HandHeld
@@ -93,4 +93,4 @@ class HandRecipe(Recipe):
         metadata: dict[str, Any] = {"name": name, "source": "simulation", "rate": rate, "sampling": sampling}
         sensor = mounted(states, mounting)
         truth = {"orientation": sensor.orientation, "position": sensor.position}
-        return Trajectory(times, measurements, truth, metadata=metadata)
+        return trusted(Trajectory(times, measurements, truth, metadata=metadata))

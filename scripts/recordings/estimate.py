@@ -39,7 +39,6 @@ class Args:
 
 def run(args: Args) -> int:
     """Estimate, write, print a summary."""
-    from ...baselines.evaluation import report_findings
     from ...baselines.export import WRITERS, write_estimates
     from ...baselines.registry import make_estimator
     from ...baselines.run import run as run_filter
@@ -55,7 +54,6 @@ def run(args: Args) -> int:
         estimates: dict[str, Estimate] = {}
         run_estimator = smooth if args.offline else run_filter
         for name, sensor in sensors.items():
-            report_findings(sensor)
             estimates[name] = run_estimator(args.estimator, sensor)
         rows = [summary_row(name, estimate) for name, estimate in estimates.items()]
         out.table(rows, f"Angles by {args.estimator}, deg (±: standard deviation at the end)")

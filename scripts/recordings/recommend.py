@@ -32,7 +32,7 @@ def run(args: Args) -> int:
     from dataclasses import asdict
 
     from ...baselines.comparison.recommendation import recommend
-    from ...baselines.evaluation import report_findings
+    from ...baselines.run import report_findings
     from .load import load_all, plain_warnings, sensors_of
 
     with plain_warnings(), Output("recommend", args) as out:

@@ -128,3 +128,17 @@ def test_arrays_are_read_as_a_trajectory_of_them_would_be(motion):
     with pytest.warns(UserWarning, match="count as missing samples"):
         expected = poise.run("bounded-motion", motion.replace(measurements=motion.measurements | arrays))
     np.testing.assert_allclose(found.pose["up"], expected.pose["up"], atol=1e-9)
+
+
+def test_an_implausible_recording_is_told_once_and_a_simulated_one_is_not_checked(motion, recwarn):
+    poise.run("mekf", motion)
+    turned = motion.replace(measurements={**motion.measurements, "imu/gyr": -motion.measurements["imu/gyr"]})
+    poise.run("mekf", turned, check=False)
+    assert not recwarn
+    with pytest.warns(UserWarning, match="of the gyroscope all signs are reversed") as told:
+        poise.run("mekf", turned)
+    assert told[0].filename == __file__
+    poise.smooth("mekf", turned)
+    assert not recwarn
+    with pytest.raises(ValueError, match="check must be True or False, got 1"):
+        poise.run("mekf", turned, check=1)

@@ -20,10 +20,8 @@ FORCE_UNITS = {
     "cm/s²": 100.0 * STANDARD_GRAVITY,
     "ft/s²": STANDARD_GRAVITY / 0.3048,
     "mm/s²": 1e3 * STANDARD_GRAVITY,
-    "counts of ±2 g in 16 bits": 16384.0,
-    "counts of ±4 g in 16 bits": 8192.0,
-    "counts of ±8 g in 16 bits": 4096.0,
-    "counts of ±16 g in 16 bits": 2048.0,
+    **{f"counts of ±{most} g in 16 bits": 2.0**15 / most for most in (2, 4, 8, 16)},
+    **{f"counts of ±{most} g in 16 bits, named g": 2.0**15 / most * STANDARD_GRAVITY for most in (2, 4, 8, 16)},
 }
 """Unit → what an accelerometer at rest reports in it."""
 FIELD_UNITS = {"nT": 1e3, "mG": 10.0, "G": 1e-2, "mT": 1e-3, "T": 1e-6}

@@ -13,20 +13,18 @@ from .....filters.core.quantity import STANDARD_GRAVITY
 from .....filters.support.names import unknown
 
 UNIT = re.compile(r"^(?P<name>.*?)[\s_]*(\((?P<a>(?:[^()]|\([^()]*\))*)\)|\[(?P<b>[^\[\]]*)\])$")
-SPELLED = {"deg_s": "deg/s", "degs": "deg/s", "dps": "deg/s", "mdps": "mdps", "rad_s": "rad/s", "rads": "rad/s"}
-SPELLED |= {"deg/s": "deg/s", "rad/s": "rad/s", "m/s/s": "m/s/s", "m/s2": "m/s2", "t": "T", "s": "s", "rad": "rad/s"}
-SPELLED |= dict.fromkeys(("m_s2", "ms2", "mps2"), "m/s2") | {"g": "g", "mg": "mg", "ut": "uT", "nt": "nT"}
-SPELLED |= {"gauss": "gauss"}
-"""Units within names of columns, ``gyr_x_dps`` or ``acc_mps2_x``."""
-ONLY_OF = {"g": "acc", "t": "^m", "s": "^time", "rad": "^gyr"}
-"""Short ones that are units only within names that match."""
+FORCE, FIELD = "acc|^a_?[xyz]?$", "mag|^m"
+ONLY_OF = {"g": FORCE, "gs": f"{FORCE}|{FIELD}", "mg": f"{FORCE}|{FIELD}", "a/m": FIELD, "s": "^time"}
+ONLY_OF |= dict.fromkeys(("t", "ut", "µt", "nt", "mt"), FIELD) | dict.fromkeys(
+    ("rad", "d/s", "r/min"), "gyr|^g_?[xyz]?$"
+)
+"""Short units at the end of a name → what the name before it must match."""
 MULTIPLE = re.compile(r"(?P<times>\d+\.?\d*|\.\d+)(?:/(?P<parts>[1-9]\d*\.?\d*))?(?P<unit>\D.*)")
 """A number of units, or parts of one as raw readings have, ``1/16 deg/s``."""
 RATE = re.compile(r"(\d+(?:[.,]\d+)?)\s*(k?hz|[mµu]?s\b(?![-^⁻]))?", re.IGNORECASE)
 """A rate, or the interval of a sample."""
 QUOTIENT = re.compile(r"^(?P<name>.*?(?:[xyz]|time|\bt))\s*(?:/|:| - )\s*(?P<unit>\S+)$", re.IGNORECASE)
 """Quantity over unit as ISO 80000 writes it, ``acc_x/(m/s²)`` or ``t/s``, and the same with a colon or a dash."""
-SUFFIX = re.compile(rf"^(?P<name>\w*?[a-z])_(?P<unit>{'|'.join(SPELLED)})(?P<axis>_[xyz]|\[\d\])?$", re.IGNORECASE)
 
 
 def _spellings(factors: dict[float, str]) -> dict[str, float]:
@@ -36,13 +34,13 @@ def _spellings(factors: dict[float, str]) -> dict[str, float]:
 UNITS = {
     "gyr": _spellings(
         {
-            1.0: "rad/s rads-1 rad*s-1",
-            np.pi / 180: "deg/s dps degs-1 d/s",
+            1.0: "rad/s rads-1 rad*s-1 rads",
+            np.pi / 180: "deg/s dps degs-1 d/s degs",
             np.pi / 180e2: "cdeg/s",
             np.pi / 180e3: "mdps mdeg/s millideg/s millidegrees/s",
             np.pi / (180.0 * 60.0): "deg/min",
             np.pi / (180.0 * 3600.0): "deg/h deg/hr",
-            1e-3: "mrad/s",
+            1e-3: "mrad/s mrads",
             1e-6: "urad/s µrad/s",
             2.0 * np.pi: "rev/s rps turn/s turns/s",
             np.pi / 30.0: "rpm rev/min r/min",
@@ -50,7 +48,7 @@ UNITS = {
     ),
     "acc": _spellings(
         {
-            1.0: "m/s2 m/(s2) ms-2 mps2 m/s/s m*s-2 n/kg",
+            1.0: "m/s2 m/(s2) ms-2 mps2 ms2 m/s/s m*s-2 n/kg",
             STANDARD_GRAVITY: "g g0 gs gee gn g-force gforce g's",
             STANDARD_GRAVITY / 1000.0: "mg milli-g mgs",
             STANDARD_GRAVITY / 1e6: "ug µg",
@@ -81,6 +79,7 @@ UNITS = {
 }
 """Kind of quantity → spelling of a unit without white space, in lower case → factor to rad/s, m/s², µT, s, rad."""
 KNOWN_UNITS = {spelling for spellings in UNITS.values() for spelling in spellings}
+NAMED_UNITS = {unit for kind in ("gyr", "acc", "mag") for unit in UNITS[kind] if len(unit) > 2} | set(ONLY_OF)
 OTHER_UNITS = {"c", "degc", "°c", "kpa", "hpa", "pa", "mv", "v", "%", "m", "mm", "cm", "hz", "counts", "lsb", "n", "nm"}
 
 
@@ -91,7 +90,7 @@ SPELLINGS = (
     (r"⁻²|\^-2", "-2"),
     (r"\^-1", "-1"),
     (r"μ", "µ"),
-    (r"\bper\b", "/"),
+    (r"\bper\b|(?<=[a-z])per(?=s)", "/"),
     (r"(?<=[a-z°])\s*[.*·]\s*(?=[a-z])|\s+", " "),
     (r"[°º˚¡]|\b(degrees?|grad)\b", "deg"),
     (r"\bradians?\b", "rad"),
@@ -143,12 +142,10 @@ def split_unit(name: str) -> tuple[str, str]:
     if quotient is not None and plain(quotient["unit"].strip("()[]")) in KNOWN_UNITS - {"1"}:
         return quotient["name"], quotient["unit"].strip("()[]")
     match = UNIT.match(name.strip())
-    suffix = SUFFIX.match(name.strip())
-    indexed = match is None or bool(match["b"] and match["b"].isdigit())
-    if indexed and suffix is not None:
-        unit = suffix["unit"].lower()
-        if re.search(ONLY_OF.get(unit, ""), suffix["name"], re.IGNORECASE):
-            return f"{suffix['name']}{suffix['axis'] or ''}", SPELLED[unit]
+    if match is None or (match["b"] and match["b"].isdigit()):
+        stem, unit = split_ending(name.strip())
+        if unit:
+            return stem, unit
     if match is None:
         stem, said, unit = name.strip().rpartition(" in ")
         if said and plain(unit) in UNITS["time"]:
@@ -161,6 +158,19 @@ def split_unit(name: str) -> tuple[str, str]:
     # A number before another unit may be a range, (16 g).
     known = known or bool(multiple and multiple["unit"] in (KNOWN_UNITS if multiple["parts"] else UNITS["time"]))
     return (match["name"].strip(), unit) if unit == "" or known else (name.strip(), "")
+
+
+def split_ending(name: str) -> tuple[str, str]:
+    """Name and unit of ``name_unit``, ``name_unit_axis`` and ``name_unit[0]``; the unit may have underscores."""
+    parts = re.fullmatch(r"(?P<words>.*?)(?P<axis>_[xyz]|\[\d\])?", name, re.IGNORECASE)
+    words = parts["words"].split("_")
+    for start in range(1, len(words)):
+        stem, ending = "_".join(words[:start]), words[start:]
+        quotient = f"{ending[0]}/{''.join(ending[1:])}" if len(ending) > 1 else ending[0]
+        for unit in (plain(quotient), plain(" ".join(ending))):
+            if unit in NAMED_UNITS and re.search(ONLY_OF.get(unit, "[a-z]$"), stem, re.IGNORECASE):
+                return stem + (parts["axis"] or ""), "rad/s" if unit == "rad" else unit
+    return name, ""
 
 
 def units_row(cells: Sequence[str]) -> bool:

@@ -210,6 +210,30 @@ def test_a_path_of_names_is_no_unit(name):
     assert split_unit(name) == (name, "")
 
 
+@pytest.mark.parametrize(
+    ("name", "stem", "unit"),
+    [
+        ("gyro_x_rpm", "gyro_x", "rpm"),
+        ("gyr_deg_per_s_y", "gyr_y", "deg/s"),
+        ("w_z_rad_per_sec", "w_z", "rad/s"),
+        ("gyro_z_degpersec", "gyro_z", "deg/s"),
+        ("acc_m_s_2_x", "acc_x", "m/s2"),
+        ("accel_y_m_per_s2", "accel_y", "m/s2"),
+        ("acc_x_cm_s2", "acc_x", "cm/s2"),
+        ("ax_g", "ax", "g"),
+        ("gyro_rad[0]", "gyro[0]", "rad/s"),
+        ("mag_mG[1]", "mag[1]", "mg"),
+    ],
+)
+def test_a_unit_may_end_a_name_in_any_spelling(name, stem, unit):
+    assert split_unit(name) == (stem, unit)
+
+
+@pytest.mark.parametrize("name", ["acc_rad", "imu_1", "pos_t", "speed_m_s", "force_n", "acc_t", "gyr_g"])
+def test_what_ends_a_name_is_a_unit_only_of_its_kind(name):
+    assert split_unit(name) == (name, "")
+
+
 def test_names_that_occur_twice_are_named(tmp_path):
     columns = HEADER.split(",")
     lines = [",".join([*columns, *columns[1:]]), *(",".join([*row, *row[1:]]) for row in ROWS)]
