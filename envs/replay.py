@@ -108,7 +108,8 @@ class ReplayEnv(PoseEnv):
         render_mode: ``human`` (a window), ``rgb_array`` or None.
 
     Raises:
-        ValueError: the trajectory has a single sample or no true pose, or an argument is out of its range.
+        ValueError: the trajectory has a single sample, no reading or no true pose at a scored sample, or an argument is
+            out of its range.
 
     ## Version History
 
@@ -144,6 +145,8 @@ class ReplayEnv(PoseEnv):
                     f"{trajectory.name!r}, got {duration}"
                 )
         quantity = scored_quantity(trajectory, score)
+        if not any(np.isfinite(values).all(axis=-1).any() for values in trajectory.measurements.values()):
+            raise ValueError(f"trajectory {trajectory.name!r} has no sample of any channel: all are NaN")
         super().__init__(RecordedSensors(trajectory), [quantity], 1.0 / trajectory.dt, render_mode)
         # an orientation contains its relative orientation
         wanted = [name for name in POSE if name in trajectory.truth or name == "up"]
@@ -182,7 +185,7 @@ def scored_quantity(trajectory: Trajectory, score: str | None) -> Quantity:
     """What the agent is asked for.
 
     Raises:
-        ValueError: the trajectory knows no pose, or not the one that is wanted.
+        ValueError: the trajectory knows no pose, or not the one that is wanted, or at no scored sample.
     """
     candidates = (ORIENTATION, RELATIVE_ORIENTATION, UP)
     choices = [quantity for quantity in candidates if quantity.name in trajectory.quantities]
@@ -191,4 +194,9 @@ def scored_quantity(trajectory: Trajectory, score: str | None) -> Quantity:
             f"trajectory {trajectory.name!r} knows neither orientation nor up, so that nothing can be scored; it knows "
             f"{list(trajectory.quantities)}"
         )
-    return choices[0] if score is None else choose_quantity(score, choices)
+    wanted = choices if score is None else [choose_quantity(score, choices)]
+    for quantity in wanted:
+        if (trajectory.mask & np.isfinite(trajectory.truth_of(quantity.name)).all(axis=-1)).any():
+            return quantity
+    names = " or ".join(repr(quantity.name) for quantity in wanted)
+    raise ValueError(f"trajectory {trajectory.name!r} has no scored sample with a known {names}")

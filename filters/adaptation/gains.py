@@ -16,7 +16,8 @@ import numpy as np
 
 from ..core.kalman import KalmanFilter
 from ..core.model import Equations, Model, parameters_of
-from ..registry import make, name_of
+from ..registry import FILTERS, make, name_of
+from ..support.names import unknown
 
 DECADES = 1.5
 """Powers of ten by which a variance may change in either direction.
@@ -54,12 +55,22 @@ def tunable_filter(filter: str | KalmanFilter) -> KalmanFilter:
         filter: a Kalman filter with gains, or the name of one in :data:`poise.filters.registry.FILTERS`.
 
     Raises:
-        ValueError: unknown name, or something that is not a Kalman filter with gains.
+        ValueError: another name, or something that is not a Kalman filter with gains.
     """
-    made = make(filter) if isinstance(filter, str) else filter
-    if not isinstance(made, KalmanFilter) or not made.gains:
+    if isinstance(filter, str):
+        if not has_gains(filter):
+            known = [name for name in FILTERS if has_gains(name)]
+            raise ValueError(unknown("filter", filter, known, "filter must be a Kalman filter with gains, got"))
+        return replace(make(filter), keep_covariance=False)
+    if not isinstance(filter, KalmanFilter) or not filter.gains:
         raise ValueError(f"filter must be a Kalman filter with gains, or the name of one, got {filter!r}")
-    return replace(made, keep_covariance=False) if isinstance(filter, str) else made
+    return filter
+
+
+def has_gains(name: str) -> bool:
+    """Whether this is the name of a Kalman filter with gains."""
+    entry = FILTERS.get(name)
+    return entry is not None and entry.runner is KalmanFilter and bool(entry.made_by.gains)
 
 
 def filter_name(filter: KalmanFilter) -> str:

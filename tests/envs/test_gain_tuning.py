@@ -175,7 +175,7 @@ def test_recordings_are_read_from_files(tmp_path, trajectory):
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        ({"filter": "kalman"}, "unknown estimator 'kalman'"),
+        ({"filter": "kalman"}, "filter must be a Kalman filter with gains, got 'kalman'"),
         ({"filter": 3}, "filter must be of type .*KalmanFilter, got 3"),
         ({"gains": ("process", "cheek")}, "gains must be distinct names from"),
         ({"gains": ()}, "gains must be distinct names from"),

@@ -131,6 +131,20 @@ def test_only_what_the_trajectory_knows_is_asked_for(trajectory):
     ] == pytest.approx(0.0, abs=1e-7)
 
 
+def test_what_nobody_could_be_scored_on_is_refused(trajectory):
+    nothing = {name: np.full_like(values, np.nan) for name, values in trajectory.measurements.items()}
+    with pytest.raises(ValueError, match="has no sample of any channel: all are NaN"):
+        ReplayEnv(trajectory.replace(measurements=nothing))
+    ReplayEnv(trajectory.replace(measurements=nothing | {"imu/gyr": trajectory.measurements["imu/gyr"]}))
+    with pytest.raises(ValueError, match="no scored sample with a known 'orientation' or 'relative_orientation' or"):
+        ReplayEnv(trajectory.replace(mask=np.zeros(len(trajectory), bool)))
+    unknown = np.full_like(trajectory.truth["orientation"], np.nan)
+    partly = trajectory.replace(truth=trajectory.truth | {"orientation": unknown})
+    with pytest.raises(ValueError, match=r"no scored sample with a known 'orientation'$"):
+        ReplayEnv(partly, score="orientation")
+    assert ReplayEnv(partly).action_space.shape == (3,)
+
+
 def test_snapshots_continue(trajectory):
     env, other = ReplayEnv(trajectory), ReplayEnv(trajectory)
     env.reset(seed=0)

@@ -132,7 +132,7 @@ def test_kept_rides_are_the_same_rides(tmp_path, monkeypatch):
     ("arguments", "words"),
     [
         ({"site": "thigh_left"}, "site must be one of"),
-        ({"filter": "kalman"}, "unknown estimator 'kalman'"),
+        ({"filter": "kalman"}, "filter must be a Kalman filter with gains, got 'kalman'"),
         ({"scenario": "moon"}, "unknown scenario"),
         ({"scenario": ()}, "at least one scenario"),
         ({"subject": 9}, "subject"),

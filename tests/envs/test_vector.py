@@ -108,6 +108,9 @@ def test_equal_seeds_repeat_and_others_do_not():
     assert not np.array_equal(first[0], first[2])
     # the seeds of the rows count on
     np.testing.assert_array_equal(first[0][1:], first[2][:-1])
+    for wrong in (1.5, "123", [1, 2], {3}):
+        with pytest.raises(ValueError, match="seed must be an integer, None or 3 of them, got"):
+            env.reset(seed=wrong)
 
 
 @pytest.mark.parametrize("clone", [lambda env: pickle.loads(pickle.dumps(env)), copy.deepcopy])
@@ -169,7 +172,7 @@ def test_wrong_calls_are_explained():
     env = native(HAND, **SHORT)
     with pytest.raises(RuntimeError, match="call reset first"):
         env.step(np.zeros((3, 1)))
-    with pytest.raises(ValueError, match="one number or 3 of them, got 2"):
+    with pytest.raises(ValueError, match="an integer, None or 3 of them, got"):
         env.reset(seed=[1, 2])
     with pytest.raises(ValueError, match="every row at the first reset"):
         env.reset(options={"reset_mask": np.array([True, False, False])})
