@@ -64,6 +64,8 @@ class Args:
     """labels of the recordings: their truth, or the smoother of the corrected filter, which needs none"""
     start: Path | None = None
     """weights to start from, such as those of a training on simulation"""
+    calibrate: Path | None = None
+    """weights of a preset for rides, to find their covariance anew on held-out rides without any training"""
     test_episodes: int | None = None
     """simulated episodes to test the finished network on (default: 48, with --quick 8)"""
     processes: int = 2
@@ -87,6 +89,8 @@ def run(args: Args) -> int:
     start = process_times()
     check_file("export", args.export, args.recordings)
     preset = chosen(args)
+    if args.calibrate is not None:
+        return recalibrate(args, preset)
     if args.start is not None:
         started(args.start, preset.front_end(), preset.head())  # raises, before there is a run
     own = known_recordings(args.recordings) if args.recordings else None
@@ -120,6 +124,44 @@ def run(args: Args) -> int:
         out.table(rows, "Error on unseen simulated episodes, mean of RMS, deg")
         out.add(run=str(folder.folder), card=card)
     return 0
+
+
+def recalibrate(args: Args, preset: Preset) -> int:
+    """Write weights, as they are, with a covariance found anew and a card that tells so."""
+    from ..baselines.learned.limits import limits_of
+    from ..baselines.learned.training import calibrate_weights
+    from ..baselines.weights_io import DIGEST, load_card
+
+    weights = Path(str(args.calibrate))
+    others = [each for each in ("recordings", "start", "resume") if getattr(args, each)]
+    if others:
+        raise ValueError(f"--calibrate trains nothing: it takes no --{others[0]}")
+    old = load_card(weights)
+    folder = open_run("train", args, may_differ=("processes",))
+    with Output("train", args) as out:
+        made, found = calibrate_weights(preset, args.seed, weights, processes=args.processes, show=not args.json)
+        now = jsonable(found._asdict())
+        card = {name: value for name, value in old.items() if name != DIGEST} | {
+            "calibration": now,
+            "limits": limits_of(preset, made, found),
+            "calibrated": {"command": command_line("train", args, (*OPTIONS, "calibrate"))} | today(),
+        }
+        path = made.save(folder.folder / args.preset.replace("+", "_"), card)
+        for file in [path] if args.export is None else [path, made.save(args.export, card)]:
+            out.say(f"weights: {file}")
+        kept = ("rides", "nees", "coverage")
+        rows = [
+            {"covariance": label, **{name: each.get(name) for name in kept}}
+            for label, each in (("before", old.get("calibration") or {}), ("now", now))
+        ]
+        out.table(rows, "Each held-out ride under the covariance of the others")
+        out.add(run=str(folder.folder), card=card)
+    return 0
+
+
+def today() -> dict[str, Any]:
+    """Versions and date, for a card."""
+    return {"versions": versions(("numpy", "numba", "torch", "scipy")), "date": date.today().isoformat()}
 
 
 def process_times() -> tuple[float, float]:
@@ -253,7 +295,6 @@ def card_of(args: Args, preset: Preset, result: FitResult, table: pandas.DataFra
         "limits": limits_of(preset, result.estimator, result.calibration),
         "history": jsonable([{name: round(value, 6) for name, value in entry.items()} for entry in result.history]),
         "test": means(table),
-        "versions": versions(("numpy", "numba", "torch", "scipy")),
-        "date": date.today().isoformat(),
+        **today(),
         "licence": "MIT",
     }

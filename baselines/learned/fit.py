@@ -12,10 +12,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...filters.core.backend import to_numpy
 from ...filters.support.optional import extra
 from ..checkpoint import load_checkpoint, save_checkpoint
-from .calibration import Calibration, calibrate
+from .calibration import Calibration, calibrated
 from .config import FitConfig
 from .data import SequenceData
 from .estimator import LearnedEstimator
@@ -110,7 +109,7 @@ def fit(
         raise ValueError("resume needs the folder of the interrupted training")
     if isinstance(head, AngleHead):
         # a covariance of other weights is none of these
-        head = replace(head, deviations=(), growth=())
+        head = replace(head, deviations=(), growth=(), power=1)
     home = None if folder is None else Path(folder)
     if home is not None:
         home.mkdir(parents=True, exist_ok=True)
@@ -136,18 +135,13 @@ def fit(
         finally:
             log(None)
         module.load_state_dict(trainer.best)
-        raw_output = np.concatenate([to_numpy(outputs) for _, outputs in whole_sequences(trainer, validation)])
     module.eval()
     network: Any = module.export() if hasattr(module, "export") else trainer.network  # type: ignore[operator]
     calibration = None
     if isinstance(head, AngleHead):
         network = WithUnlikeness.of(network, *standardisation(data.features, data.mask))
-        errors, unlikeness = (
-            head.errors(raw_output, validation.target, validation.spread),
-            network.unlikeness(validation.features),
-        )
-        calibration = calibrate(errors, unlikeness, validation.mask, validation.names)
-        head = replace(head, deviations=calibration.deviations, growth=calibration.growth)
+        with one_thread():
+            head, calibration = calibrated(network, head, validation)
     estimator = LearnedEstimator(network, front_end, head)
     return FitResult(estimator, trainer.history, trainer.best_epoch, calibration)
 

@@ -151,8 +151,9 @@ class AngleHead:
         scale: rad; each output of the network is in this unit, one for each corrected number.
         limit: largest correction in standard deviations of the front end, if it knows any; None: not limited.
         deviations: standard deviations in rad of what remains, found on held-out data; empty: no covariance.
-        growth: what the variances grow by where inputs are unlike those of the training, ``deviations² (1 + growth u)``
-            (:mod:`.calibration`); the network says u after its corrections. Empty: they are constant.
+        growth: what the variances grow by where inputs are unlike those of the training (:mod:`.calibration`),
+            ``deviations² (1 + growth uᵖ)``; the network says u after its corrections. Empty: they are constant.
+        power: p, 1 or 2.
     """
 
     outputs: tuple[Quantity, ...]
@@ -160,6 +161,7 @@ class AngleHead:
     limit: float | None = None
     deviations: tuple[float, ...] = ()
     growth: tuple[float, ...] = ()
+    power: int = 1
 
     kind: ClassVar[str] = "angles"
 
@@ -171,6 +173,8 @@ class AngleHead:
                 raise ValueError(f"{name} must be {self.corrected} numbers or none, got {getattr(self, name)}")
         if self.growth and not (self.deviations and all(0.0 <= each < math.inf for each in self.growth)):
             raise ValueError(f"growth must be of deviations that are given, and 0 or more, got {self.growth}")
+        if self.power not in (1, 2):
+            raise ValueError(f"power must be 1 or 2, got {self.power}")
 
     @property
     def corrected(self) -> int:
@@ -195,14 +199,15 @@ class AngleHead:
         """See :class:`Head`."""
         outputs = [[q.name, q.kind, q.size, q.unit] for q in self.outputs]
         numbers = {"scale": list(self.scale), "deviations": list(self.deviations), "growth": list(self.growth)}
-        return {"kind": self.kind, "outputs": outputs, "limit": self.limit, **numbers}
+        return {"kind": self.kind, "outputs": outputs, "limit": self.limit, **numbers, "power": self.power}
 
     @classmethod
     def read(cls, described: Mapping[str, Any]) -> Self:
         """The inverse of :meth:`describe`."""
         outputs = tuple(Quantity(*given) for given in described["outputs"])
         numbers = (tuple(described.get(name, ())) for name in ("deviations", "growth"))
-        return cls(outputs, tuple(described["scale"]), described.get("limit"), *numbers)
+        # cards before there was a power have none
+        return cls(outputs, tuple(described["scale"]), described.get("limit"), *numbers, described.get("power", 1))
 
     def estimate(self, seen: Seen, output: Array) -> Estimate:
         """See :class:`Head`."""
@@ -219,7 +224,7 @@ class AngleHead:
             return Estimate(pose)
         size = self.corrected
         growth = constant(np.array(self.growth or (0.0,) * size), output)
-        variances = constant(np.square(self.deviations), output) * (1.0 + growth * output[..., -1:])
+        variances = constant(np.square(self.deviations), output) * (1.0 + growth * output[..., -1:] ** self.power)
         if seen.alone is not None:
             parts = self.error_parts
             known = [seen.variances.get(name, variances[..., slice(*parts[name])]) for name in parts]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ import numpy as np
 from ...envs.data.trajectory import Trajectory
 from ...envs.recipes.rides import held_out
 from ...filters.support.optional import extra
+from .calibration import Calibration, calibrated
 from .data import SequenceData, taught, with_errors
 from .estimator import LearnedEstimator
 from .fit import FitResult, fit
@@ -64,32 +66,14 @@ def train_preset(
     """
     front_end: Any = preset.front_end()
     head: Any = preset.head()
-    train_seed, validation_seed, _, _ = seeds_of(seed)
     if start is not None:
         started(start, front_end, head)  # raises, before anything is simulated
-
-    def simulated(root: int, share: float, words: str) -> SequenceData:
-        if preset.rides is not None:
-            label = "" if say is None else f"{words} rides"
-            source = preset.rides if root == train_seed else held_out(preset.rides)
-            some = replace(source, rides=max(2, round(share * source.rides)))
-            return ride_data(some, root, front_end, head, processes=processes, label=label)
-        parts = [
-            SequenceData.from_recipe(
-                *(preset.recipe(name), root, max(1, round(share * count)), front_end, head),
-                cache=folder,
-                progress="" if say is None else f"{words} {name}",
-                processes=processes,
-            )
-            for name, count in preset.sources.items()
-        ]
-        return SequenceData.together(parts)
-
+    make_data = partial(simulated, preset, seed, folder=folder, processes=processes, show=say is not None)
     data = validation = None
     if teacher and (preset.filter is None or not recordings):
         raise ValueError("a teacher needs recordings, and a preset that corrects a filter")
     if recordings and teacher:
-        generator = np.random.default_rng(train_seed)
+        generator = np.random.default_rng(seeds_of(seed)[0])
         lessons = [taught(each, str(preset.filter)) for each in recordings]
         copies = [[with_errors(each, generator) for _ in range(COPIES)] for each in lessons]
         data = SequenceData.from_trajectories([each for own in copies for each in own], front_end, head)
@@ -99,11 +83,63 @@ def train_preset(
         data = SequenceData.from_trajectories(recordings[:kept], front_end, head)
         if recordings[kept:]:
             validation = SequenceData.from_trajectories(recordings[kept:], front_end, head)
-    data = simulated(train_seed, 1.0, "simulate") if data is None else data
-    validation = simulated(validation_seed, preset.validation, "held out") if validation is None else validation
+    data = make_data(held=False) if data is None else data
+    validation = make_data(held=True) if validation is None else validation
     return fit_preset(
         *(preset, seed, folder, data, validation), replicate=replicate, start=start, resume=resume, say=say
     )
+
+
+def simulated(
+    preset: Preset, seed: int, *, held: bool, folder: str | Path | None, processes: int, show: bool
+) -> SequenceData:
+    """The simulated episodes of a preset, those to train on or those held out for the best epoch and the covariance."""
+    front_end, head = preset.front_end(), preset.head()
+    root = seeds_of(seed)[1 if held else 0]
+    share, words = (preset.validation, "held out") if held else (1.0, "simulate")
+    if preset.rides is not None:
+        source = held_out(preset.rides) if held else preset.rides
+        some = replace(source, rides=max(2, round(share * source.rides)))
+        label = f"{words} rides" if show else ""
+        return ride_data(some, root, front_end, head, processes=processes, label=label)
+    parts = [
+        SequenceData.from_recipe(
+            *(preset.recipe(name), root, max(1, round(share * count)), front_end, head),
+            cache=folder,
+            progress=f"{words} {name}" if show else "",
+            processes=processes,
+        )
+        for name, count in preset.sources.items()
+    ]
+    return SequenceData.together(parts)
+
+
+def calibrate_weights(
+    preset: Preset, seed: int, weights: str | Path, *, processes: int = 1, show: bool = False
+) -> tuple[LearnedEstimator, Calibration]:
+    """Trained weights with the covariance that a training of their preset gives them today; the weights stay.
+
+    Args:
+        preset: that they were trained by.
+        seed: root seed of their training, so that held-out riders are others than those trained on.
+        weights: file, or name of shipped weights.
+        processes: how many rides are simulated at a time; the numbers do not depend on it.
+        show: progress bars.
+
+    Raises:
+        FileNotFoundError: there are no such weights.
+        ValueError: they are damaged, state no covariance, or are of another preset.
+    """
+    made, front_end, head = LearnedEstimator.load(weights), preset.front_end(), preset.head()
+    if not isinstance(head, AngleHead):
+        raise ValueError(f"only networks of riders have a covariance to calibrate, got {preset.summary!r}")
+    blank = {"deviations": (), "growth": (), "power": 1}
+    same = isinstance(made.head, AngleHead) and made.front_end.describe() == front_end.describe()
+    if not same or replace(made.head, **blank).describe() != head.describe():
+        raise ValueError(f"{weights} has another front end or head than the preset {preset.summary!r}")
+    data = simulated(preset, seed, held=True, folder=None, processes=processes, show=show)
+    calibrated_head, found = calibrated(made.network, head, data)
+    return replace(made, head=calibrated_head), found
 
 
 def fit_preset(

@@ -5,9 +5,9 @@ holds over the next interval, as bounded log factors on the filter's constants (
 and R are made of, or shares of the Kalman gain (:mod:`.gain_shares`). The covariance is the filter's own.
 
 A tuning that is right while errors are small is not right while a large one is corrected: where an input was missing
-for longer than :data:`LONGEST_GAP`, the published gains hold until a second after it. On simulated gestures (mixed,
-fast, slow) the NEES of ``mekf+noise`` 0.2 s after gaps of 2 s is 3 so, as that of ``mekf``, and 15 without; one second
-does as much as ten.
+for longer than :data:`.gain_head.LONGEST_GAP`, the published gains hold until a second after it. On simulated gestures
+(mixed, fast, slow) the NEES of ``mekf+noise`` 0.2 s after gaps of 2 s is 3 so, as that of ``mekf``, and 15 without; one
+second does as much as ten.
 """
 
 from __future__ import annotations
@@ -28,11 +28,7 @@ from ....filters.support.names import look_up
 from ...weights_io import load_weights
 from ..estimator import NETWORKS, NetworkParts
 from ..inputs.gain_features import GainFeatures, ObservedState
-from .gain_head import GainHead
-
-LONGEST_GAP = 0.09
-"""s without an input. Where half of all samples of 100 Hz are lost, one by one, most of them are left to the network: a
-shorter one would come up every second."""
+from .gain_head import LONGEST_GAP, GainHead, recovering
 
 
 class GainFilterState(NamedTuple):
@@ -111,9 +107,8 @@ class GainFilter(NetworkParts):
 
     def step(self, state: GainFilterState, measurement: Measurement) -> tuple[GainFilterState, Estimate]:
         """Process one sample of every channel, ``(*batch, size)``; NaN where there is none."""
-        inner, estimate = self.filter.step(
-            state.filter, measurement, self._unless_recovering(state.output, state.since)
-        )
+        gains = self._unless(self._gaps.bears(state.since), state.output)
+        inner, estimate = self.filter.step(state.filter, measurement, gains)
         front, seen = self.front_end.step(state.front, measurement)
         memory, output = state.memory, state.output
         if (np.asarray(seen.due) == 1.0).any():
@@ -134,8 +129,8 @@ class GainFilter(NetworkParts):
         memory, output = (np.zeros((*batch, size)) for size in (self.network.memory_size, self.network.outputs))
         _, _, outputs = self._advance(seen.features, seen.due, memory, output)
         # what is said at the end of an interval holds from the next sample on
-        since = np.concatenate([self._gaps.start((1, *batch)), self._gaps.run(arrays)[:-1]])
-        gains = self._unless_recovering(np.concatenate([output[None], outputs[:-1]]), since)
+        bears = recovering(self.front_end.kalman.model, arrays)
+        gains = self._unless(bears, np.concatenate([output[None], outputs[:-1]]))
         return self.filter.run(arrays, gains), gains
 
     def gains(self, output: np.ndarray) -> dict[str, np.ndarray]:
@@ -144,9 +139,8 @@ class GainFilter(NetworkParts):
         named = {name: factors[..., index] for index, name in enumerate(self.head.gains)}
         return self.front_end.kalman.model.limited(named)
 
-    def _unless_recovering(self, output: np.ndarray, since: np.ndarray) -> dict[str, np.ndarray]:
-        """Log factors by gain: zeros, the published tuning, in and after a gap."""
-        bears = self._gaps.bears(since)
+    def _unless(self, bears: np.ndarray, output: np.ndarray) -> dict[str, np.ndarray]:
+        """Log factors by gain: zeros, the published tuning, where the estimate bears a gap."""
         return {name: np.where(bears, 0.0, factor) for name, factor in self.gains(output).items()}
 
     @cached_property

@@ -11,7 +11,8 @@ and zero is the published tuning. They are trained through the filter: of each s
 with e the error of an output and s² its variance in the filter's covariance. The first part weighs quiet and vigorous
 sequences alike, as gradients of the mean error would not. The second, the likelihood of the errors under Student's t
 distribution with ν = 8, keeps the covariance honest; a published tuning that errs by a hundred deviations does not
-outweigh everything else, as it would under the normal distribution.
+outweigh everything else, as it would under the normal distribution. In a gap of an input and after it the filter has
+the published tuning, in training as in use (:mod:`.gain_filter`).
 """
 
 from __future__ import annotations
@@ -28,15 +29,18 @@ from ....envs.data.trajectory import Trajectory
 from ....filters.core.backend import Array, namespace
 from ....filters.core.estimator import check_measurements
 from ....filters.core.kalman import KalmanFilter
-from ....filters.core.model import parameters_of, with_parameters
-from ....filters.core.quantity import UP, Quantity
+from ....filters.core.model import Equations, parameters_of, with_parameters
+from ....filters.core.quantity import UP, Measurement, Quantity
 from ....filters.core.rotation import wrap
-from ....filters.core.sampling import join, split
+from ....filters.core.sampling import GapWatch, join, split
 from ..inputs.gain_features import GainFeatures
 
 if TYPE_CHECKING:
     from ..data import SequenceData
 
+LONGEST_GAP = 0.09
+"""s without an input. Where half of all samples of 100 Hz are lost, one by one, most of them are left to the network: a
+shorter one would come up every second."""
 FREEDOM = 8.0
 """ν, degrees of freedom of the distribution of errors"""
 CONSTANT_STEPS = 60
@@ -237,7 +241,8 @@ class GainHead:
         named = {name: factors[:, index].detach().numpy() for index, name in enumerate(self.gains)}
         taken = np.stack([np.asarray(values) for values in model.limited(named).values()], axis=-1)
         factors = factors + (torch.from_numpy(taken) - factors.detach())
-        factors = factors.repeat_interleave(whole, dim=0)[:, None]
+        bears = torch.from_numpy(recovering(model, arrays))
+        factors = torch.where(bears[..., None], 0.0, factors.repeat_interleave(whole, dim=0)[:, None])
         through = self._filter.with_model(model)
         _, found = through.run(through.init({name: array[0] for name, array in arrays.items()}), arrays, factors)
         return self._scored(found, truth)
@@ -254,6 +259,13 @@ class GainHead:
         parts = [slice(*self.kalman.model.error_parts[q.name]) for q in self.outputs]
         variances = torch.diagonal(P, dim1=-2, dim2=-1)
         return wrap(angles - truth), torch.cat([variances[:, part] for part in parts], dim=-1)
+
+
+def recovering(model: Equations, measurements: Measurement) -> np.ndarray:
+    """Samples ``(T, *batch)`` at which an estimate bears a gap of the model's inputs before them, NumPy."""
+    gaps = GapWatch(model, LONGEST_GAP)
+    since = gaps.run(measurements)
+    return gaps.bears(np.concatenate([gaps.start((1, *since.shape[1:])), since[:-1]]))
 
 
 def tilt_error(up: Any, truth: Any) -> Any:

@@ -21,6 +21,9 @@ from .gain_shares import with_gain_shares
 GYROSCOPE_BIAS = (0.03 * DEG, 6.0 * DEG)
 ACCELEROMETER_BIAS = (0.01, 0.3)
 """rad/s and m/s²: devices as in the hand recipes, also such that were never calibrated"""
+PACKET_LOSS, BURST, SILENT = 0.3, (0.05, 2.0), 0.2
+"""Shares of devices that lose packets and whose accelerometer pauses, and mean length of the former, s: a network meets
+gaps and what comes after them."""
 DURATION = 60.0
 """s of an episode"""
 
@@ -68,9 +71,16 @@ class GainPreset(Preset):
         return GainHead(kalman, tuple(self.limits), tuple(limits), self.likelihood, self.small_error)
 
     def recipe(self, name: str) -> Recipe:
-        """Episodes of a minute with devices that may be uncalibrated."""
+        """Episodes of a minute with devices that may be uncalibrated, and gaps."""
         made = hand_recipe(name)
-        sensors = replace(made.sensors, gyroscope_bias=GYROSCOPE_BIAS, accelerometer_bias=ACCELEROMETER_BIAS)
+        timing = replace(made.sensors.timing, packet_loss_share=PACKET_LOSS, burst_duration=BURST)
+        sensors = replace(
+            made.sensors,
+            gyroscope_bias=GYROSCOPE_BIAS,
+            accelerometer_bias=ACCELEROMETER_BIAS,
+            silent_share=SILENT,
+            timing=timing,
+        )
         return replace(made, duration=DURATION, sensors=sensors)
 
     def quick(self) -> Preset:
@@ -115,14 +125,15 @@ GAIN_PRESETS: dict[str, Preset] = {
     ),
     "mekf+gain": GainPreset(
         "mekf, its Kalman gain corrected and its noises set by a recurrent network",
-        HANDS,
+        {"hand-held-prompt": 72, "carried-prompt": 36, "gestures-varying": 36},
         filter="mekf",
         shares=True,
         units=32,
         limits={"process": NOISE, "bias": NOISE, "measurement": NOISE, "attitude-gain": SHARE, "bias-gain": SHARE},
         scale=2.0,
         noise=0.05,
-        fit=FIT,
+        fit=replace(FIT, epochs=6),
+        small_error=0.2 * DEG,
     ),
     "two-gyro-level+noise": GainPreset(
         "two-gyro-level, its noises and how far level ground is believed set by a recurrent network",

@@ -34,10 +34,13 @@ def parts(gains=("process", "measurement"), limit=8.0):
 
 
 def test_the_loss_runs_the_filter_that_the_estimator_runs():
-    """At any sampling rate, with constants of the sequence, outputs one interval late."""
+    """At any sampling rate, with constants of the sequence, outputs one interval late, and the same after a gap."""
     front_end, head = parts()
     motions = [RECIPE.episode(5, index) for index in range(2)]
     assert len({motion.dt for motion in motions}) == 2
+    lost = (motions[0].time > 5.0) & (motions[0].time < 5.5)
+    samples = {name: np.where(lost[:, None], np.nan, values) for name, values in motions[0].measurements.items()}
+    motions[0] = motions[0].replace(measurements=samples)
     data = SequenceData.from_trajectories(motions, front_end, head)
     module = GruModule(front_end.size, head.size, 6, scale=3.0)
     torch.nn.init.normal_(module.output.weight)
