@@ -254,16 +254,23 @@ class AngleHead:
 
         Its gradient weights angles that a filter knows to 0.3° as much as those that it knows to 5°.
         """
-        return mean_of_sequences(self.correction(output, spread) - target, mask)
+        return mean_of_sequences(self._difference(output, target, spread), mask)
 
     def errors(self, output: Array, target: Array, spread: Array) -> Array:
         """See :class:`Head`."""
-        return namespace(output).abs(self.correction(output, spread) - target)
+        return namespace(output).abs(self._difference(output, target, spread))
+
+    def _difference(self, output: Array, target: Array, spread: Array) -> Array:
+        """Correction less target ``(..., K)``; angles on both sides of half a turn are near each other."""
+        difference = self.correction(output, spread) - target
+        turns = [2.0 * math.pi * (quantity.kind == "angle") for quantity in self.outputs for _ in range(quantity.size)]
+        whole = namespace(difference).round(difference / (2.0 * math.pi))
+        return difference - constant(np.array(turns), difference) * whole
 
     def augmented(
         self, features: np.ndarray, target: np.ndarray, generator: np.random.Generator
     ) -> tuple[np.ndarray, np.ndarray]:
-        """As they are: rides are redrawn and mirrored as a whole (:mod:`poise.envs.recipes.redraw`)."""
+        """As they are: rides are redrawn and mirrored as a whole."""
         return features, target
 
 

@@ -168,8 +168,9 @@ def fit_preset(
         if say is not None:
             say(f"best constant log factors: {dict(zip(head.gains, constants.round(2).tolist(), strict=True))}")
     if isinstance(head, AngleHead) and preset.filter is None and start is None:
-        # a network that stands alone starts as the mean
-        usual = data.target[data.mask].mean(axis=0) / np.array(head.scale)
+        # a network that stands alone starts as the mean direction
+        known = data.target[data.mask].astype(float)
+        usual = np.arctan2(np.sin(known).mean(axis=0), np.cos(known).mean(axis=0)) / np.array(head.scale)
         module.output.bias.data.copy_(torch.from_numpy(usual.astype(np.float32)))
     result = fit(module, front_end, head, data, validation, config, folder=folder, resume=resume, say=say)
     if isinstance(head, GainHead):

@@ -148,3 +148,18 @@ def test_growth_needs_deviations() -> None:
         AngleHead(HEAD.outputs, HEAD.scale, deviations=(1.0, 1.0), growth=(1.0,))
     with pytest.raises(ValueError, match="power must be 1 or 2, got 3"):
         AngleHead(HEAD.outputs, HEAD.scale, power=3)
+
+
+def test_angles_on_both_sides_of_half_a_turn_are_near_each_other() -> None:
+    """A shoulder may turn about ±180°: neither errors nor loss are of the long way round."""
+    head = AngleHead((Quantity("a", "angle", 1, "rad"), Quantity("b", "length", 1, "m")), (1.0, 1.0))
+    output = torch.full((1, 5, 2), 3.0, requires_grad=True)
+    target, none = torch.full((1, 5, 2), -3.0), torch.ones((1, 5, 0))
+    expected = [2.0 * np.pi - 6.0, 6.0]
+    np.testing.assert_allclose(head.errors(output, target, none).detach()[0, 0], expected, rtol=1e-5)
+    loss = head.loss(output, target, none, torch.ones((1, 5), dtype=torch.bool))
+    assert float(loss.detach()) == pytest.approx(np.mean(expected), rel=1e-5)
+    loss.backward()
+    assert output.grad is not None
+    assert (output.grad[..., 0] < 0.0).all()
+    assert (output.grad[..., 1] > 0.0).all()
