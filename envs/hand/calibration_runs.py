@@ -38,6 +38,7 @@ ACCELEROMETER_MOUNTINGS = (*(("+z", "+x"), ("-z", "-x")), *(("+x", "+y"), ("-x",
 GYROSCOPE_MOUNTINGS = (("+x", "+y"), ("+y", "+z"), ("+z", "+x"))
 ONE_AXIS = AccelerometerArray(((0.0, 0.0, 0.0),), ((0.0, 0.0, 1.0),))
 """An accelerometer that no reading is taken of."""
+LONE_GYROSCOPE = HandDevice("gyroscope", ONE_AXIS, "array-data-sheet", magnetometer=False)
 
 
 def nominal_calibration(array: AccelerometerArray) -> CalibrationRecord:
@@ -108,10 +109,9 @@ def accelerometer_runs(
 
 def gyroscope_runs(truth: CalibrationRecord, seed: int, *, hold: float = 10.0) -> RateTableData:
     """Runs for every axis: −325 to 350 °/s by 25, of which the largest saturate; arguments as for accelerometers."""
-    device = HandDevice("gyroscope", ONE_AXIS, "array-data-sheet", magnetometer=False)
     channel, table = truth.channels["imu/gyr"], RateTable(BOTH_WAYS, hold, offset=(0.0, 0.0, 0.0))
     tables = dict.fromkeys(GYROSCOPE_MOUNTINGS, table)
-    return _runs(device, tables, seed, lambda read: counts(channel, read["imu/gyr"], GYROSCOPE_RANGE))
+    return _runs(LONE_GYROSCOPE, tables, seed, lambda read: counts(channel, read["imu/gyr"], GYROSCOPE_RANGE))
 
 
 def magnetometer_run(truth: CalibrationRecord, seed: int, *, duration: float = 60.0) -> MagnetometerData:
@@ -142,14 +142,20 @@ def _runs(
     for child, ((up, out), table) in zip(np.random.SeedSequence(seed).spawn(len(tables)), tables.items(), strict=True):
         table = replace(table, attitude=tuple(rotation.from_matrix(mounting_matrix(up, out)).tolist()))
         run = simulate_hand(table, int(child.generate_state(1)[0]), device=device)
-        gesture = table.draw(np.random.default_rng(0))
-        step = np.searchsorted(gesture.starts, run.time, "right") - 1
-        steady = (step >= 0) & (run.time > gesture.starts[np.maximum(step, 0)] + table.ramp + 0.05)
+        steady, rate = held_rates(table, run.time)
         time, readings = run.time[steady], {name: values[steady] for name, values in run.measurements.items()}
         mounted = np.full(len(time), up), np.full(len(time), out)
         if data is not None:
             time = time + data.time[-1] + 60.0
-        one = RateTableData(time, *mounted, gesture.rates[step[steady]], raw(readings))
+        one = RateTableData(time, *mounted, rate, raw(readings))
         data = one if data is None else data.joined(one)
     assert data is not None
     return data
+
+
+def held_rates(table: RateTable, time: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Which of the times ``(T,)`` lie where the table holds a rate, and those rates ``(n,)`` rad/s."""
+    gesture = table.draw(np.random.default_rng(0))
+    step = np.searchsorted(gesture.starts, time, "right") - 1
+    steady = (step >= 0) & (time > gesture.starts[np.maximum(step, 0)] + table.ramp + 0.05)
+    return steady, gesture.rates[step[steady]]

@@ -17,17 +17,18 @@ from ....envs.data.trajectory import Trajectory
 from ....envs.hand.controller_gestures import Pointing
 from ....envs.hand.devices import DEVICES, array_preset
 from ....envs.hand.sensing import simulate_hand
-from ....filters.arrays.spatial.pointing import pointing_angles, tilt_error_bound
+from ....filters.arrays.spatial.pointing import tilt_error_bound
 from ....filters.core import rotation
 from ....filters.core.consistency import nees
 from ....filters.core.estimator import run
 from ....filters.core.kalman import KalmanFilter
-from ...plots import TRUTH_COLOR, legend_above, new_figure, time_figure
+from ...plots import TRUTH_COLOR, legend_above, new_figure
 from ..averages import interval_of_mean
 from ..claims import Claim
 from ..kit import Study
 from ..report import OVER_MOTIONS, Report
 from ..ride_figures import DRAWN
+from .figures import pointing_figure
 from .orientation_bounds import attitude_covariance
 from .rate_table import TABLE_4_2
 from .spatial import (
@@ -40,6 +41,7 @@ from .spatial import (
     WITHOUT_GYROSCOPE,
     estimated,
     pointed,
+    pointing_curves,
     pointing_errors,
     prepared,
 )
@@ -81,15 +83,9 @@ def tracked(device: str, seed: int, duration: float) -> tuple[Trajectory, np.nda
     return trajectory, rotation.multiply(trajectory.truth["orientation"], error)
 
 
-def curves(device: str, seed: int, duration: float) -> dict[str, Any]:
-    """``time``; true ``pitch`` and ``azimuth``, deg; ``errors`` against the tracker: method → [pitch, azimuth], deg."""
-    trajectory, reference = tracked(device, seed, duration)
-    pitch, azimuth = (np.degrees(angle).tolist() for angle in pointing_angles(reference))
-    estimates = {method: estimated(method, device, trajectory) for method in METHODS[device]}
-    errors = {
-        method: np.degrees(pointing_errors(estimate, reference)[:2]).tolist() for method, estimate in estimates.items()
-    }
-    return {"time": trajectory.time.tolist(), "pitch": pitch, "azimuth": azimuth, "errors": errors}
+def measured_curves(device: str, seed: int, duration: float) -> dict[str, Any]:
+    """:func:`.spatial.pointing_curves` of the experiment, against the tracker; the proposed method first."""
+    return pointing_curves(device, *tracked(device, seed, duration), METHODS[device][::-1])
 
 
 def largest(device: str, seed: int, duration: float) -> list[Row]:
@@ -180,31 +176,13 @@ def experiment(study: Study, report: Report, simulated: list[Row]) -> None:
         rows.append(row)
     report.table("Consistency of the proposed method", rows, "Of the attitude, a degree of freedom; 1 if P is right.")
     for device in FIRST:
-        one = study.cached(f"experiment curves {device}", curves, device, roots[0], duration)
-        experiment_figure(report, device, one)
+        one = study.cached(f"experiment curves {device}", measured_curves, device, roots[0], duration)
+        title = f"Figures {NUMBERS[device]}: the {device} after calibration"
+        note = "Simulated; errors beyond 20° are cut."
+        report.figure(f"experiment-{device}", pointing_figure(one, "tracker", 20.0), title, note)
     report.figure(
         "cone", cone_figure(study.seed_of("pointing", 0), duration), "Figure 5.22: errors and the cone (5.63)"
     )
-
-
-def experiment_figure(report: Report, device: str, one: dict[str, Any]) -> None:
-    """Pitch and azimuth by the tracker and the proposed method, and errors of all four methods."""
-    figure, axes = time_figure(7.5, 7.0, 4)
-    time = np.array(one["time"])
-    for row, angle in enumerate(("pitch", "azimuth")):
-        top, below = axes[2 * row], axes[2 * row + 1]
-        true = np.array(one[angle])
-        own = np.array(one["errors"][FIRST[device]][row])
-        top.plot(time, true, color=TRUTH_COLOR, linewidth=1.2, label="tracker")
-        top.plot(time, true + own, color=DRAWN[-1], linewidth=0.8, label="proposed")
-        top.set_ylabel(f"{angle}, deg")
-        for name, color in zip(METHODS[device], DRAWN, strict=True):
-            below.plot(time, one["errors"][name][row], color=color, linewidth=0.8, label=name.split(",")[0])
-        below.set(ylabel=f"error of {angle}, deg", ylim=(-20.0, 20.0))
-    legend_above(axes[0])
-    legend_above(axes[1])
-    title = f"Figures {NUMBERS[device]}: the {device} after calibration"
-    report.figure(f"experiment-{device}", figure, title, "Simulated; errors beyond 20° are cut.")
 
 
 def cone_figure(seed: int, duration: float) -> Any:

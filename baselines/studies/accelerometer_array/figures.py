@@ -54,40 +54,45 @@ def readings_figure(trajectory: Trajectory) -> Any:
     return figure
 
 
-def pointing_figures(report: Report, device: str, curves: dict[str, Any]) -> None:
-    """Figures 5.6 to 5.8, or 5.9 to 5.11, from :func:`.spatial.attitude_curves`."""
-    errors_name, path_name = NUMBERS[device]
+def pointing_figure(curves: dict[str, Any], reference: str, limit: float) -> Any:
+    """Pitch and azimuth, errors of all methods within ±``limit`` deg; curves as :func:`.spatial.pointing_curves`.
+
+    The first method is the proposed one, whose angles are drawn too.
+    """
     figure, axes = time_figure(7.5, 7.0, 4)
-    time = curves["time"]
-    for row, (angle, true) in enumerate((("pitch", curves["pitch"]), ("azimuth", curves["azimuth"]))):
-        top, below = axes[2 * row], axes[2 * row + 1]
-        top.plot(time, true, color=TRUTH_COLOR, linewidth=1.0, label="true")
-        top.plot(time, curves["found"][row], color=LINES[0], linewidth=1.0, linestyle="--", label="proposed")
-        top.set_ylabel(f"{angle}, °")
-        drawn = list(zip(LINES, curves["errors"].items(), strict=False))
-        for place, (colour, (name, both)) in enumerate(drawn):
-            first = place == 0
-            style: dict[str, Any] = {"linewidth": 1.4 if first else 0.8, "alpha": 1.0 if first else 0.65}
-            below.plot(time, both[row], color=colour, label=name, zorder=3 if first else 2, **style)
-        below.set_ylim(-30.0, 30.0)
-        below.set_ylabel(f"error of {angle}, °")
+    time, methods = curves["time"], list(curves["errors"])
+    for row, angle in enumerate(("pitch", "azimuth")):
+        top, below = axes[2 * row : 2 * row + 2]
+        top.plot(time, curves[angle], color=TRUTH_COLOR, linewidth=1.2, label=reference)
+        top.plot(time, proposed(curves, row), "--", color=LINES[0], linewidth=1.0, label="proposed")
+        top.set_ylabel(f"{angle}, deg")
+        for name, colour in reversed(list(zip(methods, LINES, strict=False))):
+            style = {"linewidth": 1.4} if name == methods[0] else {"linewidth": 0.8, "alpha": 0.65}
+            below.plot(time, curves["errors"][name][row], color=colour, label=name, **style)
+        below.set(ylabel=f"error of {angle}, deg", ylim=(-limit, limit))
     legend_above(axes[0])
-    figure.legend(*axes[1].get_legend_handles_labels(), loc="outside lower center", fontsize=7.5, ncols=3)
-    report.figure(
-        f"pointing-{device}",
-        figure,
-        f"Figures {errors_name}: pitch and azimuth of the {device}",
-        "Errors beyond 30° are cut.",
-    )
+    handles, labels = axes[1].get_legend_handles_labels()
+    figure.legend(handles[::-1], labels[::-1], loc="outside lower center", fontsize=7.5, ncols=3)
+    return figure
+
+
+def proposed(curves: dict[str, Any], row: int) -> np.ndarray:
+    """Pitch (row 0) or azimuth (row 1) by the proposed method, deg."""
+    angle = curves[("pitch", "azimuth")[row]]
+    return np.add(angle, next(iter(curves["errors"].values()))[row])
+
+
+def pointing_figures(report: Report, device: str, curves: dict[str, Any]) -> None:
+    """Figures 5.6 to 5.8, or 5.9 to 5.11."""
+    errors_name, path_name = NUMBERS[device]
+    title = f"Figures {errors_name}: pitch and azimuth of the {device}"
+    report.figure(f"pointing-{device}", pointing_figure(curves, "true", 30.0), title, "Errors beyond 30° are cut.")
     figure, (ax,) = new_figure(5.0, 4.6)
     limit = math.degrees(math.pi / 4.0)
     ax.plot([-limit, limit, limit, -limit, -limit], [-limit, -limit, limit, limit, -limit], "k:", linewidth=0.8)
     ax.plot(curves["azimuth"], curves["pitch"], color=TRUTH_COLOR, linewidth=0.9, label="true")
-    ax.plot(curves["found"][1], curves["found"][0], color=LINES[0], linewidth=0.9, linestyle="--", label="proposed")
-    ax.set_xlabel("azimuth, °")
-    ax.set_ylabel("pitch, °")
-    ax.set_aspect("equal")
+    ax.plot(proposed(curves, 1), proposed(curves, 0), "--", color=LINES[0], linewidth=0.9, label="proposed")
+    ax.set(xlabel="azimuth, deg", ylabel="pitch, deg", aspect="equal")
     legend_above(ax)
-    report.figure(
-        f"path-{device}", figure, f"Figure {path_name}: where the {device} points", "Dotted: targets' limits."
-    )
+    title = f"Figure {path_name}: where the {device} points"
+    report.figure(f"path-{device}", figure, title, "Dotted: targets' limits.")

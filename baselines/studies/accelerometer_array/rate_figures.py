@@ -20,9 +20,9 @@ EVERY = 5
 """samples from point to point"""
 
 
-def error_curves(seed: int, errors: str = CALIBRATED, duration: float = DURATION) -> dict[str, Any]:
+def error_curves(seed: int, duration: float) -> dict[str, Any]:
     """``time``; method → |ω̂ − ω| (2.56), rad/s; ``predicted``: √tr Σ; ``rate`` and ``weight`` ``(T, 3)``."""
-    trajectory = shaken(seed, errors, duration)
+    trajectory = shaken(seed, CALIBRATED, duration)
     truth = trajectory.truth["angular_rate"]
     curves: dict[str, Any] = {"time": trajectory.time[::EVERY].tolist()}
     for method in SHOWN:
@@ -38,12 +38,7 @@ def error_curves(seed: int, errors: str = CALIBRATED, duration: float = DURATION
 def rate_pictures(study: Study, report: Report) -> None:
     """Both figures, of one motion."""
     duration = 40.0 if study.quick else DURATION
-    seed = study.seed_of("shaking", 0)
-    rate_figures(report, study.cached("angular rate errors", error_curves, seed, CALIBRATED, duration))
-
-
-def rate_figures(report: Report, curves: dict[str, Any]) -> None:
-    """Both figures, from :func:`error_curves`."""
+    curves = study.cached("angular rate errors", error_curves, study.seed_of("shaking", 0), duration)
     figure, (ax,) = time_figure(7.5, 3.2)
     for method, color in SHOWN.items():
         ax.semilogy(curves["time"], np.maximum(curves[method], 1e-3), color=color, linewidth=0.8, label=method)

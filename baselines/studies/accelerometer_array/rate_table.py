@@ -14,16 +14,17 @@ import numpy as np
 from ....envs.data.calibration.records import CalibrationRecord, ChannelCalibration
 from ....envs.hand.calibration_runs import (
     GYROSCOPE_RANGE,
+    LONE_GYROSCOPE,
     accelerometer_runs,
     counts,
     gyroscope_runs,
+    held_rates,
     magnetometer_run,
     random_calibration,
 )
 from ....envs.hand.controller_gestures import BOTH_WAYS, RateTable
-from ....envs.hand.devices import HandDevice
 from ....envs.hand.sensing import simulate_hand
-from ....filters.arrays.array import CONTROLLER, AccelerometerArray, recorded_channel
+from ....filters.arrays.array import CONTROLLER, recorded_channel
 from ....filters.arrays.calibration.magnetometer import fit_ellipsoid
 from ....filters.arrays.calibration.rate_table import calibrate_accelerometer, calibrate_gyroscope
 from ....filters.core.quantity import DEG, STANDARD_GRAVITY
@@ -70,15 +71,11 @@ def bent(raw: np.ndarray, scale: float, offset: float, sensor: str) -> np.ndarra
 
 def on_the_table(truth: CalibrationRecord, rates: tuple[float, ...], place: float, seed: int, hold: float) -> Any:
     """Rate of the table (rad/s) and raw readings of the gyroscope about it, ``(2, T)``, while the rate is constant."""
-    one_axis = AccelerometerArray(((0.0, 0.0, 0.0),), ((0.0, 0.0, 1.0),))
-    device = HandDevice("gyroscope", one_axis, "array-data-sheet", magnetometer=False)
     table = RateTable(rates=rates, hold=hold, offset=(place, 0.0, 0.0))
-    run = simulate_hand(table, seed, device=device)
-    gesture = table.draw(np.random.default_rng(0))
-    step = np.searchsorted(gesture.starts, run.time, "right") - 1
-    steady = (step >= 0) & (run.time > gesture.starts[np.maximum(step, 0)] + table.ramp + 0.05)
+    run = simulate_hand(table, seed, device=LONE_GYROSCOPE)
+    steady, rate = held_rates(table, run.time)
     raw = counts(truth.channels["imu/gyr"], run.measurements["imu/gyr"][steady], GYROSCOPE_RANGE)
-    return np.stack([gesture.rates[step[steady]], raw[:, 2]])
+    return np.stack([rate, raw[:, 2]])
 
 
 def measured(seed: int, hold: float) -> dict[str, Any]:

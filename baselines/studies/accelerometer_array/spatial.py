@@ -183,15 +183,15 @@ def attitude_table(rows: list[Row]) -> list[Row]:
     return grouped(rows, {"device": "device", "method": "method"}, columns)
 
 
-def wrong_start(seed: int, angle: float = math.radians(40.0), duration: float = 60.0) -> dict[str, list[float]]:
-    """A controller whose filter starts rolled by ``angle`` about the pointing axis, with a closed and an open prior.
+def wrong_start(seed: int, duration: float = 60.0) -> dict[str, list[float]]:
+    """A controller whose filter starts rolled by 40° about the pointing axis, with a closed and an open prior.
 
     Returns:
         Prior → total error in degrees, rms over 5 to 20 s and over the last 20 s.
     """
     trajectory = pointed("controller", seed, duration)
     truth, time = trajectory.truth["orientation"], trajectory.time
-    start = rotation.multiply(truth[0], rotation.exp(np.array([0.0, angle, 0.0])))
+    start = rotation.multiply(truth[0], rotation.exp(np.array([0.0, math.radians(40.0), 0.0])))
     found = {}
     for label, parameters in (
         ("closed prior", {}),
@@ -223,41 +223,38 @@ def cone(seed: int, duration: float = DURATION) -> dict[str, float]:
         pitch = np.abs(pointing_errors(estimated(method, "controller", trajectory), truth)[0])
         for name, bound in bounds.items():
             shares[f"{method}, beyond the {name}"] = float((pitch > bound)[moving].mean())
-    pitch = np.abs(reading_of_pitch(truth, acceleration) - pointing_angles(truth)[0])
+    # the pitch that an exact accelerometer reads if its specific force is taken for the vertical
+    force = rotation.rotate_back(truth, acceleration + np.array([0.0, 0.0, STANDARD_GRAVITY]))
+    pitch = np.abs(np.arctan2(force[:, 1], np.hypot(force[:, 0], force[:, 2])) - pointing_angles(truth)[0])
     # beyond by more than rounding
     shares[f"{READING}, beyond the arcsine"] = float((pitch > bounds["arcsine"] + 1e-9)[moving].mean())
     return shares
 
 
-def reading_of_pitch(orientation: np.ndarray, acceleration: np.ndarray) -> np.ndarray:
-    """Pitch ``(T,)``, rad, that an exact accelerometer reads if its specific force is taken for the vertical."""
-    force = rotation.rotate_back(orientation, acceleration + np.array([0.0, 0.0, STANDARD_GRAVITY]))
-    return np.arctan2(force[:, 1], np.hypot(force[:, 0], force[:, 2]))
-
-
-def attitude_curves(device: str, seed: int, duration: float = DURATION, every: int = 5) -> dict[str, Any]:
-    """Pitch, azimuth and their errors over time, degrees, as in Figures 5.6, 5.7, 5.9 and 5.10; and directions.
+def pointing_curves(
+    device: str, trajectory: Trajectory, reference: np.ndarray, methods: Iterable[str], every: int = 1
+) -> dict[str, Any]:
+    """Pitch and azimuth of a reference ``(T, 4)`` and errors of methods against it, every so many samples, deg.
 
     Returns:
-        ``time``; ``pitch`` and ``azimuth``, the true ones; ``errors``: method → [pitch, azimuth]; ``found``: the same
-        two angles of the first method.
+        ``time``; ``pitch`` and ``azimuth`` of the reference; ``errors``: method → [pitch, azimuth].
     """
-    trajectory = pointed(device, seed, duration)
-    truth = trajectory.truth["orientation"]
-    shown = [method for method in METHODS[device] if "published" not in method and "first order" not in method]
-    estimates = {method: estimated(method, device, trajectory) for method in shown}
 
-    def sampled(angles: Iterable[np.ndarray]) -> list[list[float]]:
+    def shown(angles: Iterable[np.ndarray]) -> list[list[float]]:
         return [np.degrees(angle)[::every].tolist() for angle in angles]
 
-    pitch, azimuth = sampled(pointing_angles(truth))
-    return {
-        "time": trajectory.time[::every].tolist(),
-        "pitch": pitch,
-        "azimuth": azimuth,
-        "errors": {method: sampled(pointing_errors(each, truth)[:2]) for method, each in estimates.items()},
-        "found": sampled(pointing_angles(estimates[shown[0]])),
+    pitch, azimuth = shown(pointing_angles(reference))
+    errors = {
+        method: shown(pointing_errors(estimated(method, device, trajectory), reference)[:2]) for method in methods
     }
+    return {"time": trajectory.time[::every].tolist(), "pitch": pitch, "azimuth": azimuth, "errors": errors}
+
+
+def simulated_curves(device: str, seed: int, duration: float) -> dict[str, Any]:
+    """:func:`pointing_curves` of the simulation, as in Figures 5.6, 5.7, 5.9 and 5.10; the proposed method first."""
+    trajectory = pointed(device, seed, duration)
+    methods = [method for method in METHODS[device] if "published" not in method and "first order" not in method]
+    return pointing_curves(device, trajectory, trajectory.truth["orientation"], methods, 5)
 
 
 def claims(rows: list[Row]) -> list[Claim]:
@@ -346,7 +343,7 @@ def spatial(study: Study, report: Report) -> list[Row]:
     report.claims("Chapter 5: what holds here", claims(rows))
     _inclined(study, report, roots[: 2 if study.quick else 5], duration)
     for device in METHODS:
-        curves = study.cached(f"pointing curves {device}", attitude_curves, device, roots[0], duration)
+        curves = study.cached(f"pointing curves {device}", simulated_curves, device, roots[0], duration)
         pointing_figures(report, device, curves)
     first = pointed("controller", roots[0], min(duration, 30.0))
     report.figure("pointing-path", move_figure(first), "Figures 5.3 and 5.4: path and profile of a move")

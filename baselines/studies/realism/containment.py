@@ -14,7 +14,7 @@ from ....envs.recipes.recipe import Recipe
 from ....envs.recipes.registry import recipe
 from ....envs.recipes.rider import RiderRecipe
 from ..kit import Study
-from .motion import SHARE_OF_RATE, UNITS, MotionSpectra, motion_spectra, statistics_of
+from .motion import SHARE_OF_RATE, UNITS, motion_spectra, statistics_of
 from .spectra import Spectrum
 
 LOW, HIGH = 5.0, 95.0
@@ -51,13 +51,9 @@ def summary(trajectory: Trajectory, site: str, bandwidths: Sequence[float], orie
     own = SHARE_OF_RATE * spectra.rate
     found = {each: statistics_of(spectra, min(each, own)) for each in bandwidths}
     fell = trajectory.metadata.get("ended") == "terminated"
-    return Summary(trajectory.name, spectra.rate, found, banded_spectra(spectra), fell)
-
-
-def banded_spectra(spectra: MotionSpectra) -> dict[str, list[float]]:
-    """Densities in the bands of :data:`DRAWN`, by signal."""
     known = {"gyr": spectra.gyr, "force": spectra.force, "acc": spectra.acc}
-    return {name: banded(each).tolist() for name, each in known.items() if each is not None}
+    bands = {name: banded(each).tolist() for name, each in known.items() if each is not None}
+    return Summary(trajectory.name, spectra.rate, found, bands, fell)
 
 
 def banded(spectrum: Spectrum) -> np.ndarray:
@@ -75,13 +71,8 @@ def episode_summary(
 ) -> list[dict[str, Any]]:
     """Simulate one episode of a described recipe and summarise it site by site, for :meth:`.Study.map`."""
     episode = recipe(described).episode(seed, index)
-    found = [summary(episode, site, bandwidths, orientation_of(site)) for site in sites]
+    found = [summary(episode, site, bandwidths, "orientation" if site == "imu" else "") for site in sites]
     return [one._asdict() | {"statistics": [one.statistics[each] for each in bandwidths]} for one in found]
-
-
-def orientation_of(site: str) -> str:
-    """Name of the truth that is the orientation of a sensor itself: of a hand-held one only."""
-    return "orientation" if site == "imu" else ""
 
 
 def simulated_summaries(

@@ -19,7 +19,7 @@ from ....envs.recipes.rider import RIDDEN
 from ....envs.sensors.allan import allan_floors
 from ..kit import Study
 from ..report import Report
-from ..rides.saddle import APART, worst_of
+from ..rides.saddle import APART
 from ..rides.steering import by_speed
 from ..rides.vibration import MEASURED
 from . import probes
@@ -28,7 +28,7 @@ from .environments import medians, rides
 from .ranges import BELIEVABLE, Believable, Covered
 from .ranks import ranked
 from .roles import Recorded
-from .simulators import BUMPY, vibrations
+from .simulators import saddle_values, vibrations
 
 BEFORE = "188cca9"
 TITLE = "Fifteen points"
@@ -128,15 +128,14 @@ Rides = Mapping[str, Sequence[Mapping[str, float]]]
 
 def saddle(full: Rides) -> Iterator[dict[str, Any]]:
     """Point 1: the saddle presses."""
-    firm = {name: found for name, found in full.items() if name not in BUMPY}
-    pulls = {name: worst_of(found, "seated_pulls") for name, found in firm.items()}
-    claim = "samples in which a cell of a seated rider is below -5 N"
-    yield point(1, claim, "18 … 24 %", pulls, "share of samples in which a load cell pulls")
-    least = {name: worst_of(found, "seated_least") for name, found in firm.items()}
-    yield point(1, "least force of a cell, seated", "-475 N", least, "least force of a load cell")
-    for axis in ("across", "along"):
-        ends = [worst_of(firm[name], f"{axis}_{end}") for name in firm for end in (5, 95)]
-        yield point(1, f"centre of pressure {axis}, 5 to 95 %", "±220 … 298 mm", ends, f"centre of pressure {axis}")
+    said = (
+        ("samples in which a cell of a seated rider is below -5 N", "18 … 24 %"),
+        ("least force of a cell, seated", "-475 N"),
+        ("centre of pressure across, 5 to 95 %", "±220 … 298 mm"),
+        ("centre of pressure along, 5 to 95 %", "±220 … 298 mm"),
+    )
+    for (claim, before), (target, values) in zip(said, saddle_values(full).items(), strict=True):
+        yield point(1, claim, before, values, target)
 
 
 def body(middle: Mapping[str, Mapping[str, float]]) -> Iterator[dict[str, Any]]:

@@ -84,11 +84,8 @@ def ride_motion(study: Study, report: Report, count: int, groups: Sequence[Recor
     report.table(
         "Trunk, against what is believable",
         [
-            judged(quantity, {name: each[f"trunk_imu/{statistic}"] for name, each in middle.items()})
-            for quantity, statistic in (
-                ("trunk gyroscope rms", "gyr_rms"),
-                ("trunk gyroscope 95 % frequency", "gyr_f95"),
-            )
+            judged(f"trunk gyroscope {what}", {name: each[f"trunk_imu/{statistic}"] for name, each in middle.items()})
+            for what, statistic in (("rms", "gyr_rms"), ("95 % frequency", "gyr_f95"))
         ],
     )
     saddle(report, found)
@@ -123,6 +120,19 @@ def shaken(report: Report, found: Mapping[str, Sequence[Mapping[str, float]]], g
     )
 
 
+def saddle_values(found: Mapping[str, Sequence[Mapping[str, float]]]) -> dict[str, dict[str, float]]:
+    """Quantity of :data:`.BELIEVABLE` → scenario (and end of the range) → worst of its rides; without :data:`BUMPY`."""
+    firm = {name: rides for name, rides in found.items() if name not in BUMPY}
+    values = {
+        "share of samples in which a load cell pulls": {name: worst_of(firm[name], "seated_pulls") for name in firm},
+        "least force of a load cell": {name: worst_of(firm[name], "seated_least") for name in firm},
+    }
+    for axis in ("across", "along"):
+        ends = {f"{name}, {end} %": worst_of(firm[name], f"{axis}_{end}") for name in firm for end in (5, 95)}
+        values[f"centre of pressure {axis}"] = ends
+    return values
+
+
 def saddle(report: Report, found: Mapping[str, Sequence[Mapping[str, float]]]) -> None:
     """Load cells and centre of pressure by scenario, worst of all rides."""
     report.table(
@@ -131,17 +141,7 @@ def saddle(report: Report, found: Mapping[str, Sequence[Mapping[str, float]]]) -
         "Largest shares, least force and widest 5 to 95 % of the centre of pressure over the rides of a scenario. "
         f"Off the saddle: less than {SITTING:g} N on it; all else is of the other samples.",
     )
-    firm = {name: rides for name, rides in found.items() if name not in BUMPY}
-    rows = [
-        judged(quantity, {name: worst_of(each, statistic) for name, each in firm.items()})
-        for quantity, statistic in (
-            ("share of samples in which a load cell pulls", "seated_pulls"),
-            ("least force of a load cell", "seated_least"),
-        )
-    ]
-    for axis in ("across", "along"):
-        ends = {f"{name}, {end} %": worst_of(firm[name], f"{axis}_{end}") for name in firm for end in (5, 95)}
-        rows.append(judged(f"centre of pressure {axis}", ends))
+    rows = [judged(quantity, values) for quantity, values in saddle_values(found).items()]
     report.table("Saddle, against what is believable", rows)
 
 
@@ -196,12 +196,8 @@ def sensors(report: Report) -> None:
     report.table(
         f"Allan deviation at {FLOOR_TIME:g} s",
         [
-            {
-                "preset": each["name"],
-                "gyroscope °/h": each["gyroscope"],
-                "accelerometer µg": each["accelerometer"],
-                "assumed": each["assumed"],
-            }
+            {"preset": each["name"], "gyroscope °/h": each["gyroscope"], "accelerometer µg": each["accelerometer"]}
+            | {"assumed": each["assumed"]}
             for each in found
         ],
         "Expected from the parameters (IEEE Std 952); fields that no data sheet states are named assumptions.",

@@ -20,8 +20,7 @@ from ...learned.rides import UNSEEN, unseen_rides
 from ...registry import TRAINED, make_estimator
 from ...weights_io import load_card
 from .errors import Errors, angle_bounds, angle_names, angles_of, errors_of, score, truth_of
-from .learnt import Learnt, learn
-from .references import moving_averages
+from .learnt import Learnt, learn, moving_averages
 
 PAPERS = ("two-gyro", "force-inertial", "whole-body")
 """Filters of riders that networks correct."""
@@ -202,18 +201,14 @@ def learnt_by(settings: RiderSuite, *, processes: int = 1, progress: bool = Fals
     for _ in in_parallel(simulate, [(source, seed, index) for index in range(source.rides)], processes, label=label):
         pass
     jobs = [(paper, PRESETS[f"{paper}+network"].filter or paper, source, seed) for paper in settings.papers]
-    return dict(in_parallel(learn_named, jobs, processes, label="learn" if progress else ""))
+    found = in_parallel(learn, jobs, processes, label="learn" if progress else "")
+    return {each.paper: each for each in found}
 
 
 def simulate(source: Any, seed: int, index: int) -> int:
     """Ride once, into the cache; for parallel processes."""
     simulated(source, seed, index)
     return index
-
-
-def learn_named(paper: str, start: str, source: Any, seed: int) -> tuple[str, Learnt]:
-    """The paper, and what its references learn; for parallel processes."""
-    return paper, learn(paper, start, source, seed)
 
 
 def compare(settings: RiderSuite, folder: Path, *, processes: int = 1, progress: bool = False) -> list[Row]:

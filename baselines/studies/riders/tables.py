@@ -62,11 +62,6 @@ def riders(rows: Sequence[Row]) -> np.ndarray:
     return np.array([[np.mean([row.mean for row in rows if row.ride == ride]) for ride in rides]])
 
 
-def labelled(method: str) -> str:
-    """Name of a method in tables of means."""
-    return f"{method} (roll alone)" if method in ROLL_ONLY else method
-
-
 def summary(rows: Sequence[Row]) -> list[dict[str, Any]]:
     """Numbers of each paper, method and group, for :mod:`poise.baselines.comparison.rider_tables`, as JSON has them.
 
@@ -88,7 +83,8 @@ def summary(rows: Sequence[Row]) -> list[dict[str, Any]]:
                     numbers[name] = float(np.mean(values))
                 numbered = ("nees", "coverage") if method.endswith(CONSTANT) else tuple(numbers)
                 known = {n: v if n in numbered and np.isfinite(v) else None for n, v in numbers.items()}
-                found.append({"paper": paper, "method": labelled(method), "group": group, **known})
+                label = f"{method} (roll alone)" if method in ROLL_ONLY else method
+                found.append({"paper": paper, "method": label, "group": group, **known})
     return found
 
 

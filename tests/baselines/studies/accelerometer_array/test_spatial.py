@@ -81,12 +81,12 @@ SHARES = (
 
 def canned_curves(device, seed, duration):
     line = [0.0, 1.0]
-    return {"time": line, "pitch": line, "azimuth": line, "found": [line, line], "errors": {PROPOSED: [line, line]}}
+    return {"time": line, "pitch": line, "azimuth": line, "errors": {PROPOSED: [line, line]}}
 
 
 def test_the_section_has_its_tables_and_figures(study, monkeypatch, tmp_path):
     monkeypatch.setattr(spatial_study, "attitude_errors", canned)
-    monkeypatch.setattr(spatial_study, "attitude_curves", canned_curves)
+    monkeypatch.setattr(spatial_study, "simulated_curves", canned_curves)
     monkeypatch.setattr(spatial_study, "wrong_start", lambda seed: {prior: [3.0, 1.0] for prior in PRIORS})
     monkeypatch.setattr(spatial_study, "cone", lambda seed, duration: dict.fromkeys(SHARES, 0.1))
     report = Report(tmp_path / "run")

@@ -16,7 +16,7 @@ from poise.baselines.learned.rides import UNSEEN
 from poise.baselines.studies.averages import circular_mean
 from poise.baselines.studies.riders import suite, sweeps, tables
 from poise.baselines.studies.riders.errors import Errors, angle_names, errors_of, score
-from poise.baselines.studies.riders.references import Ridge, moving_averages
+from poise.baselines.studies.riders.learnt import Ridge, moving_averages
 from poise.envs import episodes
 from poise.envs.recipes.rides import RideSource, ride
 from poise.filters.core import rotation
