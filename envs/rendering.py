@@ -63,15 +63,15 @@ class DeviceScene:
         )
         return self._physics.create_body(0.0, (0.0, 0.0, 0.0), visual=visual)
 
-    def _draw_ground(self, tiles: int = 3, side: float = 0.5) -> None:
-        places = [(i, j) for i in range(-tiles, tiles) for j in range(-tiles, tiles)]
+    def _draw_ground(self) -> None:
+        places = [(i, j) for i in range(-3, 3) for j in range(-3, 3)]
         for parity, colour in enumerate(TILE_COLOURS):
             chosen = [place for place in places if sum(place) % 2 == parity]
             for begin in range(0, len(chosen), 16):
                 # PyBullet takes at most 16 shapes a body
                 self._body(
                     [
-                        ((0.5 * side, 0.5 * side, 0.005), ((i + 0.5) * side, (j + 0.5) * side, -0.005), colour)
+                        ((0.25, 0.25, 0.005), ((i + 0.5) * 0.5, (j + 0.5) * 0.5, -0.005), colour)
                         for i, j in chosen[begin : begin + 16]
                     ]
                 )

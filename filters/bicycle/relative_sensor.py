@@ -56,8 +56,9 @@ class MarkerPlaces:
         return cls(geometry.trunk_pivot, (left, right, low), (CAMERA, CAMERA, CAMERA))
 
     @classmethod
-    def of_disk(cls, centre: Point = DISK_CENTRE, radius: float = 0.15) -> Self:
+    def of_disk(cls) -> Self:
         """Markers 120° apart on the rim of the disk of ``poise/BicycleFixture-v0``, observed from behind and above."""
+        centre, radius = DISK_CENTRE, 0.15
         half, height = 0.5 * radius, 0.75**0.5 * radius
         camera = (centre[0] - 0.35, centre[1] + 0.1, centre[2] + 0.35)
         markers = ((0.0, radius, 0.0), (-height, -half, 0.0), (height, -half, 0.0))

@@ -7,45 +7,23 @@ of pressure therefore never leaves the triangle of the three points. Friction ho
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 from ....filters.compile.cache import jit
-from ....filters.support.parameters import check_positive
 from ...sensors.ideal import STANDARD_GRAVITY
 from ..frame.parameters import Mass
 from .posture import Posture, placed
 
-
-@dataclass(frozen=True)
-class SaddleParameters:
-    """Buttocks, padding and springs of a saddle; round figures of this project.
-
-    With 45 kg on it: a bounce at 5 Hz with a third of critical damping, as seated people have it (ISO 5982: main
-    resonance of the driving-point mass at 4 to 6 Hz).
-
-    Raises:
-        ValueError: a length or stiffness that is not positive, or a negative damping.
-    """
-
-    stiffness: float = 4.5e4
-    """N/m of saddle and buttocks together, vertically"""
-    damping: float = 950.0
-    """N·s/m, likewise"""
-    sit_bones: float = 0.05
-    """m: each sit bone's distance from the middle (ischial tuberosities are 0.10 to 0.14 m apart)"""
-    behind: float = 0.035
-    """m of the sit bones behind the saddle point"""
-    front: float = 0.12
-    """m of the foremost support ahead of the saddle point"""
-    tissue_stiffness: float = 1.2e5
-    """N/m of the cover and the tissue under each of the three points, against tipping"""
-    tissue_damping: float = 3e3
-    """N·s/m, likewise"""
-
-    def __post_init__(self) -> None:
-        positive = ("stiffness", "sit_bones", "behind", "front", "tissue_stiffness")
-        check_positive(self, *positive, or_zero=("damping", "tissue_damping"))
+STIFFNESS, DAMPING = 4.5e4, 950.0
+"""N/m and N·s/m of saddle and buttocks together, vertically; round figures of this project, as all here. With 45 kg on
+it: a bounce at 5 Hz with a third of critical damping, as seated people have it (ISO 5982: main resonance of the
+driving-point mass at 4 to 6 Hz)."""
+TISSUE_STIFFNESS, TISSUE_DAMPING = 1.2e5, 3e3
+"""N/m and N·s/m of the cover and the tissue under each of the three points, against tipping"""
+SIT_BONES = 0.05
+"""m: each sit bone's distance from the middle (ischial tuberosities are 0.10 to 0.14 m apart)"""
+BEHIND, FRONT = 0.035, 0.12
+"""m of the sit bones behind the saddle point, and of the foremost support ahead of it"""
 
 
 class SeatContact(NamedTuple):
@@ -75,30 +53,27 @@ class SeatContact(NamedTuple):
     """m from the middle"""
 
 
-def seat_contact(load: float, ahead: float, parameters: SaddleParameters | None = None) -> SeatContact:
+def seat_contact(load: float, ahead: float) -> SeatContact:
     """The saddle under one rider.
 
     Args:
         load: what rests on it when nothing moves, N; with it the pelvis is where the posture has it.
         ahead: of the saddle point is the centre of pressure then, m.
-        parameters: None for default ones.
     """
-    p = SaddleParameters() if parameters is None else parameters
     # three equal springs about their centroid
-    along = 2.0 / 3.0 * (p.front + p.behind) ** 2
-    across = 2.0 * p.sit_bones**2
+    along, across = 2.0 / 3.0 * (FRONT + BEHIND) ** 2, 2.0 * SIT_BONES**2
     return SeatContact(
         load=load,
         ahead=ahead,
-        stiffness=p.stiffness,
-        damping=p.damping,
-        pitch_stiffness=along * p.tissue_stiffness,
-        pitch_damping=along * p.tissue_damping,
-        roll_stiffness=across * p.tissue_stiffness,
-        roll_damping=across * p.tissue_damping,
-        front=p.front,
-        behind=p.behind,
-        sit_bones=p.sit_bones,
+        stiffness=STIFFNESS,
+        damping=DAMPING,
+        pitch_stiffness=along * TISSUE_STIFFNESS,
+        pitch_damping=along * TISSUE_DAMPING,
+        roll_stiffness=across * TISSUE_STIFFNESS,
+        roll_damping=across * TISSUE_DAMPING,
+        front=FRONT,
+        behind=BEHIND,
+        sit_bones=SIT_BONES,
     )
 
 

@@ -109,16 +109,16 @@ def sensor_sites(posture: Posture, *, viewpoints: Sequence[Vector3] = (CAMERA_SI
     )
 
 
-def fixture_sites(sites: SensorSites, centre: Vector3, radius: float = 0.15) -> SensorSites:
+def fixture_sites(sites: SensorSites, centre: Vector3) -> SensorSites:
     """The two-gyro paper's fixture instead of a rider: a rotating disk, body ``disk``, seen by a camera above it.
 
     Args:
         sites: those of the bicycle.
         centre: of the disk in the bicycle frame, m; origin of the disk's frame, whose z is its normal.
-        radius: at which three markers sit, 120° apart (assumed), m.
     """
+    # three markers, 120° apart (assumed)
     angles = np.radians([90.0, 210.0, 330.0])
-    rim = radius * np.stack([np.cos(angles), np.sin(angles), np.zeros(3)], axis=1)
+    rim = 0.15 * np.stack([np.cos(angles), np.sin(angles), np.zeros(3)], axis=1)
     camera = tuple(np.add(centre, (-0.35, 0.1, 0.35)).tolist())
     markers = tuple(tuple(marker) for marker in rim.tolist())
     return replace(sites, seen="disk", markers=markers, viewpoints=(camera,) * 3)  # type: ignore[arg-type]
