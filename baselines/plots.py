@@ -117,6 +117,8 @@ def rms_bars(table: pandas.DataFrame, kinds: Mapping[str, str], metric: str = "i
     The scale is set by the better half of the estimators. Values beyond it are cut off and marked by a triangle at the
     edge with the largest value. ``kinds`` of estimators choose the colours.
     """
+    from matplotlib.patches import Patch
+
     from .error_table import summary
 
     means = summary(table, metric)["mean"].dropna()
@@ -145,8 +147,8 @@ def rms_bars(table: pandas.DataFrame, kinds: Mapping[str, str], metric: str = "i
     ax.set_xlabel(f"{metric} error, RMS, {unit}\n(bar: mean, dot: one trajectory{beyond})")
     ax.grid(axis="y", visible=False)
     present = [kind for kind in COLOURS if kind in {kinds.get(str(name)) for name in means.index}]
-    patches = [_patch(COLOURS[kind]) for kind in present]
     if present:
+        patches = [Patch(color=COLOURS[kind], alpha=0.85) for kind in present]
         figure.legend(patches, present, loc="outside upper right", ncols=len(present), frameon=False, fontsize=8.5)
     if title:
         ax.set_title(title, loc="left", fontsize=10.5)
@@ -165,12 +167,6 @@ def scale_of(means: pandas.Series, chosen: pandas.DataFrame) -> float:
     limit = min(float(values.max()), 2.0 * middle)
     near = means[means <= 1.5 * limit]
     return 1.08 * max(limit, float(near.max()) if len(near) else 0.0)
-
-
-def _patch(colour: str) -> Any:
-    from matplotlib.patches import Patch
-
-    return Patch(color=colour, alpha=0.85)
 
 
 def error_curves(

@@ -30,16 +30,16 @@ class Args:
 def run(args: Args) -> int:
     """Measure and print every group as soon as it is complete."""
     from functools import partial
-    from itertools import groupby
+    from itertools import chain, groupby
 
     from ..baselines.speed.environments import environment_speeds
-    from ..baselines.speed.families import FAMILIES, family_speeds, learned_speeds
+    from ..baselines.speed.families import FAMILIES, estimator_speeds, learned_speeds
     from ..baselines.speed.filters import filter_speeds, latencies
     from ..baselines.speed.vectors import vector_speeds
 
     parts = {"filters": filter_speeds, "latency": latencies, "environments": environment_speeds}
     parts |= {"vectors": vector_speeds, "learned": learned_speeds}
-    parts |= {family: partial(family_speeds, names) for family, names in FAMILIES.items()}
+    parts |= {family: partial(chain.from_iterable, map(estimator_speeds, names)) for family, names in FAMILIES.items()}
     with Output("speed", args) as out:
         for name in args.what:
             for group, rows in groupby(parts[name](), key=lambda speed: speed.group):

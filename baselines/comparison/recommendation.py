@@ -207,7 +207,8 @@ def ranked_row(name: str, kind: str, near: Sequence[Mapping[str, Any]], fed: Col
     inclinations = [each["inclination"] for each in errors]
     headings = [each["heading"] for each in errors if "heading" in each]
     best = sum(name == min(set(fed) & set(one["errors"]), key=lambda other: inclination_of(one, other)) for one in near)
-    reason = f"the best on {best} of these {len(near)}" if best else f"mean rank {rank_of(name, near, fed):.1f}"
+    ranks = [1 + sum(inclination_of(one, other) < inclination_of(one, name) for other in fed) for one in near]
+    reason = f"the best on {best} of these {len(near)}" if best else f"mean rank {np.mean(ranks):.1f}"
     return {
         "estimator": name,
         "kind": kind,
@@ -221,12 +222,6 @@ def ranked_row(name: str, kind: str, near: Sequence[Mapping[str, Any]], fed: Col
 def inclination_of(recording: Mapping[str, Any], name: str) -> float:
     """Inclination error of an estimator on a benchmark recording; infinite if there is none."""
     return float(recording["errors"].get(name, {}).get("inclination", np.inf))
-
-
-def rank_of(name: str, near: Sequence[Mapping[str, Any]], fed: Collection[str]) -> float:
-    """Mean rank of an estimator among those that can be run."""
-    ranks = [1 + sum(inclination_of(one, other) < inclination_of(one, name) for other in fed) for one in near]
-    return float(np.mean(ranks))
 
 
 def notes_on(trajectory: Trajectory, motion: Motion, near: Sequence[Mapping[str, Any]]) -> list[str]:

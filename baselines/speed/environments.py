@@ -29,6 +29,8 @@ RIDE_LENGTH, RIDES = 60.0, 1000
 
 def environment_speeds() -> Iterator[Speed]:
     """Steps per CPU second of hand motion, replay and gain tuning; simulation without steps; riders on bicycles."""
+    from ...envs.hand.sensing import simulate_hand
+
     group = "environments at 100 Hz"
     bare = measure(bare_steps(STEPS * PHYSICS_PER_STEP), STEPS * PHYSICS_PER_STEP, clock=CLOCK)
     yield Speed(group, "bare stepSimulation of one free body, 10 a step", bare / PHYSICS_PER_STEP, "steps/s", 1.0)
@@ -40,7 +42,7 @@ def environment_speeds() -> Iterator[Speed]:
     ):
         rate = environment_rate(identity, options)
         yield Speed(group, what, rate, "steps/s", rate / (bare / PHYSICS_PER_STEP))
-    rate = bulk_rate()
+    rate = measure(lambda: simulate_hand("mixed", seed=0, duration=60.0), 6001, clock=CLOCK)
     yield Speed(group, "simulate_hand, whole episode at once", rate, "steps/s", rate / (bare / PHYSICS_PER_STEP))
     yield from rider_speeds("full")
     yield from rider_speeds("lumped")
@@ -178,10 +180,3 @@ def environment_rate(identity: str, options: dict[str, Any]) -> float:
     finally:
         env.close()
     return sorted(rates[1:])[REPEATS // 2]
-
-
-def bulk_rate() -> float:
-    """Steps per CPU second of recording a kinematic episode without an environment."""
-    from ...envs.hand.sensing import simulate_hand
-
-    return measure(lambda: simulate_hand("mixed", seed=0, duration=60.0), 6001, clock=CLOCK)

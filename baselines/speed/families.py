@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from functools import partial
 from itertools import pairwise
 
@@ -38,12 +38,6 @@ LONG = 20_000
 """samples of whole sequences"""
 ARRAYS = 20
 """samples of the slow forms"""
-
-
-def family_speeds(names: Sequence[str]) -> Iterator[Speed]:
-    """Rates of the estimators of a family, a group each."""
-    for name in names:
-        yield from estimator_speeds(name)
 
 
 def estimator_speeds(name: str) -> Iterator[Speed]:

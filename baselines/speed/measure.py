@@ -67,7 +67,8 @@ def form_rates(
         wide: samples of a batch in the compiled form.
         batches: numbers of sequences that run at a time.
     """
-    arrays = in_arrays(estimator)
+    # the same without the compiled form; the estimator itself if it has none
+    arrays = replace(estimator, compiled=False) if hasattr(estimator, "compiled") else estimator  # type: ignore[type-var]
     forms: list[tuple[str, Estimator[Any], Callable[..., Any], Mapping[str, np.ndarray], int]] = [
         ("step by step, arrays", arrays, run_by_steps, sample(short), 1)
     ]
@@ -85,11 +86,6 @@ def form_rates(
         # Batches use several cores.
         clock = time.process_time if width == 1 else time.perf_counter
         yield what, measure(partial(runner, form, data), count, clock=clock)
-
-
-def in_arrays(estimator: Estimator[Any]) -> Estimator[Any]:
-    """The same without the compiled form; the estimator itself if it has none."""
-    return replace(estimator, compiled=False) if hasattr(estimator, "compiled") else estimator  # type: ignore[type-var]
 
 
 def widened(data: Mapping[str, np.ndarray], batch: int) -> dict[str, np.ndarray]:

@@ -80,13 +80,9 @@ def _wrench(ride: Trajectory) -> np.ndarray:
     return np.concatenate([rotation.rotate_back(mounted, values) for values in (force, moment)], axis=-1)
 
 
-def _hands(ride: Trajectory) -> np.ndarray:
-    return np.concatenate([ride.truth[f"handlebar/force_{side}"] for side in ("left", "right")], axis=-1)
-
-
 IDEAL: dict[str, Callable[[Trajectory], np.ndarray]] = {
     "relative/orientation": _relative,
     "seat/wrench": _wrench,
-    "handlebar/force": _hands,
+    "handlebar/force": lambda ride: np.concatenate([ride.truth[f"handlebar/force_{s}"] for s in ("left", "right")], -1),
 }
 """Channel → its ideal samples."""

@@ -116,24 +116,22 @@ def table_i(report: Report) -> None:
     )
     root = math.sqrt(RATE)
     noises = (
-        ("gyroscopes, °/s a sample", MODEL_605_GYROSCOPE.noise.white_noise * root / DEG),
-        ("σ of the gyroscopes' bias, °/s", MODEL_605_GYROSCOPE.noise.bias_instability / DEG),
-        ("accelerometers, m/s² a sample", MODEL_605_ACCELEROMETER.noise.white_noise * root),
-        ("seat force, N a sample", SEAT_WRENCH.noise.white_noise * root),
-        ("zero of the seat force, N", SEAT_WRENCH.noise.turn_on_bias),
-        ("load cells, N a sample", LOAD_CELL.noise.white_noise * root),
-        ("handlebar force, N a sample", STRAIN_GAUGES.noise.white_noise * root),
-        ("zero of the handlebar force, N", STRAIN_GAUGES.noise.turn_on_bias),
+        ("gyroscopes, °/s a sample", None, MODEL_605_GYROSCOPE.noise.white_noise * root / DEG),
+        ("σ of the gyroscopes' bias, °/s", None, MODEL_605_GYROSCOPE.noise.bias_instability / DEG),
+        ("accelerometers, m/s² a sample", None, MODEL_605_ACCELEROMETER.noise.white_noise * root),
+        ("seat force, N a sample", None, SEAT_WRENCH.noise.white_noise * root),
+        ("zero of the seat force, N", None, SEAT_WRENCH.noise.turn_on_bias),
+        ("load cells, N a sample", None, LOAD_CELL.noise.white_noise * root),
+        ("handlebar force, N a sample", None, STRAIN_GAUGES.noise.white_noise * root),
+        ("zero of the handlebar force, N", None, STRAIN_GAUGES.noise.turn_on_bias),
     )
-    rows = [{"parameter": name, "published": published, "simulated": ours} for name, published, ours in lengths]
-    rows += [{"parameter": name, "published": None, "simulated": value} for name, value in noises]
+    rows = [
+        {"parameter": name, "published": published, "simulated": None if ours is None else float(f"{ours:.3g}")}
+        for name, published, ours in (*lengths, *noises)
+    ]
     note = (
         "l_b and h_b, the place of the bicycle's centre of mass, enter no equation of the filter. The published saddle "
         "is lower than the unit on the frame (h_s below p_z); the simulated one is where a rider can sit. The paper "
         "gives none of the noises; those here are standard deviations of the simulated sensors."
     )
-    report.table("Table I: parameters", [{**row, "simulated": _short(row["simulated"])} for row in rows], note)
-
-
-def _short(value: float | str | None) -> float | None:
-    return None if value is None else float(f"{float(value):.3g}")
+    report.table("Table I: parameters", rows, note)

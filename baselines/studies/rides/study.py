@@ -48,15 +48,12 @@ DRAWN = 20.0
 """s of a ride at most in the figure"""
 
 
-def ride_seeds(seed: int) -> dict[tuple[str, int], int]:
-    """Seed of every scenario and rider, whichever of them ride."""
-    pairs = list(product(list_scenarios(), range(len(SUBJECTS))))
-    return dict(zip(pairs, child_seeds(seed, len(pairs)), strict=True))
-
-
 def rides(study: Study, report: Report, scenarios: Sequence[str], fidelity: str) -> list[dict[str, Any]]:
     """Ride, and report the numbers of every ride, what agrees with the papers, and the signals of one ride."""
-    seeds, which = ride_seeds(study.seed), list(product(scenarios, study.subjects))
+    # the seed of a scenario and rider does not depend on which of them ride
+    pairs = list(product(list_scenarios(), range(len(SUBJECTS))))
+    seeds = dict(zip(pairs, child_seeds(study.seed, len(pairs)), strict=True))
+    which = list(product(scenarios, study.subjects))
     jobs = [(*pair, study.duration, fidelity, seeds[pair]) for pair in which]
     found = study.map("rides", ride, jobs)
     report.numbers(results(found))

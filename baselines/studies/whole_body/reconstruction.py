@@ -191,7 +191,7 @@ def skeleton(
     lines |= bicycle(geometry, link, steer)
     roll = rotation.elementary_matrix(0, pose["bicycle/roll"][0])
     # from the paper's axes (forward, up, right) to ours (forward, left, up), rolled about the contact line
-    return {name: _ours(points @ roll.T) for name, points in lines.items()}
+    return {name: (points @ roll.T)[:, [0, 2, 1]] * [1.0, -1.0, 1.0] for name, points in lines.items()}
 
 
 def bicycle(geometry: RiderGeometry, link: RiderLinkage, steer: np.ndarray) -> dict[str, np.ndarray]:
@@ -211,7 +211,3 @@ def bicycle(geometry: RiderGeometry, link: RiderLinkage, steer: np.ndarray) -> d
         "fork": np.stack([front, head, stem]),
         "handlebar": np.stack(hands),
     }
-
-
-def _ours(points: np.ndarray) -> np.ndarray:
-    return np.stack([points[:, 0], -points[:, 2], points[:, 1]], axis=-1)
