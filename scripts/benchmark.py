@@ -73,6 +73,8 @@ class Args:
 
 def run(args: Args) -> int:
     """Simulate, load, estimate, compare."""
+    import pandas
+
     from ..baselines.comparison.recommendation import load_results
     from ..baselines.comparison.tasks import run_tasks
     from .comparison.riders import rider_settings, rider_sweeps, rider_tables
@@ -106,7 +108,10 @@ def run(args: Args) -> int:
                 reference=args.reference,
             )
         ridden = None if riders is None else rider_tables(riders, args, folder, out)
-        table = all_rows(suites, [] if ridden is None else ridden.rows)
+        tables = [results.table.assign(suite=suite) for suite, results in suites.items()]
+        if ridden is not None:
+            tables.append(pandas.DataFrame(ridden.rows))
+        table = pandas.concat(tables, ignore_index=True)
         folder.write_results(table)
         for suite, results in suites.items():
             show_suite(suite, results, [task for task in tasks if task.suite == suite], args, folder, out)
@@ -152,14 +157,6 @@ def tasks_of(args: Args, recorded: list[Trajectory]) -> tuple[list[Task], list[s
     again = {"settings": {"reference_clock": "corrected", "check": False}, "suffix": CORRECTED}
     tasks += recording_tasks(with_other_clocks(recorded), "recordings, clock corrected", **again)
     return tasks, channels
-
-
-def all_rows(suites: dict[str, Results], more: list[dict[str, Any]]) -> pandas.DataFrame:
-    """All results with their suite, in the order of the suites, and more rows of the same columns."""
-    import pandas
-
-    tables = [results.table.assign(suite=suite) for suite, results in suites.items()]
-    return pandas.concat([*tables, *([pandas.DataFrame(more)] if more else [])], ignore_index=True)
 
 
 def show_suite(suite: str, results: Results, tasks: list[Task], args: Args, folder: Run, out: Output) -> None:

@@ -14,7 +14,6 @@ import warnings
 from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
@@ -100,12 +99,6 @@ def jumps_to_range(values: np.ndarray, limit: float) -> np.ndarray:
     return found
 
 
-def full_scales(metadata: Mapping[str, Any]) -> dict[str, float]:
-    """Channel → range in its unit, of ``metadata["full_scale"]``."""
-    given = metadata.get("full_scale", {})
-    return {str(name): float(limit) for name, limit in given.items()} if isinstance(given, Mapping) else {}
-
-
 def reached_ranges(measurements: Mapping[str, np.ndarray]) -> dict[str, float]:
     """Channel → range in its unit, of gyroscopes and accelerometers whose readings show it."""
     kinds = {name: name.rpartition("/")[2] for name, values in measurements.items() if values.shape[1] == 3}
@@ -162,7 +155,9 @@ def without_glitches(trajectory: Trajectory) -> dict[str, np.ndarray]:
     """
     measurements, reports = dict(trajectory.measurements), []
     dt = trajectory.dt if len(trajectory) > 1 else None
-    ranges = reached_ranges(measurements) | full_scales(trajectory.metadata)
+    given = trajectory.metadata.get("full_scale", {})
+    stated = {str(name): float(limit) for name, limit in given.items()} if isinstance(given, Mapping) else {}
+    ranges = reached_ranges(measurements) | stated
     for name, parts in no_samples(measurements, ranges, dt).items():
         wrong = np.logical_or.reduce(list(parts.values()))
         if wrong.any():

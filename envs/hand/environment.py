@@ -21,7 +21,7 @@ from .arm.driver import ArmDriver
 from .devices import HandDevice, check_planar, hand_device
 from .drivers import Device, KinematicDriver, MotionDriver
 from .gestures import GestureConfig, gesture_config, make_gesture
-from .sensing import HandVariation, built_array, check_duration, hand_gesture, hand_suite, samples_of, sense
+from .sensing import HandVariation, built_array, check_duration, hand_suite, samples_of, sense
 
 DriveKind = Literal["dynamic", "kinematic"]
 
@@ -167,7 +167,8 @@ class HandMotionEnv(PoseEnv):
         render_mode: str | None = None,
     ) -> None:
         held = hand_device(device)
-        gesture = hand_gesture(gesture, held)
+        if gesture is None:
+            gesture = "infinity" if held is not None and held.planar else "slow"
         config = gesture_config(gesture)
         check_duration(duration)
         if drive not in ("dynamic", "kinematic"):

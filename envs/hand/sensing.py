@@ -67,13 +67,6 @@ def samples_of(duration: float, rate: float) -> int:
     return max(1, math.floor(duration * rate + 1e-6)) + 1
 
 
-def hand_gesture(gesture: str | GestureConfig | None, device: HandDevice | None) -> str | GestureConfig:
-    """The gesture itself; where none is given ``slow``, or ``infinity`` for a planar device."""
-    if gesture is not None:
-        return gesture
-    return "infinity" if device is not None and device.planar else "slow"
-
-
 def built_array(
     device: HandDevice | None, sensors: str | SensorPreset | SensorSuite | None, generator: np.random.Generator
 ) -> AccelerometerArray | None:

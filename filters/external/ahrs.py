@@ -140,7 +140,9 @@ class AHRSEKF(AHRSFilter):
         if not f.any():
             # The package would skip the prediction too.
             F = engine.dfdq(gyroscope, self.dt)
-            W = _rate_jacobian(q, self.dt)
+            w, x, y, z = q
+            # derivative of the predicted quaternion with respect to the rate
+            W = 0.5 * self.dt * np.array([[-x, -y, -z], [w, -z, y], [z, w, -x], [-y, x, w]])
             covariance = F @ covariance @ F.T + self.gyroscope_variance * W @ W.T
             q = np.asarray(normalize(engine.f(q, gyroscope, self.dt)))
             return (q, covariance, dip), q
@@ -148,9 +150,3 @@ class AHRSEKF(AHRSFilter):
         # Its accelerometer points down in east-north-up.
         q = np.asarray(engine.update(q, gyroscope, -f, field), dtype=float)
         return (q, engine.P, dip), q
-
-
-def _rate_jacobian(q: np.ndarray, dt: float) -> np.ndarray:
-    """Derivative ``(4, 3)`` of the predicted quaternion with respect to the rate."""
-    w, x, y, z = q
-    return 0.5 * dt * np.array([[-x, -y, -z], [w, -z, y], [z, w, -x], [-y, x, w]])

@@ -37,8 +37,9 @@ def curves_of(truth: Arrays, estimates: Mapping[str, Arrays], outputs: Mapping[s
         for quantity in {each.name: each for each in (UP, *outputs[label])}.values():
             if quantity.name in pose and quantity.name in truth:
                 error = np.asarray(metrics.error(quantity, pose[quantity.name], truth[quantity.name]))
-                scale = math.degrees(1.0) if quantity.kind != "vector" else 1.0
-                errors.setdefault(_title(quantity), {})[label] = scale * error
+                scale, unit = (math.degrees(1.0), "deg") if quantity.kind != "vector" else (1.0, quantity.unit)
+                named = "inclination" if quantity.name == UP.name else quantity.name
+                errors.setdefault(f"error of {named} ({unit})", {})[label] = scale * error
         for name, values in angles_of(pose, outputs[label]).items():
             angles.setdefault(name, {})[label] = values
     every = [quantity for each in outputs.values() for quantity in each]
@@ -46,12 +47,6 @@ def curves_of(truth: Arrays, estimates: Mapping[str, Arrays], outputs: Mapping[s
         if name in angles or not outputs:
             angles[name] = {TRUTH: values, **angles.get(name, {})}
     return errors | angles
-
-
-def _title(quantity: Quantity) -> str:
-    named = "inclination" if quantity.name == UP.name else quantity.name
-    unit = "deg" if quantity.kind != "vector" else quantity.unit
-    return f"error of {named} ({unit})"
 
 
 def angles_of(pose: Arrays, outputs: Sequence[Quantity]) -> dict[str, np.ndarray]:

@@ -11,22 +11,16 @@ from ...envs.drawn import AXIS_COLOURS, DEVICE_SIZE, device_boxes
 from ...filters.arrays.spatial.orientation import ArrayOrientation
 from ...filters.arrays.spatial.virtual_controller import VIRTUAL_POSITION, advance
 from ...filters.core import rotation
-from .meshes import Colour, Mesh, box, rod
+from .meshes import Mesh, box, rod
 
 Values = Mapping[str, np.ndarray]
 
 
 def device_meshes(size: Sequence[float] = DEVICE_SIZE) -> list[Mesh]:
     """The device of the rendered environments, of some size along the body axes (m), and its axes."""
-    boxes = [box(centre, 2.0 * np.array(half), as_colour(colour)) for half, centre, colour in device_boxes(size)]
+    boxes = [box(centre, 2.0 * np.array(half), (r, g, b)) for half, centre, (r, g, b, *_) in device_boxes(size)]
     ends = 1.1 * size[0] * np.eye(3)
     return [*boxes, *(rod((0.0, 0.0, 0.0), end, 0.003, colour) for end, colour in zip(ends, AXIS_COLOURS, strict=True))]
-
-
-def as_colour(colour: Sequence[float]) -> Colour:
-    """Red, green and blue of a colour."""
-    red, green, blue, *_ = colour
-    return (red, green, blue)
 
 
 @dataclass

@@ -133,7 +133,10 @@ class Rider:
 
     def motion(self, block: Block) -> Motion:
         """What is drawn of a block."""
-        known = {**_encoders(block.measurements), **block.truth}
+        # angles of steering and crank by their encoders, where the truth is not known
+        encoders = {"steer/angle": "bicycle/steer", "crank/angle": "bicycle/crank"}
+        read = {name: values for name, values in block.measurements.items() if name in encoders}
+        known = {encoders[name]: np.nan_to_num(values) for name, values in read.items()} | dict(block.truth)
         figures = {}
         if "bicycle/orientation" in block.truth:
             figures[TRUTH] = rider_poses(self.geometry, known)
@@ -201,9 +204,3 @@ def true_orientation(truth: Arrays) -> np.ndarray | None:
     if "orientation" in truth:
         return np.asarray(truth["orientation"], float)
     return rotation.level(np.asarray(truth["up"], float)) if "up" in truth else None
-
-
-def _encoders(measurements: Arrays) -> dict[str, np.ndarray]:
-    """Angles of steering and crank by their encoders, the last valid sample where there is none."""
-    names = {"steer/angle": "bicycle/steer", "crank/angle": "bicycle/crank"}
-    return {quantity: np.nan_to_num(measurements[name]) for name, quantity in names.items() if name in measurements}

@@ -124,17 +124,13 @@ def arguments_of(kind: type) -> list[dict[str, Any]]:
         parameters = inspect.signature(each.__init__).parameters  # type: ignore[misc]
         for name, one in parameters.items():
             if name != "self" and one.kind not in (one.VAR_KEYWORD, one.VAR_POSITIONAL):
-                default = None if one.default is one.empty else f"`{default_of(one.default)}`"
+                # a long one by its type
+                text = repr(one.default) if len(repr(one.default)) <= 40 else f"{type(one.default).__name__}(…)"
+                default = None if one.default is one.empty else f"`{text}`"
                 rows.setdefault(name, {"argument": f"`{name}`", "default": default, "meaning": texts.get(name)})
         if all(one.kind != one.VAR_KEYWORD for one in parameters.values()):
             break
     return list(rows.values())
-
-
-def default_of(value: Any) -> str:
-    """A default on a page: a long one by its type."""
-    text = repr(value)
-    return text if len(text) <= 40 else f"{type(value).__name__}(…)"
 
 
 def short(space: spaces.Space[Any]) -> str:

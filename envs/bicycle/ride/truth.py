@@ -12,7 +12,6 @@ import numpy as np
 from ....filters.core import rotation
 from ....filters.core.quantity import Quantity
 from ...sensors.ideal import BodyState
-from ..rider.limbs import LimbPosture
 from ..rider.posture import LIMBS, SIDES, segments_of
 from .log import RideLog, limb_root
 
@@ -136,12 +135,6 @@ def continuous_pose(pose: dict[str, np.ndarray], last: Quaternions) -> tuple[dic
     return found, now
 
 
-def joint_angles(log: RideLog) -> np.ndarray:
-    """Angles ``(n, 19)`` in the order of :data:`FULL_JOINTS`, rad."""
-    limbs: list[LimbPosture] = [log.limbs[name] for name in LIMBS]
-    return np.concatenate([log.trunk_joints, *(limb.angles for limb in limbs)], axis=1)
-
-
 def other_truth(log: RideLog, head: BodyState) -> dict[str, np.ndarray]:
     """What is known besides the pose, name → ``(n, size)``; see the environment's table."""
     frame, contact = log.frames["rear_frame"], log.contact
@@ -161,7 +154,7 @@ def other_truth(log: RideLog, head: BodyState) -> dict[str, np.ndarray]:
         "pelvis/height": log.pelvis[:, 2:3],
         "seat/force": rotation.rotate_back(back, contact.seat_force),
         "seat/moment": rotation.rotate_back(back, contact.seat_moment),
-        "joints/angles": joint_angles(log),
+        "joints/angles": np.concatenate([log.trunk_joints, *(log.limbs[name].angles for name in LIMBS)], axis=1),
         "joints/torques": log.torques,
         "steer/rate": log.rates[:, :1],
         "crank/rate": log.rates[:, 1:2],

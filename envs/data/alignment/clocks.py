@@ -67,6 +67,8 @@ def align_clocks(
         ValueError: no such gyroscope, recordings that do not overlap long enough, no motion, or devices that do not
             turn alike.
     """
+    from scipy.stats import theilslopes
+
     grids = [rate_on_grid(one, name) for one, name in ((trajectory, site), (reference, reference_site))]
     (start, own), (other_start, other) = grids
     if min(len(own), len(other)) < 2.0 * RATE:
@@ -98,7 +100,8 @@ def align_clocks(
     time, shift, value = np.array(found).T
     if len(found) < 3:
         return ClockAlignment(float(shift.mean()), 0.0, float(shift.std()), float(value.mean()), len(found))
-    drift, offset = robust_line(time, shift)
+    # the median of slopes between points, so that a wrong window does not count
+    drift, offset, *_ = theilslopes(shift, time)
     residual = float(np.sqrt(np.mean((shift - offset - drift * time) ** 2)))
     return ClockAlignment(float(offset), float(drift), residual, float(value.mean()), len(found))
 
@@ -153,14 +156,6 @@ def best_lag(own: np.ndarray, other: np.ndarray, most: int, *, inside: bool = Fa
         bend = left - 2.0 * top + right
         fraction = float(np.clip(0.5 * (left - right) / bend, -0.5, 0.5)) if bend < 0.0 else 0.0
     return float(lag[peak] + fraction), float(correlation[peak])
-
-
-def robust_line(x: np.ndarray, y: np.ndarray) -> tuple[float, float]:
-    """Slope and intercept; the median of slopes between points (Theil–Sen), so that a wrong window does not count."""
-    from scipy.stats import theilslopes
-
-    slope, intercept, *_ = theilslopes(y, x)
-    return float(slope), float(intercept)
 
 
 def merged(trajectories: Mapping[str, Trajectory], rate: float | None = None) -> Trajectory:

@@ -115,8 +115,10 @@ def align_segment(
             f"{LEAST_DOMINANCE:.0%} are needed"
         )
     wanted = AXES[axis.removeprefix("-")]
-    # The sense of the first large turn is that of the name of the axis.
-    sense = np.sign(first_turn(rate @ turning)) * (-1.0 if axis.startswith("-") else 1.0)
+    # The sense of the first large turn, where half of the largest rate is reached first, is that of the axis' name.
+    along = rate @ turning
+    first = along[int(np.argmax(np.abs(along) >= 0.5 * np.abs(along).max()))]
+    sense = np.sign(first) * (-1.0 if axis.startswith("-") else 1.0)
     turning = turning * sense
     vertical = np.array([0.0, 0.0, 1.0])
     angle = math.degrees(math.acos(min(1.0, abs(float(up @ turning)))))
@@ -166,11 +168,6 @@ def main_axis(rate: np.ndarray) -> tuple[np.ndarray, float]:
         return np.array([1.0, 0.0, 0.0]), 0.0
     values, directions = np.linalg.eigh(rate.T @ rate)
     return directions[:, -1], float(values[-1] / max(values.sum(), 1e-12))
-
-
-def first_turn(rate: np.ndarray) -> float:
-    """The rate of the first large turn: where half of the largest rate is reached first."""
-    return float(rate[int(np.argmax(np.abs(rate) >= 0.5 * np.abs(rate).max()))])
 
 
 def triad(first: np.ndarray, second: np.ndarray) -> np.ndarray:

@@ -64,11 +64,6 @@ def euroc_root(path: Path) -> Path | None:
     return None
 
 
-def is_euroc(head: Head) -> bool:
-    """Whether a path is a sequence of EuRoC, or the file of its IMU."""
-    return euroc_root(head.path) is not None
-
-
 def load_euroc(path: Path) -> list[Trajectory]:
     """Read a sequence: ``gyr``, ``acc``; truth ``orientation``, ``position``, ``velocity`` where there is a file of it.
 
@@ -118,17 +113,11 @@ def euroc_truth(path: Path, origin: int, time: np.ndarray) -> dict[str, np.ndarr
     return {name: interpolated(Stream(seconds, array), time, name) for name, array in values.items()}
 
 
-def qualisys_file(folder: Path) -> Path | None:
-    """The file of Qualisys that belongs to the folder of a phone, or None."""
-    candidate = folder.parent.parent / "qualisys" / f"{folder.name}.mat"
-    return candidate if candidate.is_file() else None
-
-
 def load_phone(folder: Path) -> list[Trajectory]:
     """Read the folder of a phone, with the orientation of Qualisys if the file of the benchmark is beside it."""
     (recorded,) = load_streams(folder)
-    reference = qualisys_file(folder)
-    if reference is None:
+    reference = folder.parent.parent / "qualisys" / f"{folder.name}.mat"
+    if not reference.is_file():
         return [recorded]
     fields = load_mat(reference)
     rotations = next((value for name, value in fields.items() if name.endswith("RigidBodies/Rotations")), None)

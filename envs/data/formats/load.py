@@ -14,7 +14,7 @@ from ..calibration.records import CalibrationRecord, apply_calibration, as_recor
 from ..reference_clock import measured
 from ..storage import FORMAT, HDF5_SIGNATURE, is_trajectory_file
 from ..trajectory import Trajectory, load_trajectory
-from .benchmarks import is_archive, is_euroc, is_repoimu, load_archive, load_euroc, load_phone, load_repoimu
+from .benchmarks import euroc_root, is_archive, is_repoimu, load_archive, load_euroc, load_phone, load_repoimu
 from .broad import is_broad, load_broad
 from .described import complete, load_described, mapping_of, with_checked_orientation
 from .dot import is_dot, is_xsens, load_dot, load_xsens
@@ -41,27 +41,6 @@ class RecordingFormat:
     name: str
     recognises: Callable[[Head], bool]
     load: Callable[[Path], list[Trajectory]]
-
-
-def is_own(head: Head) -> bool:
-    """Whether this package wrote a file."""
-    return is_trajectory_file(head.content, head.path)
-
-
-def load_own(path: Path) -> list[Trajectory]:
-    """Read a trajectory file of this package."""
-    return [load_trajectory(path)]
-
-
-def is_map(head: Head) -> bool:
-    """Whether a file is a mapping in TOML."""
-    return head.path.suffix.lower() == ".toml" and "[columns]" in head.text
-
-
-def load_map(path: Path) -> list[Trajectory]:
-    """Read the table that a mapping beside it describes; drafts are made by ``poise inspect --write-map``."""
-    data, mapping = read_map(path)
-    return mapped(data, mapping)
 
 
 def is_described(head: Head) -> bool:
@@ -91,17 +70,26 @@ def load_any_described(path: Path) -> list[Trajectory]:
     return load_described(path, table, name)
 
 
+def is_map(head: Head) -> bool:
+    """Whether a file is a mapping in TOML."""
+    return head.path.suffix.lower() == ".toml" and "[columns]" in head.text
+
+
 FORMATS: tuple[RecordingFormat, ...] = (
-    RecordingFormat(f"{FORMAT} (HDF5)", is_own, load_own),
+    RecordingFormat(
+        f"{FORMAT} (HDF5)",
+        lambda head: is_trajectory_file(head.content, head.path),
+        lambda path: [load_trajectory(path)],
+    ),
     RecordingFormat("BROAD (MATLAB or HDF5)", is_broad, load_broad),
     RecordingFormat("Movella/Xsens DOT export (CSV)", is_dot, load_dot),
     RecordingFormat("Xsens MT Manager export (text)", is_xsens, load_xsens),
     RecordingFormat("RepoIMU (CSV)", is_repoimu, load_repoimu),
-    RecordingFormat("EuRoC (folder)", is_euroc, load_euroc),
+    RecordingFormat("EuRoC (folder)", lambda head: euroc_root(head.path) is not None, load_euroc),
     RecordingFormat("x-io x-IMU3, NGIMU (folder)", is_member, load_member),
     RecordingFormat("phone: phyphox, Sensor Logger, SensLogs (folder)", is_folder_of_streams, load_phone),
     RecordingFormat("NumPy archive of t, gyr, acc (npz)", is_archive, load_archive),
-    RecordingFormat("mapping (TOML)", is_map, load_map),
+    RecordingFormat("mapping (TOML)", is_map, lambda path: mapped(*read_map(path))),
     RecordingFormat(
         "table with units in its header: x-io Fusion, APDM Moveo, Shimmer Consensys, …",
         is_described,

@@ -198,7 +198,8 @@ class ArrayOrientation(ArrayEquations, Model):
 
     def prior(self, z: Measurement) -> tuple[Array, Array]:
         """At rest: inclination from readings, heading from the field; or as given. α₀ = 0, ω₀ from the gyroscope."""
-        readings, field = z[self.readings.name], self._body_field(z)
+        readings, mag = z[self.readings.name], z["imu/mag"]
+        field = rotate(vector_of(self.magnetometer_mounting, 0.0 * mag[..., :1]), mag)
         xp = namespace(readings)
         zero = 0.0 * field + 0.0 * xp.sum(readings, axis=-1)[..., None]
         q = align(times(constant(self._mean, readings), readings), field, self.declination)
@@ -327,9 +328,6 @@ class ArrayOrientation(ArrayEquations, Model):
     def _mean(self) -> np.ndarray:
         """A_P⁺ ``(3, m)``: specific force at the reference point from readings without rotational terms."""
         return np.linalg.pinv(self.geometry.A_P)
-
-    def _body_field(self, z: Measurement) -> Array:
-        return rotate(vector_of(self.magnetometer_mounting, 0.0 * z["imu/mag"][..., :1]), z["imu/mag"])
 
     @staticmethod
     def _matrix(x: Array) -> Array:

@@ -219,7 +219,10 @@ class ForceInertial(ForceInertialParameters, Model):
         r = xp.stack([*(xp.where(row, part, part + xp.nan) for row, part in zip(lost, r, strict=False)), r[3]], axis=-1)
         H = xp.stack([-gradient(each, x[..., :7]) for each in residuals], axis=-2)
         if self.form == "published" and not whole:
-            H = self._with_published_h14(H, x, rate)
+            # H_14 as published: −2 m_h h_s h_h s_δ s_θ φ̇_b
+            product = self.trunk_mass * self.pivot_height * self.trunk_height
+            entry = -2.0 * product * sin(x[..., 3] - x[..., 0]) * sin(x[..., 1]) * rate.phi_b
+            H = rows([[entry if (i, j) == (0, 3) else H[..., i, j] for j in range(7)] for i in range(4)])
         deviations = [self.torque_noise, self.torque_noise, self.roll_noise, self.shoulder_noise]
         return r, H, diagonal([d * d for d in deviations], 0.0 * x[..., :1])
 
@@ -304,12 +307,6 @@ class ForceInertial(ForceInertialParameters, Model):
         zero = 0.0 * x[..., 0]
         still = needed_load(angles, Rates(*[zero] * 5), Accelerations(*[zero] * 5), zero, Travel(zero, zero), self)
         return still._replace(force=moving.force)
-
-    def _with_published_h14(self, H: Array, x: Array, rate: Rates) -> Array:
-        """H with the published H_14: −2 m_h h_s h_h s_δ s_θ φ̇_b."""
-        product = self.trunk_mass * self.pivot_height * self.trunk_height
-        entry = -2.0 * product * sin(x[..., 3] - x[..., 0]) * sin(x[..., 1]) * rate.phi_b
-        return rows([[entry if (i, j) == (0, 3) else H[..., i, j] for j in range(7)] for i in range(4)])
 
 
 PUBLISHED: dict[str, float] = {

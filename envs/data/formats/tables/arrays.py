@@ -49,12 +49,6 @@ INSIDE: dict[tuple[int, bytes], str] = {
 """The same further inside: place and bytes."""
 
 
-def other_kind(head: bytes) -> str | None:
-    """What a file of another kind is, and what to do; None of unknown ones."""
-    explanation = next((text for start, text in OTHERS.items() if head.startswith(start)), None)
-    return explanation or next((text for (at, sign), text in INSIDE.items() if head[at:].startswith(sign)), None)
-
-
 def read_table(path: Path) -> Table:
     """Read the table of a file, whose kind is told by its content.
 
@@ -78,9 +72,11 @@ def read_table(path: Path) -> Table:
         return as_table(read_hdf5(path, hdf5_arrays), "HDF5 file")
     if head.startswith(MATLAB):
         return as_table(load_mat(path), "MATLAB file")
-    other = other_kind(head)
-    if other is not None:
-        raise ValueError(f"it {other}")
+    # files of another kind, and what to do
+    others = [text for start, text in OTHERS.items() if head.startswith(start)]
+    others += [text for (at, sign), text in INSIDE.items() if head[at:].startswith(sign)]
+    if others:
+        raise ValueError(f"it {others[0]}")
     if is_text(head):
         if head.lstrip()[:1] == b"<":
             raise ValueError("it is XML; save its samples as a table, such as CSV, one row a sample")
