@@ -43,6 +43,17 @@ class RecordingFormat:
     load: Callable[[Path], list[Trajectory]]
 
 
+def load_own(path: Path) -> list[Trajectory]:
+    """Read a trajectory file of this package."""
+    return [load_trajectory(path)]
+
+
+def load_map(path: Path) -> list[Trajectory]:
+    """Read the table that a mapping beside it describes; drafts are made by ``poise inspect --write-map``."""
+    data, mapping = read_map(path)
+    return mapped(data, mapping)
+
+
 def is_described(head: Head) -> bool:
     """Whether a table names its columns and their units."""
     arrays = head.content.startswith((PARQUET, HDF5_SIGNATURE, MATLAB))
@@ -76,11 +87,7 @@ def is_map(head: Head) -> bool:
 
 
 FORMATS: tuple[RecordingFormat, ...] = (
-    RecordingFormat(
-        f"{FORMAT} (HDF5)",
-        lambda head: is_trajectory_file(head.content, head.path),
-        lambda path: [load_trajectory(path)],
-    ),
+    RecordingFormat(f"{FORMAT} (HDF5)", lambda head: is_trajectory_file(head.content, head.path), load_own),
     RecordingFormat("BROAD (MATLAB or HDF5)", is_broad, load_broad),
     RecordingFormat("Movella/Xsens DOT export (CSV)", is_dot, load_dot),
     RecordingFormat("Xsens MT Manager export (text)", is_xsens, load_xsens),
@@ -89,7 +96,7 @@ FORMATS: tuple[RecordingFormat, ...] = (
     RecordingFormat("x-io x-IMU3, NGIMU (folder)", is_member, load_member),
     RecordingFormat("phone: phyphox, Sensor Logger, SensLogs (folder)", is_folder_of_streams, load_phone),
     RecordingFormat("NumPy archive of t, gyr, acc (npz)", is_archive, load_archive),
-    RecordingFormat("mapping (TOML)", is_map, lambda path: mapped(*read_map(path))),
+    RecordingFormat("mapping (TOML)", is_map, load_map),
     RecordingFormat(
         "table with units in its header: x-io Fusion, APDM Moveo, Shimmer Consensys, …",
         is_described,
