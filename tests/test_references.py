@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import re
 import sys
+from collections import defaultdict
 from collections.abc import Iterator
 from functools import cache
 
@@ -51,9 +52,11 @@ def defined() -> frozenset[str]:
             (f"{module}.{node.name}", ast.unparse(base).split(".")[-1]) for node in classes for base in node.bases
         ]
     for _ in range(3):  # generations
-        members = [name.split(".") for name in found if name.count(".") > 1]
+        members: dict[str, set[str]] = defaultdict(set)
+        for owner, _, member in (name.rpartition(".") for name in found):
+            members[owner.rpartition(".")[2]].add(member)
         for child, parent in inherits:
-            found.update(f"{child}.{parts[-1]}" for parts in members if parts[-2] == parent)
+            found.update(f"{child}.{member}" for member in members[parent])
     every = [name.split(".") for name in found]
     return frozenset(".".join(parts[start:]) for parts in every for start in range(len(parts)))
 

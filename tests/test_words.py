@@ -62,7 +62,9 @@ def found_in(prose: str) -> list[str]:
 
 
 def test_words_are_those_of_the_field() -> None:
-    found = {name_of(path): found_in(prose_of(path)) for path in [*PAGES, *FILES]}
+    # a file without these words anywhere need not be taken apart, which is slow
+    written = [path for path in [*PAGES, *FILES] if found_in(path.read_text(encoding="utf-8"))]
+    found = {name_of(path): found_in(prose_of(path)) for path in written}
     assert {name: words for name, words in found.items() if words} == {}
 
 

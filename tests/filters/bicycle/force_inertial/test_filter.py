@@ -168,7 +168,7 @@ def test_perfect_data_are_followed(course):
 
 def test_corrected_against_printed():
     """Errata that change what comes out, indoors: (13) at face value, (12) without N_z."""
-    data, truth = ride(2, "indoor", 20.0)
+    data, truth = ride(2, "indoor", 12.0)
     found = {}
     for name, options in {
         "corrected": {},
