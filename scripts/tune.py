@@ -102,6 +102,7 @@ def run(args: Args) -> int:
     if args.policy is not None and (args.agent in SEARCHES or args.resume is not None):
         raise ValueError("policy cannot be given with a search of constant gains, nor with resume: nothing is trained")
     from ..baselines.gain_policy.compared.contenders import rows_of
+    from ..baselines.gain_policy.config import check_simulated
     from ..baselines.gain_policy.policy import GainPolicy
     from ..envs.gain_episode import check_scored
     from ..envs.gain_reward import scored_quantity
@@ -114,6 +115,7 @@ def run(args: Args) -> int:
         raise ValueError(f"trials must be at least 1, got {args.trials}")
     config = training_config(args)
     tuned = TunedFilter.of(tunable_filter(args.filter), config.gains)
+    check_simulated(config, tuned)
     given = None if args.policy is None else loaded(args.policy, tuned)
     recorded = recorded_sets(args.recordings)
     for each in itertools.chain.from_iterable(recorded.values()):

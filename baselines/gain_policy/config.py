@@ -7,9 +7,11 @@ import math
 from dataclasses import asdict, dataclass, field, fields, replace
 from typing import Any, Literal, get_args
 
+from ...envs.gain_episode import check_channels
 from ...envs.hand.gestures import Mixed
 from ...envs.hand.trajectories import HandTrajectories
 from ...envs.sensors.presets import sensor_preset
+from ...filters.adaptation.tuned import TunedFilter
 from ...filters.core.quantity import DEG
 from .motions import FLOWN_MOTIONS, GradedMotions, MixedMotions, Motions, RiddenMotions, uneven_rides
 
@@ -219,6 +221,23 @@ def shipped_config(filter: str) -> TrainingConfig:
         warm_start=150,
         warm_start_centre=centre,
     )
+
+
+def check_simulated(config: TrainingConfig, tuned: TunedFilter) -> None:
+    """Refuse a filter that reads what is not simulated for it.
+
+    Raises:
+        ValueError: names the missing channels, and what is simulated.
+    """
+    if config.filter in RIDERS:  # their rides have every sensor of the filter
+        return
+    try:
+        check_channels(config.motions.draw_many(config.seed, 1)[0], tuned)
+    except ValueError as reason:
+        raise ValueError(
+            f"{reason}; gains are tuned on motions of one sensor, which has a magnetometer in the recipe "
+            f"hand-held-magnetic, and on rides for {', '.join(RIDERS)}"
+        ) from None
 
 
 def config_of(agent: AgentName, config: TrainingConfig) -> TrainingConfig:

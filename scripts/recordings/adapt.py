@@ -66,7 +66,7 @@ def run(args: Args) -> int:
     from ...baselines.gain_policy.compared.ablation import ablation
     from ...baselines.gain_policy.compared.contenders import contenders, rows_of, side_by_side
     from ...baselines.gain_policy.compared.explained import gains_by_motion, gains_figure
-    from ...baselines.gain_policy.config import shipped_config
+    from ...baselines.gain_policy.config import check_simulated, shipped_config
     from ...baselines.gain_policy.constant_gains import best_constant_gains
     from ...baselines.gain_policy.motions import RiddenMotions
     from ...baselines.gain_policy.policy import GainPolicy
@@ -94,6 +94,7 @@ def run(args: Args) -> int:
         if math.isfinite(policy.bias_limit)
     }
     tuned = TunedFilter.of(tunable_filter(args.filter), config.gains)
+    check_simulated(config, tuned)
     scored = scored_quantities(tuned.kalman, args.quantities or None)
     quantity = replace(scored[0], name=", ".join(each.name for each in scored))
     sets = recorded_sets(args.recordings)

@@ -60,6 +60,11 @@ def test_agents_and_searches_leave_runs_that_a_report_compares(
         (["mekff"], "did you mean 'mekf'"),
         (["vqf"], "filter must be a Kalman filter with gains, got 'vqf' (filters: external-acceleration, mekf, "),
         (["mekf+noise"], "filter must be a Kalman filter with gains, got 'mekf+noise'"),
+        (
+            ["mekf-9"],
+            "lacks the channels ['imu/mag'] that mekf-9 reads; gains are tuned on motions of one sensor",
+        ),
+        (["two-gyro"], "'relative/orientation'] that two-gyro reads; gains are tuned on motions of one sensor"),
         (["mekf", "--test-trajectories", "0"], "test_trajectories must be at least 1"),
         (["mekf", "--quick", "--preset", "shipped"], "quick cannot be given with the preset shipped"),
         (["mekf", "--quick", "--steps", "0"], "poise: error: steps must be at least 1, got 0"),
