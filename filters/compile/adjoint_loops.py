@@ -23,7 +23,7 @@ def follow(  # type: ignore[no-untyped-def]
     stages, xs, Ps, presents, befores, ages = records
     sizes = x.shape[1], P.shape[1], whites.shape[2], Z.shape[2], parameters.shape[2]
     vectors, square, measured, rows = scratch(*sizes)
-    current, present, before, x1, x0, r, dx, noise = vectors
+    current, present, before, x1, x0, r, dx, noise, _ = vectors
     P0, F, Q, work = square
     H, R, S, HP, K = measured
     starts, F_first, F_column = part(plan, 0), part(plan, 1), part(plan, 2)
@@ -40,7 +40,7 @@ def follow(  # type: ignore[no-untyped-def]
             copy(age[b], ages[t, b])
             logarithms[t, b] = 0.0
             if started[b]:
-                call(plan[GROW], (p, age[b], present, noise))
+                call(plan[GROW], (p, age[b], present, P1, noise))
                 call(plan[PREDICT], (state, present, before, noise, x1, F, Q))
                 propagate(F, P1, Q, work, F_first, F_column)
                 call(plan[RESIDUAL], (x1, z, p, r, H, R))
@@ -112,7 +112,7 @@ def back(Z, parameters, records, given, gx, gP, gparameters, plan, own):  # type
             p = parameters[t if parameters.shape[0] > 1 else 0, b if parameters.shape[1] > 1 else 0]
             z, present, before = Z[t, b], presents[t, b], befores[t, b]
             # the sample again
-            call(plan[GROW], (p, ages[t, b], present, noise))
+            call(plan[GROW], (p, ages[t, b], present, Ps[t, b], noise))
             call(plan[PREDICT], (xs[t, b], present, before, noise, x1, F, Q))
             copy_matrix(Ps[t, b], P1)
             propagate(F, P1, Q, square, F_first, F_column)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..core.held_inputs import UNCERTAIN_TILT
 from .cache import jit
 
 
@@ -64,9 +65,10 @@ def scratch(n, e, m, d, p):  # type: ignore[no-untyped-def]
     """Memory of a run, reused at every time step: vectors, matrices of states and of rows, the rows that were used.
 
     For n states, e error states, m rows, d numbers a sample and p parameters: current, present, before, x1, x0, r, dx,
-    grown; P0, F, Q, work; H, R, S, HP, K; rows.
+    grown, blind; P0, F, Q, work; H, R, S, HP, K; rows.
     """
-    vectors = np.empty(d), np.empty(d), np.empty(d), np.empty(n), np.empty(n), np.empty(m), np.empty(e), np.empty(p)
+    samples = np.empty(d), np.empty(d), np.empty(d)
+    vectors = *samples, np.empty(n), np.empty(n), np.empty(m), np.empty(e), np.empty(p), np.empty(d)
     square = zeros(e, e), zeros(e, e), zeros(e, e), zeros(e, e)
     measured = zeros(m, e), zeros(m, m), zeros(m, m), zeros(m, e), zeros(m, e)
     return vectors, square, measured, np.empty(m, np.int64)
@@ -106,6 +108,23 @@ def all_new(age, channels):  # type: ignore[no-untyped-def]
         if age[c] > 0.0:
             return False
     return True
+
+
+@jit
+def is_unsure(P, tilt):  # type: ignore[no-untyped-def]
+    """Whether the rotation that begins in row ``tilt`` of the error is uncertain about the horizontal axes; not if −1.
+
+    See :func:`poise.filters.core.held_inputs.tilt_variance`.
+    """
+    return tilt >= 0 and 0.5 * (P[tilt, tilt] + P[tilt + 1, tilt + 1]) > UNCERTAIN_TILT * UNCERTAIN_TILT
+
+
+@jit
+def without_field(z, field, blind):  # type: ignore[no-untyped-def]
+    """Write a sample without the three numbers of the magnetometer, which begin at ``field`` (−1: it has none)."""
+    copy(z, blind)
+    if field >= 0:
+        fill(blind[field : field + 3], np.nan)
 
 
 @jit

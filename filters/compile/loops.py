@@ -3,12 +3,28 @@
 from __future__ import annotations
 
 from .cache import jit
-from .kernel import all_new, all_older, begin, copy, correct, fill, keep, propagate, remember, scratch, take
+from .kernel import (
+    all_new,
+    all_older,
+    begin,
+    copy,
+    correct,
+    fill,
+    is_unsure,
+    keep,
+    propagate,
+    remember,
+    scratch,
+    take,
+    without_field,
+)
 from .native import call
 from .plan import (
     DT,
+    FIELD,
     FINISH,
     GROW,
+    LEVEL,
     LONGEST,
     POSE,
     PREDICT,
@@ -18,6 +34,7 @@ from .plan import (
     RESIDUAL,
     RETRACT,
     STORE,
+    TILT,
     WATCH,
     WHERE_LOST,
     part,
@@ -37,13 +54,14 @@ def run(  # type: ignore[no-untyped-def]
     recorded = stage.shape[0] > 0
     sizes = x.shape[1], P.shape[1], whites.shape[2], Z.shape[2], parameters.shape[2]
     vectors, square, measured, rows = scratch(*sizes)
-    current, present, before, x1, x0, r, dx, grown = vectors
+    current, present, before, x1, x0, r, dx, grown, blind = vectors
     P0, F, Q, work = square
     H, R, S, HP, K = measured
     starts, F_first, F_column = part(plan, 0), part(plan, 1), part(plan, 2)
     H_first, H_column = part(plan, 3), part(plan, 4)
     inputs, longest = part(plan, 5), plan[LONGEST] / 1e6
     watched = restart and plan[WATCH] != 0
+    tilt = plan[TILT] if watched else -1
     for t in range(Z.shape[0]):
         for b in range(Z.shape[1]):
             p = parameters[t if parameters.shape[0] > 1 else 0, b if parameters.shape[1] > 1 else 0]
@@ -54,23 +72,36 @@ def run(  # type: ignore[no-untyped-def]
             missing = take(z, held[b], age[b], starts, p[plan[DT]], current, present, before)
             lost = watched and monitor[b, plan[WHERE_LOST]] > 0.5
             if started[b] and not lost and not (outlasted and all_new(age[b], inputs)):
-                noise = p
+                noise, seen = p, z
                 if missing:
-                    call(plan[GROW], (p, age[b], present, grown))
+                    call(plan[GROW], (p, age[b], present, P1, grown))
                     noise = grown
                 call(plan[PREDICT], (state, present, before, noise, x1, F, Q))
                 if P1.shape[0] > 0:
                     propagate(F, P1, Q, work, F_first, F_column)
-                    call(plan[RESIDUAL], (x1, z, p, r, H, R))
+                    unsure = is_unsure(P1, tilt)
+                    heading = 0.0
+                    if unsure:
+                        heading = P1[tilt + 2, tilt + 2]
+                        seen = blind
+                        without_field(z, plan[FIELD], blind)
+                        call(plan[LEVEL], (x1, blind, P1, p, r, H, R))
+                    else:
+                        call(plan[RESIDUAL], (x1, z, p, r, H, R))
                     nis[t, b] = correct(r, H, R, P1, dx, white, rows, S, HP, K, H_first, H_column)
                     if recorded:
                         call(plan[STORE], (F, H, entries[t, b]))
                         remember(K, S, rows, gains[t, b], factors[t, b], used[t, b])
+                    if unsure:
+                        P1[tilt + 2, tilt + 2] = max(heading, P1[tilt + 2, tilt + 2])
+                        # The residual does not write its zeros.
+                        fill(H[0], 0.0)
+                        fill(H[1], 0.0)
                 call(plan[RETRACT], (x1, dx, p, x0))
                 if recorded:
                     stage[t, b] = 2
                     copy(x0, updated[t, b])
-                call(plan[FINISH], (x0, z, p, state))
+                call(plan[FINISH], (x0, seen, p, state))
             else:
                 factor = 1.0
                 if lost:

@@ -14,10 +14,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..core.held_inputs import grown_parameters, longest_gap
+from ..core.held_inputs import coarse_rows, grown_parameters, longest_gap, rotation_part
 from ..core.model import Equations, Model, Recurrence, parameters_of, with_parameters
 from ..core.monitor import MEMORY, inputs_of, places_of, realigned, starts_of, watch, without_impacts
-from ..core.quantity import ACCELEROMETER, GYROSCOPE
+from ..core.quantity import ACCELEROMETER, GYROSCOPE, MAGNETOMETER
 from ..core.sampling import split
 from .emit import print_function
 from .trace import Expression, Tape
@@ -38,6 +38,10 @@ class Printed(NamedTuple):
     """number of elements of F and H that vary"""
     longest: float
     """s, of that gap"""
+    tilt: int
+    """first element of the rotation in the error of equations that may be levelled anew; −1 of others"""
+    field: int
+    """first element of the magnetometer in a sample, likewise"""
 
 
 def _lists(array: np.ndarray) -> tuple[list[int], list[int]]:
@@ -88,12 +92,13 @@ def _recursion(traced: Equations, tape: Tape, names: list[str], begins: list[int
     channels, places = [channel.name for channel in traced.channels], places_of(traced)
     p, age, x = tape.inputs("p", len(names)), tape.inputs("age", len(channels)), tape.inputs("x", traced.state_size)
     present, current, z = (tape.inputs(name, begins[-1]) for name in ("present", "current", "z"))
+    P = tape.inputs("P", traced.error_size, traced.error_size)
 
     def grow() -> Any:
-        grown = grown_parameters(traced, age, split(present, traced.channels))
+        grown = grown_parameters(traced, age, split(present, traced.channels), P)
         return np.array([grown.get(name, value) for name, value in zip(names, p, strict=True)])
 
-    functions: dict[str, Any] = {"grow(p, age, present, grown)": (("grown",), grow)}
+    functions: dict[str, Any] = {"grow(p, age, present, P, grown)": (("grown",), grow)}
     if places is not None:
         memory, posed = tape.inputs("memory", MEMORY), tape.inputs("posed", sum(part.size for part in traced.outputs))
         of_rate, of_force = (age[i : i + 1] for i in map(channels.index, (GYROSCOPE.name, ACCELEROMETER.name)))
@@ -103,6 +108,12 @@ def _recursion(traced: Equations, tape: Tape, names: list[str], begins: list[int
             ("memory",),
             lambda: watch(memory, inputs_of(traced, places, present, z, x, posed, of_rate)),
         )
+        if rotation_part(traced) >= 0:
+            # Its Jacobian can be other than zero where that of the residual can, and in the first two rows elsewhere.
+            functions["level(x, z, P, p, r, H, R)"] = (
+                ("r", "H", "R"),
+                lambda: coarse_rows(traced, x, split(z, traced.channels), P),
+            )
     return functions
 
 
@@ -179,4 +190,6 @@ def print_model(model: Equations) -> Printed:
     longest, inputs = longest_gap(model)
     lasting = places_of(model) is None and math.isfinite(longest)
     lists = begins, *_lists(F), *_lists(H), inputs if lasting else []
-    return Printed(functions, lists, names.index("dt"), entries, longest if lasting else 0.0)
+    tilt = rotation_part(model) if places_of(model) is not None else -1
+    field = starts_of(model.channels).get(MAGNETOMETER.name, -1)
+    return Printed(functions, lists, names.index("dt"), entries, longest if lasting else 0.0, tilt, field)

@@ -7,7 +7,17 @@ grows first with a⁴, as the rate changes smoothly, and then with a², as one w
 
 with the correlation time τ of the motion and its deviation s, which is larger where the last sample was. A rotation
 cannot be wronger than any rotation, so V_b(a) = V / (1 + V / B) levels out at B. In one interval V_b grows by ΔV, and
-the noise of the input grows from σ² Δtⁿ to σ² Δtⁿ + ΔV: a sample of age zero changes nothing.
+the noise of the input grows from σ² Δtⁿ to σ² Δtⁿ + ΔV: a sample of age zero changes nothing. Where the filter's own
+variance p of the rotation is known, it stands in for V_b in dV_b = (1 − V_b / B)² dV: what other sensors correct in a
+gap of the gyroscope is lost again as fast as the held rate is wrong, at any age.
+
+After such a gap the vertical may be wrong by any angle, which no linearised measurement finds: it corrects sin δ, and
+becomes certain of δ. Until the deviation of the tilt is small again, the direction of the specific force is measured
+instead, by the whole angle (coarse levelling), and the magnetometer, whose heading is that of the vertical, waits:
+
+    r = arccos(u₃) (u × e₃) / ‖u × e₃‖,  u = q f q* / ‖f‖,   σ = 0.2 + 2 | ‖f‖ / g − 1 |
+
+An acceleration that changes the length of the force by a share turns its direction by about as much.
 
 A rider keeps upright, which no held rate knows: after a second or two a prior is nearer than the prediction, whose
 error is by then too large for a linearisation. Equations whose inputs were all lost so long start anew.
@@ -20,8 +30,19 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from .backend import Array, namespace
-from .quantity import Measurement
+from .backend import Array, constant, expand, is_torch, namespace
+from .quantity import GRAVITY, MAGNETOMETER, Measurement
+from .rotation import norm, rotate
+
+UNCERTAIN_TILT, LARGEST_LINEAR_TILT = 0.2, 0.5
+"""Deviation of the tilt about an axis, rad, beyond which the heading is not measured, and beyond which measurements
+that are linear in the tilt are not used."""
+FORCE_DEVIATION, FORCE_SHARE = 0.2, 2.0
+"""rad: σ of the direction of a force as long as gravity, and what a relative error of its length adds. Of the hands
+below a force within 5 % of gravity is 10° from the vertical, one within 20 % or more 35° (root mean squares)."""
+SURER = 2.0
+"""Variance of the tilt, in those of the direction of the force, beyond which the latter is used; so not at once again,
+as the acceleration of the next sample is nearly the same."""
 
 
 @dataclass(frozen=True)
@@ -55,10 +76,13 @@ class HeldInput:
     bound: float = 2.0
     longest: float = math.inf
 
-    def noise(self, sigma: Array, age: Array, held: Array, dt: Array) -> Array:
-        """The parameter ``(...)`` for an interval that ends at an age ``(...)`` of a last sample ``(..., size)``."""
+    def noise(self, sigma: Array, age: Array, held: Array, dt: Array, known: Array | None = None) -> Array:
+        """The parameter ``(...)`` for an interval that ends at an age ``(...)`` of a last sample ``(..., size)``.
+
+        ``known`` is the variance ``(...)`` of the integral before it, where the filter has one.
+        """
         squared = namespace(held).sum(held * held, axis=-1)
-        return grown(sigma, age, squared, dt, dt**self.power, self.spread, self.share, self.time, self.bound)
+        return grown(sigma, age, squared, dt, dt**self.power, self.spread, self.share, self.time, self.bound, known)
 
 
 RIDDEN: Mapping[str, tuple[float, float, float]] = {
@@ -94,6 +118,7 @@ def grown(
     share: Array,
     time: Array,
     bound: Array,
+    known: Array | None = None,
 ) -> Array:
     """The noise σ for an interval that ends at an age, by the equations above; all arguments ``(...)``.
 
@@ -107,6 +132,7 @@ def grown(
         share: κ.
         time: τ, s.
         bound: B.
+        known: p; None for V_b.
     """
     xp = namespace(age, squared)
     missing, scale = xp.greater(age, 0.0), 2.0 * time * time
@@ -114,26 +140,34 @@ def grown(
 
     def variance(a: Array) -> Array:
         free = motion * (a * a - scale * xp.log(1.0 + a * a / scale))
-        return free / (1.0 + free / bound)
+        return free if known is not None else free / (1.0 + free / bound)
 
     end = xp.where(missing, age, 0.0 * age + dt)
     more = variance(end) - variance(end - dt)
+    if known is not None:
+        left = 1.0 - known / bound
+        more = more * xp.where(xp.greater(left, 0.0), left * left, 0.0 * left)
     return xp.where(missing, xp.sqrt(sigma * sigma + more / weight), sigma + 0.0 * age)
 
 
-def grown_parameters(model: Any, ages: Array, held: Measurement) -> Mapping[str, Array]:
+def grown_parameters(model: Any, ages: Array, held: Measurement, P: Array) -> Mapping[str, Array]:
     """The noises of a model's held inputs: parameter → value, in the shape of the batch.
 
     Args:
         model: the equations.
         ages: ``(..., channels)`` s since the last sample of each channel.
         held: channel → ``(..., size)`` last samples.
+        P: ``(..., e, e)`` covariance before the interval.
     """
-    names = [channel.name for channel in model.channels]
+    names, start = [channel.name for channel in model.channels], rotation_part(model)
     result: dict[str, Array] = {}
+    known = None
+    if start >= 0:
+        known = (P[..., start, start] + P[..., start + 1, start + 1] + P[..., start + 2, start + 2]) / 3.0
+        known = known.detach() if is_torch(known) else known
     for item in model.held_inputs:
         age = ages[..., names.index(item.channel)]
-        noise = item.noise(_value(model, item.parameter), age, held[item.channel], model.dt)
+        noise = item.noise(_value(model, item.parameter), age, held[item.channel], model.dt, known)
         other = result.get(item.parameter)
         result[item.parameter] = noise if other is None else namespace(noise).maximum(noise, other)
     return result
@@ -144,6 +178,72 @@ def longest_gap(model: Any) -> tuple[float, list[int]]:
     names = [channel.name for channel in model.channels]
     longest = min((item.longest for item in model.held_inputs), default=math.inf)
     return longest, sorted({names.index(item.channel) for item in model.held_inputs})
+
+
+def rotation_part(model: Any) -> int:
+    """Where the error of a model has the rotation of one inertial sensor, in world axes; −1 without one."""
+    return int(model.error_parts.get("relative_orientation", (-1, -1))[0])
+
+
+def tilt_variance(P: Array, start: int) -> Array:
+    """Mean variance ``(...)`` of the rotation about the horizontal axes, rad²."""
+    return 0.5 * (P[..., start, start] + P[..., start + 1, start + 1])
+
+
+def coarse_rows(model: Any, x: Array, z: Measurement, P: Array) -> tuple[Array, Array, Array]:
+    """Residual, Jacobian and covariance of a sample while the tilt is uncertain, of the shapes of the model's.
+
+    The first two rows are the direction of the force where that is surer than the prediction, and the others are none.
+    Where it is not, the rows are the model's, unless the tilt is too uncertain for a linear measurement.
+
+    Args:
+        model: the equations, whose error has a :func:`rotation_part`.
+        x: ``(..., n)`` predicted state.
+        z: the samples, without that of the magnetometer.
+        P: ``(..., e, e)`` predicted covariance.
+    """
+    xp, start = namespace(x), rotation_part(model)
+    r, H, R = model.residual(x, z)
+    pose, force = model.pose(x), z["imu/acc"]
+    q = pose["orientation"] if "orientation" in pose else pose["relative_orientation"]
+    length, tilt = norm(force), tilt_variance(P, start)[..., None]
+    up = rotate(q, force) / length
+    across = xp.sqrt(up[..., :1] * up[..., :1] + up[..., 1:2] * up[..., 1:2] + 1e-18)
+    angle = xp.atan2(across, up[..., 2:3]) / across
+    gravity = expand(getattr(model, "gravity", GRAVITY), 1)
+    deviation = FORCE_DEVIATION + FORCE_SHARE * xp.abs(length / gravity - 1.0)
+    variance = deviation * deviation
+    direct = xp.greater(tilt, SURER * variance)
+    linear = xp.less_equal(tilt, LARGEST_LINEAR_TILT**2)
+    missing = xp.nan + 0.0 * tilt
+    rows = [angle * up[..., 1:2], -angle * up[..., :1], *[missing] * (model.residual_size - 2)]
+    r = xp.where(direct, xp.concat(rows, axis=-1), xp.where(linear, r, missing))
+    whole = direct[..., None]
+    axes = constant([[float(j == start + i) for j in range(model.error_size)] for i in range(2)], x)
+    unit = constant([[float(i == j) for j in range(model.residual_size)] for i in range(model.residual_size)], x)
+    H = xp.concat([xp.where(whole, axes + 0.0 * H[..., :2, :], H[..., :2, :]), H[..., 2:, :]], axis=-2)
+    return r, H, xp.where(whole, variance[..., None] * unit, R)
+
+
+def without_field(z: Measurement, unsure: Array) -> dict[str, Array]:
+    """The samples, without that of the magnetometer where the tilt is uncertain, ``(...)`` bool."""
+    xp = namespace(*z.values())
+    return {
+        name: xp.where(unsure[..., None], xp.nan + 0.0 * value, value) if name == MAGNETOMETER.name else value
+        for name, value in z.items()
+    }
+
+
+def heading_kept(before: Array, P: Array, unsure: Array, start: int) -> Array:
+    """The covariance ``(..., e, e)`` after a measurement, with the variance of the heading before it where ``unsure``.
+
+    No measurement but that of the field tells the heading. Linearised about a wrong one, that of a velocity seems to.
+    """
+    xp, size, place = namespace(P), P.shape[-1], start + 2
+    more = before[..., place, place] - P[..., place, place]
+    more = xp.where(unsure & (more > 0.0), more, xp.zeros_like(more))
+    entry = constant([[float(i == j == place) for j in range(size)] for i in range(size)], P)
+    return P + more[..., None, None] * entry
 
 
 def _value(model: Any, parameter: str) -> Array:

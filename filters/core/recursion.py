@@ -1,12 +1,13 @@
 """Recursion over samples for Kalman filters and observers, identical in the array form and the compiled form.
 
-Six rules hold for all equations:
+Seven rules hold for all equations:
 
 * where a row of a measurement is not finite (no sample, drop-out, out of range), its update is skipped;
 * a missing sample of an input (a gyroscope, say) is replaced by the channel's last one;
 * an estimator initialises itself at the first sample with a finite prior; earlier estimates are NaN;
 * gains, log factors on named constants, may change at every sample; all zeros is exactly the published tuning;
 * the noise of an input grows with the age of its last sample (:mod:`.held_inputs`);
+* while the tilt is too uncertain for a linear measurement, the direction of the force stands in for it (likewise);
 * an estimate that contradicts the sensors for too long starts anew, and a force that no motion explains is no sample
   (:mod:`.monitor`); so does one of a rider that had no input for too long.
 
@@ -26,7 +27,16 @@ import numpy as np
 from ..compile.run import compiled_equations
 from .backend import Array, constant, is_torch, namespace
 from .estimator import check_measurements, stack_estimates
-from .held_inputs import grown_parameters, longest_gap
+from .held_inputs import (
+    UNCERTAIN_TILT,
+    coarse_rows,
+    grown_parameters,
+    heading_kept,
+    longest_gap,
+    rotation_part,
+    tilt_variance,
+    without_field,
+)
 from .matrices import times
 from .model import Gain, Model, Recurrence, with_parameters
 from .monitor import LOST, inputs_of, places_of, realigned, watch, without_impacts
@@ -199,12 +209,18 @@ class Recursion:
         going = started & ~lost
         if bool(xp.any(going)):
             now, before = (split(filled(part), self.channels) for part in (current, state.held))
-            grown = grown_parameters(model, age, now) if bool(xp.any(age > 0.0)) else {}
+            grown = grown_parameters(model, age, now, P) if bool(xp.any(age > 0.0)) else {}
             held = with_parameters(model, grown) if grown else model
             if isinstance(held, Model) and isinstance(model, Model):
                 x1, F, Q = held.predict(x, now, before)
                 P1 = F @ P @ F.mT + 0.5 * (Q + Q.mT)
-                dx, P1, whitened = correct(P1, *model.residual(x1, samples))
+                start = rotation_part(model) if places is not None else -1
+                unsure = tilt_variance(P1, start) > UNCERTAIN_TILT**2 if start >= 0 else started & ~started
+                coarse = bool(xp.any(unsure))
+                samples = without_field(samples, unsure) if coarse else samples
+                rows = coarse_rows(model, x1, samples, P1) if coarse else model.residual(x1, samples)
+                dx, corrected, whitened = correct(P1, *rows)
+                P1 = heading_kept(P1, corrected, unsure, start) if coarse else corrected
                 x1 = model.retract(x1, dx)
             else:
                 x1, P1 = held.predict(x, now, before), P

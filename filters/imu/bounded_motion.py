@@ -160,9 +160,10 @@ class BoundedMotion(Model):
         xp = namespace(x)
         q, f = normalize(x[..., :4]), z["imu/acc"]
         present = xp.all(xp.isfinite(f), axis=-1)[..., None]
+        both = xp.logical_and(present, xp.all(xp.isfinite(z["imu/gyr"]), axis=-1)[..., None])
         zero = 0.0 * x[..., 13:14]
         elapsed = xp.where(self._is_due(x, z), zero, x[..., 13:14])
-        age = xp.where(present, zero, x[..., 14:15] + expand(self.dt, 1))
+        age = xp.where(both, zero, x[..., 14:15] + expand(self.dt, 1))
         forgotten = xp.greater_equal(age, expand(self.hold, 1))
         remembered = xp.where(forgotten, 0.0 * x[..., 10:13], x[..., 10:13])
         acceleration = xp.where(present, self._external(q, f), remembered)
