@@ -66,10 +66,10 @@ class BoundedMotion(Model):
     """Six axes: inclination, gyroscope bias and external acceleration. The heading starts at zero and drifts.
 
     State: q (4), b (3), v (3), external acceleration in sensor axes (3, remembered), seconds since the last correction,
-    seconds since the last accelerometer sample.
+    seconds since the last sample of both accelerometer and gyroscope.
 
-    If accelerometer samples are missing for longer than ``hold``, the velocity is unknown. It is reset to zero with its
-    prior variance, and its updates are skipped until samples return. During the gap the gyroscope alone is integrated.
+    If samples of accelerometer or gyroscope are missing for longer than ``hold``, the velocity is unknown. It is reset
+    to zero with its prior variance, and its updates are skipped until both return.
     """
 
     gyroscope_noise: float = 5e-3
@@ -97,7 +97,7 @@ class BoundedMotion(Model):
     velocity_prior: float = 0.5
     """m/s"""
     hold: float = 0.05
-    """s: longest time for which the last accelerometer sample replaces missing ones"""
+    """s: longest time for which the last sample of accelerometer or gyroscope replaces missing ones"""
     gravity: float = GRAVITY
     """g, m/s²"""
 
