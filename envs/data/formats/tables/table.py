@@ -162,7 +162,8 @@ def split_unit(name: str) -> tuple[str, str]:
 
 def split_ending(name: str) -> tuple[str, str]:
     """Name and unit of ``name_unit``, ``name_unit_axis`` and ``name_unit[0]``; the unit may have underscores."""
-    parts = re.fullmatch(r"(?P<words>.*?)(?P<axis>_[xyz]|\[\d\])?", name, re.IGNORECASE)
+    parts = re.fullmatch(r"(?P<words>.*?)(?P<axis>_[xyz]|\[\d\])?", name, re.IGNORECASE | re.DOTALL)
+    assert parts is not None  # the axis may be missing, and the words may be anything
     words = parts["words"].split("_")
     for start in range(1, len(words)):
         stem, ending = "_".join(words[:start]), words[start:]

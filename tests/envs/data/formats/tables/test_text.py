@@ -291,3 +291,7 @@ def test_whole_numbers_in_groups_are_read(tmp_path, mark, delimiter):
     table = table_of(tmp_path / "a.csv", "\n".join([delimiter.join(["time_ms", "x", "y"]), *rows, ""]))
     np.testing.assert_array_equal(table.arrays["time_ms"], stamps)
     np.testing.assert_array_equal(table.arrays["x"], 1.5)
+
+
+def test_a_name_over_two_lines_has_no_unit_and_stops_nothing() -> None:
+    assert split_unit("angle of\nthe head") == ("angle of\nthe head", "")
