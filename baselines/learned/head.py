@@ -205,9 +205,9 @@ class AngleHead:
     def read(cls, described: Mapping[str, Any]) -> Self:
         """The inverse of :meth:`describe`."""
         outputs = tuple(Quantity(*given) for given in described["outputs"])
-        numbers = (tuple(described.get(name, ())) for name in ("deviations", "growth"))
-        # cards before there was a power have none
-        return cls(outputs, tuple(described["scale"]), described.get("limit"), *numbers, described.get("power", 1))
+        deviations, growth = (tuple(described.get(name, ())) for name in ("deviations", "growth"))
+        power = described.get("power", 1)  # older cards have none
+        return cls(outputs, tuple(described["scale"]), described.get("limit"), deviations, growth, power)
 
     def estimate(self, seen: Seen, output: Array) -> Estimate:
         """See :class:`Head`."""

@@ -133,9 +133,9 @@ def calibrate_weights(
     made, front_end, head = LearnedEstimator.load(weights), preset.front_end(), preset.head()
     if not isinstance(head, AngleHead):
         raise ValueError(f"only networks of riders have a covariance to calibrate, got {preset.summary!r}")
-    blank = {"deviations": (), "growth": (), "power": 1}
-    same = isinstance(made.head, AngleHead) and made.front_end.describe() == front_end.describe()
-    if not same or replace(made.head, **blank).describe() != head.describe():
+    theirs = replace(made.head, deviations=(), growth=(), power=1) if isinstance(made.head, AngleHead) else None
+    same = theirs is not None and theirs.describe() == head.describe()
+    if not same or made.front_end.describe() != front_end.describe():
         raise ValueError(f"{weights} has another front end or head than the preset {preset.summary!r}")
     data = simulated(preset, seed, held=True, folder=None, processes=processes, show=show)
     calibrated_head, found = calibrated(made.network, head, data)

@@ -61,7 +61,9 @@ def tunable_filter(filter: str | KalmanFilter) -> KalmanFilter:
         if not has_gains(filter):
             known = [name for name in FILTERS if has_gains(name)]
             raise ValueError(unknown("filter", filter, known, "filter must be a Kalman filter with gains, got"))
-        return replace(make(filter), keep_covariance=False)
+        made = make(filter)
+        assert isinstance(made, KalmanFilter)
+        return replace(made, keep_covariance=False)
     if not isinstance(filter, KalmanFilter) or not filter.gains:
         raise ValueError(f"filter must be a Kalman filter with gains, or the name of one, got {filter!r}")
     return filter
@@ -70,7 +72,7 @@ def tunable_filter(filter: str | KalmanFilter) -> KalmanFilter:
 def has_gains(name: str) -> bool:
     """Whether this is the name of a Kalman filter with gains."""
     entry = FILTERS.get(name)
-    return entry is not None and entry.runner is KalmanFilter and bool(entry.made_by.gains)
+    return entry is not None and entry.runner is KalmanFilter and bool(getattr(entry.made_by, "gains", ()))
 
 
 def filter_name(filter: KalmanFilter) -> str:
