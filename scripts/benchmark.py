@@ -201,7 +201,12 @@ def keep(args: Args, folder: Run, parts: dict[str, list[dict[str, Any]]]) -> Pat
     assert args.save is not None
     kept = load_results(args.save) if args.save.exists() else {}
     new = {part: rows for part, rows in parts.items() if rows}
-    named, earlier = list(new), kept.get("source", {})
+    named, earlier = list(new), dict(kept.get("source", {}))
+    if not args.estimators:
+        # sources of their own, of earlier runs of named estimators, are those of rows that are replaced
+        replaced_names = {row[key] for row in new.get("riders", []) for key in ("paper", "method")}
+        replaced_names |= {name for one in new.get("recordings", []) for name in one["errors"]}
+        earlier = {name: source for name, source in earlier.items() if name not in replaced_names}
     stay: dict[str, Any] = {}
     if "recordings" in new and not args.estimators:
         rows = replaced(kept.get("recordings", []), new["recordings"], "dataset")

@@ -97,12 +97,17 @@ def test_evaluate_prints_tables_and_leaves_a_run(episodes, tmp_path, capsys):
 
 def test_benchmark_keeps_what_was_written_while_it_ran(tmp_path):
     kept = tmp_path / "kept.json"
-    kept.write_text(json.dumps({"recordings": [], "riders": [{"paper": "two-gyro"}]}))
+    rides = [{"paper": "two-gyro", "method": "two-gyro+network"}]
+    sources = {"recordings": 0, "mekf": 1, "riders": 2, "two-gyro+network": 3}
+    kept.write_text(json.dumps({"recordings": [], "riders": rides, "source": sources}))
     folder = SimpleNamespace(versions={"poise": "0", "python": "3", "packages": {}})
-    broad = {"dataset": "broad", "errors": {}}
+    broad = {"dataset": "broad", "errors": {"mekf": {}}}
     keep(benchmark.Args(save=kept), folder, {"recordings": [broad], "riders": []})
     saved = json.loads(kept.read_text())
-    assert (saved["recordings"], saved["riders"]) == ([broad], [{"paper": "two-gyro"}])
+    assert (saved["recordings"], saved["riders"]) == ([broad], rides)
+    # of what a run of all estimators replaces there is one source
+    assert set(saved["source"]) == {"recordings", "riders", "two-gyro+network"}
+    assert (saved["source"]["riders"], saved["source"]["two-gyro+network"]) == (2, 3)
 
 
 def test_benchmark_compares_and_reports(episodes, tmp_path, capsys):
