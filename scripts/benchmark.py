@@ -202,22 +202,24 @@ def keep(args: Args, folder: Run, parts: dict[str, list[dict[str, Any]]]) -> Pat
     kept = load_results(args.save) if args.save.exists() else {}
     new = {part: rows for part, rows in parts.items() if rows}
     named, earlier = list(new), dict(kept.get("source", {}))
-    if not args.estimators:
-        # sources of their own, of earlier runs of named estimators, are those of rows that are replaced
-        replaced_names = {row[key] for row in new.get("riders", []) for key in ("paper", "method")}
-        replaced_names |= {name for one in new.get("recordings", []) for name in one["errors"]}
-        earlier = {name: source for name, source in earlier.items() if name not in replaced_names}
     stay: dict[str, Any] = {}
-    if "recordings" in new and not args.estimators:
-        rows = replaced(kept.get("recordings", []), new["recordings"], "dataset")
-        others = {one["dataset"] for one in rows} - {one["dataset"] for one in new["recordings"]}
-        stay = {one: earlier.get(one, earlier.get("recordings")) for one in sorted(others)}
-        new["recordings"] = rows
-    for part in ("recordings", "riders"):
-        if args.estimators and kept.get(part) and part in new:
-            before, after = kept[part], new[part]
-            new[part] = merged(before, after) if part == "recordings" else replaced(before, after, "paper")
-            named = [name for name in named if name != part] + list(args.estimators)
+    if args.estimators:
+        if "recordings" in new and kept.get("recordings"):
+            new["recordings"] = merged(kept["recordings"], new["recordings"])
+        if "riders" in new and kept.get("riders"):
+            new["riders"] = replaced(kept["riders"], new["riders"], "paper")
+        beside = [part for part in new if kept.get(part)]
+        named = [part for part in new if part not in beside] + (list(args.estimators) if beside else [])
+    else:
+        # sources of their own, of earlier runs of named estimators, are those of rows that are replaced
+        had = {row[key] for row in new.get("riders", []) for key in ("paper", "method")}
+        had |= {name for one in new.get("recordings", []) for name in one["errors"]}
+        earlier = {name: source for name, source in earlier.items() if name not in had}
+        if "recordings" in new:
+            rows = replaced(kept.get("recordings", []), new["recordings"], "dataset")
+            others = {one["dataset"] for one in rows} - {one["dataset"] for one in new["recordings"]}
+            stay = {one: earlier.get(one, earlier.get("recordings")) for one in sorted(others)}
+            new["recordings"] = rows
     source = {key: folder.versions[key] for key in ("poise", "python", "packages")} | {"seed": args.seed}
     sources = {**earlier, **stay, **dict.fromkeys(named, source)}
     return write_json(args.save, {"recordings": [], **kept, **new, "source": sources}, indent=None)

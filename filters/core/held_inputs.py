@@ -30,6 +30,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from .backend import Array, constant, expand, is_torch, namespace
 from .quantity import GRAVITY, MAGNETOMETER, Measurement
 from .rotation import norm, rotate
@@ -219,8 +221,7 @@ def coarse_rows(model: Any, x: Array, z: Measurement, P: Array) -> tuple[Array, 
     rows = [angle * up[..., 1:2], -angle * up[..., :1], *[missing] * (model.residual_size - 2)]
     r = xp.where(direct, xp.concat(rows, axis=-1), xp.where(linear, r, missing))
     whole = direct[..., None]
-    axes = constant([[float(j == start + i) for j in range(model.error_size)] for i in range(2)], x)
-    unit = constant([[float(i == j) for j in range(model.residual_size)] for i in range(model.residual_size)], x)
+    axes, unit = constant(np.eye(2, model.error_size, start), x), constant(np.eye(model.residual_size), x)
     H = xp.concat([xp.where(whole, axes + 0.0 * H[..., :2, :], H[..., :2, :]), H[..., 2:, :]], axis=-2)
     return r, H, xp.where(whole, variance[..., None] * unit, R)
 
