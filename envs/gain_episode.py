@@ -146,6 +146,36 @@ def check_scored(trajectory: Trajectory, tuned: TunedFilter, quantities: Sequenc
             raise ValueError(f"trajectory {name!r} has no scored sample with a known {quantity.name!r}")
 
 
+def scorable_starts(
+    trajectory: Trajectory, tuned: TunedFilter, quantities: Sequence[Quantity], samples: int
+) -> np.ndarray:
+    """Samples at which an episode of ``samples`` samples can start: every channel is read in it, then something scored.
+
+    What fills no interval at its end does not count.
+
+    Raises:
+        ValueError: there is no such sample.
+    """
+    interval, kalman = tuned.features.interval_samples(trajectory.dt), filter_for(tuned.kalman, trajectory)
+    index = np.arange(len(trajectory))
+    scored = trajectory.mask.copy()
+    for quantity in quantities:
+        scored &= np.isfinite(true_values(trajectory, quantity, kalman)).all(axis=-1)
+    latest = np.maximum.accumulate(np.where(scored, index, -1))
+    starts = index[: len(index) - samples + 1]
+    there = np.ones(len(starts), dtype=bool)
+    for channel in kalman.channels:
+        read = np.isfinite(trajectory.measurements[channel.name]).all(axis=-1)
+        first = np.minimum.accumulate(np.where(read, index, len(index))[::-1])[::-1]
+        there &= first[starts] <= latest[starts + samples // interval * interval - 1]
+    if not there.any():
+        raise ValueError(
+            f"no part of {trajectory.name!r} of {samples * trajectory.dt:g} s has a sample of every channel of "
+            f"{tuned.name} and then a scored sample with a known truth"
+        )
+    return starts[there]
+
+
 def filter_for(kalman: KalmanFilter, trajectory: Trajectory) -> KalmanFilter:
     """The filter at the rate of a trajectory, and for the rider, vehicle or device that its metadata describe."""
     kalman = kalman.with_dt(trajectory.dt)

@@ -15,7 +15,7 @@ from ..filters.support.seeds import child_seeds, root_seed
 from .data.formats.load import load_recording
 from .data.trajectory import Trajectory
 from .gain_env import Drawn, GainTuningEnv
-from .gain_episode import check_scored
+from .gain_episode import check_scored, scorable_starts
 from .gain_vector import GainTuningVectorEnv
 from .hand.gestures import GestureConfig
 from .hand.trajectories import HandTrajectories
@@ -157,8 +157,9 @@ class ReplayGainEnv(GainTuningEnv):
 
     ## Start and end
 
-    Each reset draws one of the trajectories and, with a ``duration``, where the episode starts in it. Truncated when
-    the part is over (samples that fill no interval are left out); never terminated.
+    Each reset draws one of the trajectories and, with a ``duration``, where the episode starts in it, among the parts
+    that have samples of every channel of the filter and something to score. Truncated when the part is over (samples
+    that fill no interval are left out); never terminated.
 
     ## Arguments
 
@@ -189,23 +190,23 @@ class ReplayGainEnv(GainTuningEnv):
             raise ValueError("trajectory must name at least one trajectory, got none")
         loaded = (item if isinstance(item, Trajectory) else load_recording(item) for item in items)
         self.trajectories = tuple(item.on_grid() for item in loaded)
+        self.duration = duration
+        self._lengths, self._starts = [], []
         for item in self.trajectories:
             check_scored(item, self.tuned, self.quantities)
             shortest = self.tuned.features.interval_samples(item.dt)
-            length = len(item) if duration is None else math.floor(duration / item.dt + 1e-6)
-            if min(length, len(item)) < shortest:
+            length = len(item) if duration is None else min(math.floor(duration / item.dt + 1e-6), len(item))
+            if length < shortest:
                 raise ValueError(f"an episode of {item.name!r} must last one interval at least ({shortest} samples)")
-        self.duration = duration
+            self._lengths.append(length)
+            self._starts.append(scorable_starts(item, self.tuned, self.quantities, length))
 
     def draw(self, generator: np.random.Generator) -> Drawn:
         """One of the trajectories, or a part of it."""
         index = int(generator.integers(len(self.trajectories)))
-        trajectory = self.trajectories[index]
-        length = len(trajectory)
-        if self.duration is not None:
-            length = min(math.floor(self.duration / trajectory.dt + 1e-6), length)
-        start = 0 if self.duration is None else int(generator.integers(len(trajectory) - length + 1))
-        return (index, start), partial(trajectory.__getitem__, slice(start, start + length))
+        starts, length = self._starts[index], self._lengths[index]
+        start = 0 if self.duration is None else int(starts[generator.integers(len(starts))])
+        return (index, start), partial(self.trajectories[index].__getitem__, slice(start, start + length))
 
 
 class HandMotionGainVectorEnv(GainTuningVectorEnv):

@@ -166,6 +166,28 @@ def test_replay_draws_parts_of_several_trajectories():
     assert len(starts) > 10
 
 
+def test_replay_draws_only_parts_that_can_be_scored(trajectory):
+    truth = {"up": trajectory.truth["up"].copy()}
+    truth["up"][150:] = np.nan
+    lost = trajectory.measurements["imu/acc"].copy()
+    lost[:60] = np.nan
+    # Truth until 1.5 s, forces from 0.6 s on: parts of 0.5 s must end after 0.6 s and begin before 1.5 s.
+    some = trajectory.replace(truth=truth, measurements={**trajectory.measurements, "imu/acc": lost})
+    options = {"trajectory": some, "duration": 0.5, "reward": "error"}
+    env, many, starts = ReplayGainEnv(**options), gym.make_vec("poise/ReplayGain-v0", 4, **options), set()
+    for seed in range(40):
+        rewards, _ = play(env, lambda observation: np.ones(1), seed)
+        starts.add(round(100 * env.trajectory.time[0]))
+        assert any(rewards)
+    assert 10 < min(starts) < 25
+    assert 130 < max(starts) < 150
+    for seed in range(4):
+        many.reset(seed=seed)
+        assert sum(many.step(np.ones((4, 1)))[1] for _ in range(5)).all()
+    with pytest.raises(ValueError, match=r"no part of .* of 0.05 s has a sample of every channel"):
+        ReplayGainEnv(some.replace(mask=some.time < 0.5), duration=0.05, interval=0.05)
+
+
 def test_recordings_are_read_from_files(tmp_path, trajectory):
     path = trajectory.save(tmp_path / "one.h5")
     rewards, _ = play(gym.make("poise/ReplayGain-v0", trajectory=path), lambda observation: np.zeros(1, np.float32))
