@@ -44,7 +44,8 @@ class Args:
     recordings: tuple[Path, ...] = ()
     """recordings, or folders of them, to compare on as well"""
     estimators: tuple[str, ...] = ()
-    """names of estimators, or files of trained weights (default: all that are installed, except some slow loops)"""
+    """names of estimators, or files of trained weights (default: all that are installed, except some slow loops); on
+    riders a paper's filter stands for all that is compared with it"""
     reference: str = "auto"
     """replacement of a missing truth (agreement, not error), see `poise evaluate --help`"""
     offline: bool = False
@@ -86,6 +87,8 @@ def run(args: Args) -> int:
         raise ValueError(f"{wrong} has nothing for --suite rider, which compares the filters of the papers on riders")
     if args.sweep and args.suite != "rider":
         raise ValueError(f"--sweep belongs to --suite rider, not {args.suite}")
+    if args.sweep and riders is not None and riders.estimators:
+        raise ValueError(f"--sweep compares whole papers: name their filters, {', '.join(riders.papers)}")
     check_file("save", args.save, (*args.recordings, *(() if args.baseline is None else (args.baseline,))))
     before = None if args.baseline is None else load_baseline(args.baseline)
     if args.save is not None and args.save.exists():
@@ -194,9 +197,9 @@ def keep(args: Args, folder: Run, parts: dict[str, list[dict[str, Any]]]) -> Pat
     """Write what this run has into the file of ``--save``, with its source, beside what is there now.
 
     A run of all estimators replaces the errors on all data sets that it has, one of named estimators theirs alone: on
-    recordings those of each estimator, on rides those of each paper.
+    recordings those of each estimator, on rides those of each estimator, or of each paper whose filter is named.
     """
-    from ..baselines.comparison.recommendation import load_results, merged, replaced
+    from ..baselines.comparison.recommendation import load_results, merged, merged_rides, replaced
 
     assert args.save is not None
     kept = load_results(args.save) if args.save.exists() else {}
@@ -207,7 +210,7 @@ def keep(args: Args, folder: Run, parts: dict[str, list[dict[str, Any]]]) -> Pat
         if "recordings" in new and kept.get("recordings"):
             new["recordings"] = merged(kept["recordings"], new["recordings"])
         if "riders" in new and kept.get("riders"):
-            new["riders"] = replaced(kept["riders"], new["riders"], "paper")
+            new["riders"] = merged_rides(kept["riders"], new["riders"])
         beside = [part for part in new if kept.get(part)]
         named = [part for part in new if part not in beside] + (list(args.estimators) if beside else [])
     else:
@@ -216,7 +219,7 @@ def keep(args: Args, folder: Run, parts: dict[str, list[dict[str, Any]]]) -> Pat
         had |= {name for one in new.get("recordings", []) for name in one["errors"]}
         earlier = {name: source for name, source in earlier.items() if name not in had}
         if "recordings" in new:
-            rows = replaced(kept.get("recordings", []), new["recordings"], "dataset")
+            rows = replaced(kept.get("recordings", []), new["recordings"])
             others = {one["dataset"] for one in rows} - {one["dataset"] for one in new["recordings"]}
             stay = {one: earlier.get(one, earlier.get("recordings")) for one in sorted(others)}
             new["recordings"] = rows

@@ -121,12 +121,24 @@ def merged(kept: Sequence[dict[str, Any]], new: Sequence[dict[str, Any]]) -> lis
     return [{**one, "errors": one["errors"] | found.get((one["name"], one["dataset"]), {})} for one in kept]
 
 
-def replaced(kept: Sequence[dict[str, Any]], new: Sequence[dict[str, Any]], part: str) -> list[dict[str, Any]]:
-    """Results with those of some data sets (``part`` "dataset") or papers ("paper") replaced, parts in their order."""
-    order = list(dict.fromkeys(row[part] for row in (*kept, *new)))
-    had = {row[part] for row in new}
-    rows = [*(row for row in kept if row[part] not in had), *new]
-    return sorted(rows, key=lambda row: order.index(row[part]))
+def replaced(kept: Sequence[dict[str, Any]], new: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Results with those of some data sets replaced, data sets in their order."""
+    order = list(dict.fromkeys(row["dataset"] for row in (*kept, *new)))
+    had = {row["dataset"] for row in new}
+    rows = [*(row for row in kept if row["dataset"] not in had), *new]
+    return sorted(rows, key=lambda row: order.index(row["dataset"]))
+
+
+def merged_rides(kept: Sequence[dict[str, Any]], new: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Rows of riders with new ones in the places of those that they replace, or after the others of their paper.
+
+    With its own filter, all of a paper is replaced.
+    """
+    whole = {row["paper"] for row in new if row["method"] == row["paper"]}
+    order = list(dict.fromkeys(row["paper"] for row in (*kept, *new)))
+    found = {(row["paper"], row["method"], row["group"]): row for row in new}
+    rows = [found.pop((row["paper"], row["method"], row["group"]), row) for row in kept if row["paper"] not in whole]
+    return sorted([*rows, *found.values()], key=lambda row: order.index(row["paper"]))
 
 
 def load_results(path: Path = RESULTS) -> dict[str, Any]:

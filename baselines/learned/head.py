@@ -226,8 +226,7 @@ class AngleHead:
         growth = constant(np.array(self.growth or (0.0,) * size), output)
         variances = constant(np.square(self.deviations), output) * (1.0 + growth * output[..., -1:] ** self.power)
         if seen.alone is not None:
-            parts = self.error_parts
-            known = [seen.variances.get(name, variances[..., slice(*parts[name])]) for name in parts]
+            known = [seen.variances.get(name, variances[..., slice(*part)]) for name, part in self.error_parts.items()]
             variances = xp.where(seen.alone[..., None], xp.concat(known, axis=-1), variances)
         return Estimate(pose, variances[..., None] * constant(np.eye(size), output))
 

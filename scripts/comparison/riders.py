@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ...filters.support.rows import RESULT, markdown_table
@@ -33,13 +34,20 @@ class RiderPart(NamedTuple):
 
 
 def rider_settings(estimators: Sequence[str], seed: int, *, quick: bool) -> RiderSuite | None:
-    """Settings of the suite for the estimators that are named, all if none; None if none of them is of a paper."""
-    from ...baselines.studies.riders.suite import PAPERS, RiderSuite
+    """Settings of the suite for the estimators that are named, all if none; None if none of them is of a paper.
+
+    A paper's own filter stands for everything that is compared with it, any other estimator for itself.
+    """
+    from ...baselines.studies.riders.suite import PAPERS, RiderSuite, estimators_of
 
     wanted = tuple(paper for paper in PAPERS if not estimators or paper in estimators)
+    alone = () if wanted else tuple(estimators)
+    wanted = wanted or tuple(paper for paper in PAPERS if not set(alone).isdisjoint(estimators_of(paper)))
     if not wanted:
         return None
-    return RiderSuite(wanted, rides=1, draws=1, training=0, seed=seed) if quick else RiderSuite(wanted, seed=seed)
+    made = RiderSuite(wanted, seed=seed, estimators=alone)
+    made = replace(made, training=0) if alone else made
+    return replace(made, rides=1, draws=1, training=0) if quick else made
 
 
 def rider_tables(settings: RiderSuite, args: Any, folder: Run, out: Output) -> RiderPart:

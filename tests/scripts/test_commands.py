@@ -163,6 +163,7 @@ def test_benchmark_compares_and_reports(episodes, tmp_path, capsys):
         (["--suite", "rider", "--estimators", "mekf"], "--estimators mekf has nothing for --suite rider"),
         (["--suite", "rider", "--recordings", "some.csv"], "--recordings has nothing for --suite rider"),
         (["--sweep"], "--sweep belongs to --suite rider, not all"),
+        (["--suite", "rider", "--sweep", "--estimators", "gru-two-gyro"], "whole papers: name their filters, two-gyro"),
     ],
 )
 def test_a_benchmark_of_nothing_is_refused(words, said, tmp_path, capsys):

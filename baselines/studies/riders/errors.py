@@ -12,6 +12,7 @@ from ....filters.analysis.bounds import posterior_bound
 from ....filters.bicycle.two_gyro import truth as two_gyro
 from ....filters.core import rotation
 from ....filters.core.estimator import Estimator
+from ....filters.core.model import equations_of
 from ....filters.core.quantity import Estimate, Quantity
 from ....filters.registry import make
 from ..force_inertial import states as force_inertial
@@ -81,8 +82,7 @@ def angles_of(outputs: tuple[Quantity, ...], values: Mapping[str, Any]) -> np.nd
 
 def truth_of(estimator: Any, ride: Trajectory) -> dict[str, np.ndarray]:
     """The truth of a ride with the angles that the paper defines."""
-    define = getattr(estimator, "truth", None) or estimator.model.truth
-    return {**ride.truth, **define(ride.truth)}
+    return {**ride.truth, **equations_of(estimator).truth(ride.truth)}
 
 
 def errors_of(estimator: Estimator[Any], ride: Trajectory, estimate: Estimate, scored: np.ndarray) -> Errors:
@@ -100,7 +100,7 @@ def errors_of(estimator: Estimator[Any], ride: Trajectory, estimate: Estimate, s
 
 def deviation_parts(estimator: Any) -> list[int | None]:
     """Place of each angle in the estimator's covariance; None where it is in none."""
-    parts = getattr(getattr(estimator, "model", estimator), "error_parts", {})
+    parts = getattr(equations_of(estimator), "error_parts", {})
     found: list[int | None] = []
     for quantity in estimator.outputs:
         if quantity.kind == "angle":

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -57,6 +57,8 @@ class RiderSuite:
     """rides from which references learn; 0 leaves those out"""
     seed: int = 0
     """root seed: that with which the networks were trained, so that test riders are others"""
+    estimators: tuple[str, ...] = ()
+    """of the papers, to run alone, without references; empty for all"""
 
     def __post_init__(self) -> None:
         for name, least in (("rides", 1), ("draws", 1), ("training", 0)):
@@ -65,6 +67,10 @@ class RiderSuite:
         unknown = sorted(set(self.papers) - set(PAPERS))
         if unknown or not self.papers:
             raise ValueError(f"papers must be some of {list(PAPERS)}, got {list(self.papers)}")
+
+    def alone(self, paper: str) -> list[str]:
+        """Estimators of a paper that are run alone; empty where everything is compared."""
+        return [name for name in estimators_of(paper) if name in self.estimators]
 
 
 @dataclass(frozen=True)
@@ -92,7 +98,7 @@ class Row:
 def estimators_of(paper: str) -> list[str]:
     """Names of all estimators of a paper's angles that are compared: published, consistent, networks."""
     own = [paper, f"{paper}-consistent"]
-    networks = [f"{paper}+network", f"gru-{paper}", f"gru-{paper}-bicycle"]
+    networks = [f"{paper}+network", f"{paper}-level+noise", f"gru-{paper}", f"gru-{paper}-bicycle"]
     return [name for name in own if name in FILTERS] + [name for name in networks if name in TRAINED]
 
 
@@ -114,13 +120,19 @@ def all_errors(
     for name, roll in rolls.items():
         others = np.full((len(roll), published.values.shape[1] - 1), np.nan)
         found[name] = Errors(wrapped(np.concatenate([roll, others], axis=1)))
-    for name in estimators_of(paper):
-        if name != paper:
-            found[name] = errors = estimated(name, ride, scored)
-            constant = constant_deviations(name)
-            if constant is not None:
-                found[f"{name}, {CONSTANT}"] = Errors(errors.values, np.broadcast_to(constant, errors.values.shape))
+    found |= errors_of_named([name for name in estimators_of(paper) if name != paper], ride, scored)
     return found | {f"{paper}, {ORACLE}": Errors(published.values - published.values.mean(axis=0))}
+
+
+def errors_of_named(names: Sequence[str], ride: Trajectory, scored: np.ndarray) -> dict[str, Errors]:
+    """Label → errors of estimators, and of networks with deviations that do not grow."""
+    found = {}
+    for name in names:
+        found[name] = errors = estimated(name, ride, scored)
+        constant = constant_deviations(name)
+        if constant is not None:
+            found[f"{name}, {CONSTANT}"] = Errors(errors.values, np.broadcast_to(constant, errors.values.shape))
+    return found
 
 
 def references(
@@ -179,11 +191,13 @@ def ride_rows(settings: RiderSuite, learnt: Mapping[str, Learnt], group: str, in
     bounds: dict[str, np.ndarray] = {}
     for _, draw, ride in unseen_rides(source, seeds_of(settings.seed)[3], group, index):
         ride, scored = ride.on_grid(), scored_samples(ride)
-        rolls = roll_errors(ride, scored)
+        rolls = {} if settings.estimators else roll_errors(ride, scored)
         for paper in settings.papers:
             if paper not in bounds:  # the same, nearly, for all draws of one ride
                 bounds[paper] = angle_bounds(paper, ride, scored)
-            for label, errors in all_errors(paper, learnt.get(paper), ride, scored, rolls).items():
+            alone = settings.alone(paper)
+            named = errors_of_named(alone, ride, scored) if alone else None
+            for label, errors in (named or all_errors(paper, learnt.get(paper), ride, scored, rolls)).items():
                 found = score(errors)
                 angles = tuple(float(angle) for angle in found.angles)
                 ratio = float(np.nanmean(found.angles / bounds[paper]))

@@ -11,6 +11,7 @@ from poise.baselines.comparison.recommendation import (
     dataset_errors,
     load_results,
     merged,
+    merged_rides,
     motion_of,
     recommend,
     replaced,
@@ -150,13 +151,18 @@ def test_errors_of_some_estimators_are_replaced():
 def test_data_sets_that_a_benchmark_does_not_have_stay():
     kept = [{"name": name, "dataset": each, "errors": {}} for name, each in (("1", "hands"), ("2", "rides"))]
     new = [{"name": "1", "dataset": "hands", "errors": {"x": {"inclination": 1.0}}}]
-    assert replaced(kept, new, "dataset") == [*new, kept[1]]
+    assert replaced(kept, new) == [*new, kept[1]]
 
 
 def test_a_benchmark_of_one_paper_leaves_the_others_as_they_are():
-    kept = [{"paper": paper, "method": name, "error": 1.0} for paper in ("two-gyro", "whole-body") for name in "ab"]
-    new = [{"paper": "two-gyro", "method": "a", "error": 2.0}]
-    assert replaced(kept, new, "paper") == [*new, *kept[2:]]
+    def row(paper, method, error=1.0):
+        return {"paper": paper, "method": method, "group": "unseen riders", "error": error}
+
+    kept = [row(paper, method) for paper in ("two-gyro", "whole-body") for method in (paper, f"gru-{paper}", "ridge")]
+    whole = [row("two-gyro", "two-gyro", 2.0)]
+    assert merged_rides(kept, whole) == [*whole, *kept[3:]], "a published filter stands for all that was compared"
+    alone = [row("two-gyro", "gru-two-gyro", 2.0), row("two-gyro", "new", 3.0)]
+    assert merged_rides(kept, alone) == [kept[0], alone[0], kept[2], alone[1], *kept[3:]]
 
 
 def test_a_distance_is_that_of_ratios():

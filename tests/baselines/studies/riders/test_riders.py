@@ -21,6 +21,7 @@ from poise.envs import episodes
 from poise.envs.recipes.rides import RideSource, ride
 from poise.filters.core import rotation
 from poise.filters.registry import make
+from poise.scripts.comparison.riders import rider_settings
 
 QUICK = {"pilots": ["ideal"], "scenarios": ["straight"], "fidelity": ["lumped"], "suite": ["two-gyro"]}
 SHORT = RideSource(2, 1, 12.0, QUICK)
@@ -126,6 +127,17 @@ def test_tables_of_kept_numbers() -> None:
     assert by_group(numbers, "whole-body", "bound") == []
 
 
+def test_a_paper_is_compared_as_a_whole_or_some_estimators_alone() -> None:
+    everything, paper = rider_settings((), 0, quick=False), rider_settings(("whole-body", "mekf"), 0, quick=False)
+    assert everything == suite.RiderSuite()
+    assert paper == suite.RiderSuite(("whole-body",))
+    alone = rider_settings(("gru-two-gyro", "two-gyro-level+noise", "mekf"), 3, quick=False)
+    assert alone is not None
+    assert (alone.papers, alone.training, alone.seed) == (("two-gyro",), 0, 3)
+    assert alone.alone("two-gyro") == ["two-gyro-level+noise", "gru-two-gyro"]
+    assert rider_settings(("mekf",), 0, quick=False) is None
+
+
 def test_settings_that_cannot_be_are_refused() -> None:
     with pytest.raises(ValueError, match="papers must be some of"):
         suite.RiderSuite(("mekf",))
@@ -164,6 +176,11 @@ def test_the_comparison_of_one_paper(monkeypatch: pytest.MonkeyPatch, tmp_path: 
     quick = suite.compare(replace(settings, training=0), tmp_path)
     assert {row.method for row in quick} < {row.method for row in rows}
     assert suite.MEAN not in {row.method for row in quick}
+    alone = suite.compare(replace(settings, training=0, estimators=("gru-two-gyro",)), tmp_path)
+    assert {row.method for row in alone} == {"gru-two-gyro", f"gru-two-gyro, {suite.CONSTANT}"}
+    assert str(alone) == str(
+        [row for row in rows if row.method.startswith("gru-two-gyro") and "bicycle" not in row.method]
+    )
 
 
 def test_constant_deviations_are_told_of_consistency_alone(monkeypatch: pytest.MonkeyPatch) -> None:
