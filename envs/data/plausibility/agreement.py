@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ....filters.core import rotation
+from .integration import attitudes
 
 LARGEST_LAG = 0.6
 """s; lags are looked for within it."""
@@ -61,16 +62,6 @@ class Windows(NamedTuple):
     rates: np.ndarray
     directions: np.ndarray
     step: float
-
-    def attitudes(self, rates: np.ndarray) -> np.ndarray:
-        """Attitudes ``(W, M + N + M, 4)`` in the middle of each step, of rates of the shape of ``self.rates``."""
-        half = rotation.exp(0.5 * self.step * rates)
-        attitude = np.empty(half.shape)
-        q = np.broadcast_to([1.0, 0.0, 0.0, 0.0], half[:, 0].shape)
-        for t in range(half.shape[1]):
-            q = attitude[:, t] = rotation.multiply(q, half[:, t])
-            q = rotation.multiply(q, half[:, t])
-        return attitude
 
     def within(self, values: np.ndarray, lag: float) -> np.ndarray:
         """The part ``(W, N, …)`` of values ``(W, M + N + M, …)`` that is later by a lag in s, in whole steps."""
@@ -150,18 +141,18 @@ def agreement(rate: np.ndarray, vector: np.ndarray, interval: float) -> Agreemen
     def median_left(attitude: np.ndarray, lag: float) -> float:
         return float(np.median(windows.left(windows.turned(attitude, windows.rates, lag)[1])))
 
-    attitude = windows.attitudes(windows.rates)
+    attitude = attitudes(windows.step * windows.rates)
     whole_steps = np.round(COARSE_LAGS / windows.step) * windows.step
     lag = min(whole_steps.tolist(), key=lambda one: median_left(attitude, one))
     scale = min(
         COARSE_SCALES,
-        key=lambda one: median_left(attitude if one == 1.0 else windows.attitudes(one * windows.rates), lag),
+        key=lambda one: median_left(attitude if one == 1.0 else attitudes(one * windows.step * windows.rates), lag),
     )
     bias, scatter = np.zeros(3), np.eye(5)
     prior = np.diag([0.0, SCALE_PRIOR**-2.0, *[BIAS_PRIOR**-2.0] * 3])
     for _ in range(ITERATIONS):
         rates = scale * windows.rates - bias
-        integrated = windows.attitudes(rates)
+        integrated = attitudes(windows.step * rates)
         attitude, directions = windows.turned(integrated, rates, lag)
         residual = windows.segments(directions)
         slopes = windows.segments(sensitivities(windows.step, windows.within(rates, lag), attitude, directions))

@@ -9,11 +9,13 @@ force over a window is gravity, however strong the motion is.
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from ....filters.core import rotation
+from .integration import attitudes
 
 SEGMENT = 1.0
 """s over which acceleration averages out; three of them are one window."""
@@ -175,8 +177,12 @@ def rate_consistency(
         for unit, scale in SCALES.items()
         if unit == "rad/s" or (scale * fastest < FASTEST_TURN and not (small and unit.startswith("m")))
     }
-    scales = np.array([0.0, *units.values()])[:, None, None, None]
-    left, lengths = residuals(np.concatenate([scales * turns, rearranged(axes, turns)]), vectors, constant)
+    # The rates as none, in each unit, and in rad/s the other way round.
+    scales = np.array([0.0, *units.values(), -1.0])
+    sequences = scales[:, None, None, None] * turns
+    hypotheses = [(index, np.eye(3)) for index in range(len(units) + 1)]
+    hypotheses += rearranged(axes, 1 + [*units].index("rad/s"), len(units) + 1)
+    left, lengths = residuals(sequences, vectors, constant, hypotheses)
     at_rest, *rest = left.tolist()
     by_unit, by_axes = dict(zip(units, rest, strict=False)), rest[len(units) :]
     given, length = by_unit["rad/s"], size * float(lengths[len(units) + 1])
@@ -186,16 +192,18 @@ def rate_consistency(
     if by_unit[unit] > CLEARLY * given or by_unit[unit] > min(by_axes):
         unit = "rad/s"
     elif by_unit[unit] > 0.5 * at_rest:
-        by_axes = residuals(rearranged(axes, SCALES[unit] * turns), vectors, constant)[0].tolist()
+        both = SCALES[unit] * np.stack([turns, -turns])
+        by_axes = residuals(both, vectors, constant, rearranged(axes, 0, 1))[0].tolist()
     else:
         return RateConsistency(given, at_rest, unit, by_unit[unit], axes[0], by_unit[unit], length, longest, len(turns))
     best = int(np.argmin(by_axes))
     return RateConsistency(given, at_rest, unit, by_unit[unit], axes[best], by_axes[best], length, longest, len(turns))
 
 
-def rearranged(axes: list[np.ndarray], turns: np.ndarray) -> np.ndarray:
-    """Rotation vectors ``(hypotheses, windows, steps, 3)`` under every arrangement of the axes."""
-    return np.einsum("hij,wtj->hwti", np.stack(axes), turns)
+def rearranged(axes: Sequence[np.ndarray], forward: int, backward: int) -> list[tuple[int, np.ndarray]]:
+    """The hypotheses of :func:`residuals` of arrangements of the axes: the rates of two sequences, turned."""
+    proper = [float(np.linalg.det(matrix)) > 0.0 for matrix in axes]
+    return [(forward, one.T) if turns else (backward, -one.T) for one, turns in zip(axes, proper, strict=True)]
 
 
 def cut(time: np.ndarray, rate: np.ndarray, vector: np.ndarray) -> tuple[np.ndarray, np.ndarray, float] | None:
@@ -235,32 +243,35 @@ def cut(time: np.ndarray, rate: np.ndarray, vector: np.ndarray) -> tuple[np.ndar
     return turns[chosen].reshape(len(chosen), -1, 3), vectors[chosen].reshape(len(chosen), -1, 3), size
 
 
-def residuals(turns: np.ndarray, vectors: np.ndarray, constant: bool) -> tuple[np.ndarray, np.ndarray]:
+def residuals(
+    turns: np.ndarray, vectors: np.ndarray, constant: bool, hypotheses: Sequence[tuple[int, np.ndarray]]
+) -> tuple[np.ndarray, np.ndarray]:
     """Motion of the mean vectors of the segments, turned back to the start of their window, as a share of their mean.
 
+    A gyroscope whose axes are rearranged by a rotation M turns v by M R Mᵀ, where R is its turn as given; one whose
+    axes are rearranged by −M turns it by that of reversed rates. The first M changes no length, so that the means of
+    R and the elements of v, taken once, serve all arrangements.
+
     Args:
-        turns: ``(hypotheses, windows, steps, 3)`` rotation vectors.
+        turns: ``(sequences, windows, steps, 3)`` rotation vectors.
         vectors: ``(windows, steps, 3)``.
         constant: count the motion within a segment, too.
+        hypotheses: index of a sequence, and the rotation ``(3, 3)`` of the axes, Mᵀ.
 
     Returns:
         ``(hypotheses,)`` root of the median over windows of the relative variance of the means; and ``(hypotheses,)``
         median length of the mean over a window.
     """
-    q = np.zeros((*turns.shape[:2], 4))
-    q[..., 0] = 1.0
-    turned = np.empty(turns.shape)
-    for t in range(turns.shape[2]):
-        # A mean over an interval belongs to the attitude in its middle.
-        half = rotation.exp(0.5 * turns[:, :, t])
-        q = rotation.multiply(q, half)
-        turned[:, :, t] = rotation.rotate(q, vectors[:, t])
-        q = rotation.multiply(q, half)
-    segments = turned.reshape(*turns.shape[:2], SEGMENTS, -1, 3)
-    means = segments.mean(axis=3)
+    # A mean over an interval belongs to the attitude in its middle.
+    matrices = rotation.to_matrix(attitudes(turns))
+    segments = vectors.reshape(len(vectors), SEGMENTS, -1, 3)
+    parts = matrices.reshape(len(turns), *segments.shape[:3], 9)
+    products = (parts.swapaxes(-1, -2) @ segments / segments.shape[2]).reshape(*parts.shape[:3], 3, 9)
+    means = np.stack([products[sequence] @ turn.ravel() for sequence, turn in hypotheses])
     variance, square = np.var(means, axis=2).sum(axis=-1), np.square(means.mean(axis=2)).sum(axis=-1)
     if constant:
         # A vector that is spun around keeps its part along the axis.
-        within = np.var(segments, axis=3).sum(axis=-1).mean(axis=-1)
+        lengths = np.square(segments).sum(axis=-1).mean(axis=-1)
+        within = (lengths - np.square(means).sum(axis=-1)).mean(axis=-1)
         variance += np.maximum(within - 2.0 * within.min(axis=0) - SPUN, 0.0)
     return np.sqrt(np.median(variance / (square + variance), axis=1)), np.sqrt(np.median(square, axis=1))
