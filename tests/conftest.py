@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 from pathlib import Path
 
@@ -17,6 +18,12 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         if "recordings_folder" in getattr(item, "fixturenames", ()):
             item.add_marker(pytest.mark.recordings)
+
+
+def pytest_collection_finish() -> None:
+    # What was imported stays: the collector of garbage need not look through it again and again.
+    gc.collect()
+    gc.freeze()
 
 
 @pytest.fixture(scope="session")

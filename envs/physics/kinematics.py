@@ -43,12 +43,13 @@ def move_links(tree, state, frames):  # type: ignore[no-untyped-def]
     """
     n = tree.shape[0]
     base = frames[0]
-    base[0:3] = state[0:3]
+    base[0], base[1], base[2] = state[0], state[1], state[2]
     w, x, y, z = state[3], state[4], state[5], state[6]
     base[3], base[4], base[5] = 1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)
     base[6], base[7], base[8] = 2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)
     base[9], base[10], base[11] = 2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)
-    base[12:18] = state[7:13]
+    for i in range(6):
+        base[12 + i] = state[7 + i]
     zero, turn = np.empty((3, 3)), np.empty((3, 3))
     for link in range(n):
         row, up, here = tree[link], frames[int(tree[link, 0]) + 1], frames[link + 1]

@@ -9,6 +9,7 @@ before and cannot be written is read.
 from __future__ import annotations
 
 import functools
+import gc
 import hashlib
 import importlib
 import pickle
@@ -80,12 +81,15 @@ def jit(function: Callable[..., Any]) -> Any:
 
     Numba compiles a function anew when its own file changes. Compiled functions call those of other files too, so
     those of a layer are kept in a folder that is named by the digest of all of them.
+
+    Such functions assign the elements of an array to those of another one in loops: for ``a[:] = b`` numba would
+    compile the words of an error message, too, which takes longer than most functions.
     """
     numba: Any = importlib.import_module("numba")
     options = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
     folder = cache_folder()
     if folder is None:
-        return numba.njit(**options)(function)
+        return _uncollected(numba.njit(**options)(function))
     source = Path(function.__code__.co_filename)
     if source.is_relative_to(ROOT):
         layer = source.relative_to(ROOT).parts[0]
@@ -103,7 +107,25 @@ def jit(function: Callable[..., Any]) -> Any:
     place.ensure_cache_path = functools.partial(_made_if_possible, place)
     files = compiled._cache._cache_file
     files.__class__ = _checked(type(files))
+    return _uncollected(compiled)
+
+
+def _uncollected(compiled: Any) -> Any:
+    """The function, for which numba compiles without collecting garbage: nearly all that it makes lives to the end."""
+    compiler = compiled._compiler
+    compiler.compile = functools.partial(without_collecting, compiler.compile)
     return compiled
+
+
+def without_collecting(function: Callable[..., Any], *arguments: Any) -> Any:
+    """What a function returns, called while no garbage is collected."""
+    collecting = gc.isenabled()
+    gc.disable()
+    try:
+        return function(*arguments)
+    finally:
+        if collecting:
+            gc.enable()
 
 
 def _made_if_possible(locator: Any) -> None:

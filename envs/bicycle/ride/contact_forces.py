@@ -129,7 +129,9 @@ def sampled_contact(  # type: ignore[no-untyped-def]
             if step < sample * steps + first:
                 continue
             bicycle_axes(before[0], axes, frame)
-            vectors[2:] = pushes[step]
+            for tip in range(4):
+                for axis in range(3):
+                    vectors[2 + tip, axis] = pushes[step, tip, axis]
             if not full:
                 turn(pushes[step], frame, vectors[2:])
             point = place_on(before[0], saddle)
@@ -153,7 +155,9 @@ def sampled_contact(  # type: ignore[no-untyped-def]
         # the last of these axes are those at the sample
         turn(mean, frame, found[sample])
         for index in range(wanted.shape[0]):
-            kept[sample, 0, index], kept[sample, 1, index] = before[wanted[index]], after[wanted[index]]
+            for column in range(18):
+                kept[sample, 0, index, column] = before[wanted[index], column]
+                kept[sample, 1, index, column] = after[wanted[index], column]
 
 
 @jit

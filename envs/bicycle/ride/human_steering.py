@@ -120,7 +120,8 @@ def estimate(columns, state, inputs, readings, now, present):  # type: ignore[no
         add_column(before, columns, column, state[column])
     for column in range(3):
         add_column(before, columns, 12 + column, inputs[0, column])
-    now[:] = before
+    for row in range(STATES):
+        now[row] = before[row]
     for sense in range(6):
         add_column(now, columns, 15 + sense, readings[0, sense] - before[CHANNELS[sense]])
     present[:] = 0.0
@@ -156,6 +157,14 @@ def steady_turn(human, speed, steer, lean):  # type: ignore[no-untyped-def]
 
 
 @jit
+def move_up(rows):  # type: ignore[no-untyped-def]
+    """Each row ``(n,)`` takes what the next one holds; the last one keeps its own."""
+    for row in range(rows.shape[0] - 1):
+        for column in range(rows.shape[1]):
+            rows[row, column] = rows[row + 1, column]
+
+
+@jit
 def steer_humanly(  # type: ignore[no-untyped-def]
     numbers, stiffness, human, points, below, above, part, noise, seen, wanted, lean, memory, state, inputs, readings
 ):
@@ -182,7 +191,7 @@ def steer_humanly(  # type: ignore[no-untyped-def]
     person = human_of(human[0], human[1], human[2], human[3])
     low, high = below[1], above[1]
     curvature, offset, heading = follow(points, now, memory)
-    readings[:-1] = readings[1:]
+    move_up(readings)
     felt = (now.roll_rate, -now.steer, -now.steer_rate, now.roll, -heading, -offset)
     heed = min(1.0, max(LOWEST_SPEED, now.speed) / ATTENTIVE)
     for sense in range(6):
@@ -222,7 +231,7 @@ def steer_humanly(  # type: ignore[no-untyped-def]
     # the path turns the heading; so does what steering does beyond the linear model
     angle = -piloted.tilt * max(-1.2, min(1.2, steer))
     curvature /= max(0.5, 1.0 + curvature * offset)
-    inputs[:-1] = inputs[1:]
+    move_up(inputs)
     inputs[-1, 0] = command
     inputs[-1, 1] = now.speed * (curvature - (math.tan(angle) - angle) / piloted.wheelbase)
     inputs[-1, 2] = lean

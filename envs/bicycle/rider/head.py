@@ -65,13 +65,12 @@ def _deviations(step, pushed, force, values):  # type: ignore[no-untyped-def]
     """Deviations and rates ``(n, 6)`` after n intervals of constant force; ``step`` ``(2, 2)``, ``pushed`` ``(2,)``."""
     found = np.empty((force.shape[0], 6))
     for index in range(force.shape[0]):
-        new = np.empty(6)
+        new = found[index]
         for axis in range(3):
             for row in range(2):
                 moved = step[row, 0] * values[axis] + step[row, 1] * values[3 + axis]
                 new[3 * row + axis] = moved + pushed[row] * force[index, axis]
         values = new
-        found[index] = new
     return found
 
 

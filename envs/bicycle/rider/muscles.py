@@ -167,7 +167,9 @@ def plan(  # type: ignore[no-untyped-def]
     target[0] = build.flexion + intended[0]
     target[1] = intended[1]
     target[2] = intended[2] + SHOULDERS_FOLLOW * max(-TURNED, min(TURNED, steer))
-    memory[WANTED] = intended[3:7]
+    swivels = memory[WANTED]
+    for limb in range(4):
+        swivels[limb] = intended[3 + limb]
     pitch, roll, rise = state[first + links[0]], state[first + links[1]], state[first + links[2]]
     pitching, rolling, rising = state[rates + links[0]], state[rates + links[1]], state[rates + links[2]]
     # muscles also carry the legs' weight around, half of it each
@@ -277,7 +279,8 @@ def act(numbers, tree, state, frames, links, holds, memory, forces):  # type: ig
     pitching, rolling, rising = state[rates + links[0]], state[rates + links[1]], state[rates + links[2]]
     seat, target, support = seat_of(numbers), memory[TARGET], memory[SUPPORT]
     applied = memory[MUSCLES + joints :]
-    applied[:] = memory[MUSCLES : MUSCLES + joints]
+    for joint in range(joints):
+        applied[joint] = memory[MUSCLES + joint]
     # the trunk keeps its posture in the bicycle, whatever the pelvis does below it
     c, s = math.cos(target[0]), math.sin(target[0])
     below, moving = (pitch, c * roll, s * roll), (pitching, c * rolling, s * rolling)

@@ -79,7 +79,7 @@ def _displacements(step, pushed, force, values):  # type: ignore[no-untyped-def]
     """States ``(n, 9)`` after n intervals of constant force; ``step`` ``(3, 3)``, ``pushed`` ``(3,)``: of one axis."""
     found = np.empty((force.shape[0], 9))
     for index in range(force.shape[0]):
-        new = np.empty(9)
+        new = found[index]
         for axis in range(3):
             for row in range(3):
                 total = pushed[row] * force[index, axis]
@@ -87,7 +87,6 @@ def _displacements(step, pushed, force, values):  # type: ignore[no-untyped-def]
                     total += step[row, column] * values[3 * column + axis]
                 new[3 * row + axis] = total
         values = new
-        found[index] = new
     return found
 
 

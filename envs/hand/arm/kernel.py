@@ -129,4 +129,5 @@ def pulled(
         nz = cosine * z + ex * y - ey * x + ez * w
         size = math.sqrt(nw * nw + nx * nx + ny * ny + nz * nz)
         state[3], state[4], state[5], state[6] = nw / size, nx / size, ny / size, nz / size
-        states[step] = state
+        for i in range(state.shape[0]):
+            states[step, i] = state[i]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import gc
 import os
 import stat
 import subprocess
@@ -54,6 +55,16 @@ def test_a_line_tells_what_takes_long_and_only_then(
     assert str(tmp_path) in told
     assert compiled(tmp_path, monkeypatch) == (1, 0)
     assert capsys.readouterr().err == ""
+
+
+def test_garbage_is_collected_again_after_compiling() -> None:
+    compiling = cache.jit(double)._compiler.compile
+    assert compiling.func is cache.without_collecting
+    assert not compiling.func(gc.isenabled)
+    assert gc.isenabled()
+    with pytest.raises(ZeroDivisionError):
+        compiling.func(lambda: 1 // 0)
+    assert gc.isenabled()
 
 
 @pytest.mark.skipif(os.name != "posix", reason="processes wait for each other on POSIX only")
