@@ -105,3 +105,14 @@ def bootstrap_interval(
         values[draw] = statistic(*(table[row, drawn] for table, row in zip(tables, rows, strict=True)))
     low, high = np.quantile(values, [0.5 - 0.5 * level, 0.5 + 0.5 * level])
     return Interval(float(statistic(*tables)), float(low), float(high))
+
+
+def mean_interval(values: np.ndarray, draws: int = DRAWS, level: float = LEVEL) -> Interval:
+    """The mean of ``values`` ``(tasks,)`` with the interval of other tasks.
+
+    The same numbers as of :func:`bootstrap_interval` of :func:`mean_score` of one run with ``tasks_too``, all at once.
+    """
+    (table,) = scores_of(values[None])
+    drawn = np.random.default_rng(0).integers(len(table), size=(draws, len(table)))
+    low, high = np.quantile(table[drawn].mean(axis=1), [0.5 - 0.5 * level, 0.5 + 0.5 * level])
+    return Interval(float(table.mean()), float(low), float(high))

@@ -10,7 +10,7 @@ import numpy as np
 from ...filters.core.consistency import consistency
 from ..error_table import COMPLETE, coverage
 from ..measures import MEASURES, OF_ERROR
-from ..statistics import bootstrap_interval, mean_score, probability_of_improvement
+from ..statistics import mean_interval, probability_of_improvement
 
 if TYPE_CHECKING:
     import pandas
@@ -61,8 +61,7 @@ def intervals(errors: pandas.DataFrame) -> list[dict[str, Any]]:
     rows = []
     for name in order:
         own = errors[name].to_numpy()
-        mean = bootstrap_interval(mean_score, own[None], draws=DRAWS, tasks_too=True)
-        paired = bootstrap_interval(mean_score, (own - other)[None], draws=DRAWS, tasks_too=True)
+        mean, paired = mean_interval(own, DRAWS), mean_interval(own - other, DRAWS)
         rows.append(
             {
                 "estimator": name,

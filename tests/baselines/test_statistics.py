@@ -6,6 +6,7 @@ import pytest
 from poise.baselines.statistics import (
     bootstrap_interval,
     interquartile_mean,
+    mean_interval,
     mean_score,
     performance_profile,
     probability_of_improvement,
@@ -64,6 +65,12 @@ def test_strata_are_kept_and_tasks_may_be_drawn():
     assert bootstrap_interval(mean_score, scores, draws=50) == (2.0, 2.0, 2.0)
     wide = bootstrap_interval(mean_score, scores, draws=500, tasks_too=True)
     assert wide.low < 1.4 < 2.6 < wide.high
+
+
+@pytest.mark.parametrize("tasks", [1, 2, 7, 40, 300])
+def test_the_interval_of_a_mean_is_that_of_one_run(tasks):
+    values = np.random.default_rng(tasks).gamma(2.0, 0.8, tasks)
+    assert mean_interval(values, 200) == bootstrap_interval(mean_score, values[None], draws=200, tasks_too=True)
 
 
 def test_equal_seeds_give_equal_intervals():

@@ -112,7 +112,7 @@ def test_benchmark_keeps_what_was_written_while_it_ran(tmp_path):
 
 def test_benchmark_compares_and_reports(episodes, tmp_path, capsys):
     estimators = ["--estimators", "external-acceleration", "mekf-9", "tilt"]
-    words = ["benchmark", "--quick", "--suite", "hand", "--runs", str(tmp_path), *estimators]
+    words = ["benchmark", "--quick", "--suite", "hand", "--processes", "1", "--runs", str(tmp_path), *estimators]
     assert main([*words, "--recordings", str(episodes / "hand_motion_0000.h5"), "--json"]) == 0
     captured = capsys.readouterr()
     (folder,) = (tmp_path / "benchmark").iterdir()

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...learned.rides import UNSEEN
-from ...statistics import bootstrap_interval
+from ...statistics import mean_interval
 from ..report import result
 from .suite import CONSTANT, ROLL_ONLY, Row, names_of
 
@@ -57,9 +57,9 @@ def ride_means(rows: Iterable[Row], paper: str) -> list[tuple[str, str, str, str
 
 
 def riders(rows: Sequence[Row]) -> np.ndarray:
-    """Mean error ``(1, rides)`` of each ride over its draws, deg; every ride has a rider of its own."""
+    """Mean error ``(rides,)`` of each ride over its draws, deg; every ride has a rider of its own."""
     rides = sorted({row.ride for row in rows})
-    return np.array([[np.mean([row.mean for row in rows if row.ride == ride]) for ride in rides]])
+    return np.array([np.mean([row.mean for row in rows if row.ride == ride]) for ride in rides])
 
 
 def summary(rows: Sequence[Row]) -> list[dict[str, Any]]:
@@ -73,7 +73,7 @@ def summary(rows: Sequence[Row]) -> list[dict[str, Any]]:
     for paper in dict.fromkeys(row.paper for row in rows):
         for method, groups in by_method(rows, paper).items():
             for group, own in groups.items():
-                error = bootstrap_interval(lambda scores: float(scores.mean()), riders(own), tasks_too=True)
+                error = mean_interval(riders(own))
                 numbers = {"error": error.value, "low": error.low, "high": error.high}
                 for name, values in (
                     ("over bound", [row.over_bound for row in own]),
