@@ -1,7 +1,7 @@
 """Samples that a recording shows to be none, although each alone could be one: found from what comes before and after.
 
 While samples arrive, :class:`SamplesSoFar` decides as for a recording that ends with the last one, and revises what it
-decided on the samples before.
+decided on the samples before; bursts and blocks that were written again are looked for in recordings alone.
 
 A glitch of the transmission stands alone: the sample after it is where the sample before was. What a motion or an
 impact does to a sensor rings on. In the recordings of BROAD, RepoIMU, EuRoC, smartphones and a bicycle ride no sample
@@ -17,8 +17,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from .bursts import bursts
 from .ranges import at_range, reached_range
-from .repeats import CHANNELS, RunsSoFar, moves, repeated, runs_of, zeros_in_motion
+from .repeats import CHANNELS, RunsSoFar, moves, repeated, repeated_blocks, runs_of, zeros_in_motion
 from .trajectory import Trajectory
 
 LEAST = {"gyr": 3.0, "acc": 30.0}
@@ -111,15 +112,15 @@ def no_samples(
 ) -> dict[str, dict[str, np.ndarray]]:
     """Channel → kind of what is no sample → where ``(T,)`` bool.
 
-    That is a glitch of a gyroscope or an accelerometer; a gyroscope's 0, 0, 0 beside an accelerometer's, or for a while
-    beside one that moves, which is how a logger writes that nothing came; what jumps to the end of the range of a
-    sensor; and samples that were written again where none came (:mod:`.repeats`), which those of a saturated sensor are
-    not.
+    That is a glitch or a burst of a gyroscope or an accelerometer; a gyroscope's 0, 0, 0 beside an accelerometer's, or
+    for a while beside one that moves, which is how a logger writes that nothing came; what jumps to the end of the
+    range of a sensor; and samples that were written again where none came (:mod:`.repeats`), one by one or in blocks,
+    which those of a saturated sensor are not.
 
     Args:
         measurements: channel → ``(T, size)``, on a grid.
         ranges: channel → range in its unit, where it is known.
-        dt: s between samples; None to look for no repeats.
+        dt: s between samples; None to look for no repeats and no bursts.
     """
     found: dict[str, dict[str, np.ndarray]] = {}
     for name, values in measurements.items():
@@ -132,10 +133,13 @@ def no_samples(
             repeats = repeated(values, dt, moving)
             if name in ranges:
                 repeats &= ~at_range(values, ranges[name])
-            found[name] = {"repeats of an earlier sample": repeats}
+            blocks = repeated_blocks(values) & ~repeats
+            found[name] = {"repeats of an earlier sample": repeats, "samples of blocks that were written again": blocks}
         if kind not in LEAST:
             continue
-        found.setdefault(name, {})["glitches"] = glitches(values, LEAST[kind])
+        found.setdefault(name, {})["glitches"] = single = glitches(values, LEAST[kind])
+        if dt is not None:
+            found[name]["samples of bursts"] = bursts(values, kind, dt) & ~single
         force = measurements.get(f"{site}/acc")
         if kind == "gyr" and force is not None:
             zeros = np.logical_not(values.any(axis=1) | force.any(axis=1))

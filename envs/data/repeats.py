@@ -1,7 +1,8 @@
-"""Samples that are none, because a recorder wrote its last one again where nothing came.
+"""Samples that are none, because a recorder wrote its last one, or a block of earlier ones, again where nothing came.
 
 No sensor with noise gives one sample several times in a row: three axes with a standard deviation of one step of
-their digits repeat by chance in 2 % of the samples, five times in a row in less than one of a million.
+their digits repeat by chance in 2 % of the samples, five times in a row in less than one of a million. Nor does it give
+ten samples that it gave before.
 """
 
 from __future__ import annotations
@@ -29,6 +30,12 @@ AT_ONCE = 0.1
 """rad/s beside zeros: a motion, or a simulation without errors, comes to rest in smaller steps."""
 STANDSTILL = 1e-6
 """rad/s below which no gyroscope reads but a simulated one without errors, or one that writes zeros at rest."""
+BLOCK = 10
+"""Samples that a block which is written again has at least."""
+BY_CHANCE = 1e-6
+"""Probability of such a block anywhere in a recording whose samples come in any order."""
+PERIODIC = 0.3
+"""Share of a recording that repeats itself, from which on that is a motion without noise, or a recording in a loop."""
 
 
 def runs_of(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -76,6 +83,42 @@ def repeated(values: np.ndarray, dt: float, moving: np.ndarray | None = None) ->
     for begin, length in zip(*foreign_runs(values, dt, moving), strict=True):
         found[begin + 1 : begin + length] = values[begin].any()
     return found
+
+
+def repeated_blocks(values: np.ndarray) -> np.ndarray:
+    """Samples ``(T,)`` bool of ``(T, 3)`` in blocks that are equal to earlier ones, sample by sample.
+
+    The rarer its samples are, the less likely is a block by chance. One that stands as long as the one before counts
+    once.
+    """
+    found = np.zeros(len(values), bool)
+    if len(values) < 2 * BLOCK:
+        return found
+    known = np.isfinite(values).all(axis=1)
+    present = known[:, None] & (np.abs(values) > STANDSTILL)
+    bits = np.where(present, values, 0.0).view(np.uint64)
+    mixed = np.array([0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9], np.uint64)
+    rows = ((bits ^ (bits >> np.uint64(29))) * mixed).sum(axis=1, dtype=np.uint64)
+    _, place, count = np.unique(rows, return_inverse=True, return_counts=True)
+    changed = known & np.append(True, rows[1:] != rows[:-1])
+    rarity = np.where(changed, np.log(len(values) / count[place]), 0.0)
+    # The hash of each block of the shortest length, and the place at which it stood before.
+    powers = np.cumprod(np.full(BLOCK, mixed[0], np.uint64))
+    windows = np.lib.stride_tricks.sliding_window_view
+    whole = windows(known, BLOCK).all(axis=1)
+    blocks = (windows(rows, BLOCK) * powers).sum(axis=1, dtype=np.uint64)
+    order = np.argsort(blocks, kind="stable")
+    again = np.flatnonzero(blocks[order[1:]] == blocks[order[:-1]])
+    lags = np.zeros(len(blocks), int)
+    lags[order[again + 1]] = order[again + 1] - order[again]
+    lags[~whole] = 0
+    total = np.append(0.0, np.cumsum(rarity))
+    begins = np.flatnonzero(np.append(True, lags[1:] != lags[:-1]))
+    for begin, end in zip(begins, np.append(begins[1:], len(lags)), strict=True):
+        stop = end - 1 + BLOCK
+        if lags[begin] and total[stop] - total[begin] > 2.0 * np.log(len(values)) - np.log(BY_CHANCE):
+            found[begin:stop] = True
+    return found if found.mean() < PERIODIC else np.zeros(len(values), bool)
 
 
 def zeros_in_motion(gyroscope: np.ndarray, force: np.ndarray, dt: float) -> np.ndarray:

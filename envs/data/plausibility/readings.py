@@ -10,9 +10,10 @@ from typing import Literal
 import numpy as np
 
 from ....filters.core.quantity import ACCELEROMETER, GYROSCOPE, MAGNETOMETER, SHORTEST
+from ..bursts import bursts
 from ..glitches import LEAST, glitches
 from ..ranges import at_range, reached_range
-from ..repeats import HELD, foreign_runs, moves, runs_of, usual_run
+from ..repeats import HELD, foreign_runs, moves, repeated_blocks, runs_of, usual_run
 
 CHANNELS = {"gyr": GYROSCOPE, "acc": ACCELEROMETER, "mag": MAGNETOMETER}
 LONGEST_ABSENCE = 0.3
@@ -134,7 +135,26 @@ def check_alive(
         yield Finding("note", channel, what, "errors of the transmission", "They are treated as missing samples.")
     yield from check_axes_alive(channel, samples[~impossible])
     yield from check_repeats(channel, values, dt, moving)
+    if dt is not None:
+        yield from check_stretches(channel, values, dt)
     yield from check_range(channel, samples[~impossible])
+
+
+def check_stretches(channel: str, values: np.ndarray, dt: float) -> Iterator[Finding]:
+    """Bursts (:mod:`poise.envs.data.bursts`), and blocks that were written again."""
+    kind = channel.rpartition("/")[2]
+    remedy = "They are treated as missing samples."
+    again = np.flatnonzero(repeated_blocks(values))
+    if len(again):
+        what = f"{len(again)} samples in blocks that stood there before, from sample {again[0]}"
+        added = "If rows were added so, leave them out: what follows is late."
+        yield Finding("note", channel, what, "a buffer that was sent or written twice", f"{remedy} {added}")
+    if kind not in LEAST:
+        return
+    wild = np.flatnonzero(bursts(values, kind, dt) & ~glitches(values, LEAST[kind]))
+    if len(wild):
+        what = f"{len(wild)} samples in a row jump away and back at once, from sample {wild[0]}"
+        yield Finding("note", channel, what, "errors of the transmission", remedy)
 
 
 def slower(samples: np.ndarray) -> bool:

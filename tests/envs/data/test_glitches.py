@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import poise
-from poise.envs.data.glitches import FEWEST, SamplesSoFar, without_glitches
+from poise.envs.data.glitches import FEWEST, SamplesSoFar, no_samples, without_glitches
 from poise.envs.data.ranges import FULL
 from poise.envs.data.trajectory import Trajectory
 from poise.envs.hand.sensing import simulate_hand
@@ -130,10 +130,9 @@ def test_samples_that_arrive_are_judged_as_those_of_a_recording(seed: int, lengt
     ranges = {"imu/gyr": 30.0}
     channels = {f"imu/{name}": values for name, values in measurements.items()}
     found, decided = so_far(channels, ranges)
-    recording = KNOWN[300 : 300 + length].replace(measurements=channels, metadata={"full_scale": ranges})
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", UserWarning)
-        expected = without_glitches(recording)
+    # bursts and blocks are looked for in recordings alone
+    none = {name: np.logical_or.reduce(list(parts.values())) for name, parts in no_samples(channels, ranges).items()}
+    expected = {name: np.where(none[name][:, None], np.nan, values) for name, values in channels.items()}
     for name in channels:
         if length > 1:  # the last one may be withheld until the next one shows what it is
             np.testing.assert_array_equal(found[name][:-1], expected[name][:-1])
@@ -182,7 +181,7 @@ def test_a_few_samples_in_a_row_at_the_end_of_the_range_count_as_missing(kind, v
     assert any("saturation" in finding.cause for finding in told)
 
 
-@pytest.mark.parametrize("share", [0.5, 0.9])
+@pytest.mark.parametrize("share", [0.8, 0.9])
 def test_a_peak_within_the_range_that_is_held_is_motion(share) -> None:
     gyr = KNOWN.measurements["imu/gyr"]
     row = int(np.argmax(np.abs(gyr).max(axis=1)))

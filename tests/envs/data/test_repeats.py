@@ -10,7 +10,7 @@ import pytest
 import poise
 from poise.baselines.online import OnlineEstimator
 from poise.envs.data.plausibility.recording import check_recording
-from poise.envs.data.repeats import RunsSoFar, moves, repeated, runs_of, zeros_in_motion
+from poise.envs.data.repeats import RunsSoFar, moves, repeated, repeated_blocks, runs_of, zeros_in_motion
 from poise.envs.data.trajectory import Trajectory
 from poise.envs.hand.sensing import simulate_hand
 from poise.filters.core import metrics
@@ -128,3 +128,47 @@ def test_a_loop_that_is_stuck_predicts() -> None:
         estimate = stepping.step({name: values[row] for name, values in trajectory.measurements.items()})
     assert estimate.covariance is not None
     assert np.degrees(np.sqrt(np.trace(estimate.covariance[:3, :3]) / 3.0)) > 10.0
+
+
+def written_again(kind: str, begin: int, length: int, lag: int) -> Trajectory:
+    """The recording with the samples from ``begin`` on overwritten by those that stood there ``lag`` before."""
+    changed = np.array(KNOWN.measurements[f"imu/{kind}"])
+    changed[begin : begin + length] = np.resize(changed[begin - lag : begin], (length, 3))
+    return KNOWN.replace(measurements=KNOWN.measurements | {f"imu/{kind}": changed})
+
+
+@pytest.mark.parametrize("kind", ["gyr", "acc", "mag"])
+@pytest.mark.parametrize(
+    ("begin", "length", "lag"), [(1000, 50, 50), (2000, 12, 12), (1500, 200, 40), (2500, 30, 1700)]
+)
+def test_blocks_that_were_written_again_are_none(kind: str, begin: int, length: int, lag: int) -> None:
+    faulty = written_again(kind, begin, length, lag)
+    with pytest.warns(UserWarning, match=f"imu/{kind}: {length} samples of blocks that were written again"):
+        found = poise.run("bounded-motion-9", faulty)
+    absent = np.array(faulty.measurements[f"imu/{kind}"])
+    absent[begin : begin + length] = np.nan
+    expected = poise.run("bounded-motion-9", faulty.replace(measurements=faulty.measurements | {f"imu/{kind}": absent}))
+    np.testing.assert_array_equal(found.pose["up"], expected.pose["up"])
+    told = [each.what for each in check_recording(faulty) if each.channel == f"imu/{kind}"]
+    assert any(f"from sample {begin}" in what for what in told)
+
+
+def test_rows_that_were_sent_twice_are_named_where_they_begin() -> None:
+    order = np.r_[0:1200, 1150:1200, 1200 : len(KNOWN)]
+    measurements = {name: values[order] for name, values in KNOWN.measurements.items()}
+    twice = Trajectory(np.arange(len(order)) * 0.01, measurements)
+    told = [str(each) for each in check_recording(twice)]
+    assert sum("50 samples in blocks that stood there before, from sample 1200" in each for each in told) == 3
+
+
+def test_what_may_be_equal_by_chance_or_in_a_loop_is_left_alone() -> None:
+    rng = np.random.default_rng(2)
+    rest = np.round(1.2 * rng.standard_normal((30000, 3)))
+    slow = np.repeat(rest[:3000], 10, axis=0)
+    loop = np.tile(KNOWN.measurements["imu/gyr"][:500], (4, 1))
+    for values in (rest, slow, loop, np.zeros((400, 3)), np.full((400, 3), np.nan), loop[:12]):
+        assert not repeated_blocks(values).any()
+    coarse = np.round(KNOWN.measurements["imu/gyr"], 2)
+    assert not repeated_blocks(coarse).any()
+    coarse[2000:2040] = coarse[700:740]
+    assert repeated_blocks(coarse)[2000:2040].mean() > 0.9
