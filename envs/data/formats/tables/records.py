@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import warnings
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -27,10 +28,15 @@ FEW_PARTS = 64
 HEADS, ROWS = ("columns", "header", "headers", "fields", "names"), ("data", "rows", "values", "samples", "records")
 NAMING = ("sensor", "type", "name", "kind", "device", "id")
 """Keys by which an object says whose data it holds."""
+OTHERS = "others"
+"""Attribute of a frame: lists beside it that have another length."""
 
 
 def read_json(path: Path) -> Table:
     """The samples of a JSON file, or of one with a record a line.
+
+    Warns:
+        UserWarning: lists that are not read, as they have another length or are those of other sensors.
 
     Raises:
         ValueError: there are none, or it is truncated.
@@ -49,12 +55,22 @@ def read_json(path: Path) -> Table:
     }
     both = [(name, frame) for name, frame in found if {"gyr", "acc"} <= kinds(frame)]
     of_kinds = [(name, frame) for name, frame in found if kind_of(label[name])[0]]
+    chosen = both or of_kinds
     if len(both) == 1 or (not both and len(of_kinds) < 2):
-        frame = (both or sorted(found, key=lambda one: -len(one[1])))[0][1]
+        chosen = [both[0] if both else max(found, key=lambda one: len(one[1]))]
+        frame = chosen[0][1]
     else:
         frame = pandas.concat(
-            [frame.assign(**{"device" if both else "sensor": label[name]}) for name, frame in both or of_kinds],
+            [frame.assign(**{"device" if both else "sensor": label[name]}) for name, frame in chosen],
             ignore_index=True,
+        )
+    read = [name for name, _ in chosen]
+    others = [f"{name.strip('/')} ({len(one)} rows)" for name, one in found if name not in read]
+    others += [text for _, one in chosen for text in one.attrs.get(OTHERS, ())]
+    if others:
+        what = f"of its lists {', '.join(others)} {'are' if len(others) > 1 else 'is'} not read"
+        warnings.warn(
+            f"{path.name}: {what}, beside {', '.join(map(str, frame.columns))[:200]} ({len(frame)} rows)", stacklevel=4
         )
     table = table_of_frame(frame, "JSON records")
     told = dict(scalars(whole, 0))
@@ -142,6 +158,8 @@ def frames_of_object(value: Mapping[str, Any], name: str, depth: int) -> Iterato
         usual = max(set(lengths), key=lambda length: (lengths.count(length), length))
         frame = pandas.DataFrame({key: one for key, one in columns.items() if len(one) == usual})
         if kinds(frame) or depth:
+            others = {key: len(one) for key, one in columns.items() if FEWEST <= len(one) != usual}
+            frame.attrs[OTHERS] = tuple(f"{key} ({length} values)" for key, length in others.items())
             yield name, frame
             return
     for key, part in value.items():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import json
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -201,3 +202,20 @@ def test_nested_columns_of_parquet(tmp_path: Path, shape: str) -> None:
             columns |= {kind: [dict(zip("xyz", row, strict=True)) for row in columns[kind]] for kind in ("gyr", "acc")}
     pandas.DataFrame(columns).to_parquet(tmp_path / "a.parquet")
     right(tmp_path / "a.parquet")
+
+
+SHORT = {"x": [1.0] * 50, "y": [2.0] * 50, "z": [3.0] * 50}
+
+
+@pytest.mark.parametrize(
+    ("content", "named"),
+    [
+        ({"t": TIME, "gyr": G, "acc": A, "mag": [[1.0, 2.0, 3.0]] * 50}, "mag (50 values)"),
+        ({"t": TIME, "gyr": axes(GYR), "acc": axes(ACC), "mag": SHORT}, "mag.x (50 values), mag.y (50 values)"),
+        ({"imu": RECORDS, "barometer": [{"t": t, "pressure": 1013.0 + t} for t in TIME[:70]]}, "barometer (70 rows)"),
+    ],
+)
+def test_lists_of_another_length_that_are_not_read_are_named(tmp_path: Path, content: Any, named: str) -> None:
+    (tmp_path / "a.json").write_text(json.dumps(content))
+    with pytest.warns(UserWarning, match=re.escape(f"a.json: of its lists {named}")):
+        right(tmp_path / "a.json")
