@@ -9,8 +9,9 @@ import numpy as np
 from .agreement import Agreement, agreement
 from .readings import Finding, Severity
 
-EXPLAINED = 0.9
-"""Share of a direction's motion that rates must explain before their lag or scale is believed."""
+EXPLAINED, IN_STRONG_MOTION = 0.9, 0.6
+"""Share of a direction's motion that rates must explain before their lag or scale is believed; and before a lag is that
+explains much, where strong accelerations are the rest."""
 LEAST_LAG = 0.015
 """s: filters of sensors delay by as much."""
 LARGE_LAG, LATE_FIELD = 0.025, 0.05
@@ -34,12 +35,17 @@ def agreements(gyr: np.ndarray, vectors: dict[str, np.ndarray | None], interval:
     """Fits of the rates ``(T, 3)`` to other channels ``(T, 3)``, by name, where there is one to be believed."""
     fits = {name: agreement(gyr, vector, interval) for name, vector in vectors.items() if vector is not None}
     known = {name: one for name, one in fits.items() if one is not None and SCALES[0] < one.scale < SCALES[1]}
-    return {name: one for name, one in known.items() if one.explained > EXPLAINED}
+    return {name: one for name, one in known.items() if one.explained > IN_STRONG_MOTION}
+
+
+def is_sure(one: Agreement | None) -> bool:
+    """Whether there is a fit that explains so much that its scale is believed, too."""
+    return one is not None and one.explained > EXPLAINED
 
 
 def is_late(kind: str, one: Agreement) -> bool:
     """Whether there is a lag for certain."""
-    enough = LITTLE[kind] if one.left < QUIET else MUCH
+    enough = LITTLE[kind] if one.left < QUIET and is_sure(one) else MUCH
     return abs(one.lag) - CERTAIN * one.lag_error > LEAST_LAG and one.explained_by_lag > enough
 
 
@@ -73,7 +79,7 @@ def finding(channel: str, lag: float, other: str) -> Finding:
 
 def check_gyroscope_scale(site: str, found: dict[str, Agreement]) -> Iterator[Finding]:
     """Scale of the gyroscope against gravity, or against a field that fits it so well that it is undisturbed."""
-    name, one = next(((kind, found[kind]) for kind in ("acc", "mag") if kind in found), ("", None))
+    name, one = next(((kind, found[kind]) for kind in ("acc", "mag") if is_sure(found.get(kind))), ("", None))
     if one is None or (name == "mag" and one.explained < UNDISTURBED):
         return
     if abs(np.log(one.scale)) - CERTAIN * one.scale_error / one.scale < np.log1p(LEAST_SCALE):

@@ -11,8 +11,10 @@ import warnings
 from ..repeats import moves
 from ..resampling import shifted
 from ..trajectory import Trajectory
+from .bias_steps import check_bias_step
 from .clocks import check_clock
-from .lateness import agreements, check_gyroscope_scale, check_lag
+from .field_changes import check_field_change
+from .lateness import agreements, check_gyroscope_scale, check_lag, is_sure
 from .readings import Finding, check_alive, check_copies
 from .reference import check_drift, check_frozen, check_reference, check_steps, reference_on_sensor
 from .sites import seen, sites, vectors
@@ -65,6 +67,12 @@ def check_site(trajectory: Trajectory, site: str, wrong_clock: bool) -> list[Fin
     gyr, acc, mag = (
         None if f"{site}/{kind}" in dead else seen(trajectory, f"{site}/{kind}") for kind in ("gyr", "acc", "mag")
     )
+    if mag is not None:
+        findings += check_field(f"{site}/mag", mag)
+        if gyr is not None and acc is not None and not wrong_clock:
+            changes = list(check_field_change(f"{site}/mag", trajectory.time, gyr, acc, mag))
+            # Two fields tell nothing of the other sensors.
+            findings, mag = findings + changes, None if changes else mag
     fits = {} if gyr is None or wrong_clock else agreements(gyr, {"acc": acc, "mag": mag}, trajectory.dt)
     late = list(check_lag(site, fits))
     if gyr is not None and any(finding.channel == f"{site}/gyr" for finding in late):
@@ -75,14 +83,15 @@ def check_site(trajectory: Trajectory, site: str, wrong_clock: bool) -> list[Fin
         findings += check_force(f"{site}/acc", acc, gyr, turning.get("accelerometer"))
     if gyr is not None:
         if not wrong_clock:
-            rates = list(check_rates(trajectory, site, gyr, turning, fits["acc"].scale if "acc" in fits else None))
+            scale = fits["acc"].scale if is_sure(fits.get("acc")) else None
+            rates = list(check_rates(trajectory, site, gyr, turning, scale))
             # Of rates in another unit a fit of the lag tells nothing.
             findings += rates or [*check_gyroscope_scale(site, fits), *late]
         known = any(finding.channel == f"{site}/gyr" and finding not in late for finding in findings)
         findings += check_rest(f"{site}/gyr", gyr, known or any(one.explains for one in turning.values()))
         findings += [] if known or acc is None else check_noise(f"{site}/gyr", gyr, acc)
-    if mag is not None:
-        findings += check_field(f"{site}/mag", mag)
+    if gyr is not None and not wrong_clock and not any(finding.severity == "warning" for finding in findings):
+        findings += check_bias_step(f"{site}/gyr", gyr, acc, mag, trajectory.dt)
     removed = any(f.channel == f"{site}/acc" and f.severity == "warning" and f not in late for f in findings)
     if acc is not None and not removed:
         findings += check_sign(trajectory, f"{site}/acc", acc, mag)

@@ -7,6 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from ....filters.core import rotation
+from ..reference_clock import coarse_shift
+from ..resampling import shifted
 from ..trajectory import Trajectory
 from .rate_consistency import FASTEST_TURN, SCALES, RateConsistency, rate_consistency
 from .readings import Finding
@@ -15,6 +17,8 @@ LEANING, STILL = 0.2, 0.05
 """rad by which a specific force must lean for a gyroscope to show it; below which share of that it shows none."""
 NEAR_SCALE = 0.15
 """Of the logarithm, by which a unit may differ from a known scale."""
+LATE = 0.05
+"""s by which a reference must be early or late for that to hide how its quaternions are read."""
 MOVING = 1.0
 """rad/s that a gyroscope reports only if it moves, or in another unit."""
 
@@ -92,7 +96,10 @@ def check_disagreement(site: str, found: dict[str, RateConsistency]) -> Iterator
 
 
 def check_reading(trajectory: Trajectory, gyr: np.ndarray, found: dict[str, RateConsistency]) -> Iterator[Finding]:
-    """Whether the reference turns as the gyroscope does only if its quaternions are read in another way."""
+    """Whether the reference turns as the gyroscope does only if its quaternions are read in another way.
+
+    It may be early or late as well.
+    """
     given = found.get("reference")
     if given is None or given.as_given < 0.3 * given.at_rest or given.at_rest < 0.05:
         return
@@ -106,9 +113,16 @@ def check_reading(trajectory: Trajectory, gyr: np.ndarray, found: dict[str, Rate
         (f"{first}, and conjugate ones", "Read them so."): rotation.conjugate(rotation.to_xyzw(q)),
     }
     for (cause, remedy), other in readings.items():
+        lag = trajectory.dt * coarse_shift(other, gyr, trajectory.dt)
+        moved = abs(lag) > LATE
+        if moved:
+            other = shifted({"orientation": other}, trajectory.time, lag)["orientation"]
         turned = rate_consistency(trajectory.time, gyr, rotation.rotate_back(other, np.array([0.6, 0.0, 0.8])), True)
         if turned is not None and turned.as_given < 0.3 * min(given.as_given, given.axes_residual):
             what = "gyroscope and reference turn together only if it is read the other way round"
+            if moved:
+                what += f" and moved by {lag:+.2f} s"
+                cause += ", on another clock"
             del found["reference"]
             yield Finding("warning", "orientation", what, cause, remedy)
             return

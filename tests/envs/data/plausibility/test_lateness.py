@@ -50,6 +50,15 @@ def test_a_late_gyroscope_is_named_without_a_magnetometer(motions, lag):
     assert found.what.endswith("late against the accelerometer")
 
 
+@pytest.mark.parametrize("lag", [-0.3, 0.2, 0.3])
+@pytest.mark.parametrize("gesture", ["fast", "severe", "mixed"])
+def test_a_late_accelerometer_is_named_in_strong_motion(gesture, lag):
+    motion = simulate_hand(gesture, seed=1, duration=60.0).replace(truth={})
+    (found,) = told(late(motion, lag, "acc"))
+    assert found.channel == "imu/acc"
+    assert float(found.what.split(" ms")[0]) == pytest.approx(1e3 * abs(lag), abs=30.0)
+
+
 @pytest.mark.parametrize("scale", [0.7, 0.85, 1.3, 1.5])
 @pytest.mark.parametrize("seed", [0, 3])
 def test_a_wrong_scale_of_the_gyroscope_is_named(motions, seed, scale):

@@ -125,6 +125,22 @@ def test_two_kinds_are_told_apart() -> None:
     assert "turned by 20°" in axes
 
 
+@pytest.mark.parametrize("gesture", list(MOTIONS))
+@pytest.mark.parametrize("samples", [0, 30, 80, -150])
+@pytest.mark.parametrize(
+    ("change", "cause"), [(rotation.conjugate, "conjugate quaternions"), (rotation.to_xyzw, "whose scalar is the last")]
+)
+def test_how_quaternions_are_read_shows_whatever_their_clock(
+    gesture: str, samples: int, change: Callable[[np.ndarray], np.ndarray], cause: str
+) -> None:
+    known = MOTIONS[gesture]
+    q = np.roll(change(np.array(known.truth["orientation"])), samples, axis=0)
+    trajectory = known.replace(truth={"orientation": q})[200:-200]
+    found = next(str(one) for one in check_recording(trajectory) if "the other way round" in one.what)
+    assert cause in found
+    assert (f"and moved by {-0.01 * samples:+.2f} s" in found) == (samples != 0)
+
+
 def test_jumps_do_not_hide_the_axes() -> None:
     def change(q: np.ndarray) -> np.ndarray:
         return wrong(slice(1200, 1230), (1.0, 0.0, 0.0, 0.0))(in_body((1.0, 0.0, 0.0), 9.0)(q))
