@@ -17,6 +17,8 @@ SUDDEN = {"gyr": 4.0, "acc": 6.0}
 """The same, in steps of the samples before and after."""
 LONGEST = {"gyr": 0.2, "acc": 0.1}
 """s; of an accelerometer less, as grips and steps look alike when they last longer."""
+LARGEST = 1e100
+"""Step as which a larger one counts."""
 BESIDE = 8
 """Samples before and after, whose second largest step counts: one may be a part of the burst."""
 RETURN = 0.5
@@ -38,7 +40,7 @@ def bursts(values: np.ndarray, kind: str, dt: float) -> np.ndarray:
     if len(values) <= 2 * BESIDE or longest <= SHORTEST[kind]:
         return found
     with np.errstate(invalid="ignore", over="ignore"):
-        steps = np.nan_to_num(np.linalg.norm(np.diff(values, axis=0), axis=1), posinf=np.finfo(float).max)
+        steps = np.minimum(np.nan_to_num(np.linalg.norm(np.diff(values, axis=0), axis=1)), LARGEST)
     large = np.flatnonzero(steps > LEAST[kind])
     large = large[(large >= BESIDE) & (large < len(steps) - BESIDE)]
     window = np.arange(BESIDE)

@@ -82,6 +82,24 @@ def repeated(values: np.ndarray, dt: float, moving: np.ndarray | None = None) ->
     found = np.zeros(len(values), bool)
     for begin, length in zip(*foreign_runs(values, dt, moving), strict=True):
         found[begin + 1 : begin + length] = values[begin].any()
+    for _, begin, length in stuck_axes(values, dt):
+        found[begin + 1 : begin + length] = True
+    return found
+
+
+def stuck_axes(values: np.ndarray, dt: float) -> list[tuple[int, int, int]]:
+    """Axis, first row and length of the runs in which one axis of ``(T, 3)`` stands still and another does not.
+
+    Such runs are longer than any of a sensor; what stands at the largest reading may be saturated.
+    """
+    largest, found = float(np.nanmax(np.abs(values), initial=0.0)), []
+    for axis in range(values.shape[1]):
+        column = values[:, axis : axis + 1]
+        for begin, length in zip(*foreign_runs(column, dt), strict=True):
+            part = values[begin : begin + length]
+            others = int((np.diff(part, axis=0) != 0.0).any(axis=1).sum())
+            if length * dt >= HELD and others > 0.5 * length and abs(part[0, axis]) < 0.99 * largest:
+                found.append((axis, int(begin), int(length)))
     return found
 
 

@@ -25,14 +25,16 @@ SCATTER, SHARE = 2.0, 0.8
 """Bound of what counts as the same field, in deviations from the median that this share of one side keeps."""
 SAME, OTHER, NEXT = 0.9, 0.85, 0.75
 """Share of the windows of one side within that bound, of the other side beyond it, and of those beside the change."""
+WHOLE = 0.9
+"""Length of the mean field of a window, in that of the samples, below which the rates do not turn it back."""
 LARGE = 1.8
 """Median change: 22 % of the length or 18° of dip."""
 
 
-def field_of_windows(
-    gyr: np.ndarray, acc: np.ndarray, mag: np.ndarray, dt: float
-) -> tuple[np.ndarray, np.ndarray, float]:
-    """Length ``(W,)`` and dip ``(W,)`` in degrees of the field in windows, NaN where unknown, and their distance in s.
+def field_of_windows(gyr: np.ndarray, acc: np.ndarray, mag: np.ndarray, dt: float) -> tuple[np.ndarray, float]:
+    """Length, dip in degrees, and how much of the length the mean keeps, of the field in windows; their distance in s.
+
+    The first is ``(3, W)``, NaN where unknown.
 
     Args:
         gyr: ``(T, 3)`` rad/s on a grid, NaN where missing.
@@ -59,18 +61,22 @@ def field_of_windows(
         up, north = (np.nanmean(rotation.rotate(attitude, values), axis=1) for values in (force, field))
         size = np.nanmean(np.linalg.norm(field, axis=2), axis=1)
         sine = np.sum(up * north, axis=1) / (np.linalg.norm(up, axis=1) * np.linalg.norm(north, axis=1))
-    return size, -np.degrees(np.arcsin(np.clip(sine, -1.0, 1.0))), apart * length * step
+        share = np.linalg.norm(north, axis=1) / size
+    return np.stack([size, -np.degrees(np.arcsin(np.clip(sine, -1.0, 1.0))), share]), apart * length * step
 
 
-def change_of(length: np.ndarray, dip: np.ndarray) -> int | None:
-    """First window ``(W,)`` of a field that is another for good, or None."""
+def change_of(field: np.ndarray) -> int | None:
+    """First window of a field ``(3, W)`` of :func:`field_of_windows` that is another for good, or None."""
     with np.errstate(divide="ignore", invalid="ignore"):
-        values = np.stack([np.log(length) / LENGTH, dip / DIP], axis=1)
+        values = np.stack([np.log(field[0]) / LENGTH, field[1] / DIP, field[2]], axis=1)
     places = np.flatnonzero(np.isfinite(values).all(axis=1))
     values, best, found = values[places], 0, None
     for backwards in (False, True):
-        same = values[::-1] if backwards else values
+        ordered = values[::-1] if backwards else values
+        same, share = ordered[:, :2], ordered[:, 2]
         for border in range(FEWEST, len(same) - FEWEST):
+            if np.median(share[:border]) < WHOLE:
+                continue
             away = np.abs(same - np.median(same[:border], axis=0))
             bound = np.maximum(1.0, SCATTER * np.quantile(away[:border], SHARE, axis=0))
             beyond = (away > bound).any(axis=1)
@@ -95,10 +101,11 @@ def check_field_change(
         acc: m/s².
         mag: any unit.
     """
-    length, dip, window = field_of_windows(gyr, acc, mag, float(np.median(np.diff(time))))
-    place = change_of(length, dip)
+    field, window = field_of_windows(gyr, acc, mag, float(np.median(np.diff(time))))
+    place = change_of(field)
     if place is None:
         return
+    length, dip, _ = field
     before, after = (
         f"{np.nanmedian(length[part]):.3g} with a dip of {np.nanmedian(dip[part]):.0f}°"
         for part in (slice(place), slice(place + 1, None))

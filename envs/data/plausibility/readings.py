@@ -13,7 +13,7 @@ from ....filters.core.quantity import ACCELEROMETER, GYROSCOPE, MAGNETOMETER, SH
 from ..bursts import bursts
 from ..glitches import LEAST, glitches
 from ..ranges import at_range, reached_range
-from ..repeats import HELD, foreign_runs, moves, repeated_blocks, runs_of, usual_run
+from ..repeats import HELD, foreign_runs, moves, repeated_blocks, runs_of, stuck_axes, usual_run
 
 CHANNELS = {"gyr": GYROSCOPE, "acc": ACCELEROMETER, "mag": MAGNETOMETER}
 LONGEST_ABSENCE = 0.3
@@ -141,9 +141,12 @@ def check_alive(
 
 
 def check_stretches(channel: str, values: np.ndarray, dt: float) -> Iterator[Finding]:
-    """Bursts (:mod:`poise.envs.data.bursts`), and blocks that were written again."""
+    """Axes that stand still, blocks that were written again, and bursts (:mod:`poise.envs.data.bursts`)."""
     kind = channel.rpartition("/")[2]
     remedy = "They are treated as missing samples."
+    for axis, begin, length in stuck_axes(values, dt):
+        what = f"axis {'xyz'[axis]} stands at {values[begin, axis]:.4g} for {length * dt:.1f} s from sample {begin}"
+        yield Finding("warning", channel, what, "an axis that failed on the way", remedy)
     again = np.flatnonzero(repeated_blocks(values))
     if len(again):
         what = f"{len(again)} samples in blocks that stood there before, from sample {again[0]}"

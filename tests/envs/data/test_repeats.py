@@ -161,6 +161,19 @@ def test_rows_that_were_sent_twice_are_named_where_they_begin() -> None:
     assert sum("50 samples in blocks that stood there before, from sample 1200" in each for each in told) == 3
 
 
+@pytest.mark.parametrize(("kind", "axis"), [("gyr", 0), ("gyr", 2), ("acc", 1), ("mag", 0)])
+@pytest.mark.parametrize(("begin", "end"), [(1200, 1300), (1500, 3001)])
+def test_an_axis_that_fails_on_the_way_is_named_and_leaves_no_samples(
+    kind: str, axis: int, begin: int, end: int
+) -> None:
+    changed = np.array(KNOWN.measurements[f"imu/{kind}"])
+    changed[begin:end, axis] = changed[begin, axis]
+    faulty = KNOWN.replace(measurements=KNOWN.measurements | {f"imu/{kind}": changed})
+    np.testing.assert_array_equal(np.flatnonzero(repeated(changed, 0.01)), np.arange(begin + 1, min(end, len(changed))))
+    told = [str(each) for each in check_recording(faulty) if each.severity == "warning"]
+    assert any(f"imu/{kind}: axis {'xyz'[axis]} stands at" in each and f"sample {begin}" in each for each in told)
+
+
 def test_what_may_be_equal_by_chance_or_in_a_loop_is_left_alone() -> None:
     rng = np.random.default_rng(2)
     rest = np.round(1.2 * rng.standard_normal((30000, 3)))

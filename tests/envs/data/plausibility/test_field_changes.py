@@ -54,6 +54,9 @@ def test_what_comes_and_goes_or_was_always_there_is_no_change() -> None:
         assert not [each for each in told(changed("slow", rows, np.array([25.0, 0.0, 0.0]))) if "another" in each]
     generator = np.random.default_rng(0)
     for count in (3, 12, 13, 60):
-        assert change_of(generator.uniform(20.0, 80.0, count), generator.uniform(-90.0, 90.0, count)) is None
-    assert change_of(np.full(40, np.nan), np.zeros(40)) is None
-    assert change_of(np.repeat([45.0, 90.0], 12), np.full(24, 66.0)) in (11, 12)
+        noise = np.stack([generator.uniform(20.0, 80.0, count), generator.uniform(-90.0, 90.0, count), np.ones(count)])
+        assert change_of(noise) is None
+    step = np.stack([np.repeat([45.0, 90.0], 12), np.full(24, 66.0), np.ones(24)])
+    assert change_of(step) in (11, 12)
+    assert change_of(step * [[np.nan], [1.0], [1.0]]) is None
+    assert change_of(step * [[1.0], [1.0], [0.5]]) is None
