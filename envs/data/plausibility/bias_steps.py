@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .agreement import MOST_MISSING, STEP, Windows, sensitivities
+from .integration import attitudes
 from .readings import Finding
 
 SHORTEST, LONGEST, WINDOWS = 1.2, 4.0, 10
@@ -82,7 +83,7 @@ def bias_step(rate: np.ndarray, vector: np.ndarray, interval: float) -> BiasStep
     bias, prior = np.zeros(3), np.eye(3) / PRIOR**2
     for _ in range(ITERATIONS):
         rates = windows.rates - bias
-        attitude, directions = windows.turned(windows.attitudes(rates), rates, 0.0)
+        attitude, directions = windows.turned(attitudes(windows.step * rates), rates, 0.0)
         residual = windows.segments(directions)
         slopes = windows.segments(sensitivities(windows.step, rates, attitude, directions))[..., 2:]
         known = np.isfinite(residual)

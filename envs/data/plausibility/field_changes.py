@@ -13,6 +13,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ....filters.core import rotation
+from .integration import attitudes
 from .readings import Finding
 
 WINDOW, STEP = 1.5, 0.02
@@ -53,11 +54,7 @@ def field_of_windows(gyr: np.ndarray, acc: np.ndarray, mag: np.ndarray, dt: floa
             np.nanmean(values[: count * length * together].reshape(count, length, together, 3)[::apart], axis=2)
             for values in (gyr, acc, mag)
         )
-        half = rotation.exp(0.5 * step * np.nan_to_num(rate))
-        attitude, q = np.empty((*half.shape[:2], 4)), np.broadcast_to([1.0, 0.0, 0.0, 0.0], (len(half), 4))
-        for t in range(length):
-            q = attitude[:, t] = rotation.multiply(q, half[:, t])
-            q = rotation.multiply(q, half[:, t])
+        attitude = attitudes(step * np.nan_to_num(rate))
         up, north = (np.nanmean(rotation.rotate(attitude, values), axis=1) for values in (force, field))
         size = np.nanmean(np.linalg.norm(field, axis=2), axis=1)
         sine = np.sum(up * north, axis=1) / (np.linalg.norm(up, axis=1) * np.linalg.norm(north, axis=1))
