@@ -18,7 +18,7 @@ from .lateness import agreements, check_gyroscope_scale, check_lag, is_sure
 from .readings import Finding, check_alive, check_copies
 from .reference import check_drift, check_frozen, check_reference, check_steps, reference_on_sensor
 from .sites import seen, sites, vectors
-from .turning import check_rates, compared
+from .turning import check_halves, check_rates, compared
 from .units import check_field, check_force, check_noise, check_rest, check_sign
 
 
@@ -91,7 +91,9 @@ def check_site(trajectory: Trajectory, site: str, wrong_clock: bool) -> list[Fin
         findings += check_rest(f"{site}/gyr", gyr, known or any(one.explains for one in turning.values()))
         findings += [] if known or acc is None else check_noise(f"{site}/gyr", gyr, acc)
     if gyr is not None and not wrong_clock and not any(finding.severity == "warning" for finding in findings):
-        findings += check_bias_step(f"{site}/gyr", gyr, acc, mag, trajectory.dt)
+        findings += list(check_halves(trajectory, site, gyr, acc, mag)) or [
+            *check_bias_step(f"{site}/gyr", gyr, acc, mag, trajectory.dt)
+        ]
     removed = any(f.channel == f"{site}/acc" and f.severity == "warning" and f not in late for f in findings)
     if acc is not None and not removed:
         findings += check_sign(trajectory, f"{site}/acc", acc, mag)

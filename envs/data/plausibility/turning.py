@@ -19,6 +19,8 @@ NEAR_SCALE = 0.15
 """Of the logarithm, by which a unit may differ from a known scale."""
 LATE = 0.05
 """s by which a reference must be early or late for that to hide how its quaternions are read."""
+SHORTEST_HALF = 10.0
+"""s."""
 MOVING = 1.0
 """rad/s that a gyroscope reports only if it moves, or in another unit."""
 
@@ -37,8 +39,33 @@ def compared(
     return {name: one for name, one in found.items() if one is not None}
 
 
+def check_halves(
+    trajectory: Trajectory, site: str, gyr: np.ndarray, acc: np.ndarray | None, mag: np.ndarray | None
+) -> Iterator[Finding]:
+    """Unit, signs and axes of the gyroscope in each half of a recording that has others on the whole.
+
+    Arguments as for :func:`compared`; the trajectory is on its grid.
+    """
+    middle = len(gyr) // 2
+    if middle * trajectory.dt < SHORTEST_HALF:
+        return
+    for name, part in (("first", slice(middle)), ("second", slice(middle, None))):
+        half = trajectory.replace(truth={})[part]
+        rates, *others = (None if values is None else values[part] for values in (gyr, acc, mag))
+        if rates is None or not np.isfinite(rates).all(axis=1).any():
+            continue
+        for one in check_rates(half, site, rates, compared(half, site, rates, *others), sure=True):
+            remedy = f"If they change on the way, cut the recording there. {one.remedy}"
+            yield Finding(one.severity, one.channel, f"in the {name} half, {one.what}", one.cause, remedy)
+
+
 def check_rates(
-    trajectory: Trajectory, site: str, gyr: np.ndarray, turning: dict[str, RateConsistency], scale: float | None = None
+    trajectory: Trajectory,
+    site: str,
+    gyr: np.ndarray,
+    turning: dict[str, RateConsistency],
+    scale: float | None = None,
+    sure: bool = False,
 ) -> Iterator[Finding]:
     """Unit, signs and axes of the gyroscope, against the motion of gravity, of the field and of the truth.
 
@@ -48,6 +75,7 @@ def check_rates(
         gyr: ``(T, 3)``.
         turning: see :func:`compared`.
         scale: by which the rates must be multiplied, where that is known for certain; then no other unit is.
+        sure: only what a unit or an arrangement of axes explains.
     """
     channel, found = f"{site}/gyr", dict(turning)
     fastest = float(np.nanquantile(np.linalg.norm(gyr, axis=1), 0.99))
@@ -75,7 +103,8 @@ def check_rates(
         yield Finding("warning", channel, what, "rates in deg/s, or raw counts", "Convert to rad/s.")
         return
     yield from check_axes(site, decided)
-    yield from check_disagreement(site, found)
+    if not sure:
+        yield from check_disagreement(site, found)
 
 
 def check_disagreement(site: str, found: dict[str, RateConsistency]) -> Iterator[Finding]:
