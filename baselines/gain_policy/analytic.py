@@ -27,7 +27,7 @@ from ...filters.compile.differentiable import DifferentiableEquations
 from ...filters.core.metrics import error
 from ...filters.core.model import structure_of
 from ...filters.support.optional import extra
-from .policy import GainPolicy
+from .policy import GainPolicy, rule_skip
 
 with extra("rl"):
     import torch
@@ -116,9 +116,12 @@ class Actor(torch.nn.Module):
         std: their standard deviations ``(n,)``.
         start: action ``(k,)`` at the beginning.
         net_arch: units of the hidden layers.
+        small: factor on the weights of the last layer at the beginning.
     """
 
-    def __init__(self, mean: np.ndarray, std: np.ndarray, start: np.ndarray, net_arch: Sequence[int]) -> None:
+    def __init__(
+        self, mean: np.ndarray, std: np.ndarray, start: np.ndarray, net_arch: Sequence[int], small: float = 0.01
+    ) -> None:
         super().__init__()
         self.mean, self.std = mean, std
         self.linear = torch.nn.ModuleList(
@@ -126,7 +129,7 @@ class Actor(torch.nn.Module):
         )
         with torch.no_grad():
             last: Any = self.linear[-1]
-            last.weight.mul_(0.01)
+            last.weight.mul_(small)
             last.bias.copy_(torch.as_tensor(0.95 * start))
 
     def forward(self, observations: np.ndarray) -> torch.Tensor:
@@ -225,6 +228,7 @@ def train_analytically(
     trajectories: Sequence[Trajectory],
     start: np.ndarray,
     *,
+    reference: np.ndarray | None = None,
     epochs: int = 30,
     learning_rate: float = 2e-3,
     net_arch: Sequence[int] = (64, 64),
@@ -237,12 +241,13 @@ def train_analytically(
     save: Callable[[dict[str, Any]], None] | None = None,
     state: dict[str, Any] | None = None,
 ) -> GainPolicy:
-    """Train a policy from constant gains on.
+    """Train a policy from constant gains on, or from a rule.
 
     Args:
         tuned: the filter with its actions and features.
         trajectories: simulated, with truth.
-        start: constant action ``(k,)`` that the network begins with.
+        start: constant action ``(k,)`` that the network begins with, of features with a rule what it adds to that.
+        reference: constant action ``(k,)`` whose errors weight the trajectories; None for the published gains.
         epochs: passes over the trajectories.
         learning_rate: of Adam; falls to zero along a cosine.
         net_arch: units of the hidden layers.
@@ -258,19 +263,20 @@ def train_analytically(
         state: from ``save``: continue there, bit by bit as if there had been no interruption.
     """
     reward = GainReward("relative", error_scale=np.radians(error_scale))
-    costs = Costs(tuned, reward, quantity)
-    sets, unseen = (costs.episodes(some, np.zeros(tuned.actions)) for some in (trajectories, validation))
+    costs, skip = Costs(tuned, reward, quantity), rule_skip(tuned.features, tuned.actions)
+    compared = np.zeros(tuned.actions) if reference is None else reference
+    sets, unseen = (costs.episodes(some, compared) for some in (trajectories, validation))
     generator = np.random.default_rng(seed)
     best, least, history = None, np.inf, []
     if state is None:
-        neutral = GainPolicy.constant(tuned, start)
+        neutral = replace(GainPolicy.constant(tuned, start), skip=skip)
         first = np.concatenate([each.observations(neutral).reshape(-1, tuned.observation_size) for each in sets])
         mean, std = first.mean(axis=0), first.std(axis=0) + 1e-2
     else:
         mean, std = state["normalisation"]
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(seed)
-        actor = Actor(mean, std, np.asarray(start, float), net_arch)
+        actor = Actor(mean, std, np.asarray(start, float), net_arch, small=0.01 if skip is None else 0.0)
     optimizer = torch.optim.Adam(actor.parameters(), lr=learning_rate)
     updates = epochs * sum(-(-len(each.episodes) // ROWS) for each in sets)
     schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimizer, updates)
@@ -281,10 +287,12 @@ def train_analytically(
         generator.bit_generator.state = json.loads(state["generator"])
         history, least = state["history"], state["least"]
         if state["best"] is not None:
-            best = replace(GainPolicy.neutral(tuned), layers=tuple((a, b) for a, b in state["best"]))
+            best = replace(actor.policy(tuned), layers=tuple((a, b) for a, b in state["best"]))
         for epoch, (cost, unseen_cost) in enumerate(history):
             if report is not None:
                 report(epoch, cost, unseen_cost)
+    elif skip is not None and unseen:
+        best, least = actor.policy(tuned), costs.of_policy(unseen, actor.policy(tuned))
     for epoch in range(len(history), epochs):
         policy, total = actor.policy(tuned), []
         seen = [each.observations(policy) for each in sets]
@@ -297,6 +305,8 @@ def train_analytically(
             index, rows = jobs[job]
             some = seen[index][:, rows]
             actions = actor(some + noise * actor.std * generator.standard_normal(some.shape))
+            if skip is not None:
+                actions = actions + torch.as_tensor(some @ skip.T, dtype=torch.float32)
             cost, slope = costs.gradient(sets[index].part(rows), actions.detach().numpy().astype(float))
             beyond = (actions - actions.detach().clamp(-1.0, 1.0)).square().sum(dim=-1).mean()
             optimizer.zero_grad()

@@ -109,6 +109,8 @@ class TrainingConfig:
     """who learns; PPO has a critic that sees the truth, and alone starts from the oracle"""
     gains: tuple[str, ...] | None = None
     """gains that the policy sets; None for all of the filter"""
+    rule: str | None = None
+    """rule that the policy corrects: its actions are added to those of the rule; the exact gradient alone has it"""
     interval: float = 0.1
     """s between decisions"""
     motions: Motions = TRAINING_MOTIONS
@@ -158,6 +160,8 @@ class TrainingConfig:
     def __post_init__(self) -> None:
         if self.agent not in get_args(AgentName):
             raise ValueError(f"agent must be one of {list(get_args(AgentName))}, got {self.agent!r}")
+        if self.rule is not None and self.agent != "analytic":
+            raise ValueError(f"rule must be None for the agent {self.agent}, got {self.rule!r}")
         for name in ("trajectories", "total_timesteps", "n_envs", "n_steps", "batch_size", "n_epochs", "lstm_units"):
             if getattr(self, name) < 1:
                 raise ValueError(f"{name} must be at least 1, got {getattr(self, name)}")
@@ -184,8 +188,17 @@ RIDERS: dict[str, tuple[tuple[str, ...], str | None]] = {
     "whole-body": (("trunk", "limb", "acceleration", "lateral"), None),
     "force-inertial": (("torque", "roll"), "seat offset"),
     "odometry-aided": (("process", "bias"), "bias step"),
+    "two-gyro-consistent": (("process", "measurement"), None),
+    "force-inertial-consistent": (("torque", "roll"), "seat offset"),
+    "whole-body-consistent": (("trunk", "limb", "acceleration", "lateral"), None),
 }
 """Filter of rides → gains that are acted on, and the fault of the sensors in all rides, if there is one."""
+
+
+CORRECTED = {"two-gyro-level": "turning", "platform-gyro": "turning"}
+"""Filter → rule that a policy trained by the exact gradient corrects."""
+RIDES_SCALE = 15.0
+"""deg, in place of the error scale of hands: a roll that turns over must not count little."""
 
 
 def shipped_config(filter: str) -> TrainingConfig:
@@ -250,7 +263,10 @@ def config_of(agent: AgentName, config: TrainingConfig) -> TrainingConfig:
     if agent == "ppo":
         return replace(config, agent=agent)
     if agent == "analytic":
-        return replace(config, agent=agent, warm_start=0, learning_rate=2e-3, net_arch=(32, 32))
+        rule = CORRECTED.get(config.filter)
+        scale = config.error_scale if rule is None else RIDES_SCALE
+        changed: dict[str, Any] = {"warm_start": 0, "learning_rate": 2e-3, "net_arch": (32, 32), "error_scale": scale}
+        return replace(config, agent=agent, rule=rule, **changed)
     common = {"agent": agent, "warm_start": 0, "n_envs": 64, "smoothing": config.smoothing or 0.5}
     if agent == "recurrent-ppo":
         return replace(config, **common, batch_size=1024, n_epochs=4, learning_rate=3e-4)  # type: ignore[arg-type]

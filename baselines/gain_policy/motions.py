@@ -166,8 +166,14 @@ class RiddenMotions:
 
     def draw_many(self, seed: int, count: int) -> list[Trajectory]:
         """The first draws of the first rides of the root seed."""
-        rides = range(math.ceil(count / self.source.draws))
-        return [each for index in rides for each in drawn(self.source, seed, index)][:count]
+        return self.devices(seed, count, 0)
+
+    def devices(self, seed: int, count: int, index: int) -> list[Trajectory]:
+        """The same rides with other devices: set ``index`` of the draws on each ride."""
+        draws = self.source.draws
+        source = dataclasses.replace(self.source, draws=(index + 1) * draws)
+        rides = range(math.ceil(count / draws))
+        return [each for ride in rides for each in drawn(source, seed, ride)[index * draws :]][:count]
 
     def describe(self) -> dict[str, Any]:
         """All fields, for JSON."""

@@ -17,6 +17,7 @@ from ...envs.data.trajectory import Trajectory
 from ...filters.support.seeds import named_seed
 from ..checkpoint import has_checkpoint
 from .config import TrainingConfig
+from .motions import RiddenMotions
 from .policy import GainPolicy
 from .training import CHECKPOINT, Report, Validate, train_policy
 
@@ -27,6 +28,12 @@ OF_EACH = ("steps", "chosen_steps", "costs", "seconds")
 def network_seed(root: int, index: int) -> int:
     """Seed of a network; a larger number of networks keeps the first ones."""
     return named_seed(root, "network", index)
+
+
+def ridden(config: TrainingConfig, index: int) -> list[Trajectory] | None:
+    """Rides of the root seed with the devices of a network; None where motions are no rides."""
+    motions = config.motions
+    return motions.devices(config.seed, config.trajectories, index) if isinstance(motions, RiddenMotions) else None
 
 
 def train_networks(
@@ -41,6 +48,8 @@ def train_networks(
     validate: Validate | None = None,
 ) -> GainPolicy:
     """Train networks one after the other; each draws its motions, weights and order from its own seed.
+
+    Riding takes long: networks for filters of rides share the rides, with other devices on each.
 
     Its limit for the gyroscope bias is the smallest of theirs: all networks have seen biases up to it.
 
@@ -72,7 +81,7 @@ def train_networks(
         home = None if folder is None else Path(folder) / f"network-{index}"
         policy = train_policy(
             replace(config, seed=network_seed(config.seed, index)),
-            trajectories=trajectories,
+            trajectories=ridden(config, index) if trajectories is None else trajectories,
             start=start,
             folder=home,
             resume=resume and home is not None and has_checkpoint(home / CHECKPOINT),

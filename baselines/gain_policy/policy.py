@@ -13,6 +13,8 @@ import numpy as np
 from ...filters.adaptation.features import InnovationFeatures
 from ...filters.adaptation.gains import GainRange
 from ...filters.adaptation.named_features import NamedFeatures
+from ...filters.adaptation.ruled_features import RuledFeatures, in_range
+from ...filters.adaptation.rules import RULES, Rule
 from ...filters.adaptation.time_scales import Features
 from ...filters.adaptation.tuned import TunedFilter
 from ..weights_io import load_weights, save_weights
@@ -28,6 +30,8 @@ Layer = tuple[np.ndarray, np.ndarray]
 class GainPolicy:
     """Observation ``(*batch, n)`` → action ``(*batch, k)`` in [−1, 1]: layers with tanh between them, then a clip.
 
+    Of a policy that corrects a rule the action of the rule is added before the clip.
+
     Of several networks the action is the mean of theirs: the logarithms of the gains are averaged, each within its
     range, so a network that is wrong somewhere moves them by its share only.
 
@@ -40,6 +44,7 @@ class GainPolicy:
         smoothing: s; the gains follow the actions with this time constant, 0: at once.
         bias_limit: rad/s; an estimator that follows the policy keeps the published gains while the estimated gyroscope
             bias is larger or not known yet (:mod:`.known_bias`). ∞: never.
+        skip: ``(k, n)`` what is added of the observation to the last layer; None: nothing.
 
     Raises:
         ValueError: layers do not fit each other, the observation or the actions, or the limit is not positive.
@@ -52,6 +57,7 @@ class GainPolicy:
     card: dict[str, Any] = field(default_factory=dict)
     smoothing: float = 0.0
     bias_limit: float = math.inf
+    skip: np.ndarray | None = None
 
     def __post_init__(self) -> None:
         if not self.bias_limit > 0.0:
@@ -73,6 +79,8 @@ class GainPolicy:
             raise ValueError(
                 f"the last layer must give {len(self.ranges)} actions, got {width if layers else 'no layer'}"
             )
+        if self.skip is not None and self.skip.shape != (wanted := (width, self.features.size(width))):
+            raise ValueError(f"skip must have the shape {wanted}, got {self.skip.shape}")
 
     @classmethod
     def constant(cls, tuned: TunedFilter, action: Sequence[float] | np.ndarray) -> GainPolicy:
@@ -95,7 +103,8 @@ class GainPolicy:
         ]
         weight, bias = layers[0]
         layers[0] = (weight / std, bias - (weight / std) @ mean)
-        return cls(tuned.name, tuned.ranges, tuned.features, tuple(layers), smoothing=tuned.smoothing)
+        skip = rule_skip(tuned.features, len(tuned.ranges))
+        return cls(tuned.name, tuned.ranges, tuned.features, tuple(layers), smoothing=tuned.smoothing, skip=skip)
 
     @classmethod
     def mean_of(cls, policies: Sequence[GainPolicy]) -> GainPolicy:
@@ -125,10 +134,11 @@ class GainPolicy:
         """The action of an observation."""
         x = np.asarray(observation, dtype=float)
         batch, x = x.shape[:-1], x.reshape(-1, x.shape[-1])
+        added = 0.0 if self.skip is None else x @ self.skip.T
         for weight, bias in self.layers[:-1]:
             x = np.tanh(x @ weight.swapaxes(-1, -2) + bias[..., None, :])
         weight, bias = self.layers[-1]
-        actions = np.clip(x @ weight.swapaxes(-1, -2) + bias[..., None, :], -1.0, 1.0)
+        actions = np.clip(x @ weight.swapaxes(-1, -2) + bias[..., None, :] + added, -1.0, 1.0)
         if actions.ndim == 3:
             actions = actions.mean(axis=0)
         return actions.reshape(*batch, -1)
@@ -138,6 +148,8 @@ class GainPolicy:
         arrays = {}
         for index, (weight, bias) in enumerate(self.layers):
             arrays[f"{index}.weight"], arrays[f"{index}.bias"] = weight.astype(np.float32), bias.astype(np.float32)
+        if self.skip is not None:
+            arrays["skip"] = self.skip.astype(np.float32)
         own = {
             "kind": KIND,
             "filter": self.filter,
@@ -150,6 +162,8 @@ class GainPolicy:
         }
         if isinstance(self.features, NamedFeatures):
             own["rows"], own["channels"] = self.features.rows, [list(entry) for entry in self.features.channels]
+        if isinstance(self.features, RuledFeatures):
+            own["rule"] = rule_name(self.features.rule)
         described = dict(self.card if card is None else card)
         described.pop("sha256", None)
         return save_weights(path, arrays, {**own, **{name: described[name] for name in described if name not in own}})
@@ -174,7 +188,10 @@ class GainPolicy:
             )
             if "channels" in card:
                 channels = tuple((str(name), int(size), str(unit)) for name, size, unit in card["channels"])
-                features = NamedFeatures(features.interval, features.scales, int(card["rows"]), channels)
+                named = features.interval, features.scales, int(card["rows"]), channels
+                features = NamedFeatures(*named)
+                if "rule" in card:
+                    features = RuledFeatures(*named, in_range(card["rule"], ranges[0]))
             layers = tuple((arrays[f"{index}.weight"], arrays[f"{index}.bias"]) for index in range(card["layers"]))
             limit = card.get("bias_limit")
             return cls(
@@ -185,6 +202,28 @@ class GainPolicy:
                 card,
                 float(card.get("smoothing", 0.0)),
                 math.inf if limit is None else float(limit),
+                arrays["skip"].astype(float) if "skip" in arrays else None,
             )
         except KeyError as missing:
             raise ValueError(f"{path_or_name}: the {KIND} lacks {missing}") from None
+
+
+def rule_skip(features: Features, actions: int) -> np.ndarray | None:
+    """What adds the action of a rule among the features to the first gain ``(k, n)``; None where there is none."""
+    if not isinstance(features, RuledFeatures):
+        return None
+    skip = np.zeros((actions, features.size(actions)))
+    skip[0, features.names.index("rule")] = 1.0
+    return skip
+
+
+def rule_name(rule: Rule) -> str:
+    """Name of a rule with the constants of :data:`.RULES`; its range is that of the gain.
+
+    Raises:
+        ValueError: its constants are others.
+    """
+    for name, known in RULES.items():
+        if replace(rule, largest=known.largest, reach=known.reach) == known:
+            return name
+    raise ValueError(f"a policy that is saved must correct a rule of {sorted(RULES)}, got {rule}")

@@ -9,20 +9,12 @@ from typing import Any
 import numpy as np
 
 from ...filters.adaptation.gains import DECADES, filter_name, gain_ranges
-from ...filters.adaptation.rules import AccelerationRule, InnovationRule, PitchRateRule, Rule, TurningRule
+from ...filters.adaptation.rules import RULES, AccelerationRule, InnovationRule, Rule
 from ...filters.core.kalman import KalmanFilter
 from ...filters.registry import make
 from ...filters.support.names import look_up
 from .adaptive import AdaptiveEstimator
 from .policy import GainPolicy
-
-RULES: dict[str, Rule] = {
-    "pitch-rate": PitchRateRule(),
-    "innovation": InnovationRule(),
-    "turning": TurningRule(),
-    "acceleration": AccelerationRule(),
-}
-"""Name → rule, with constants chosen on simulated motion and rides."""
 
 
 def by_rule(filter: str, rule: str, dt: float = 0.01, **parameters: Any) -> AdaptiveEstimator:
@@ -30,7 +22,7 @@ def by_rule(filter: str, rule: str, dt: float = 0.01, **parameters: Any) -> Adap
 
     Args:
         filter: name of a Kalman filter.
-        rule: one of :data:`RULES`.
+        rule: one of :data:`.RULES`.
         dt: sampling interval, s.
         parameters: constants of the filter that differ from the published tuning, by the model's field names.
 

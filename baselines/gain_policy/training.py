@@ -21,6 +21,7 @@ from ...envs.data.trajectory import Trajectory
 from ...envs.gain_tuning import ReplayGainVectorEnv
 from ...filters.adaptation.gains import tunable_filter
 from ...filters.adaptation.named_features import features_of
+from ...filters.adaptation.ruled_features import ruled_features
 from ...filters.adaptation.tuned import TunedFilter
 from ...filters.core.kalman import KalmanFilter
 from ...filters.support.optional import extra
@@ -89,6 +90,8 @@ def train_policy(
 
     filter = tunable_filter(config.filter) if kalman is None else kalman
     tuned = TunedFilter.of(filter, config.gains, features_of(filter, config.interval), config.smoothing)
+    if config.rule is not None:
+        tuned = replace(tuned, features=ruled_features(filter, config.rule, config.interval, tuned.ranges))
     motions = config.motions.draw_many(config.seed, config.trajectories) if trajectories is None else list(trajectories)
     home = None if folder is None else Path(folder)
     key = training_key(config, tuned, motions)
@@ -157,7 +160,8 @@ def analytic_policy(
     policy = train_analytically(
         tuned,
         train,
-        start,
+        start if config.rule is None else np.zeros_like(start),
+        reference=None if config.rule is None else start,
         epochs=epochs,
         learning_rate=config.learning_rate,
         net_arch=config.net_arch,

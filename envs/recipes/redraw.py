@@ -16,8 +16,8 @@ from ...filters.bicycle.geometry import GEOMETRY_STD, RiderGeometry, TapeMeasure
 from ...filters.core import rotation
 from ...filters.core.quantity import STANDARD_GRAVITY
 from ..bicycle.sensors.measured_geometry import measured
-from ..bicycle.sensors.placement import PLACED
-from ..bicycle.sensors.sites import sensor_sites
+from ..bicycle.sensors.placement import PLACED, PlacementErrors
+from ..bicycle.sensors.sites import BICYCLE_IMU_TILT, pitched, sensor_sites
 from ..bicycle.sensors.suites import rider_bicycle_suite
 from ..data.trajectory import Trajectory
 from ..sensors.ideal import Mounting
@@ -75,6 +75,28 @@ def redrawn(
         taped = measured(true, tape, geometry).describe()
         metadata |= {"geometry": taped, TRUE_GEOMETRY: metadata["geometry"], GEOMETRY_STD: asdict(geometry)}
     return ride.replace(measurements=measurements, truth=ride.truth | biases, metadata=metadata)
+
+
+def turned_anew(ride: Trajectory, generator: np.random.Generator) -> Trajectory:
+    """A ride with ideal sensors whose bicycle IMU is turned by another draw of the error of its placement.
+
+    What gains are best on the one and on the other does not depend on how the sensor was turned: no sensor shows that.
+
+    Raises:
+        ValueError: as of :func:`redrawn`.
+    """
+    described = ideal_sensors(ride)
+    turn = PlacementErrors().fixed_turn * generator.standard_normal(3)
+    axes = rotation.multiply(rotation.exp(turn), np.array(pitched(BICYCLE_IMU_TILT)))
+    measurements, sensors = dict(ride.measurements), []
+    for sensor in described["sensors"]:
+        name = sensor["channel"]
+        if name.startswith("bicycle_imu/"):
+            readings = rotation.rotate(np.array(sensor["rotation"]), measurements[name])
+            measurements[name], sensor = rotation.rotate_back(axes, readings), {**sensor, "rotation": axes.tolist()}
+        sensors.append(sensor)
+    metadata = {**ride.metadata, "sensors": {**described, "sensors": sensors}}
+    return ride.replace(measurements=measurements, metadata=metadata)
 
 
 def ideal_sensors(ride: Trajectory) -> Mapping[str, Any]:

@@ -19,7 +19,7 @@ from ...filters.support.names import look_up
 from ..data.trajectory import Trajectory
 from ..episodes import EpisodeStore
 from .recipe import Recipe
-from .redraw import TRUE_GEOMETRY
+from .redraw import TRUE_GEOMETRY, turned_anew
 from .registry import described_recipe, recipe
 from .slopes import sloped
 
@@ -78,12 +78,20 @@ def ride(source: RideSource, seed: int, index: int) -> Trajectory:
     return store.episode((seed, index), lambda: made.ride(sequence, f"ride-{seed}-{index}"))
 
 
-def drawn(source: RideSource, seed: int, index: int) -> list[Trajectory]:
-    """The draws of devices and geometry on one ride; what is not settled is left out of the mask."""
+def drawn(source: RideSource, seed: int, index: int, turned: bool = False) -> list[Trajectory]:
+    """The draws of devices and geometry on one ride; what is not settled is left out of the mask.
+
+    With ``turned`` the bicycle's IMU is turned otherwise in every draw but the first (:func:`.turned_anew`).
+    """
     made: Any = source.recipe()
     ridden = ride(source, seed, index)
     children = np.random.SeedSequence(seed, spawn_key=(index, 1)).spawn(source.draws + source.exact_draws)
-    draws = [made.sensed(ridden, child).replace(mask=ridden.time > SETTLED) for child in children]
+    placing = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(index, 4)))
+    placed = [turned_anew(ridden, placing) if turned and place else ridden for place in range(len(children))]
+    draws = [
+        made.sensed(each, child).replace(mask=ridden.time > SETTLED)
+        for each, child in zip(placed, children, strict=True)
+    ]
     draws[source.draws :] = map(measured_exactly, draws[source.draws :])
     if source.fault is not None:
         sequence = np.random.SeedSequence(seed, spawn_key=(index, 3))

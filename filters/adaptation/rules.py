@@ -203,3 +203,12 @@ class AccelerationRule(Rule):
         there = known > 0.0
         ratio = square / np.where(there, known, 1.0) / self.reference**2
         return np.where(there, np.maximum(np.log(np.maximum(ratio, 1e-8)), self.smallest), 0.0)
+
+
+RULES: dict[str, Rule] = {
+    "pitch-rate": PitchRateRule(),
+    "innovation": InnovationRule(),
+    "turning": TurningRule(),
+    "acceleration": AccelerationRule(),
+}
+"""Name → rule, with constants chosen on simulated motion and rides."""

@@ -29,7 +29,7 @@ class Args:
 
     filter: tyro.conf.Positional[str] = "external-acceleration"
     """name of a Kalman filter; of rides: two-gyro-level, platform-gyro, balanced-gyro, whole-body, or force-inertial or
-    odometry-aided, whose sensors then have a lasting fault"""
+    odometry-aided, whose sensors then have a lasting fault; or two-gyro-consistent and the other consistent forms"""
     quantities: tuple[str, ...] = ()
     """outputs of the filter that are scored together (default: up, or the first)"""
     recordings: tuple[Path, ...] = ()
@@ -42,6 +42,9 @@ class Args:
     errors: float = 1.0
     """factor on sensor and placement errors of the simulated rides that are compared on; 0.01 leaves the errors
     that gains can reduce"""
+    turned: bool = False
+    """rides: the other draw of sensors, on which the oracle chooses, has the bicycle's IMU turned otherwise too, which
+    no sensor shows"""
     training: int = 24
     """simulated trajectories on which the best constants are searched"""
     points: int = 32
@@ -85,6 +88,8 @@ def run(args: Args) -> int:
         raise ValueError(f"folds train on one quantity, got {list(args.quantities)}")
     if args.errors != 1.0 and (args.recordings or not isinstance(config.motions, RiddenMotions)):
         raise ValueError("errors can only be given for simulated rides: recordings and hand motions keep theirs")
+    if args.turned and (args.recordings or not isinstance(config.motions, RiddenMotions)):
+        raise ValueError("turned can only be given for simulated rides")
     shipped = f"{args.filter.replace('-', '_')}_policy"
     names = args.policies or tuple(name for name in (shipped,) if name in list_weights())
     policies = {"policy" if name == shipped else f"policy {Path(name).stem}": GainPolicy.load(name) for name in names}
@@ -173,7 +178,7 @@ def simulated(args: Args, motions: object) -> tuple[dict[str, list[Trajectory]],
     if not isinstance(motions, RiddenMotions):
         return {SIMULATED: motions.draw_many(seed, args.trajectories)}, []  # type: ignore[attr-defined]
     source = replace(motions.source, draws=2, changes=smaller_errors(motions.source.changes, args.errors))
-    pairs = [drawn(source, seed, index) for index in range(args.trajectories)]
+    pairs = [drawn(source, seed, index, args.turned) for index in range(args.trajectories)]
     lasting = [pair for pair in pairs if pair[0].mask.any()]
     # Left and right may be exchanged between the two draws; the schedule of gains does not depend on the side.
     return {SIMULATED: [pair[0] for pair in lasting]}, [pair[1] for pair in lasting]

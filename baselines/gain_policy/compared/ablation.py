@@ -65,7 +65,12 @@ def blinded(policy: GainPolicy, places: np.ndarray, values: np.ndarray) -> GainP
     (weight, bias), *rest = policy.layers
     kept = weight.copy()
     kept[..., places] = 0.0
-    return replace(policy, layers=((kept, bias + weight[..., places] @ values[places]), *rest))
+    layers, skip = [(kept, bias + weight[..., places] @ values[places]), *rest], policy.skip
+    if skip is not None:
+        (last, least), skip = layers[-1], skip.copy()
+        layers[-1] = (last, least + skip[:, places] @ values[places])
+        skip[:, places] = 0.0
+    return replace(policy, layers=tuple(layers), skip=skip)
 
 
 def holding(policy: GainPolicy, gain: int, action: float) -> GainPolicy:
@@ -73,7 +78,8 @@ def holding(policy: GainPolicy, gain: int, action: float) -> GainPolicy:
     *rest, (weight, bias) = policy.layers
     weight, bias = weight.copy(), bias.copy()
     weight[..., gain, :], bias[..., gain] = 0.0, action
-    return replace(policy, layers=(*rest, (weight, bias)))
+    skip = None if policy.skip is None else policy.skip * (np.arange(len(bias.T)) != gain)[:, None]
+    return replace(policy, layers=(*rest, (weight, bias)), skip=skip)
 
 
 def ablation(

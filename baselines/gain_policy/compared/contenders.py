@@ -13,6 +13,7 @@ from ....envs.data.trajectory import Trajectory
 from ....envs.gain_episode import filter_for
 from ....envs.gain_reward import scored_quantities, true_values
 from ....filters.adaptation.multiple_model import bank_of
+from ....filters.adaptation.rules import RULES
 from ....filters.adaptation.tuned import TunedFilter
 from ....filters.core.estimator import Estimator, run
 from ....filters.core.kalman import KalmanFilter
@@ -25,7 +26,7 @@ from ...statistics import Interval, bootstrap_interval
 from ..adaptive import AdaptiveEstimator
 from ..constant_gains import left_out_errors
 from ..policy import GainPolicy
-from ..rules import RULES, ruled
+from ..rules import ruled
 from .oracles import Quantities, pose_error, schedule_error, windowed_oracle
 
 POINTS = 32

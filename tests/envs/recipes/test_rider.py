@@ -17,7 +17,7 @@ from poise.envs.recipes import rides
 from poise.envs.recipes.devices import VariedTiming
 from poise.envs.recipes.mirror import mirrored
 from poise.envs.recipes.recipe import unspawned
-from poise.envs.recipes.redraw import TRUE_GEOMETRY, redrawn, with_errors
+from poise.envs.recipes.redraw import TRUE_GEOMETRY, redrawn, turned_anew, with_errors
 from poise.envs.recipes.registry import rebuilt, recipe
 from poise.envs.recipes.rider import RiderRecipe, RideSensors
 from poise.envs.record import record
@@ -54,6 +54,25 @@ def test_errors_drawn_again_are_those_of_the_environment(ride: Trajectory) -> No
         np.testing.assert_allclose(found[name], values, rtol=0.0, atol=1e-9, err_msg=name)
     for name, values in biases.items():
         np.testing.assert_allclose(values, expected.truth[name], atol=1e-12, err_msg=name)
+
+
+def test_a_bicycle_imu_that_is_turned_anew_measures_the_same_ride_in_other_axes(ride: Trajectory) -> None:
+    other = turned_anew(ride, np.random.default_rng(1))
+    axes = {}
+    for each in (ride, other):
+        (sensor,) = (one for one in each.metadata["sensors"]["sensors"] if one["channel"] == "bicycle_imu/gyr")
+        axes[each is other] = np.array(sensor["rotation"])
+    turn = np.degrees(2.0 * np.arccos(abs(axes[False] @ axes[True])))
+    assert 0.2 < turn < 5.0
+    for name, values in ride.measurements.items():
+        found = other.measurements[name]
+        if name.startswith("bicycle_imu/"):
+            assert np.nanmax(np.abs(found - values)) > 1e-3
+            values, found = rotation.rotate(axes[False], values), rotation.rotate(axes[True], found)
+        np.testing.assert_allclose(found, values, rtol=0.0, atol=1e-12)
+    assert np.isfinite(redrawn(other, 0).measurements["bicycle_imu/gyr"]).any()
+    with pytest.raises(ValueError, match="sensors='ideal'"):
+        turned_anew(redrawn(ride, 0), np.random.default_rng(1))
 
 
 def test_draws_differ_in_errors_and_measured_geometry_only(ride: Trajectory) -> None:
