@@ -105,7 +105,7 @@ def run(args: Args) -> int:
     from ..baselines.gain_policy.config import check_simulated
     from ..baselines.gain_policy.policy import GainPolicy
     from ..envs.gain_episode import check_scored
-    from ..envs.gain_reward import scored_quantity
+    from ..envs.gain_reward import scored_quantities
     from ..filters.adaptation.gains import tunable_filter
     from ..filters.adaptation.tuned import TunedFilter
 
@@ -116,10 +116,12 @@ def run(args: Args) -> int:
     config = training_config(args)
     tuned = TunedFilter.of(tunable_filter(args.filter), config.gains)
     check_simulated(config, tuned)
+    scored = scored_quantities(tuned.kalman, config.quantities or None)
+    quantity = replace(scored[0], name=", ".join(each.name for each in scored))
     given = None if args.policy is None else loaded(args.policy, tuned)
     recorded = recorded_sets(args.recordings)
     for each in itertools.chain.from_iterable(recorded.values()):
-        check_scored(each, tuned, (scored_quantity(tuned.kalman, None),))
+        check_scored(each, tuned, scored)
     folder = open_run(
         "tune", args, may_differ=("quick", "steps", "test_trajectories", "test_seed", "recordings", "report")
     )
@@ -136,17 +138,18 @@ def run(args: Args) -> int:
             candidates["policy"] = limited(given, config, tuned)
         elif args.agent not in SEARCHES:
             candidates["policy"] = train(args, folder, constant.action)
-        errors = errors_of(tuned, candidates, sets, constant)
+        errors = errors_of(tuned, candidates, sets, constant, config.quantities or None)
         write_json(folder.folder / SETS, {group: [each.name for each in some] for group, some in sets.items()})
-        folder.write_results(results(errors, sets, scored_quantity(tuned.kalman, None)))
+        folder.write_results(results(errors, sets, quantity))
         summary = {
             name: {group: round(float(np.degrees(np.mean(found[name]))), 4) for group, found in errors.items()}
             for name in [*candidates, "oracle"]
         }
-        name = scored_quantity(tuned.kalman, None).name
         for group, found in errors.items():
             named = {NAMES.get(each, each): values for each, values in found.items()}
-            out.table(rows_of(named), f"Error of {args.filter} ({name}) on {group} trajectories, RMS of each, deg")
+            out.table(
+                rows_of(named), f"Error of {args.filter} ({quantity.name}) on {group} trajectories, RMS of each, deg"
+            )
         final = candidates["constant" if args.agent in SEARCHES else "policy"]
         card = card_of(args, final, constant, summary)
         out.say(f"weights: {final.save(folder.folder / 'policy', card)}")
@@ -219,9 +222,8 @@ def searched(args: Args, config: TrainingConfig, tuned: TunedFilter, out: Output
         return optuna_constant_gains(tuned, motions, trials=args.trials, seed=args.seed)
     samples, refinements = (config.gain_search,) * 2 if args.preset == "shipped" else (16, 20)
     guesses = () if config.warm_start_centre is None else (config.warm_start_centre,)
-    return best_constant_gains(
-        tuned, motions, guesses=guesses, samples=samples, refinements=refinements, seed=args.seed
-    )
+    common: dict[str, Any] = {"guesses": guesses, "samples": samples, "refinements": refinements, "seed": args.seed}
+    return best_constant_gains(tuned, motions, quantity=config.quantities or None, **common)
 
 
 def train(args: Args, folder: Run, start: np.ndarray) -> Trained:
@@ -326,6 +328,7 @@ def errors_of(
     candidates: Mapping[str, Trained],
     sets: Mapping[str, Sequence[Trajectory]],
     constant: ConstantGains,
+    quantity: str | Sequence[str] | None = None,
     points: int = 32,
 ) -> dict[str, dict[str, np.ndarray]]:
     """Set of trajectories → gains → error on each trajectory, rad.
@@ -339,8 +342,11 @@ def errors_of(
     # The first that were tried lie evenly in the box; those at the end crowd around the best.
     actions, table = [constant.action, *constant.tried[:points]], {}
     for group, trajectories in sets.items():
-        found = {name: policy_errors_of(tuned.kalman, policy, trajectories) for name, policy in candidates.items()}
-        found["oracle"] = np.min([constant_errors(tuned, trajectories, action) for action in actions], axis=0)
+        found = {
+            name: policy_errors_of(tuned.kalman, policy, trajectories, quantity) for name, policy in candidates.items()
+        }
+        tried = [constant_errors(tuned, trajectories, action, quantity) for action in actions]
+        found["oracle"] = np.min(tried, axis=0)
         table[group] = found
     return table
 

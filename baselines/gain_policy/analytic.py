@@ -20,7 +20,7 @@ import numpy as np
 
 from ...envs.data.trajectory import Trajectory
 from ...envs.gain_episode import GainEpisode
-from ...envs.gain_reward import GainReward, scored_quantity
+from ...envs.gain_reward import GainReward, scored_quantities
 from ...filters.adaptation.rows import TunedRows
 from ...filters.adaptation.tuned import TunedFilter
 from ...filters.compile.differentiable import DifferentiableEquations
@@ -34,6 +34,8 @@ with extra("rl"):
 
 ROWS = 5
 """Episodes of one update."""
+NO_ERROR = 1e-6
+"""rad, added to the square of the errors of several quantities, whose root has no derivative at zero."""
 BEYOND = 1.0
 """Weight of the squared distance of an action from its range, where it has no effect on the filter."""
 
@@ -150,12 +152,12 @@ class Costs:
     Args:
         tuned: the filter with its actions.
         reward: how errors count.
-        quantity: output that is scored; None for ``up``, or the first.
+        quantity: output that is scored, or several, whose root mean square is; None for ``up``, or the first.
     """
 
-    def __init__(self, tuned: TunedFilter, reward: GainReward, quantity: str | None = None) -> None:
+    def __init__(self, tuned: TunedFilter, reward: GainReward, quantity: str | Sequence[str] | None = None) -> None:
         self.tuned, self.reward = tuned, reward
-        self.quantity = scored_quantity(tuned.kalman, quantity)
+        self.quantities = scored_quantities(tuned.kalman, quantity)
         self.gains = tuple(part.gain for part in tuned.ranges)
         self._equations: dict[Any, DifferentiableEquations] = {}
 
@@ -163,7 +165,7 @@ class Costs:
         """Trajectories as episodes whose reference is the constant action ``start``, one entry a rate and structure."""
         groups: dict[Any, list[GainEpisode]] = {}
         for trajectory in trajectories:
-            one = GainEpisode.of(trajectory, self.tuned, (self.quantity,), self.reward, start)
+            one = GainEpisode.of(trajectory, self.tuned, self.quantities, self.reward, start)
             groups.setdefault((round(1e6 * trajectory.dt), structure_of(one.kalman.model)), []).append(one)
         return [Episodes.of(self.tuned.with_dt(group[0].trajectory.dt), group) for group in groups.values()]
 
@@ -196,10 +198,11 @@ class Costs:
         measurements = part.measurements()
         state = kalman.init({name: values[0] for name, values in measurements.items()})
         followed, after = equations.follow(state, measurements, table)
-        columns = equations.form.columns[self.quantity.name]
+        places = np.arange(followed.poses.shape[-1])
+        columns = np.concatenate([places[equations.form.columns[one.name]] for one in self.quantities])
         poses = torch.from_numpy(followed.poses[..., columns].copy()).requires_grad_()
         counted = torch.from_numpy(part.counted & np.isfinite(followed.poses[..., columns]).all(axis=-1))
-        errors = error(self.quantity, torch.nan_to_num(poses), torch.from_numpy(part.truth))
+        errors = self._errors(torch.nan_to_num(poses), torch.from_numpy(part.truth))
         cost = torch.log1p(errors / self.reward.error_scale) * self.reward.error_scale
         per_episode = torch.where(counted, cost, 0.0).sum(dim=0) / counted.sum(dim=0).clamp(min=1)
         weighted = per_episode * torch.from_numpy(part.weight)
@@ -219,6 +222,13 @@ class Costs:
         summed = found.reshape(len(actions), part.interval, *found.shape[1:]).sum(axis=1)
         return weighted.detach().numpy(), np.where(inside, summed * free, 0.0)
 
+    def _errors(self, poses: torch.Tensor, truth: torch.Tensor) -> torch.Tensor:
+        """Errors ``(T, N)``, as of :func:`poise.envs.gain_reward.errors_of`, but with a derivative at zero."""
+        sizes = [one.size for one in self.quantities]
+        pairs = zip(self.quantities, poses.split(sizes, dim=-1), truth.split(sizes, dim=-1), strict=True)
+        found = [error(*each) for each in pairs]
+        return found[0] if len(found) == 1 else (torch.stack(found).square().mean(dim=0) + NO_ERROR**2).sqrt()
+
     def _reach(self) -> tuple[np.ndarray, np.ndarray]:
         return np.array([-part.lower for part in self.tuned.ranges]), np.array([p.upper for p in self.tuned.ranges])
 
@@ -234,7 +244,7 @@ def train_analytically(
     net_arch: Sequence[int] = (64, 64),
     error_scale: float = 5.0,
     seed: int = 0,
-    quantity: str | None = None,
+    quantity: str | Sequence[str] | None = None,
     noise: float = 0.6,
     validation: Sequence[Trajectory] = (),
     report: Callable[[int, float, float], None] | None = None,
@@ -253,7 +263,7 @@ def train_analytically(
         net_arch: units of the hidden layers.
         error_scale: deg; errors far above it count by their logarithm.
         seed: of weights and order.
-        quantity: output that is scored; None for ``up``, or the first.
+        quantity: output that is scored, or several together; None for ``up``, or the first.
         noise: added to the observations of a training, in their standard deviations.
         validation: trajectories that are not trained on; the policy of least cost on them is returned, otherwise the
             last one.

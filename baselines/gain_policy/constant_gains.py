@@ -10,7 +10,7 @@ import numpy as np
 
 from ...envs.data.trajectory import Trajectory
 from ...envs.gain_episode import filter_for
-from ...envs.gain_reward import scored_quantities, scored_quantity, true_values
+from ...envs.gain_reward import scored_quantities, true_values
 from ...filters.adaptation.tuned import TunedFilter
 from ...filters.core.kalman import KalmanFilter
 from ...filters.core.metrics import error, rms
@@ -127,14 +127,17 @@ def constant_errors(
 
 
 def policy_errors(
-    kalman: KalmanFilter, policy: GainPolicy, trajectories: Sequence[Trajectory], quantity: str | None = None
+    kalman: KalmanFilter,
+    policy: GainPolicy,
+    trajectories: Sequence[Trajectory],
+    quantity: str | Sequence[str] | None = None,
 ) -> np.ndarray:
-    """Root mean square error of a policy on each trajectory ``(trajectories,)``, rad.
+    """Root mean square error of a policy on each trajectory ``(trajectories,)``, rad; of several outputs their mean.
 
     The filter is that of the rider, vehicle or device of each trajectory; those that share it, and a length, run as one
     batch.
     """
-    output = scored_quantity(kalman, quantity)
+    outputs = scored_quantities(kalman, quantity)
     groups: dict[Any, list[int]] = {}
     filters = [filter_for(kalman, trajectory) for trajectory in trajectories]
     for index, (own, trajectory) in enumerate(zip(filters, trajectories, strict=True)):
@@ -145,9 +148,9 @@ def policy_errors(
         estimator = AdaptiveEstimator(filters[members[0]], policy)
         names = [channel.name for channel in estimator.channels]
         batch = {name: np.stack([trajectories[i].measurements[name] for i in members], axis=1) for name in names}
-        estimate = estimator.run(batch).pose[output.name]
+        pose = estimator.run(batch).pose
         for column, index in enumerate(members):
-            trajectory = trajectories[index]
-            found = error(output, estimate[:, column], true_values(trajectory, output, filters[index]))
-            errors[index] = float(rms(found, trajectory.mask))
+            trajectory, own = trajectories[index], filters[index]
+            found = [error(q, pose[q.name][:, column], true_values(trajectory, q, own)) for q in outputs]
+            errors[index] = float(np.mean([rms(each, trajectory.mask) for each in found]))
     return errors

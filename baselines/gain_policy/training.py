@@ -161,12 +161,13 @@ def analytic_policy(
         tuned,
         train,
         start if config.rule is None else np.zeros_like(start),
-        reference=None if config.rule is None else start,
+        reference=start if config.rule or config.quantities else None,
         epochs=epochs,
         learning_rate=config.learning_rate,
         net_arch=config.net_arch,
         error_scale=config.error_scale,
         seed=config.seed,
+        quantity=config.quantities or None,
         validation=unseen,
         report=report_epoch,
         save=save,
@@ -188,7 +189,8 @@ def starting_action(config: TrainingConfig, tuned: TunedFilter, motions: list[Tr
     if not config.gain_search:
         return np.zeros(tuned.actions)
     effort = config.gain_search
-    return best_constant_gains(tuned, motions[:48], samples=effort, refinements=effort, seed=config.seed).action
+    common: dict[str, Any] = {"samples": effort, "refinements": effort, "seed": config.seed}
+    return best_constant_gains(tuned, motions[:48], quantity=config.quantities or None, **common).action
 
 
 def training_key(config: TrainingConfig, tuned: TunedFilter, motions: Sequence[Trajectory]) -> dict[str, Any]:

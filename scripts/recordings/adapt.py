@@ -28,8 +28,8 @@ class Args:
     """Arguments of ``poise adapt``."""
 
     filter: tyro.conf.Positional[str] = "external-acceleration"
-    """name of a Kalman filter; of rides: two-gyro-level, platform-gyro, balanced-gyro, whole-body, or force-inertial or
-    odometry-aided, whose sensors then have a lasting fault; or two-gyro-consistent and the other consistent forms"""
+    """name of a Kalman filter; of rides: two-gyro-level, two-gyro-consistent, platform-gyro, balanced-gyro, whole-body,
+    or force-inertial, force-inertial-consistent or odometry-aided, whose sensors then have a lasting fault"""
     quantities: tuple[str, ...] = ()
     """outputs of the filter that are scored together (default: up, or the first)"""
     recordings: tuple[Path, ...] = ()

@@ -61,12 +61,21 @@ def exported_policy(model: Any, env: Any, tuned: TunedFilter, agent: AgentName) 
 
 
 def policy_errors_of(
-    kalman: KalmanFilter, policy: Trained, trajectories: Sequence[Trajectory], quantity: str | None = None
+    kalman: KalmanFilter,
+    policy: Trained,
+    trajectories: Sequence[Trajectory],
+    quantity: str | Sequence[str] | None = None,
 ) -> np.ndarray:
-    """Root mean square error of any policy on each trajectory ``(trajectories,)``, rad."""
+    """Root mean square error of any policy on each trajectory ``(trajectories,)``, rad.
+
+    Raises:
+        ValueError: several quantities of a recurrent policy.
+    """
     if isinstance(policy, GainPolicy):
         return policy_errors(kalman, policy, trajectories, quantity)
     own = replace(policy, tuned=replace(policy.tuned, kalman=kalman))
+    if not (quantity is None or isinstance(quantity, str)):
+        raise ValueError(f"a recurrent policy is scored by one quantity, got {list(quantity)}")
     return recurrent_errors(own, trajectories, quantity)
 
 

@@ -26,11 +26,12 @@ def motions():
     return HandTrajectories(duration=6.0).draw_many(3, 6)
 
 
-def test_the_gradient_is_that_of_finite_differences(motions):
+@pytest.mark.parametrize("quantity", [None, ("up", "external_acceleration")])
+def test_the_gradient_is_that_of_finite_differences(motions, quantity):
     tuned = TunedFilter.of(KALMAN, ("process", "measurement"))
-    costs = Costs(tuned, REWARD)
+    costs = Costs(tuned, REWARD, quantity)
     start = np.zeros(2)
-    part = Episodes.of(tuned, [GainEpisode.of(one, tuned, (costs.quantity,), REWARD, start) for one in motions[:2]])
+    part = Episodes.of(tuned, [GainEpisode.of(one, tuned, costs.quantities, REWARD, start) for one in motions[:2]])
     actions = np.random.default_rng(1).uniform(-0.6, 0.6, (60, 2, 2))
     actions[5, 1, 0] = 1.3
     cost, slope = costs.gradient(part, actions)
@@ -48,7 +49,7 @@ def test_short_episodes_count_as_if_they_were_alone(motions):
     tuned = TunedFilter.of(KALMAN, ("process", "measurement"))
     costs = Costs(tuned, REWARD)
     both = [motions[0], motions[1][:400]]
-    episodes = [GainEpisode.of(one, tuned, (costs.quantity,), REWARD, np.zeros(2)) for one in both]
+    episodes = [GainEpisode.of(one, tuned, costs.quantities, REWARD, np.zeros(2)) for one in both]
     actions = np.full((60, 2, 2), 0.3)
     together = costs.gradient(Episodes.of(tuned, episodes), actions)
     alone = costs.gradient(Episodes.of(tuned, episodes[1:]), actions[:40, 1:])

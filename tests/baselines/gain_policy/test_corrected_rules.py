@@ -104,6 +104,14 @@ def test_the_exact_gradient_alone_corrects_a_rule():
         TrainingConfig(rule="turning")
 
 
+def test_the_exact_gradient_alone_is_scored_by_several_quantities():
+    wanted = ("bicycle/roll", "force-inertial/trunk_angles")
+    assert config_of("analytic", shipped_config("force-inertial-consistent")).quantities == wanted
+    assert config_of("ppo", shipped_config("force-inertial-consistent")).quantities == ()
+    with pytest.raises(ValueError, match="quantities must be one at most for the agent ppo"):
+        TrainingConfig(quantities=wanted)
+
+
 def test_networks_share_rides_but_not_devices():
     changes = {"suite": ["bicycle_imu/gyr"], "fidelity": ["lumped"], "scenarios": ["straight"]}
     motions = RiddenMotions(RideSource(2, 2, 3.0, changes))
