@@ -13,6 +13,7 @@ import gc
 import hashlib
 import importlib
 import pickle
+import re
 import sys
 import tempfile
 import threading
@@ -27,6 +28,7 @@ from ..support.version import ROOT
 
 _LOCK = threading.RLock()
 _WARNED: set[Path] = set()
+IMPORT = re.compile(r"^\s*from (\.+)([\w.]*) import (\([^)]*\)|.*)", re.MULTILINE)
 PATIENCE = 1.0
 """s of compiling after which a line on standard error is printed"""
 
@@ -67,13 +69,25 @@ def unless_full(folder: Path) -> Iterator[None]:
 
 @functools.cache
 def _digest(layer: str) -> str:
-    """Digest of all source files of a layer whose functions are compiled: they may call each other across files."""
+    """Digest of the source files of a layer whose functions are compiled, and of those that they import from.
+
+    Compiled functions call each other across files, and hold the constants of other files as they were.
+    """
+    compiled = {path for path in (ROOT / layer).rglob("*.py") if b"cache import" in path.read_bytes()}
     digest = hashlib.sha256()
-    for path in sorted((ROOT / layer).rglob("*.py")):
-        source = path.read_bytes()
-        if b"cache import" in source:
-            digest.update(path.relative_to(ROOT).as_posix().encode() + b"\0" + source + b"\0")
+    for path in sorted(compiled.union(*map(imported, compiled))):
+        digest.update(path.relative_to(ROOT).as_posix().encode() + b"\0" + path.read_bytes() + b"\0")
     return digest.hexdigest()[:12]
+
+
+def imported(path: Path) -> set[Path]:
+    """Files of the package from which a source file imports, by relative imports."""
+    found = set()
+    for dots, module, names in IMPORT.findall(path.read_text(encoding="utf-8")):
+        start = path.parents[len(dots) - 1].joinpath(*module.split("."))
+        candidates = [start.with_suffix(".py"), *(start / f"{name}.py" for name in re.findall(r"\w+", names))]
+        found |= {candidate for candidate in candidates if candidate.is_file()}
+    return found
 
 
 def jit(function: Callable[..., Any]) -> Any:

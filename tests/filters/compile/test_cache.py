@@ -178,3 +178,27 @@ def test_the_folder_is_below_the_variable(tmp_path: Path, monkeypatch: pytest.Mo
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert cache.cache_folder() == tmp_path / "new" / "compiled"
+
+
+def test_code_is_kept_for_the_constants_of_other_files_too(tmp_path, monkeypatch):
+    held = cache.ROOT / "filters" / "core" / "held_inputs.py"
+    assert held in cache.imported(cache.ROOT / "filters" / "compile" / "kernel.py")
+    for name, text in {
+        "core/constants.py": "LARGEST = 1.0\n",
+        "core/other.py": "",
+        "compile/kernel.py": "from .cache import jit\nfrom ..core.constants import (\n    LARGEST,\n)\n",
+        "compile/cache.py": "",
+    }.items():
+        path = tmp_path / "filters" / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
+    monkeypatch.setattr(cache, "ROOT", tmp_path)
+
+    def digest() -> str:
+        return cache._digest.__wrapped__("filters")
+
+    before = digest()
+    (tmp_path / "filters" / "core" / "other.py").write_text("UNUSED = 1.0\n")
+    assert digest() == before
+    (tmp_path / "filters" / "core" / "constants.py").write_text("LARGEST = 2.0\n")
+    assert digest() != before
