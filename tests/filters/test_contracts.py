@@ -210,7 +210,7 @@ def test_a_missing_channel_is_named(estimator: Estimator[Any], motion: Motion) -
 @pytest.mark.parametrize("own", OWN)
 def test_arrays_torch_and_compiled_agree(own: str, motion: Motion) -> None:
     estimator = make(own)
-    singles = [with_gaps(motion(estimator, seed, 60), seed) for seed in (10, 11)]
+    singles = [with_gaps(motion(estimator, seed, 30), seed) for seed in (10, 11)]
     data = {channel: np.stack([single[channel] for single in singles], axis=1) for channel in singles[0]}
     compiled, arrays = run(estimator, data), run(make(own, compiled=False), data)
     assert_same(compiled, arrays)
@@ -222,7 +222,7 @@ def test_arrays_torch_and_compiled_agree(own: str, motion: Motion) -> None:
 @pytest.mark.parametrize("own", OWN)
 def test_gradients_flow(own: str, motion: Motion) -> None:
     estimator = make(own)
-    whole = motion(estimator, 12, 20)
+    whole = motion(estimator, 12, 10)
     channel = next((name for name in whole if name.endswith("/gyr")), next(iter(whole)))
     data = {name: torch.from_numpy(array) for name, array in (with_gaps(whole) | {channel: whole[channel]}).items()}
     data[channel].requires_grad_()
