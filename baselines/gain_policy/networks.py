@@ -7,6 +7,7 @@ between networks and mostly cancel in the mean.
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -92,7 +93,8 @@ def train_networks(
         found.append(policy)
         done = {name: done[name] + float(policy.card[name]) for name in done}
     members = [
-        {"seed": network_seed(config.seed, index), "bias_limit": policy.bias_limit}
+        {"seed": network_seed(config.seed, index)}
+        | {"bias_limit": policy.bias_limit if math.isfinite(policy.bias_limit) else None}
         | {name: policy.card[name] for name in OF_EACH if name in policy.card}
         for index, policy in enumerate(found)
     ]

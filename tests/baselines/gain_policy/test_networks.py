@@ -1,6 +1,7 @@
 """Several networks as one policy: the mean of their bounded actions, trained from seeds of their own, resumable."""
 
 import dataclasses
+import math
 from itertools import pairwise
 
 import numpy as np
@@ -109,6 +110,24 @@ def test_a_training_of_several_networks_resumes_and_a_longer_list_keeps_the_firs
     assert (whole.layers[0][0][0] != whole.layers[0][0][1]).any()
     three, _ = train(networks=3)
     np.testing.assert_array_equal(three.layers[0][0][:2], whole.layers[0][0])
+
+
+def test_networks_of_a_filter_that_estimates_its_bias_are_saved(tmp_path):
+    pytest.importorskip("torch")
+    from poise.baselines.gain_policy.networks import train_networks
+
+    training = TrainingConfig(
+        filter="bounded-motion",
+        motions=HandTrajectories(duration=4.0),
+        trajectories=2,
+        total_timesteps=2 * 40,
+        net_arch=(4,),
+    )
+    policy = train_networks(config_of("analytic", training), 2, start=np.zeros(3))
+    assert policy.bias_limit == math.inf
+    again = GainPolicy.load(policy.save(tmp_path / "policy.safetensors"))
+    assert again.bias_limit == math.inf
+    assert [member["bias_limit"] for member in again.card["networks"]] == [None, None]
 
 
 @pytest.mark.parametrize(
