@@ -18,11 +18,12 @@ def attitudes(turns: np.ndarray) -> np.ndarray:
     half = rotation.exp(0.5 * turns)
     count = half.shape[-2]
     size = max(1, math.isqrt(count))
-    padded = np.zeros((*half.shape[:-2], -(-count // size) * size, 4))
+    whole = -(-count // size)
+    padded = np.zeros((*half.shape[:-2], whole * size, 4))
     padded[..., 0] = 1.0
     padded[..., 0, :] = half[..., 0, :]
     padded[..., 1:count, :] = rotation.multiply(half[..., :-1, :], half[..., 1:, :])
-    blocks = padded.reshape(*half.shape[:-2], -1, size, 4)
+    blocks = padded.reshape(*half.shape[:-2], whole, size, 4)
     for index in range(1, size):
         blocks[..., index, :] = rotation.multiply(blocks[..., index - 1, :], blocks[..., index, :])
     ends = blocks[..., -1, :].copy()

@@ -60,3 +60,11 @@ def test_what_comes_and_goes_or_was_always_there_is_no_change() -> None:
     assert change_of(step) in (11, 12)
     assert change_of(step * [[np.nan], [1.0], [1.0]]) is None
     assert change_of(step * [[1.0], [1.0], [0.5]]) is None
+
+
+@pytest.mark.parametrize("samples", [2, 9, 40, 150])
+def test_a_recording_too_short_to_compare_fields_is_checked(samples):
+    motion = simulate_hand("slow", seed=1, duration=3.0)[:samples]
+    poise.check_recording(motion)
+    estimate = poise.run("mekf-9", motion, check=True)
+    assert len(estimate.time) == samples
