@@ -104,20 +104,16 @@ def train_policy(
     start = starting_action(config, tuned, motions) if start is None else np.asarray(start, float)
     limit = bias_limit(filter, motions)
     if config.agent == "analytic":
-        return limited(analytic_policy(config, tuned, motions, start, home, key, report, state), limit)
+        return replace(analytic_policy(config, tuned, motions, start, home, key, report, state), bias_limit=limit)
     threads = torch.get_num_threads()
     torch.set_num_threads(1)
     try:
         training = PolicyTraining(config, tuned, motions, start, home, key, report, validate)
         training.begin() if state is None else training.restore(state)
-        return limited(training.finish(), limit)
+        policy = training.finish()
+        return replace(policy, bias_limit=limit) if isinstance(policy, GainPolicy) else policy
     finally:
         torch.set_num_threads(threads)
-
-
-def limited(policy: Trained, limit: float) -> Trained:
-    """A policy with its limit for the gyroscope bias, rad/s; a recurrent one has none."""
-    return replace(policy, bias_limit=limit) if isinstance(policy, GainPolicy) else policy
 
 
 def analytic_policy(
@@ -188,8 +184,7 @@ def starting_action(config: TrainingConfig, tuned: TunedFilter, motions: list[Tr
     """The best constant gains ``(k,)`` on some of the motions, or the published ones if none are searched."""
     if not config.gain_search:
         return np.zeros(tuned.actions)
-    effort = config.gain_search
-    common: dict[str, Any] = {"samples": effort, "refinements": effort, "seed": config.seed}
+    common: dict[str, Any] = {"samples": config.gain_search, "refinements": config.gain_search, "seed": config.seed}
     return best_constant_gains(tuned, motions[:48], quantity=config.quantities or None, **common).action
 
 
