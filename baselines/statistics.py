@@ -107,12 +107,12 @@ def bootstrap_interval(
     return Interval(float(statistic(*tables)), float(low), float(high))
 
 
-def mean_interval(values: np.ndarray, draws: int = DRAWS, level: float = LEVEL) -> Interval:
+def mean_interval(values: np.ndarray, draws: int = DRAWS) -> Interval:
     """The mean of ``values`` ``(tasks,)`` with the interval of other tasks.
 
     The same numbers as of :func:`bootstrap_interval` of :func:`mean_score` of one run with ``tasks_too``, all at once.
     """
     (table,) = scores_of(values[None])
     drawn = np.random.default_rng(0).integers(len(table), size=(draws, len(table)))
-    low, high = np.quantile(table[drawn].mean(axis=1), [0.5 - 0.5 * level, 0.5 + 0.5 * level])
+    low, high = np.quantile(table[drawn].mean(axis=1), [0.5 - 0.5 * LEVEL, 0.5 + 0.5 * LEVEL])
     return Interval(float(table.mean()), float(low), float(high))

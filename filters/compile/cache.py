@@ -73,17 +73,19 @@ def _digest(layer: str) -> str:
 
     Compiled functions call each other across files, and hold the constants of other files as they were.
     """
-    compiled = {path for path in (ROOT / layer).rglob("*.py") if b"cache import" in path.read_bytes()}
+    sources = {path: path.read_bytes() for path in (ROOT / layer).rglob("*.py")}
+    compiled = {path for path, source in sources.items() if b"cache import" in source}
     digest = hashlib.sha256()
-    for path in sorted(compiled.union(*map(imported, compiled))):
-        digest.update(path.relative_to(ROOT).as_posix().encode() + b"\0" + path.read_bytes() + b"\0")
+    for path in sorted(compiled.union(*(imported(path, sources[path]) for path in compiled))):
+        source = sources[path] if path in sources else path.read_bytes()
+        digest.update(path.relative_to(ROOT).as_posix().encode() + b"\0" + source + b"\0")
     return digest.hexdigest()[:12]
 
 
-def imported(path: Path) -> set[Path]:
+def imported(path: Path, source: bytes) -> set[Path]:
     """Files of the package from which a source file imports, by relative imports."""
     found = set()
-    for dots, module, names in IMPORT.findall(path.read_text(encoding="utf-8")):
+    for dots, module, names in IMPORT.findall(source.decode()):
         start = path.parents[len(dots) - 1].joinpath(*module.split("."))
         candidates = [start.with_suffix(".py"), *(start / f"{name}.py" for name in re.findall(r"\w+", names))]
         found |= {candidate for candidate in candidates if candidate.is_file()}

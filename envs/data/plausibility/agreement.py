@@ -90,6 +90,21 @@ class Windows(NamedTuple):
         """Mean square ``(W,)`` of the motion of vectors ``(W, N, 3)``."""
         return np.nanmean(np.square(self.segments(values)).sum(axis=2), axis=1)
 
+    def linearised(
+        self, attitude: np.ndarray, rates: np.ndarray, lag: float
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """What is left of the motion, its derivatives as of :func:`sensitivities`, and the weight of each window.
+
+        They are ``(W, S, 3)``, ``(W, S, 3, 5)``, both zero without a sample, and ``(W,)``: less for what is left more.
+        """
+        attitude, directions = self.turned(attitude, rates, lag)
+        residual = self.segments(directions)
+        slopes = self.segments(sensitivities(self.step, self.within(rates, lag), attitude, directions))
+        known = np.isfinite(residual)
+        residual, slopes = np.where(known, residual, 0.0), np.where(known[..., None], slopes, 0.0)
+        left = np.square(residual).sum(axis=(1, 2)) / known[..., 0].sum(axis=1)
+        return residual, slopes, 1.0 / (left + 0.5 * np.median(left) + 1e-9)
+
 
 def cut_windows(rate: np.ndarray, vector: np.ndarray, interval: float) -> Windows | None:
     """The liveliest windows of a uniform grid; None without enough of them."""
@@ -153,13 +168,7 @@ def agreement(rate: np.ndarray, vector: np.ndarray, interval: float) -> Agreemen
     for _ in range(ITERATIONS):
         rates = scale * windows.rates - bias
         integrated = attitudes(windows.step * rates)
-        attitude, directions = windows.turned(integrated, rates, lag)
-        residual = windows.segments(directions)
-        slopes = windows.segments(sensitivities(windows.step, windows.within(rates, lag), attitude, directions))
-        known = np.isfinite(residual)
-        residual, slopes = np.where(known, residual, 0.0), np.where(known[..., None], slopes, 0.0)
-        left = np.square(residual).sum(axis=(1, 2)) / known[..., 0].sum(axis=1)
-        weight = 1.0 / (left + 0.5 * np.median(left) + 1e-9)
+        residual, slopes, weight = windows.linearised(integrated, rates, lag)
         information = np.einsum("w,wtcp,wtcq->pq", weight, slopes, slopes, optimize=True) + prior
         gradient = np.einsum("w,wtcp,wtc->wp", weight, slopes, residual, optimize=True)
         inverse = np.linalg.inv(information)

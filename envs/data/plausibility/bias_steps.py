@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .agreement import MOST_MISSING, STEP, Windows, sensitivities
+from .agreement import MOST_MISSING, STEP, Windows
 from .integration import attitudes
 from .readings import Finding
 
@@ -83,13 +83,8 @@ def bias_step(rate: np.ndarray, vector: np.ndarray, interval: float) -> BiasStep
     bias, prior = np.zeros(3), np.eye(3) / PRIOR**2
     for _ in range(ITERATIONS):
         rates = windows.rates - bias
-        attitude, directions = windows.turned(attitudes(windows.step * rates), rates, 0.0)
-        residual = windows.segments(directions)
-        slopes = windows.segments(sensitivities(windows.step, rates, attitude, directions))[..., 2:]
-        known = np.isfinite(residual)
-        residual, slopes = np.where(known, residual, 0.0), np.where(known[..., None], slopes, 0.0)
-        left = np.square(residual).sum(axis=(1, 2)) / known[..., 0].sum(axis=1)
-        weight = 1.0 / (left + 0.5 * np.median(left) + 1e-9)
+        residual, slopes, weight = windows.linearised(attitudes(windows.step * rates), rates, 0.0)
+        slopes = slopes[..., 2:].copy()
         information = np.einsum("w,wtcp,wtcq->wpq", weight, slopes, slopes, optimize=True)
         gradient = np.einsum("w,wtcp,wtc->wp", weight, slopes, residual, optimize=True)
         change = -np.linalg.solve(information.sum(axis=0) + prior, gradient.sum(axis=0))

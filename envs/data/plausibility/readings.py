@@ -129,19 +129,20 @@ def check_alive(
         what = f"{100 * impossible.mean():.3g} % of the samples reach {np.abs(samples[impossible]).max():g}"
         yield Finding("note", channel, what, "codes for no value", "They are treated as missing samples.")
     kind = channel.rpartition("/")[2]
-    alone = int((glitches(values, LEAST[kind]) & ~unreadable).sum()) if kind in LEAST and not impossible.any() else 0
+    single = glitches(values, LEAST[kind]) if kind in LEAST else np.zeros(len(values), bool)
+    alone = 0 if impossible.any() else int((single & ~unreadable).sum())
     if alone:
         what = f"{alone} samples stand alone, far from those beside them"
         yield Finding("note", channel, what, "errors of the transmission", "They are treated as missing samples.")
     yield from check_axes_alive(channel, samples[~impossible])
     yield from check_repeats(channel, values, dt, moving)
     if dt is not None:
-        yield from check_stretches(channel, values, dt)
+        yield from check_stretches(channel, values, dt, single)
     yield from check_range(channel, samples[~impossible])
 
 
-def check_stretches(channel: str, values: np.ndarray, dt: float) -> Iterator[Finding]:
-    """Axes that stand still, blocks that were written again, and bursts (:mod:`poise.envs.data.bursts`)."""
+def check_stretches(channel: str, values: np.ndarray, dt: float, single: np.ndarray) -> Iterator[Finding]:
+    """Axes that stand still, blocks that were written again, and bursts beside the glitches ``single``."""
     kind = channel.rpartition("/")[2]
     remedy = "They are treated as missing samples."
     for axis, begin, length in stuck_axes(values, dt):
@@ -154,7 +155,7 @@ def check_stretches(channel: str, values: np.ndarray, dt: float) -> Iterator[Fin
         yield Finding("note", channel, what, "a buffer that was sent or written twice", f"{remedy} {added}")
     if kind not in LEAST:
         return
-    wild = np.flatnonzero(bursts(values, kind, dt) & ~glitches(values, LEAST[kind]))
+    wild = np.flatnonzero(bursts(values, kind, dt) & ~single)
     if len(wild):
         what = f"{len(wild)} samples in a row jump away and back at once, from sample {wild[0]}"
         yield Finding("note", channel, what, "errors of the transmission", remedy)
